@@ -12,7 +12,7 @@ __version__ = VERSION
 
 # module -> names: `import mutator` stays fast because it does not load pandas, libcst or pytest.
 # Type checkers read __init__.pyi, which `python -m mutator.reference` generates from these names.
-HOMES = {
+NAMES_BY_MODULE = {
     "mutator.api.audits": ("Audit", "seal", "verify"),
     "mutator.api.caches": ("cache_entries", "cache_folder", "clear_caches", "prune_caches"),
     "mutator.api.campaigns": ("run",),
@@ -48,16 +48,16 @@ HOMES = {
     "mutator.audit.seal": ("Seals",),
     "mutator.workspace": ("Workspace",),
 }
-_LAZY = {name: home for home, names in HOMES.items() for name in names}
+_MODULE_BY_NAME = {name: home for home, names in NAMES_BY_MODULE.items() for name in names}
 
-__all__ = sorted([*_LAZY, "__version__"])
+__all__ = sorted([*_MODULE_BY_NAME, "__version__"])
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
+    if name not in _MODULE_BY_NAME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = globals()[name] = getattr(import_module(_LAZY[name]), name)
-    return found
+    value = globals()[name] = getattr(import_module(_MODULE_BY_NAME[name]), name)
+    return value
 
 
 def __dir__() -> list[str]:

@@ -1,4 +1,4 @@
-# Generated from `HOMES` in __init__.py by `python -m mutator.reference`; do not edit.
+# Generated from `NAMES_BY_MODULE` in __init__.py by `python -m mutator.reference`; do not edit.
 from mutator.api.audits import Audit as Audit
 from mutator.api.audits import seal as seal
 from mutator.api.audits import verify as verify
@@ -52,7 +52,7 @@ from mutator.store.plan_choices import Choices as Choices
 from mutator.store.run_progress import Progress as Progress
 from mutator.workspace import Workspace as Workspace
 
-HOMES: dict[str, tuple[str, ...]]
+NAMES_BY_MODULE: dict[str, tuple[str, ...]]
 __version__: str
 
 __all__ = [

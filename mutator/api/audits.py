@@ -23,8 +23,8 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.work_stretches import describe_stretches, package_versions
 from mutator.workspace import Workspace
 
-SHOWN = 20  # differences listed in the text of an audit
-NOT_SEEN = (
+MOST_LISTED_DIFFERENCES = 20  # differences listed in the text of an audit
+LIMITS_NOTE = (
     "These checks find damage and contradictions. That nobody wrote other results with matching digests "
     "shows only an expected seal (--expect)."
 )
@@ -50,9 +50,12 @@ class Audit:
         width = max(map(len, (*self.facts, *self.not_sealed)))
         rows = [(check.what, str(check.count), str(len(check.differences))) for check in self.checks]
         table = TextTable(heads=("checked", "count", "differences"), rows=rows, right_aligned=(1, 2))
-        found = [str(one).replace(f"{self.run}/", "") for one in self.differences[:SHOWN]]
-        more = len(self.differences) - SHOWN
-        listed = [*found, *([f"and {more} more"] if more > 0 else [])]
+        difference_texts = [
+            str(difference).replace(f"{self.run}/", "")
+            for difference in self.differences[:MOST_LISTED_DIFFERENCES]
+        ]
+        more = len(self.differences) - MOST_LISTED_DIFFERENCES
+        listed = [*difference_texts, *([f"and {more} more"] if more > 0 else [])]
         facts, unsealed = (
             "\n".join(f"{name.ljust(width)}  {value}" for name, value in facts.items())
             for facts in (self.facts, self.not_sealed)
@@ -63,7 +66,7 @@ class Audit:
             table.as_text(),
             "\n".join(f"- {text}" for text in listed),
             "\n".join(f"repaired: {text}" for text in self.repaired),
-            "" if self.compared else NOT_SEEN,
+            "" if self.compared else LIMITS_NOTE,
             self._outcome,
         ]
         return "\n\n".join(filter(None, parts))
@@ -80,8 +83,8 @@ class Audit:
     @property
     def differences(self) -> tuple[MutatorError, ...]:
         """All differences, without duplicates."""
-        found = (difference for check in self.checks for difference in check.differences)
-        return tuple({str(difference): difference for difference in found}.values())
+        differences = (difference for check in self.checks for difference in check.differences)
+        return tuple({str(difference): difference for difference in differences}.values())
 
     @property
     def passed(self) -> bool:
@@ -114,28 +117,30 @@ def verify(
     for name, value in (("expect", expect), ("expect_review", expect_review)):
         _check_digest(name, value)
     folder = RunFolder.open_unverified(Path(run))
-    found = _workspace(workspace)
-    checks = audit_checks(folder, found)
-    facts = _facts(folder)
+    opened_workspace = _open_workspace_if_any(workspace)
+    checks = audit_checks(folder, opened_workspace)
+    facts = _run_facts(folder)
     if rerun:
-        checks.append(_rerun(folder, found, rerun, facts))
-    seals = _seals(folder, checks)
+        checks.append(_rerun_check(folder, opened_workspace, rerun, facts))
+    seals = _seals_if_undamaged(folder, checks)
     facts |= {"seal": "none"} | seals.texts()
     if expect is not None:
         facts["expected"] = expect
-        checks.append(_as_expected(folder, seals, expect))
+        checks.append(_expected_digest_check(folder, seals, expect))
     if expect_review is not None:
         facts["expected review"] = expect_review
-        checks.append(_compared(folder, "review digest", seals.review_digest, expect_review))
+        checks.append(_digest_check(folder, "review digest", seals.review_digest, expect_review))
     identity = None
     if signed_by is not None:
-        check, identity = _signed(folder, seals, Path(signed_by))
+        check, identity = _signature_check(folder, seals, Path(signed_by))
         facts["signed by"] = identity or "nobody in the list"
         checks.append(check)
     if report:
-        checks.append(Check.of("pages of the report that follow from the run", *pages(folder, found)))
+        checks.append(
+            Check.of("pages of the report that follow from the run", *pages(folder, opened_workspace))
+        )
     damaged = any(check.differences for check in checks)
-    repaired = put_aside(folder, found) if repair and damaged else []
+    repaired = put_aside(folder, opened_workspace) if repair and damaged else []
     return Audit(
         run=folder.path,
         facts=facts,
@@ -171,28 +176,28 @@ def _check_digest(argument: str, value: str | None) -> None:
             raise MutatorError(f"'{value}'", argument=argument, expected="a digest: 64 hex digits")
 
 
-def _as_expected(folder: RunFolder, seals: Seals, expect: str) -> Check:
+def _expected_digest_check(folder: RunFolder, seals: Seals, expect: str) -> Check:
     """Compare with the seal or the results digest, whichever it is."""
     if expect == seals.results_digest:
-        return _compared(folder, "results digest", expect, expect)
-    return _compared(folder, "seal", seals.seal, expect)
+        return _digest_check(folder, "results digest", expect, expect)
+    return _digest_check(folder, "seal", seals.seal, expect)
 
 
-def _compared(folder: RunFolder, what: str, found: str | None, expect: str) -> Check:
-    wrong = MutatorError(f"{what} {found or 'none'}", where=folder.path, expected=expect)
-    return Check(what=f"{what} as expected", count=1, differences=() if found == expect else (wrong,))
+def _digest_check(folder: RunFolder, digest_name: str, actual: str | None, expect: str) -> Check:
+    wrong = MutatorError(f"{digest_name} {actual or 'none'}", where=folder.path, expected=expect)
+    return Check(what=f"{digest_name} as expected", count=1, differences=() if actual == expect else (wrong,))
 
 
-def _workspace(given: WorkspaceLike) -> Workspace | None:
+def _open_workspace_if_any(workspace: WorkspaceLike) -> Workspace | None:
     try:
-        return open_workspace(given)
+        return open_workspace(workspace)
     except MutatorError:
-        if given is not None:
+        if workspace is not None:
             raise
         return None
 
 
-def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]) -> Check:
+def _rerun_check(folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]) -> Check:
     what = "experiments rerun on the reference engine"
     if workspace is None:
         raise MutatorError("no library found", argument="rerun", expected="the library of the run")
@@ -204,7 +209,7 @@ def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: di
     return Check.of(what, len(ids), driven_again(workspace, folder, ids))
 
 
-def _signed(folder: RunFolder, seals: Seals, allowed_signers: Path) -> tuple[Check, str | None]:
+def _signature_check(folder: RunFolder, seals: Seals, allowed_signers: Path) -> tuple[Check, str | None]:
     try:
         identity = signer(folder, seals, allowed_signers)
     except CheckFailed as err:
@@ -212,7 +217,7 @@ def _signed(folder: RunFolder, seals: Seals, allowed_signers: Path) -> tuple[Che
     return Check(what="digests as signed", count=1), identity
 
 
-def _seals(folder: RunFolder, checks: list[Check]) -> Seals:
+def _seals_if_undamaged(folder: RunFolder, checks: list[Check]) -> Seals:
     try:
         return seals_of(folder)
     except (MutatorError, OSError):
@@ -221,7 +226,7 @@ def _seals(folder: RunFolder, checks: list[Check]) -> Seals:
         return Seals()
 
 
-def _facts(folder: RunFolder) -> dict[str, str]:
+def _run_facts(folder: RunFolder) -> dict[str, str]:
     head = folder.head
     packages = package_versions(folder.stretches)
     return {

@@ -51,11 +51,11 @@ def run(
     check_offered(engine)
     if choices is not None:
         check_type("choices", choices, Choices, "mutator.Choices")
-    found, place = open_workspace(workspace), Path(out)
+    opened_workspace, folder = open_workspace(workspace), Path(out)
     summary = run_campaign(
-        found,
+        opened_workspace,
         campaign,
-        place,
+        folder,
         workers=workers,
         choices=choices,
         engine=engine,
@@ -65,11 +65,11 @@ def run(
         notify=progress,
     )
     if summary.exit_code:
-        warnings.warn(_what_is_left(summary), IncompleteRun, stacklevel=2)
-    return Run(RunFolder.open(place), found, summary)
+        warnings.warn(_describe_unfinished(summary), IncompleteRun, stacklevel=2)
+    return Run(RunFolder.open(folder), opened_workspace, summary)
 
 
-def _what_is_left(summary: Summary) -> str:
+def _describe_unfinished(summary: Summary) -> str:
     parts = [f"experiments with a result: {summary.done} of {summary.planned}"]
     if summary.harness_errors:
         name, detail = summary.harness_errors[0]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mutator._common.confined_files import path_below
 from mutator._common.table_rendering import TextTable
 from mutator.api.notebook_html import text_html
-from mutator.api.runs import Run, known_alerts_note, load_run
+from mutator.api.runs import Run, alerts_note_if_any, load_run
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
 from mutator.comparison.pairs import ExperimentPair, ResultChange
@@ -21,7 +21,7 @@ from mutator.report.run_history import History
 if TYPE_CHECKING:
     import pandas as pd
 
-SHOWN = 3  # tables shown in a notebook: endings, changes, rates
+MOST_TABLES_SHOWN = 3  # tables shown in a notebook: endings, changes, rates
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,7 +38,9 @@ class RunComparison:
         names = self.comparison.names
         differing = [[f.name, f.a, f.b] for f in self.comparison.facts if f.is_different]
         facts = TextTable(heads=("what differs", names.a, names.b), rows=differing).as_html()
-        sheets = [text_html(s.title) + s.table().as_html() for s in self.comparison.sheets[:SHOWN]]
+        sheets = [
+            text_html(s.title) + s.table().as_html() for s in self.comparison.sheets[:MOST_TABLES_SHOWN]
+        ]
         remarks = "".join(map(text_html, self.comparison.remarks))
         return text_html(self.summary) + remarks + facts + "".join(sheets)
 
@@ -67,12 +69,12 @@ class RunComparison:
         """One row for each experiment that both runs have, with the columns of pairs.csv. Columns of a single
         run end in `_a` or `_b`. Times are in s since the start of the simulation.
         """
-        return _frame(self.comparison.pairs)
+        return _pairs_frame(self.comparison.pairs)
 
     @cached_property
     def changed(self) -> "pd.DataFrame":
         """The rows of `pairs` whose result changed, new hazards first."""
-        return _frame(self.comparison.changed_pairs)
+        return _pairs_frame(self.comparison.changed_pairs)
 
     @cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
@@ -88,10 +90,10 @@ class RunComparison:
         A gate is a Gate or its name, such as `new-hazard` or `severity:S2`.
         MutatorError for an unknown gate, and for a severity gate if a run has no severity classes.
         """
-        known = [gate.value for gate in Gate]
-        if strangers := [gate for gate in gates if gate not in known]:
+        gate_names = [gate.value for gate in Gate]
+        if unknown := [gate for gate in gates if gate not in gate_names]:
             raise MutatorError(
-                f"gate '{strangers[0]}'", argument="gates", expected=f"one of {', '.join(known)}"
+                f"gate '{unknown[0]}'", argument="gates", expected=f"one of {', '.join(gate_names)}"
             )
         return comparing.findings_of_gates(self.comparison, [Gate(gate) for gate in gates])
 
@@ -109,12 +111,12 @@ def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None
     `only` is a filter over the experiments' planned properties. MutatorError if no experiments match;
     CheckFailed if the equivalence check of a run failed.
     """
-    runs = [one if isinstance(one, Run) else load_run(one) for one in (a, b)]
-    first, second = map(known_alerts_note, runs)
+    runs = [run if isinstance(run, Run) else load_run(run) for run in (a, b)]
+    first, second = map(alerts_note_if_any, runs)
     return RunComparison(comparing.compare_runs(runs[0].path, runs[1].path, only, (first, second)))
 
 
-def _frame(pairs: Sequence[ExperimentPair]) -> "pd.DataFrame":
+def _pairs_frame(pairs: Sequence[ExperimentPair]) -> "pd.DataFrame":
     import pandas as pd
 
     frame = pd.DataFrame([comparison_files.pair_cells(pair) for pair in pairs])

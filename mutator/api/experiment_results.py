@@ -51,10 +51,10 @@ class ExperimentResult(ABC):
         return f"<{type(self).__name__} {self.id}: {self.experiment.label}: {self.ending}>"
 
     def _repr_html_(self) -> str:
-        return text_html(repr(self)) + diff_html(self.diff) + facts_html(self._facts())
+        return text_html(repr(self)) + diff_html(self.diff) + facts_html(self._notebook_facts())
 
-    def _facts(self) -> list[tuple[str, object]]:
-        facts = describe(self.experiment) | (self.verdict if self.record else {"status": "not run"})
+    def _notebook_facts(self) -> list[tuple[str, object]]:
+        facts = experiment_facts(self.experiment) | (self.verdict if self.record else {"status": "not run"})
         texts = {
             name: ", ".join(f"{k} {v if isinstance(v, str) else f'{v:.4g}'}" for k, v in value.items())
             or None
@@ -101,7 +101,7 @@ class ExperimentResult(ABC):
     @property
     def verdict(self) -> dict[str, Any]:
         """The verdict as plain data. Times are simulation times in s; None: no such event."""
-        return verdict(self.record, self.scale) if self.record else {"status": None}
+        return verdict_facts(self.record, self.scale) if self.record else {"status": None}
 
     @property
     @abstractmethod
@@ -126,25 +126,25 @@ class ExperimentResult(ABC):
         import pandas as pd
 
         facts = {c.name: (c.component, c.role.value, c.unit) for c in self._channels()}
-        left = sorted(self.record.left if self.record else (), key=lambda departure: departure[1])
-        rows = [(name, *facts.get(name, ("", "", "")), first, largest) for name, first, largest in left]
+        departures = sorted(self.record.left if self.record else (), key=lambda departure: departure[1])
+        rows = [(name, *facts.get(name, ("", "", "")), first, largest) for name, first, largest in departures]
         heads = ["channel", "component", "role", "unit", "t_first", "max_dev"]
         return pd.DataFrame(rows, columns=heads).set_index("channel")
 
     def plot(self) -> "Figure":
         """Plot the golden and the faulty run: one panel for each channel of the manifest, and event marks."""
         golden, faulty = self._load_traces()
-        facts = describe(self.experiment)
+        facts = experiment_facts(self.experiment)
         title = f"{facts['fault']}   {facts['scenario']}   {facts['trigger']}   [{self.id}]"
         marks = marks_of(self.record) if self.record else ()
         end = self.record.t_end if self.record else None
-        return draw_run(golden, faulty, self._target(), title=title, marks=marks, end=end)
+        return draw_run(golden, faulty, self._manifest(), title=title, marks=marks, end=end)
 
     @abstractmethod
     def _channels(self) -> Sequence[ChannelFacts]: ...
 
     @abstractmethod
-    def _target(self) -> TargetManifest: ...
+    def _manifest(self) -> TargetManifest: ...
 
     @abstractmethod
     def _load_traces(self) -> tuple[Trace, Trace]: ...
@@ -158,15 +158,15 @@ def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
     import pandas as pd
 
     time = manifest.time_channel
-    own = {own_times(name) for name in trace}
-    names = [name for name in trace if name != time and name not in own]
+    time_channels = {own_times(name) for name in trace}
+    names = [name for name in trace if name != time and name not in time_channels]
     columns = {name: on_steps(trace, name, trace[time]) for name in names}
     frame = pd.DataFrame(columns, index=pd.Index(trace[time], name=time))
     frame.attrs["units"] = {c.name: c.unit for c in (*manifest.compared, *manifest.plotted)}
     return frame
 
 
-def describe(experiment: Experiment) -> dict[str, Any]:
+def experiment_facts(experiment: Experiment) -> dict[str, Any]:
     """Describe the experiment as plain data."""
     fault, trigger = experiment.fault, experiment.trigger
     hold = fault.hold or trigger.hold
@@ -184,7 +184,7 @@ def describe(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def verdict(record: Record, scale: Scale | None) -> dict[str, Any]:
+def verdict_facts(record: Record, scale: Scale | None) -> dict[str, Any]:
     """Return the verdict as plain data. Times are simulation times in s; None: no such event.
 
     `largest_difference` covers the whole run, `difference_in_drive` only the time up to the end of the drive.

@@ -52,8 +52,8 @@ def check_library(workspace: WorkspaceLike = None, *, target: str | None = None)
 
     `target` names a manifest; default: the library's only one.
     """
-    found = open_workspace(workspace)
-    return library_check.library_problems(found, found.target_name(target))
+    opened_workspace = open_workspace(workspace)
+    return library_check.library_problems(opened_workspace, opened_workspace.target_name(target))
 
 
 def find_places(
@@ -64,11 +64,11 @@ def find_places(
 
     MutatorError for a file in which faults are not allowed, and for an unknown function.
     """
-    found = open_workspace(workspace)
-    manifest = found.manifest(found.target_name(target))
+    opened_workspace = open_workspace(workspace)
+    manifest = opened_workspace.manifest(opened_workspace.target_name(target))
     path, _, function = where.partition("::")
     check_file(manifest, path)
-    return places_of(parsed_file(manifest.tree, path), found.fault_models(), function or None)
+    return places_of(parsed_file(manifest.tree, path), opened_workspace.fault_models(), function or None)
 
 
 def check_target(
@@ -86,14 +86,16 @@ def check_target(
     faults, and whether canaries reach their hazard. `target` names a manifest; default: the library's only
     one. MutatorError for a library with problems, which `check_library` lists.
     """
-    found = open_workspace(workspace)
-    name = found.target_name(target)
-    manifest = found.manifest(name)
-    driven = (
-        drive_findings(found, name, scenarios) if drive else [fast_engine_check.loading_finding(manifest)]
+    opened_workspace = open_workspace(workspace)
+    name = opened_workspace.target_name(target)
+    manifest = opened_workspace.manifest(name)
+    findings = (
+        drive_findings(opened_workspace, name, scenarios)
+        if drive
+        else [fast_engine_check.loading_finding(manifest)]
     )
-    unused = unused_draws_finding(found.specs(), found.fault_models())
-    return [*driven, fast_engine_check.variants_finding(found, manifest), unused]
+    unused = unused_draws_finding(opened_workspace.specs(), opened_workspace.fault_models())
+    return [*findings, fast_engine_check.variants_finding(opened_workspace, manifest), unused]
 
 
 def check_hazard_analysis(
@@ -104,15 +106,15 @@ def check_hazard_analysis(
     `target` names a manifest; default: the library's only one. MutatorError for a library without an
     analysis.
     """
-    found = open_workspace(workspace)
-    analysis = _analysis(found)
-    manifest = found.manifest(found.target_name(target))
-    return check_analysis(analysis, found.specs(), manifest)
+    opened_workspace = open_workspace(workspace)
+    analysis = _load_analysis(opened_workspace)
+    manifest = opened_workspace.manifest(opened_workspace.target_name(target))
+    return check_analysis(analysis, opened_workspace.specs(), manifest)
 
 
 def draw_control_structure(workspace: WorkspaceLike = None) -> str:
     """Draw the control structure of the hazard analysis as SVG; MutatorError for a library without one."""
-    return draw(_analysis(workspace))
+    return draw(_load_analysis(workspace))
 
 
 def doctor(workspace: "Workspace | str | PathLike[str] | MutatorError | None" = None) -> list[Finding]:
@@ -124,19 +126,19 @@ def doctor(workspace: "Workspace | str | PathLike[str] | MutatorError | None" = 
     if isinstance(workspace, MutatorError):
         return examine_machine(workspace)
     try:
-        found = open_workspace(workspace)
+        opened_workspace = open_workspace(workspace)
     except MutatorError as error:
         return examine_machine(error)
-    return examine_machine(found)
+    return examine_machine(opened_workspace)
 
 
-def _analysis(workspace: WorkspaceLike) -> Analysis:
-    found = open_workspace(workspace)
-    analysis = found.analysis()
+def _load_analysis(workspace: WorkspaceLike) -> Analysis:
+    opened_workspace = open_workspace(workspace)
+    analysis = opened_workspace.analysis()
     if analysis is None:
         raise MutatorError(
             "no control_structure.yaml",
-            where=found.library / "stpa",
+            where=opened_workspace.library / "stpa",
             expected="a hazard analysis",
             remedy="write one (see docs/explanation/hazard-analysis.md); campaigns do not need it",
         )

@@ -9,9 +9,9 @@ from pathlib import Path
 from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder
 from mutator._common.message_text import counted
-from mutator.api.mutants import BuiltMutant, built
-from mutator.api.operator_mutants import OperatorChoice, operator_faults
-from mutator.api.selection import Bench, FaultChoice, WorkspaceLike, context_tables, open_workspace
+from mutator.api.mutants import BuiltMutant, build_selected
+from mutator.api.operator_mutants import OperatorChoice, draw_operator_faults
+from mutator.api.selection import FaultChoice, SelectedTarget, WorkspaceLike, context_tables, open_workspace
 from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
@@ -20,7 +20,7 @@ from mutator.store.plan_choices import Choices
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
-COLUMNS = (
+INDEX_COLUMNS = (
     "mutant_id",
     "fault_id",
     "spec",
@@ -36,30 +36,32 @@ COLUMNS = (
     "tree",
     "tree_digest",
 )
-Pair = tuple[Fault, Trigger]
+FaultWithTrigger = tuple[Fault, Trigger]
 
 
 def pairs_of_specs(
-    bench: Bench,
+    selected_target: SelectedTarget,
     specs: Iterable[str],
     triggers: Sequence[str] = (),
     *,
     seed: int | None = None,
     reading: str | None = None,
-) -> list[Pair]:
+) -> list[FaultWithTrigger]:
     """Return every fault of the specs (names, globs, files) with every trigger; default: all contexts, or
     `always` if there are none.
     """
-    made = [bench.trigger(text) for text in triggers]
-    if not made:
-        armed_after_s = bench.manifest.armed_after_s
-        tables = context_tables(bench.workspace)
-        made = [trigger for table in tables for trigger in table.triggers(armed_after_s=armed_after_s)]
-        made = made or [always_trigger(armed_after_s=armed_after_s)]
-    pairs: list[Pair] = []
-    for name in _spec_names(bench.workspace, specs):
-        faults = bench.faults(FaultChoice(spec=name, seed=seed, reading=reading))
-        pairs += [(fault, trigger) for fault in faults for trigger in made]
+    selected_triggers = [selected_target.trigger(text) for text in triggers]
+    if not selected_triggers:
+        armed_after_s = selected_target.manifest.armed_after_s
+        tables = context_tables(selected_target.workspace)
+        selected_triggers = [
+            trigger for table in tables for trigger in table.triggers(armed_after_s=armed_after_s)
+        ]
+        selected_triggers = selected_triggers or [always_trigger(armed_after_s=armed_after_s)]
+    pairs: list[FaultWithTrigger] = []
+    for name in _spec_names(selected_target.workspace, specs):
+        faults = selected_target.faults(FaultChoice(spec=name, seed=seed, reading=reading))
+        pairs += [(fault, trigger) for fault in faults for trigger in selected_triggers]
     if not pairs:
         raise MutatorError(
             "no spec given",
@@ -69,21 +71,25 @@ def pairs_of_specs(
     return pairs
 
 
-def pairs_of_campaign(workspace: Workspace, campaign: str, choices: Choices) -> tuple[Bench, list[Pair]]:
+def pairs_of_campaign(
+    workspace: Workspace, campaign: str, choices: Choices
+) -> tuple[SelectedTarget, list[FaultWithTrigger]]:
     plan = make_plan(workspace, campaign, choices)
-    return Bench.of(workspace, plan.campaign.target), [(e.fault, e.trigger) for e in plan.experiments]
+    return SelectedTarget.of(workspace, plan.campaign.target), [
+        (e.fault, e.trigger) for e in plan.experiments
+    ]
 
 
 @dataclass(frozen=True, repr=False)
 class MutantSet:
     """Faults with triggers for one target. Mutants are built when written."""
 
-    bench: Bench  #: workspace and target
-    pairs: tuple[Pair, ...]  #: each fault with its trigger
-    told: str = ""  #: for operators: how many mutants were chosen and left out
+    selected_target: SelectedTarget  #: workspace and target
+    pairs: tuple[FaultWithTrigger, ...]  #: each fault with its trigger
+    note: str = ""  #: for operators: how many mutants were chosen and left out
 
     def __repr__(self) -> str:
-        return f"<MutantSet: {counted(len(self), 'mutant')} of {self.bench.manifest.name}>"
+        return f"<MutantSet: {counted(len(self), 'mutant')} of {self.selected_target.manifest.name}>"
 
     def __len__(self) -> int:
         return len(self.pairs)
@@ -100,8 +106,11 @@ class MutantSet:
         workspace: WorkspaceLike = None,
     ) -> "MutantSet":
         """Choose every fault of the specs (names, globs, files) with every trigger; default: all contexts."""
-        bench = Bench.of(workspace, target)
-        return cls(bench, tuple(pairs_of_specs(bench, specs, triggers, seed=seed, reading=reading)))
+        selected_target = SelectedTarget.of(workspace, target)
+        return cls(
+            selected_target,
+            tuple(pairs_of_specs(selected_target, specs, triggers, seed=seed, reading=reading)),
+        )
 
     @classmethod
     def of_operators(
@@ -113,18 +122,22 @@ class MutantSet:
         workspace: WorkspaceLike = None,
     ) -> "MutantSet":
         """Choose mutants of mutation operators, with every trigger; default: `always`."""
-        bench = Bench.of(workspace, target)
-        faults, told = operator_faults(bench, choice)
-        made = [bench.trigger(text) for text in triggers or ("always",)]
-        return cls(bench, tuple((fault, trigger) for fault in faults for trigger in made), told)
+        selected_target = SelectedTarget.of(workspace, target)
+        faults, note = draw_operator_faults(selected_target, choice)
+        selected_triggers = [selected_target.trigger(text) for text in triggers or ("always",)]
+        return cls(
+            selected_target,
+            tuple((fault, trigger) for fault in faults for trigger in selected_triggers),
+            note,
+        )
 
     @classmethod
     def of_campaign(
         cls, campaign: str, *, choices: Choices | None = None, workspace: WorkspaceLike = None
     ) -> "MutantSet":
         """Choose the faults and triggers of a campaign's experiments."""
-        bench, pairs = pairs_of_campaign(open_workspace(workspace), campaign, choices or Choices())
-        return cls(bench, tuple(pairs))
+        selected_target, pairs = pairs_of_campaign(open_workspace(workspace), campaign, choices or Choices())
+        return cls(selected_target, tuple(pairs))
 
     def write(
         self, out: str | Path, *, trees: bool = False, step: Callable[[], None] = lambda: None
@@ -134,12 +147,12 @@ class MutantSet:
 
         `step` is called after each pair of fault and trigger.
         """
-        return write_mutants(self.bench, self.pairs, Path(out), trees=trees, step=step)
+        return write_mutants(self.selected_target, self.pairs, Path(out), trees=trees, step=step)
 
 
 def write_mutants(
-    bench: Bench,
-    pairs: Sequence[Pair],
+    selected_target: SelectedTarget,
+    pairs: Sequence[FaultWithTrigger],
     out: Path,
     *,
     trees: bool = False,
@@ -161,32 +174,32 @@ def write_mutants(
     (out / "patches").mkdir()
     index: dict[str, dict[str, str]] = {}
     for fault, trigger in pairs:
-        mutant = built(bench, fault, trigger)
+        mutant = build_selected(selected_target, fault, trigger)
         if mutant.id not in index:
-            index[mutant.id] = _write(mutant, out, trees=trees)
+            index[mutant.id] = _write_mutant(mutant, out, trees=trees)
         step()
     rows = list(index.values())
     with (out / "index.csv").open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        table = csv.DictWriter(file, INDEX_COLUMNS, lineterminator="\n")
         table.writeheader()
         table.writerows(rows)
     return rows
 
 
-def _spec_names(workspace: Workspace, wanted: Iterable[str]) -> Iterator[str]:
-    for text in wanted:
+def _spec_names(workspace: Workspace, names_and_globs: Iterable[str]) -> Iterator[str]:
+    for text in names_and_globs:
         if not any(c in text for c in "*?["):
             yield text
             continue
-        hits = fnmatch.filter([s.name for s in workspace.specs()], text)
-        if not hits:
+        matches = fnmatch.filter([s.name for s in workspace.specs()], text)
+        if not matches:
             raise MutatorError(
                 f"no spec matches {text!r}", argument="specs", remedy="see `mutator list specs`"
             )
-        yield from hits
+        yield from matches
 
 
-def _write(built_mutant: BuiltMutant, out: Path, *, trees: bool) -> dict[str, str]:
+def _write_mutant(built_mutant: BuiltMutant, out: Path, *, trees: bool) -> dict[str, str]:
     mutant, fault, trigger = built_mutant.mutant, built_mutant.fault, built_mutant.trigger
     patch = Path("patches") / f"{mutant.id}.patch"
     (path_below(out, patch.as_posix())).write_bytes(mutant.patch_bytes)
@@ -209,4 +222,4 @@ def _write(built_mutant: BuiltMutant, out: Path, *, trees: bool) -> dict[str, st
         tree.as_posix() if trees else "",
         mutant.tree_digest,
     )
-    return {k: "" if v is None else str(v) for k, v in zip(COLUMNS, cells, strict=True)}
+    return {k: "" if v is None else str(v) for k, v in zip(INDEX_COLUMNS, cells, strict=True)}

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from mutator._common.files import make_folder
 from mutator.api.notebook_html import diff_html, text_html
-from mutator.api.selection import Bench, FaultLike, TriggerLike, WorkspaceLike
+from mutator.api.selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
 from mutator.mutants.mutant_building import Mutant, build, write_tree
@@ -50,14 +50,14 @@ class BuiltMutant:
 
     def write(self, folder: str | Path) -> Path:
         """Write the whole mutated source tree into a new or empty folder, and return the folder."""
-        place = Path(folder)
-        make_folder(place)
-        if any(place.iterdir()):
+        out = Path(folder)
+        make_folder(out)
+        if any(out.iterdir()):
             raise MutatorError(
-                "not empty", where=place, expected="a new or empty folder", remedy="choose another folder"
+                "not empty", where=out, expected="a new or empty folder", remedy="choose another folder"
             )
-        write_tree(self.manifest, self.mutant, place)
-        return place
+        write_tree(self.manifest, self.mutant, out)
+        return out
 
 
 def build_mutant(
@@ -80,12 +80,12 @@ def build_mutant(
     MutatorError for an invalid argument, and if a place is not found in the source; InvalidMutant (a
     MutatorError) if the mutant does not compile.
     """
-    bench = Bench.of(workspace, target)
-    chosen = bench.fault(fault, value=value, seed=seed, reading=reading)
-    return built(bench, chosen, bench.trigger(trigger))
+    selected_target = SelectedTarget.of(workspace, target)
+    chosen = selected_target.fault(fault, value=value, seed=seed, reading=reading)
+    return build_selected(selected_target, chosen, selected_target.trigger(trigger))
 
 
-def built(bench: Bench, fault: Fault, trigger: Trigger) -> BuiltMutant:
+def build_selected(selected_target: SelectedTarget, fault: Fault, trigger: Trigger) -> BuiltMutant:
     """Build the mutant of a fault with a trigger."""
-    mutant = build(bench.manifest, bench.models, fault, trigger)
-    return BuiltMutant(fault=fault, trigger=trigger, mutant=mutant, manifest=bench.manifest)
+    mutant = build(selected_target.manifest, selected_target.models, fault, trigger)
+    return BuiltMutant(fault=fault, trigger=trigger, mutant=mutant, manifest=selected_target.manifest)

@@ -5,7 +5,7 @@ from html import escape
 
 from mutator._common.table_rendering import TextTable
 
-_COLOURS = {"+": "#116329", "-": "#a40e26", "@": "#0550ae"}
+_COLOUR_BY_SIGN = {"+": "#116329", "-": "#a40e26", "@": "#0550ae"}
 
 
 def facts_html(facts: Iterable[tuple[str, object]]) -> str:
@@ -19,10 +19,10 @@ def text_html(text: str) -> str:
 
 
 def diff_html(patch: str) -> str:
-    return f"<pre>{''.join(map(_line, patch.splitlines()))}</pre>"
+    return f"<pre>{''.join(map(_diff_line_html, patch.splitlines()))}</pre>"
 
 
-def _line(line: str) -> str:
-    colour = None if line.startswith(("+++", "---")) else _COLOURS.get(line[:1])
+def _diff_line_html(line: str) -> str:
+    colour = None if line.startswith(("+++", "---")) else _COLOUR_BY_SIGN.get(line[:1])
     text = escape(line) + "\n"
     return f'<span style="color:{colour}">{text}</span>' if colour else text

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from mutator._common.argument_checks import check_whole_number
 from mutator._common.message_text import counted
-from mutator.api.selection import Bench
+from mutator.api.selection import SelectedTarget
 from mutator.errors import MutatorError
 from mutator.model import Fault, Limits
 from mutator.operators.executed_lines import GoldenRunInputs, measure_executed_lines
@@ -29,7 +29,9 @@ class OperatorChoice:
     seed: int = 0  #: seed of the draw and of the golden run
 
 
-def operator_faults(bench: Bench, choice: OperatorChoice) -> tuple[tuple[Fault, ...], str]:
+def draw_operator_faults(
+    selected_target: SelectedTarget, choice: OperatorChoice
+) -> tuple[tuple[Fault, ...], str]:
     """Return the faults in the order of files and lines, and a text that counts them and those left out.
 
     MutatorError for an unknown operator or place, and if no mutant is left.
@@ -39,20 +41,24 @@ def operator_faults(bench: Bench, choice: OperatorChoice) -> tuple[tuple[Fault, 
         check_whole_number("sample", choice.sample, least=1)
     executed = None
     if choice.scenario is not None:
-        scenario = bench.workspace.scenario(choice.scenario)
+        scenario = selected_target.workspace.scenario(choice.scenario)
         drive = GoldenRunInputs(scenario=scenario, changes=(), seed=choice.seed)
-        [executed] = measure_executed_lines(bench.manifest, [drive], Limits())
+        [executed] = measure_executed_lines(selected_target.manifest, [drive], Limits())
     operators = unique_operator_names(choice.operators)
-    found = select_mutations(bench.manifest, bench.models, operators, choice.places, executed)
-    if not found.mutations:
+    candidates = select_mutations(
+        selected_target.manifest, selected_target.models, operators, choice.places, executed
+    )
+    if not candidates.mutations:
         raise MutatorError(
-            f"no mutant in {', '.join(choice.places)} ({found.told})",
+            f"no mutant in {', '.join(choice.places)} ({candidates.told})",
             argument="in",
             remedy="choose other places or operators, or include lines that are not executed",
         )
-    drawn = sample_mutations(found, choice.sample, choice.seed)
-    told = (
-        found.told if len(drawn) == len(found.mutations) else f"{counted(len(drawn), 'draw')} of {found.told}"
+    sample = sample_mutations(candidates, choice.sample, choice.seed)
+    note = (
+        candidates.told
+        if len(sample) == len(candidates.mutations)
+        else f"{counted(len(sample), 'draw')} of {candidates.told}"
     )
-    reading = bench.workspace.readings().default
-    return tuple(one.fault(reading) for one in drawn), told
+    reading = selected_target.workspace.readings().default
+    return tuple(mutation.fault(reading) for mutation in sample), note

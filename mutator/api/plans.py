@@ -23,15 +23,15 @@ def plan(
     MutatorError for a mistake in the campaign or choices, if no experiment is left, and for a folder with
     other content.
     """
-    found = open_workspace(workspace)
+    opened_workspace = open_workspace(workspace)
     if out is None:
-        return make_plan(found, campaign, choices)
-    planning = Planning(found, campaign, choices)
-    folder, tally = freeze_and_tell(planning, Path(out), found)
+        return make_plan(opened_workspace, campaign, choices)
+    planning = Planning(opened_workspace, campaign, choices)
+    folder, tally = freeze_and_tell(planning, Path(out), opened_workspace)
     return load_plan(folder, tally)  # reading it back adds the cost measured in this folder, if any
 
 
-def not_forkable(plan: Plan, workspace: Workspace) -> dict[str, str]:
+def reasons_not_to_fork(plan: Plan, workspace: Workspace) -> dict[str, str]:
     """Return the variants of a plan that only the reference engine can run, with the reasons."""
     faults = plan.tally.variants.values()
     return not_forked(workspace.manifest(plan.campaign.target), workspace.fault_models(), faults)

@@ -21,7 +21,7 @@ from mutator.review.review_page import write_page
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
-Written = dict[str, dict[str, str]]  # by group: the file of each picture, by name
+PictureFiles = dict[str, dict[str, str]]  # by group: the file of each picture, by name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,61 +54,65 @@ class ReviewedGroups:
     def matching(self, only: str | None = None, exclude: str | None = None) -> "ReviewedGroups":
         """Return the groups that match the filters, which are expressions over the result of `facts`."""
         groups = self.groups
-        for text, wanted in ((only, True), (exclude, False)):
+        for text, keeps_matches in ((only, True), (exclude, False)):
             if text is not None:
                 accepts = compile_filter(text, COLUMNS)
-                groups = tuple(g for g in groups if accepts(facts(self.review, g)) is wanted)
+                groups = tuple(g for g in groups if accepts(group_facts(self.review, g)) is keeps_matches)
         return replace(self, groups=groups)
 
     def find(self, starts: Sequence[str]) -> list[Group]:
         """Return the groups whose ids start with `starts`; MutatorError unless each start fits exactly
         one.
         """
-        found: dict[str, Group] = {}
+        group_by_id: dict[str, Group] = {}
         for start in starts:
-            hits = [group for group in self.groups if group.id.startswith(start)]
-            if len(hits) != 1 or not start:
+            matches = [group for group in self.groups if group.id.startswith(start)]
+            if len(matches) != 1 or not start:
                 raise MutatorError(
-                    f"several ids ({len(hits)}) start with '{start}'" if hits else f"no group '{start}'",
+                    f"several ids ({len(matches)}) start with '{start}'"
+                    if matches
+                    else f"no group '{start}'",
                     expected="an id from `mutator review`, or the start of only one id",
-                    remedy="give more digits of the id" if hits else "select the group's campaign or spec",
+                    remedy="give more digits of the id" if matches else "select the group's campaign or spec",
                 )
-            found[hits[0].id] = hits[0]
-        return list(found.values())
+            group_by_id[matches[0].id] = matches[0]
+        return list(group_by_id.values())
 
     def approve(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
         """Approve groups in their current state, and write the decision into the library."""
-        return self._changed(groups, Kind.APPROVE, by, remark)
+        return self._record_actions(groups, Kind.APPROVE, by, remark)
 
     def reject(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
         """Reject groups in their current state, and write the decision into the library."""
-        return self._changed(groups, Kind.REJECT, by, remark)
+        return self._record_actions(groups, Kind.REJECT, by, remark)
 
     def clear(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
         """Withdraw the decisions about groups; remarks and flags stay."""
-        return self._changed(groups, Kind.CLEAR, by, remark)
+        return self._record_actions(groups, Kind.CLEAR, by, remark)
 
     def remark(self, groups: Sequence[Group], by: str, text: str) -> "ReviewedGroups":
         """Add a remark to groups."""
-        return self._changed(groups, Kind.REMARK, by, text)
+        return self._record_actions(groups, Kind.REMARK, by, text)
 
     def flag(self, groups: Sequence[Group], by: str) -> "ReviewedGroups":
         """Flag groups for another look."""
-        return self._changed(groups, Kind.FLAG, by)
+        return self._record_actions(groups, Kind.FLAG, by)
 
     def unflag(self, groups: Sequence[Group], by: str) -> "ReviewedGroups":
         """Remove flags."""
-        return self._changed(groups, Kind.UNFLAG, by)
+        return self._record_actions(groups, Kind.UNFLAG, by)
 
     def write_page(self, out: str | Path) -> Path:
         """Write all groups to one self-contained HTML page."""
         write_page(Path(out), self.review, self.groups, self.options)
         return Path(out)
 
-    def _changed(self, groups: Sequence[Group], kind: Kind, by: str, text: str = "") -> "ReviewedGroups":
-        changes = [Change(group=group, kind=kind, by=by, text=text) for group in groups]
-        seen = {group.id: self.review.revision(group.id) for group in groups}
-        return replace(self, review=record(self.workspace, self.review.target, changes, seen))
+    def _record_actions(
+        self, groups: Sequence[Group], kind: Kind, by: str, text: str = ""
+    ) -> "ReviewedGroups":
+        actions = [Change(group=group, kind=kind, by=by, text=text) for group in groups]
+        revision_by_group = {group.id: self.review.revision(group.id) for group in groups}
+        return replace(self, review=record(self.workspace, self.review.target, actions, revision_by_group))
 
 
 def load_review(
@@ -127,25 +131,30 @@ def load_review(
     """
     if campaign and specs:
         raise MutatorError("given together with specs", argument="campaign", expected="one or the other")
-    found = open_workspace(workspace)
+    opened_workspace = open_workspace(workspace)
     if campaign:
-        plan = make_plan(found, campaign, Choices(seed=seed, reading=reading))
-        manifest = found.manifest(plan.campaign.target)
-        groups = mutant_groups.of_plan(found, plan)
+        plan = make_plan(opened_workspace, campaign, Choices(seed=seed, reading=reading))
+        manifest = opened_workspace.manifest(plan.campaign.target)
+        groups = mutant_groups.of_plan(opened_workspace, plan)
     else:
-        manifest = found.manifest(found.target_name(target))
-        groups = mutant_groups.of_library(found, manifest, specs=specs, reading=reading, seed=seed or 0)
-    review = load_decisions(found, manifest.name)
-    given = {"--campaign": campaign, "--reading": reading, "--manifest": target}
-    words = [word for name, value in given.items() if value for word in (name, value)]
-    words += ["--seed", str(seed)] if seed is not None else []
-    words += [word for spec in specs for word in ("--spec", spec)]
+        manifest = opened_workspace.manifest(opened_workspace.target_name(target))
+        groups = mutant_groups.of_library(
+            opened_workspace, manifest, specs=specs, reading=reading, seed=seed or 0
+        )
+    review = load_decisions(opened_workspace, manifest.name)
+    value_by_option = {"--campaign": campaign, "--reading": reading, "--manifest": target}
+    options = [word for name, value in value_by_option.items() if value for word in (name, value)]
+    options += ["--seed", str(seed)] if seed is not None else []
+    options += [word for spec in specs for word in ("--spec", spec)]
     return ReviewedGroups(
-        workspace=found, review=review, groups=tuple(review.in_turn(groups)), options=tuple(words)
+        workspace=opened_workspace,
+        review=review,
+        groups=tuple(review.in_turn(groups)),
+        options=tuple(options),
     )
 
 
-def facts(review: Review, group: Group) -> dict[str, object]:
+def group_facts(review: Review, group: Group) -> dict[str, object]:
     """Return the columns that filters can use for a group. Commas separate several values."""
     decision = review.decision(group.id)
     return {
@@ -171,20 +180,20 @@ def reviewer_name(workspace: WorkspaceLike = None) -> str | None:
 
 def write_pictures(
     groups: Sequence[Group], target: str, folder: Path, *, workspace: WorkspaceLike = None
-) -> tuple[Written, dict[str, str]]:
+) -> tuple[PictureFiles, dict[str, str]]:
     """Write `<group>-before.jpg` and one frame for each level, for each group that is an image effect. Return
     the files by group, and the value that each file shows.
     """
-    found = open_workspace(workspace)
-    drawn = of_groups(found, found.manifest(target), groups)
-    written: Written = {}
+    opened_workspace = open_workspace(workspace)
+    pictures_by_group = of_groups(opened_workspace, opened_workspace.manifest(target), groups)
+    written: PictureFiles = {}
     values: dict[str, str] = {}
-    if drawn:
+    if pictures_by_group:
         make_folder(folder)
-    for name, pictures in drawn.items():
-        shown = {"before": ("", pictures.before)}
-        shown |= {level.name: (level.label, level.after) for level in pictures.levels}
-        for level, (value, data) in shown.items():
+    for name, pictures in pictures_by_group.items():
+        picture_by_level = {"before": ("", pictures.before)}
+        picture_by_level |= {level.name: (level.label, level.after) for level in pictures.levels}
+        for level, (value, data) in picture_by_level.items():
             path = path_below(folder, f"{name}-{level}.jpg")
             write_atomic(path, data)
             written.setdefault(name, {})[level] = str(path)

@@ -56,17 +56,17 @@ class RunContents(StoredRun):
     @property
     def endings(self) -> dict[str, int]:
         """Number of experiments by ending: the outcome of runs that ended normally, the status of others."""
-        return outcome_counting.outcome_counts(self._frame)
+        return outcome_counting.outcome_counts(self._results_frame)
 
     @property
     def harness_errors(self) -> dict[str, str]:
         """Experiments in which the harness failed, with the reasons; `mutator.run` retries them."""
-        frame = self._frame
+        frame = self._results_frame
         failed = frame[frame["status"] == Status.HARNESS_ERROR.value]
         return dict(zip(failed["experiment_id"], failed["detail"], strict=True))
 
     @cached_property
-    def _frame(self) -> "pd.DataFrame":
+    def _results_frame(self) -> "pd.DataFrame":
         return Results.up_to_date(self.path).frame()
 
     @cached_property

@@ -8,7 +8,7 @@ from mutator._common.files import ScratchFolder
 from mutator.api.experiment_results import TraceFrames, trace_frame
 from mutator.api.run_contents import RunContents
 from mutator.api.stored_experiments import StoredExperiment
-from mutator.api.trials import Trial, trial_of
+from mutator.api.trials import Trial, build_trial
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.outcomes.golden_comparison import Trace, load_trace
@@ -41,9 +41,9 @@ class RunExperiment(StoredExperiment):
                 )
             return trial.traces()
         if self.record is None:
-            raise self.not_run()
+            raise self.not_run_error()
         golden, faulty = self.run.traces.sampled(self.id, drive=True)
-        manifest = self._target()
+        manifest = self._manifest()
         return TraceFrames(golden=trace_frame(golden, manifest), faulty=trace_frame(faulty, manifest))
 
     def rerun(self, *, keep: bool = False) -> Trial:
@@ -56,8 +56,8 @@ class RunExperiment(StoredExperiment):
         temporary = None if keep else ScratchFolder("mutator-rerun-")
         out = path_below(temporary.path, self.id) if temporary else None
         single, same = rerun(run.workspace, folder.path, self.id, out=out)
-        manifest = run.bench.manifest
-        trial = trial_of(
+        manifest = run.selected_target.manifest
+        trial = build_trial(
             single,
             manifest,
             scale=self.scale,
@@ -79,5 +79,5 @@ class RunExperiment(StoredExperiment):
 
     def _load_traces(self) -> tuple[Trace, Trace]:
         if self.record is None:
-            raise self.not_run()
+            raise self.not_run_error()
         return self.run.traces.of(self.id)

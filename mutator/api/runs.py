@@ -71,13 +71,13 @@ class Run(RunContents):
 
     def __repr__(self) -> str:
         head = self.folder.head
-        done = f"{sum(self.endings.values())} of {self.folder.planned_count} experiments"
+        progress = f"{sum(self.endings.values())} of {self.folder.planned_count} experiments"
         failed = len(self.harness_errors)
         errors = f", {failed} with a HARNESS ERROR" if failed else ""
-        return f"<Run {self.path.name}: {done} of {head.campaign}, {head.reading}{errors}>"
+        return f"<Run {self.path.name}: {progress} of {head.campaign}, {head.reading}{errors}>"
 
     def _repr_html_(self) -> str:
-        note = known_alerts_note(self)
+        note = alerts_note_if_any(self)
         parts = text_html(repr(self)), facts_html(self.endings.items()), self.counts().as_html()
         return "".join(map(str, (*parts, text_html(note) if note else "")))
 
@@ -93,7 +93,7 @@ class Run(RunContents):
 
     def counts(self) -> TextTable:
         """Count how the experiments of each fault type ended."""
-        frame = self._frame
+        frame = self._results_frame
         hazards, counts = (
             outcome_counting.hazard_names(frame),
             outcome_counting.counts_by(frame, outcome_counting.kinds(frame)),
@@ -107,7 +107,7 @@ class Run(RunContents):
         """Return the mutation score: the shares of operator mutants that changed an actuator, raised a new
         alert or caused a hazard, in total, by operator and by function. Empty without such mutants.
         """
-        frame = self._frame
+        frame = self._results_frame
         if not (frame["module"] == OPERATORS).any():
             return mutation_score_sheet(prepare_results(frame), {}, None)
         try:
@@ -122,7 +122,7 @@ class Run(RunContents):
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
         """Return the alerts and hazards of the golden runs, and the range of each plotted channel."""
-        return load_fault_free_runs(self.folder, self.bench.manifest)
+        return load_fault_free_runs(self.folder, self.selected_target.manifest)
 
     def alerts_note(self) -> str:
         """Return a sentence on the alerts that golden runs also raise; empty if there are none."""
@@ -130,8 +130,10 @@ class Run(RunContents):
 
     def experiment(self, id: str) -> RunExperiment:
         """Return the planned experiment whose id starts with `id`; MutatorError for none or several."""
-        wanted = self._find(id)
-        return RunExperiment(experiment=self.experiments[wanted], record=self.records.get(wanted), run=self)
+        experiment_id = self._find_experiment_id(id)
+        return RunExperiment(
+            experiment=self.experiments[experiment_id], record=self.records.get(experiment_id), run=self
+        )
 
     def golden(
         self, scenario: str, changes: tuple[str, ...] | None = None, *, seed: int | None = None
@@ -141,23 +143,23 @@ class Run(RunContents):
         `changes` chooses a variant of the scenario, e.g. `("alone",)`; default: the most frequent. `seed`
         chooses one of several seeds; default: the first. MutatorError if there is no such run.
         """
-        driven = [e.changes for e in self.experiments.values() if e.scenario == scenario]
-        if changes is None and driven:
-            changes = max(dict.fromkeys(driven), key=driven.count)
+        scenario_variants = [e.changes for e in self.experiments.values() if e.scenario == scenario]
+        if changes is None and scenario_variants:
+            changes = max(dict.fromkeys(scenario_variants), key=scenario_variants.count)
         seeds = self.folder.seeds
         if seed is not None and seed not in seeds:
             raise MutatorError(f"seed {seed}", argument="seed", expected=describe_seeds(seeds))
-        several = seeds[0] if seed is None else seed
-        wanted = GoldenRun(scenario, changes or (), several if len(seeds) > 1 else None)
-        folder = self.folder.golden_folder(*wanted)
+        selected_seed = seeds[0] if seed is None else seed
+        golden_run = GoldenRun(scenario, changes or (), selected_seed if len(seeds) > 1 else None)
+        folder = self.folder.golden_folder(*golden_run)
         if not folder.is_dir():
-            known = sorted(path.name for path in (self.path / "golden").glob("*"))
+            golden_names = sorted(path.name for path in (self.path / "golden").glob("*"))
             raise MutatorError(
-                f"no golden run {wanted.key}",
+                f"no golden run {golden_run.key}",
                 where=self.path,
-                expected=describe_choices(known),
+                expected=describe_choices(golden_names),
             )
-        return trace_frame(load_trace(self.bench.manifest, folder), self.bench.manifest)
+        return trace_frame(load_trace(self.selected_target.manifest, folder), self.selected_target.manifest)
 
     def report(self, *, anew: bool = False) -> report_builder.WrittenReport:
         """Write the report, Markdown and one HTML page, unless it is up to date; with `anew`, always.
@@ -195,11 +197,11 @@ class Run(RunContents):
         `failures` are the endings that JUnit shows as failures. `only`, for MCAP, is a filter over the
         columns of the results. `table` is the table for CSV and Parquet. An MCAP export is a folder of files.
         """
-        if table not in (known := [one.value for one in ExportedTable]):
-            raise MutatorError(f"'{table}'", argument="table", expected=f"one of {', '.join(known)}")
-        wanted = find_export(str(format))
-        workspace = self.workspace if wanted.needs_library else None
-        if wanted.uses_library:
+        if table not in (table_names := [choice.value for choice in ExportedTable]):
+            raise MutatorError(f"'{table}'", argument="table", expected=f"one of {', '.join(table_names)}")
+        exporter = find_export(str(format))
+        workspace = self.workspace if exporter.needs_library else None
+        if exporter.uses_library:
             workspace = self._workspace_if_any()
         place = None if out is None else Path(out)
         parts = Parts(failures=failures, only=only, table=ExportedTable(table))
@@ -223,7 +225,7 @@ class Run(RunContents):
         return cleaning.finish_deletion(self.path)
 
 
-def known_alerts_note(run: Run) -> str:
+def alerts_note_if_any(run: Run) -> str:
     try:
         return run.alerts_note()
     except (MutatorError, KeyError):

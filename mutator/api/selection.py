@@ -28,10 +28,10 @@ FaultLike: TypeAlias = "Fault | str | PathLike[str]"
 TriggerLike: TypeAlias = "Trigger | str | float"
 
 
-def open_workspace(given: WorkspaceLike) -> Workspace:
-    if isinstance(given, Workspace):
-        return given
-    return Workspace.find(None if given is None else Path(given))
+def open_workspace(workspace: WorkspaceLike) -> Workspace:
+    if isinstance(workspace, Workspace):
+        return workspace
+    return Workspace.find(None if workspace is None else Path(workspace))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +44,7 @@ class FaultChoice:
     seed: int | None = None
     reading: str | None = None
 
-    def narrowed(self, spec: FaultSpec) -> FaultSpec:
+    def narrow(self, spec: FaultSpec) -> FaultSpec:
         variants = tuple(v for v in spec if self.variant in (None, v.name))
         if not variants:
             names = ", ".join(v.name for v in spec)
@@ -56,16 +56,16 @@ class FaultChoice:
 
 
 @dataclass(frozen=True)
-class Bench:
+class SelectedTarget:
     """A workspace with one of its targets."""
 
     workspace: Workspace
     manifest: TargetManifest
 
     @classmethod
-    def of(cls, workspace: WorkspaceLike, target: str | None = None) -> "Bench":
-        found = open_workspace(workspace)
-        return cls(found, found.manifest(found.target_name(target)))
+    def of(cls, workspace: WorkspaceLike, target: str | None = None) -> "SelectedTarget":
+        opened_workspace = open_workspace(workspace)
+        return cls(opened_workspace, opened_workspace.manifest(opened_workspace.target_name(target)))
 
     @cached_property
     def models(self) -> FaultModels:
@@ -79,7 +79,7 @@ class Bench:
         """
         check_whole_number("seed", 0 if choice.seed is None else choice.seed)
         declared = self.workspace.spec(choice.spec)
-        spec = choice.narrowed(declared)
+        spec = choice.narrow(declared)
         for problem in spec_problems(spec, self.models, self.manifest):
             raise problem
         faults = expand(spec, choice.seed or 0, choice.reading, models=self.models, manifest=self.manifest)
@@ -88,37 +88,39 @@ class Bench:
         return faults
 
     def fault(
-        self, given: FaultLike, *, value: float | None = None, seed: int = 0, reading: str | None = None
+        self, fault_like: FaultLike, *, value: float | None = None, seed: int = 0, reading: str | None = None
     ) -> Fault:
         """Return the given fault, or the middle one of the first matching variant."""
-        if isinstance(given, Fault):
+        if isinstance(fault_like, Fault):
             if value is not None or reading is not None:
                 raise MutatorError(
-                    f"{given.label} together with a value or a reading",
+                    f"{fault_like.label} together with a value or a reading",
                     argument="fault",
                     expected="a fault alone, or the name of a spec with a value or a reading",
                 )
-            return given
-        spec, variant = _split(str(given))
+            return fault_like
+        spec, variant = _split_variant(str(fault_like))
         choice = FaultChoice(spec=spec, variant=variant, value=value, seed=seed, reading=reading)
-        return one_of_each_variant(self.faults(choice))[0][0]
+        return middle_of_each_variant(self.faults(choice))[0][0]
 
-    def trigger(self, given: TriggerLike, armed_after_s: float | None = None) -> Trigger:
+    def trigger(self, trigger_like: TriggerLike, armed_after_s: float | None = None) -> Trigger:
         """Return the given trigger, or one from a context (`C1`), a time in s, `always` or a condition.
 
         Contexts, `always` and conditions are armed after `armed_after_s`; default: the manifest's.
         """
         if armed_after_s is not None:
             check_number("armed_after_s", armed_after_s, least=0)
-        if isinstance(given, Trigger):
-            return given
-        if not isinstance(given, str):
-            check_number("trigger", given, least=0)
-        armed = self.manifest.armed_after_s if armed_after_s is None else armed_after_s
-        return find_trigger(self.workspace, str(given), armed, self.manifest.observation.variables)
+        if isinstance(trigger_like, Trigger):
+            return trigger_like
+        if not isinstance(trigger_like, str):
+            check_number("trigger", trigger_like, least=0)
+        arming_time_s = self.manifest.armed_after_s if armed_after_s is None else armed_after_s
+        return find_trigger(
+            self.workspace, str(trigger_like), arming_time_s, self.manifest.observation.variables
+        )
 
 
-def one_of_each_variant(faults: Iterable[Fault]) -> tuple[tuple[Fault, int], ...]:
+def middle_of_each_variant(faults: Iterable[Fault]) -> tuple[tuple[Fault, int], ...]:
     """Return the middle fault of each variant, and the variant's number of faults."""
     groups: dict[str, list[Fault]] = {}
     for fault in faults:
@@ -134,19 +136,21 @@ def find_trigger(
     workspace: Workspace, text: str, armed_after_s: float, variables: Collection[str]
 ) -> Trigger:
     tables = context_tables(workspace)
-    named = [
+    matches = [
         (table, row.id)
         for table in tables
         for row in table.rows
         if text in (row.id, f"{table.name}/{row.id}")
     ]
-    if len(named) > 1:
-        known = ", ".join(f"{table.name}/{row}" for table, row in named)
+    if len(matches) > 1:
+        qualified_names = ", ".join(f"{table.name}/{row}" for table, row in matches)
         raise MutatorError(
-            f"context '{text}' is in {len(named)} tables", argument="trigger", expected=f"one of {known}"
+            f"context '{text}' is in {len(matches)} tables",
+            argument="trigger",
+            expected=f"one of {qualified_names}",
         )
-    if named:
-        table, row = named[0]
+    if matches:
+        table, row = matches[0]
         table.check(variables)
         return table.triggers(armed_after_s=armed_after_s, rows=(row,))[0]
     try:
@@ -159,7 +163,7 @@ def find_trigger(
         ) from e
 
 
-def _split(name: str) -> tuple[str, str | None]:
+def _split_variant(name: str) -> tuple[str, str | None]:
     """Split `sensor/bias/distance` into the spec `sensor/bias` and its variant; a file is a spec."""
     parts = name.split("/")
     if len(parts) == 3 and not name.endswith((".yaml", ".yml")):
@@ -168,9 +172,9 @@ def _split(name: str) -> tuple[str, str | None]:
 
 
 def _warn_of_value(value: float, declared: FaultSpec, faults: Collection[Fault], models: FaultModels) -> None:
-    idle = [fault.label for fault in faults if changes_nothing(fault, models)]
-    if idle:
-        warnings.warn(f"the value changes nothing: {', '.join(idle)}", MutatorWarning, stacklevel=4)
+    ineffective = [fault.label for fault in faults if changes_nothing(fault, models)]
+    if ineffective:
+        warnings.warn(f"the value changes nothing: {', '.join(ineffective)}", MutatorWarning, stacklevel=4)
     outside = []
     for variant in declared:
         if variant.draw and f"{declared.name}/{variant.name}" in {fault.spec for fault in faults}:
@@ -194,6 +198,6 @@ def _with_value(spec: FaultSpec, variant: Variant, value: float) -> Variant:
             argument="value",
             remedy="leave `value` out",
         )
-    exact = int(value) if float(value).is_integer() else value
-    draw = dataclasses.replace(variant.draw, kind="list", ranges=(), values=(exact,))
+    exact_value = int(value) if float(value).is_integer() else value
+    draw = dataclasses.replace(variant.draw, kind="list", ranges=(), values=(exact_value,))
     return dataclasses.replace(variant, draw=draw)

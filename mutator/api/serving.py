@@ -15,8 +15,8 @@ def serve_runs(
     runs: Sequence[str | Path] = (),
     *,
     port: int = 0,
-    at_once: int = 1,
-    ready: Callable[[str], None],
+    most_parallel_jobs: int = 1,
+    on_ready: Callable[[str], None],
     workspace: WorkspaceLike = None,
 ) -> None:
     """Serve runs (run folders, or folders of them; default: runs/) and the library's reviews, until the
@@ -29,5 +29,5 @@ def serve_runs(
     for root in roots:
         if not root.is_dir() and root != RUNS_FOLDER:
             raise MutatorError("no such folder", where=root, expected="a run folder, or a folder of them")
-    site = Site(workspace=open_workspace(workspace), runs=Runs(roots), at_once=at_once)
-    serve(site, port=port, ready=ready)
+    site = Site(workspace=open_workspace(workspace), runs=Runs(roots), at_once=most_parallel_jobs)
+    serve(site, port=port, ready=on_ready)

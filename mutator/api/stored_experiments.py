@@ -9,8 +9,8 @@ from mutator._common.argument_checks import check_type
 from mutator._common.confined_files import path_below
 from mutator._common.folder_search import run_folders
 from mutator.api.experiment_results import ExperimentResult
-from mutator.api.mutants import built
-from mutator.api.selection import Bench
+from mutator.api.mutants import build_selected
+from mutator.api.selection import SelectedTarget
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Record
 from mutator.outcomes.fault_paths import FaultPath, FaultPaths, fault_paths_of
@@ -26,18 +26,18 @@ from mutator.targets.target_facts import ChannelFacts
 from mutator.workspace import Workspace
 
 
-def newest_run(root: Path) -> Path:
-    found = run_folders(root)
-    if not found:
+def find_newest_run(root: Path) -> Path:
+    folders = run_folders(root)
+    if not folders:
         raise MutatorError(
             "no run folder in runs/",
             argument="run",
             remedy="name one with `run`, or make one: `mutator run quickstart --out runs/first`",
         )
-    return from_here(found[0])
+    return relative_to_here(folders[0])
 
 
-def from_here(path: Path) -> Path:
+def relative_to_here(path: Path) -> Path:
     here = Path.cwd()
     return path.relative_to(here) if path.is_relative_to(here) else path
 
@@ -60,9 +60,9 @@ class StoredRun:
         return self.given_workspace or Workspace.find()
 
     @cached_property
-    def bench(self) -> Bench:
+    def selected_target(self) -> SelectedTarget:
         """The run's target in the workspace."""
-        return Bench.of(self.workspace, self.folder.head.target)
+        return SelectedTarget.of(self.workspace, self.folder.head.target)
 
     @cached_property
     def faults(self) -> dict[str, Fault]:
@@ -86,17 +86,17 @@ class StoredRun:
 
     def experiment(self, id: str) -> "StoredExperiment":
         """Return the planned experiment whose id starts with `id`; MutatorError for none or several."""
-        wanted = self._find(id)
+        experiment_id = self._find_experiment_id(id)
         return StoredExperiment(
-            experiment=self.experiments[wanted], record=self.records.get(wanted), run=self
+            experiment=self.experiments[experiment_id], record=self.records.get(experiment_id), run=self
         )
 
-    def _find(self, id: str) -> str:
+    def _find_experiment_id(self, id: str) -> str:
         check_type("id", id, str, "the id of an experiment, or the start of one")
         return self.folder.experiment_id_from(id)
 
 
-def stored_run(path: Path, workspace: Workspace | None = None) -> StoredRun:
+def open_stored_run(path: Path, workspace: Workspace | None = None) -> StoredRun:
     """Open the run folder at `path`; MutatorError if it is not one."""
     return StoredRun(RunFolder.open(path), workspace)
 
@@ -110,10 +110,10 @@ class StoredExperiment(ExperimentResult):
     @cached_property
     def patch(self) -> str:
         """The whole patch, including the probe."""
-        kept = self.run.folder.read_patch(self.id, self.record)
-        if kept is not None:
-            return kept.decode("utf-8", "surrogateescape")
-        return built(self.run.bench, self.fault, self.experiment.trigger).patch
+        stored_patch = self.run.folder.read_patch(self.id, self.record)
+        if stored_patch is not None:
+            return stored_patch.decode("utf-8", "surrogateescape")
+        return build_selected(self.run.selected_target, self.fault, self.experiment.trigger).patch
 
     @property
     def scale(self) -> Scale | None:
@@ -140,9 +140,9 @@ class StoredExperiment(ExperimentResult):
         """Whether the run folder has the plot and an undamaged series."""
         return self.record is not None and self.plot_file.exists() and self.has_series
 
-    def not_run(self) -> MutatorError:
+    def not_run_error(self) -> MutatorError:
         """Return the error for an experiment that has not run."""
-        campaign, out = self.run.folder.head.campaign, from_here(self.run.path)
+        campaign, out = self.run.folder.head.campaign, relative_to_here(self.run.path)
         return MutatorError(
             f"experiment {self.id} has not run yet",
             where=self.run.path,
@@ -160,14 +160,14 @@ class StoredExperiment(ExperimentResult):
     def _channels(self) -> Sequence[ChannelFacts]:
         return self.run.folder.head.channels
 
-    def _target(self) -> TargetManifest:
-        return self.run.bench.manifest
+    def _manifest(self) -> TargetManifest:
+        return self.run.selected_target.manifest
 
     def _load_traces(self) -> tuple[Trace, Trace]:
         if self.record is None:
-            raise self.not_run()
-        found = SeriesFolder(self.run.path).load_series(self.id, self.record)
-        if found is None:
+            raise self.not_run_error()
+        series = SeriesFolder(self.run.path).load_series(self.id, self.record)
+        if series is None:
             remedy = f"rerun the experiment: {rerun_command(self.run.path, self.id)}"
             raise MutatorError(f"no series of {self.id}", where=self.run.path, remedy=remedy)
-        return sampled_traces(*found, self._target().time_channel)
+        return sampled_traces(*series, self._manifest().time_channel)

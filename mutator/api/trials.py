@@ -9,7 +9,7 @@ from mutator._common.confined_files import check_inside, check_only_plain_files,
 from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
-from mutator.api.selection import Bench, FaultLike, TriggerLike, WorkspaceLike
+from mutator.api.selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.execution.single_run import Single, run_single
 from mutator.figures.run_plot import save
@@ -81,7 +81,7 @@ class Trial(ExperimentResult):
     def _channels(self) -> Sequence[ChannelFacts]:
         return channel_facts(self.manifest)
 
-    def _target(self) -> TargetManifest:
+    def _manifest(self) -> TargetManifest:
         return self.manifest
 
     def _load_traces(self) -> tuple[Trace, Trace]:
@@ -115,26 +115,26 @@ def try_fault(
     MutatorError for a mistake in the arguments, CheckFailed if the golden run fails. A crash of the
     controller or a harness error is a result: see `Trial.status`.
     """
-    bench = Bench.of(workspace, target)
-    file = bench.workspace.scenario(scenario)
+    selected_target = SelectedTarget.of(workspace, target)
+    file = selected_target.workspace.scenario(scenario)
     experiment = Experiment(
-        fault=bench.fault(fault, value=value, seed=seed, reading=reading),
+        fault=selected_target.fault(fault, value=value, seed=seed, reading=reading),
         scenario=str(scenario),
         scenario_digest=digest(read_bounded(file)),
         method=Method.GUIDED,
-        trigger=bench.trigger(trigger, armed_after_s),
+        trigger=selected_target.trigger(trigger, armed_after_s),
         seed=seed,
     )
     temporary = ScratchFolder("mutator-try-") if out is None else None
-    place = temporary.path if temporary else Path(out or "")
-    folder = check_inside(place, path_below(place, experiment.id))
+    out_folder = temporary.path if temporary else Path(out or "")
+    folder = check_inside(out_folder, path_below(out_folder, experiment.id))
     check_only_plain_files(folder)
-    single = run_single(bench.workspace, bench.manifest, experiment, folder)
-    scale = bench.workspace.scale_of(bench.manifest)
-    return trial_of(single, bench.manifest, scale=scale, temporary=temporary)
+    single = run_single(selected_target.workspace, selected_target.manifest, experiment, folder)
+    scale = selected_target.workspace.scale_of(selected_target.manifest)
+    return build_trial(single, selected_target.manifest, scale=scale, temporary=temporary)
 
 
-def trial_of(
+def build_trial(
     single: Single,
     manifest: TargetManifest,
     *,

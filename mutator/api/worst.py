@@ -8,7 +8,7 @@ from mutator.results.result_rows import Row, cells_by_row, rows_of
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
 
-_BATCH = 10_000  # rows filtered at a time
+_ROWS_PER_BATCH = 10_000  # rows filtered at a time
 
 
 def worst_results(run: Path, only: str | None = None, limit: int | None = None) -> tuple[list[Row], int]:
@@ -20,8 +20,10 @@ def worst_results(run: Path, only: str | None = None, limit: int | None = None) 
     order = places(frame).argsort().tolist()  # sort all rows first, because filtering keeps the order
     if only is not None:
         accepts = compile_filter(only, list(frame.columns))
-        batches = range(0, len(frame), _BATCH)
-        rows = (row for first in batches for row in cells_by_row(frame.iloc[first : first + _BATCH]))
-        fits = [accepts({name: None if cell == "" else cell for name, cell in row.items()}) for row in rows]
-        order = [row for row in order if fits[row]]
+        batches = range(0, len(frame), _ROWS_PER_BATCH)
+        rows = (row for first in batches for row in cells_by_row(frame.iloc[first : first + _ROWS_PER_BATCH]))
+        is_match = [
+            accepts({name: None if cell == "" else cell for name, cell in row.items()}) for row in rows
+        ]
+        order = [row for row in order if is_match[row]]
     return rows_of(frame.iloc[order[:limit]], plan_file.load_faults(run)), len(order)

@@ -36,8 +36,8 @@ from mutator.cli import (
     run_folders,
     serving,
 )
-from mutator.cli.console import Terminal, discard, remarking, show_error
-from mutator.cli.options import Library, Place, Root, Sandbox, Target, Templates
+from mutator.cli.console import Terminal, discard_output, ignoring_output_errors, show_error
+from mutator.cli.options import Library, Root, Sandbox, Target, Templates, WorkspaceOptions
 from mutator.errors import (
     EXIT_CHECK_FAILED,
     EXIT_HARNESS_ERRORS,
@@ -55,9 +55,9 @@ EXIT_CODES = {
     EXIT_HARNESS_ERRORS: "harness errors or unfinished experiments",
     EXIT_INTERRUPTED: "interrupted",
 }
-THE_MACHINE_SAYS_NO = {errno.EACCES, errno.EPERM, errno.EROFS}
+_PERMISSION_ERRORS = {errno.EACCES, errno.EPERM, errno.EROFS}
 
-GROUPS = (
+SUBCOMMAND_GROUPS = (
     ("Look around", ("list", "places", "init", "stpa", "check", "doctor", "cache")),
     ("One fault", ("try", "diff", "generate")),
     ("Before a campaign", ("review",)),
@@ -80,18 +80,18 @@ environment variables, the nearest parent folder with a fault_library/, the copi
 """
 
 
-class Verbs(TyperGroup):
+class GroupedSubcommands(TyperGroup):
     """The subcommands, grouped by purpose in the help."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        for title, names in GROUPS:
+        for title, names in SUBCOMMAND_GROUPS:
             rows = [(name, self.commands[name].get_short_help_str(90)) for name in names]
             with formatter.section(title):
                 formatter.write_dl(rows, col_max=12)
 
 
 app = typer.Typer(
-    cls=Verbs,
+    cls=GroupedSubcommands,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     epilog=EXAMPLES,
@@ -99,14 +99,14 @@ app = typer.Typer(
 )
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _print_version(is_requested: bool) -> None:
+    if is_requested:
         typer.echo(f"mutator {VERSION}")
         raise typer.Exit
 
 
 @app.callback()
-def start(
+def store_place(
     ctx: typer.Context,
     root: Root = None,
     library: Library = None,
@@ -114,11 +114,13 @@ def start(
     target: Target = None,
     sandbox: Sandbox = None,
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Inject faults into a driving controller, simulate it, and see the effects."""
-    ctx.obj = Place(root=root, library=library, templates=templates, target=target, sandbox=sandbox)
+    ctx.obj = WorkspaceOptions(
+        root=root, library=library, templates=templates, target=target, sandbox=sandbox
+    )
 
 
 for module in (
@@ -158,10 +160,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as standard error does by default
     try:
-        code = _answer(sys.argv[1:] if argv is None else argv)
+        code = _run_command_line(sys.argv[1:] if argv is None else argv)
         sys.stdout.flush()  # at exit, the interpreter would report a closed pipe as an error
     except BrokenPipeError:  # the reader has closed the pipe
-        discard(sys.stdout)
+        discard_output(sys.stdout)
         return EXIT_OK
     return code
 
@@ -181,22 +183,22 @@ def _open_streams() -> None:
 
 
 @cache
-def _command() -> Any:
+def _click_command() -> Any:
     """Return the program with its subcommands, whose options take long to collect."""
     return get_command(app)
 
 
-def _answer(words: Sequence[str]) -> int:
+def _run_command_line(argv: Sequence[str]) -> int:
     try:
         progress_events.open_events()
         # Not `app()`, which has its own handling of errors, interrupts and closed pipes.
-        command = _command()
+        command = _click_command()
         if "_MUTATOR_COMPLETE" in os.environ:  # a shell asks for completions
             command.main(prog_name="mutator")
         with (
             _warnings_in_one_line(),
             interruptible(),
-            command.make_context("mutator", [*words] or ["--help"]) as ctx,
+            command.make_context("mutator", [*argv] or ["--help"]) as ctx,
         ):
             command.invoke(ctx)
         return EXIT_OK
@@ -208,20 +210,20 @@ def _answer(words: Sequence[str]) -> int:
         show_error(e)
         return e.exit_code
     except typer.TyperException as e:
-        return _usage(e)
+        return _report_usage_error(e)
     except (typer.Abort, KeyboardInterrupt) as e:
-        _say(str(e) or "interrupted")
+        _print_error(str(e) or "interrupted")
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         raise
     except Exception as e:
-        if (known := _known(e)) is None:
-            return _defect()
-        show_error(known)
-        return known.exit_code
+        if (machine_error := _machine_error(e)) is None:
+            return _report_defect()
+        show_error(machine_error)
+        return machine_error.exit_code
 
 
-def _known(error: Exception) -> MutatorError | None:
+def _machine_error(error: Exception) -> MutatorError | None:
     """Return a MutatorError for an error that the user can fix on the machine, or None."""
     where = getattr(error, "filename", None)
     if is_disk_full_error(error):
@@ -229,13 +231,13 @@ def _known(error: Exception) -> MutatorError | None:
     if short := find_shortage(error):
         return short
     if isinstance(error, UnicodeEncodeError) and isinstance(error.object, str):
-        return _no_text(error.object[error.start : error.end])
-    if isinstance(error, OSError) and error.errno in THE_MACHINE_SAYS_NO:
+        return _encoding_error(error.object[error.start : error.end])
+    if isinstance(error, OSError) and error.errno in _PERMISSION_ERRORS:
         return MutatorError(str(error.strerror), where=where, remedy="choose another folder")
     return None
 
 
-def _no_text(characters: str) -> MutatorError:
+def _encoding_error(characters: str) -> MutatorError:
     return MutatorError(
         f"{characters!a} cannot be encoded in this environment",
         expected="names in UTF-8 and a UTF-8 locale",
@@ -246,21 +248,21 @@ def _no_text(characters: str) -> MutatorError:
 @contextmanager
 def _warnings_in_one_line() -> Iterator[None]:
     with warnings.catch_warnings():
-        others = warnings.showwarning
+        show_other_warning = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
             if issubclass(category, MutatorWarning):
                 progress_events.report_warning(str(message))
                 Terminal().note(f"warning: {message}")
             else:
-                others(message, category, *place, **more)
+                show_other_warning(message, category, *place, **more)
 
         warnings.simplefilter("always", MutatorWarning)
         warnings.showwarning = show
         yield
 
 
-def _usage(error: typer.TyperException) -> int:
+def _report_usage_error(error: typer.TyperException) -> int:
     ctx = getattr(error, "ctx", None)
     remedy = f"see `{ctx.command_path} --help`" if ctx else "see `mutator --help`"
     message = error.format_message().rstrip(".").replace("Value error, ", "")
@@ -269,15 +271,17 @@ def _usage(error: typer.TyperException) -> int:
     return EXIT_WRONG_INPUT
 
 
-def _defect() -> int:
-    _say(traceback.format_exc().rstrip())
-    _say("this is a bug in mutator, not in your input; please report it together with the lines above")
+def _report_defect() -> int:
+    _print_error(traceback.format_exc().rstrip())
+    _print_error(
+        "this is a bug in mutator, not in your input; please report it together with the lines above"
+    )
     return EXIT_HARNESS_ERRORS
 
 
-def _say(text: str) -> None:
+def _print_error(text: str) -> None:
     progress_events.report_error(text)
-    with remarking():
+    with ignoring_output_errors():
         print(text, file=sys.stderr)
 
 

@@ -9,8 +9,8 @@ import typer
 import mutator
 from mutator.cli import completion
 from mutator.cli.console import Terminal, error_text, short_path
-from mutator.cli.options import Json, Place, with_place
-from mutator.cli.run_folders import library_if_any
+from mutator.cli.options import Json, WorkspaceOptions, with_workspace_options
+from mutator.cli.run_folders import workspace_if_any
 from mutator.errors import EXIT_CHECK_FAILED
 
 
@@ -33,7 +33,7 @@ Examples:
 """
 
 
-@with_place
+@with_workspace_options
 def verify(
     run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=completion.runs)],
     rerun: Annotated[int, typer.Option(metavar="N", min=0, help="Rerun N randomly drawn experiments.")] = 0,
@@ -58,14 +58,14 @@ def verify(
     ] = False,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Audit a run folder and print the result on one page.
 
     The exit code is 1 if anything was changed or does not follow from the plan and the sources.
     """
     terminal = Terminal(as_json)
-    with terminal.wait("verifying"):
+    with terminal.show_spinner("verifying"):
         audit = mutator.verify(
             run,
             rerun=rerun,
@@ -74,7 +74,7 @@ def verify(
             signed_by=signed_by,
             report=report,
             repair=repair,
-            workspace=library_if_any(place),
+            workspace=workspace_if_any(workspace_options),
         )
     if as_json:
         checks = [
@@ -83,7 +83,7 @@ def verify(
         ]
         facts = {"run": str(run), "passed": audit.passed, **asdict(audit.seals), "facts": audit.facts}
         facts |= {"signer": audit.signer, "not_sealed": audit.not_sealed}
-        terminal.emit(facts | {"checks": checks, "repaired": audit.repaired})
+        terminal.print_json(facts | {"checks": checks, "repaired": audit.repaired})
     terminal.say(str(audit))
     if not audit.passed:
         raise typer.Exit(EXIT_CHECK_FAILED)
@@ -101,10 +101,10 @@ def seal(
     The signature is stored in the run folder: seal.json and seal.json.sig. `verify --signed-by` checks it.
     """
     terminal = Terminal(as_json)
-    with terminal.wait("computing the digests"):
+    with terminal.show_spinner("computing the digests"):
         seals = mutator.seal(run, sign=sign)
     if as_json:
-        terminal.emit({"run": str(run), "signed": sign is not None, **asdict(seals)})
+        terminal.print_json({"run": str(run), "signed": sign is not None, **asdict(seals)})
     for name, value in seals.texts().items():
         terminal.say(f"{name}: {value}")
     if sign:

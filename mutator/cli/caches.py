@@ -15,7 +15,7 @@ from mutator.errors import MutatorError
 if TYPE_CHECKING:
     from mutator._common.shared_cache import CacheEntry
 
-_UNITS = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
+_BYTES_BY_UNIT = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
 
 def register(app: typer.Typer) -> None:
@@ -33,7 +33,7 @@ Examples:
 
 def cache(
     path: Annotated[bool, typer.Option("--path", help="Print the folder and nothing else.")] = False,
-    most: Annotated[
+    max_size: Annotated[
         str | None,
         typer.Option(
             "--max",
@@ -50,50 +50,52 @@ def cache(
     that golden runs execute, previews of image effects, and a list of verified runs. It is in XDG_CACHE_HOME
     or ~/.cache. Results never depend on the cache; without it, runs take longer.
     """
-    if path + clear + (most is not None) > 1:
+    if path + clear + (max_size is not None) > 1:
         raise MutatorError("--path, --max and --clear together", expected="one of them")
     if path:
         typer.echo(mutator.cache_folder())
         return
     terminal = Terminal(as_json)
     deleted = mutator.clear_caches() if clear else None
-    if most is not None:
-        deleted = mutator.prune_caches(parse_size(most))
-    kept = mutator.cache_entries()
+    if max_size is not None:
+        deleted = mutator.prune_caches(parse_size(max_size))
+    entries = mutator.cache_entries()
     if as_json:
-        document = {"path": str(mutator.cache_folder()), "kept": _facts(kept)}
-        terminal.emit(document if deleted is None else {**document, "deleted": _facts(deleted)})
+        document = {"path": str(mutator.cache_folder()), "kept": _entries_as_json(entries)}
+        terminal.print_json(
+            document if deleted is None else {**document, "deleted": _entries_as_json(deleted)}
+        )
         return
     if deleted is not None:
-        terminal.say(f"deleted {counted(len(deleted), 'entry', 'entries')}, {_size(deleted)}")
-    rows = [(what, len(of), _size(of)) for what, of in _by_what(kept).items()]
-    rows.append(("total", len(kept), _size(kept)))
-    terminal.table(("what", "entries", "size"), rows, right=(1, 2), total=True)
+        terminal.say(f"deleted {counted(len(deleted), 'entry', 'entries')}, {_describe_size(deleted)}")
+    rows = [(what, len(of), _describe_size(of)) for what, of in _entries_by_kind(entries).items()]
+    rows.append(("total", len(entries), _describe_size(entries)))
+    terminal.print_table(("what", "entries", "size"), rows, right=(1, 2), total=True)
     terminal.say(f"in {short_path(mutator.cache_folder())}")
 
 
 def parse_size(text: str) -> int:
     """Return the number of bytes of a size such as 2GB, 500 MB or 0; MutatorError otherwise."""
-    found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kKMGT]?B)?", text.strip())
-    if not found:
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kKMGT]?B)?", text.strip())
+    if not match:
         raise MutatorError(
             f"size '{text}'", expected="a number of B, kB, MB, GB or TB", remedy="write e.g. 2GB"
         )
-    return int(float(found[1]) * _UNITS[(found[2] or "B").upper()])
+    return int(float(match[1]) * _BYTES_BY_UNIT[(match[2] or "B").upper()])
 
 
-def _by_what(entries: "Sequence[CacheEntry]") -> "dict[str, list[CacheEntry]]":
+def _entries_by_kind(entries: "Sequence[CacheEntry]") -> "dict[str, list[CacheEntry]]":
     groups: dict[str, list[CacheEntry]] = {}
     for entry in entries:
         groups.setdefault(entry.what, []).append(entry)
     return groups
 
 
-def _size(entries: "Sequence[CacheEntry]") -> str:
+def _describe_size(entries: "Sequence[CacheEntry]") -> str:
     size = sum(entry.size for entry in entries)
-    unit = next((unit for unit in ("GB", "MB") if size >= _UNITS[unit]), "KB")
-    return f"{size / _UNITS[unit]:.1f} {unit.replace('K', 'k')}"
+    unit = next((unit for unit in ("GB", "MB") if size >= _BYTES_BY_UNIT[unit]), "KB")
+    return f"{size / _BYTES_BY_UNIT[unit]:.1f} {unit.replace('K', 'k')}"
 
 
-def _facts(entries: "Sequence[CacheEntry]") -> list[dict[str, object]]:
+def _entries_as_json(entries: "Sequence[CacheEntry]") -> list[dict[str, object]]:
     return [{"what": e.what, "path": str(e.path), "bytes": e.size} for e in entries]

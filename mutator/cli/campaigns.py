@@ -23,15 +23,15 @@ from mutator.cli.options import (
     Json,
     Limit,
     Only,
-    OutRun,
-    Place,
+    OutRunFolder,
     Reading,
     Seed,
     SeriesMb,
-    ShardOf,
-    with_place,
+    Shard,
+    WorkspaceOptions,
+    with_workspace_options,
 )
-from mutator.cli.run_folders import show_counts
+from mutator.cli.run_folders import print_counts
 from mutator.errors import MutatorError
 from mutator.execution.progress_text import duration
 
@@ -50,7 +50,7 @@ CampaignName = Annotated[
     ),
 ]
 
-ONE_PER_CORE = "Default: one per usable core."
+WORKERS_DEFAULT_HELP = "Default: one per usable core."
 
 
 def register(app: typer.Typer) -> None:
@@ -65,13 +65,15 @@ Examples:
 """
 
 
-@with_place
+@with_workspace_options
 def plan(
     campaign: CampaignName,
-    out: OutRun,
+    out: OutRunFolder,
     workers: Annotated[
         int | None,
-        typer.Option("-n", "--workers", min=1, help=f"Estimate for this many workers. {ONE_PER_CORE}"),
+        typer.Option(
+            "-n", "--workers", min=1, help=f"Estimate for this many workers. {WORKERS_DEFAULT_HELP}"
+        ),
     ] = None,
     only: Only = None,
     exclude: Exclude = None,
@@ -80,70 +82,86 @@ def plan(
     reading: Reading = None,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Freeze a campaign's experiments without running any.
 
     Prints the expected time and disk space. `run` with the same folder then runs exactly these experiments.
     """
-    from mutator.api.plans import not_forkable
+    from mutator.api.plans import reasons_not_to_fork
 
     terminal = Terminal(as_json)
-    workspace = place.workspace()
-    chosen = mutator.Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
-    with terminal.wait("planning"):
-        made = mutator.plan(campaign, out, choices=chosen, workspace=workspace)
+    workspace = workspace_options.workspace()
+    choices = mutator.Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
+    with terminal.show_spinner("planning"):
+        new_plan = mutator.plan(campaign, out, choices=choices, workspace=workspace)
     folder = out.resolve()
-    anew = not_forkable(made, workspace)
-    cost = made.cost(workers or usable_cores())
+    reason_by_variant = reasons_not_to_fork(new_plan, workspace)
+    cost = new_plan.cost(workers or usable_cores())
     if as_json:
-        _emit_plan(terminal, folder, made, cost, anew)
-    _print_plan(terminal, made, cost, anew)
-    terminal.say(f"plan: {short_path(folder / 'plan.csv')} (digest {made.digest[:16]})")
+        _print_plan_as_json(terminal, folder, new_plan, cost, reason_by_variant)
+    _print_plan(terminal, new_plan, cost, reason_by_variant)
+    terminal.say(f"plan: {short_path(folder / 'plan.csv')} (digest {new_plan.digest[:16]})")
     command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
     terminal.say(f"run it: {shlex.join(command)}", whole=True)
 
 
-def _emit_plan(
-    terminal: Terminal, folder: Path, made: "mutator.Plan", cost: "Cost", anew: dict[str, str]
+def _print_plan_as_json(
+    terminal: Terminal,
+    folder: Path,
+    new_plan: "mutator.Plan",
+    cost: "Cost",
+    reason_by_variant: dict[str, str],
 ) -> None:
     kinds = [
-        {"module": m, "fault_type": f, "method": how, "experiments": n}
-        for (m, f, how), n in sorted(made.groups().items())
+        {"module": m, "fault_type": f, "method": method, "experiments": n}
+        for (m, f, method), n in sorted(new_plan.groups().items())
     ]
-    facts = {"run": str(folder), "digest": made.digest, "seed": made.seed, "reading": made.reading}
-    facts |= {"seeds": [made.seeds[0], made.seeds[-1]]} if len(made.seeds) > 1 else {}
-    facts |= {"experiments": len(made.experiments), "runs": made.runs, "groups": kinds, "cost": cost}
-    terminal.emit(facts | {"not_forked": anew})
+    facts = {
+        "run": str(folder),
+        "digest": new_plan.digest,
+        "seed": new_plan.seed,
+        "reading": new_plan.reading,
+    }
+    facts |= {"seeds": [new_plan.seeds[0], new_plan.seeds[-1]]} if len(new_plan.seeds) > 1 else {}
+    facts |= {"experiments": len(new_plan.experiments), "runs": new_plan.runs, "groups": kinds, "cost": cost}
+    terminal.print_json(facts | {"not_forked": reason_by_variant})
 
 
-def _print_plan(terminal: Terminal, made: "mutator.Plan", cost: "Cost", anew: dict[str, str]) -> None:
-    groups = sorted(made.groups().items())
+def _print_plan(
+    terminal: Terminal, new_plan: "mutator.Plan", cost: "Cost", reason_by_variant: dict[str, str]
+) -> None:
+    groups = sorted(new_plan.groups().items())
     rows = [(f"{module}/{kind}", method, n) for (module, kind, method), n in groups]
-    terminal.table(
+    terminal.print_table(
         ["fault type", "method", "experiments"],
-        [*rows, ("total", "", len(made.experiments))],
+        [*rows, ("total", "", len(new_plan.experiments))],
         right=(2,),
         total=True,
     )
-    for text in made.told:
+    for text in new_plan.told:
         terminal.say(text)
-    if len(made.seeds) > 1:
+    if len(new_plan.seeds) > 1:
         terminal.say(
-            f"{describe_seeds(made.seeds)}: {len(made.goldens())} golden runs (each seed has its own)"
+            f"{describe_seeds(new_plan.seeds)}: {len(new_plan.goldens())} golden runs (each seed has its own)"
         )
-    if shared := len(made.experiments) - made.runs:
-        terminal.say(f"runs: {made.runs}; experiments that reuse another scenario's identical run: {shared}")
-    for why, variants in _by_reason(anew).items():
-        terminal.say(f"only the reference engine can run {', '.join(variants)}: {why}")
-    terminal.say(f"expected: {_cost_line(cost)}")
+    if sharing := len(new_plan.experiments) - new_plan.runs:
+        terminal.say(
+            f"runs: {new_plan.runs}; experiments that reuse another scenario's identical run: {sharing}"
+        )
+    for reason, variants in _variants_by_reason(reason_by_variant).items():
+        terminal.say(f"only the reference engine can run {', '.join(variants)}: {reason}")
+    terminal.say(f"expected: {_describe_cost(cost)}")
 
 
-def _by_reason(found: dict[str, str]) -> dict[str, list[str]]:
-    return {why: [name for name in found if found[name] == why] for why in found.values()}
+def _variants_by_reason(reason_by_variant: dict[str, str]) -> dict[str, list[str]]:
+    return {
+        reason: [name for name in reason_by_variant if reason_by_variant[name] == reason]
+        for reason in reason_by_variant.values()
+    }
 
 
-def _cost_line(cost: "Cost") -> str:
+def _describe_cost(cost: "Cost") -> str:
     source = "measured in this folder" if cost.measured else "estimated with a default time per run"
     time, disk = duration(cost.wall_s), cost.disk_bytes / 1e6
     who = counted(cost.workers, "worker")
@@ -162,14 +180,14 @@ The same command resumes an interrupted or killed run.
 """
 
 
-@with_place
+@with_workspace_options
 def run(
     campaign: CampaignName,
-    out: OutRun,
+    out: OutRunFolder,
     workers: Annotated[
         int | None,
         typer.Option(
-            "-n", "--workers", min=0, help=f"Worker processes; 0: only this process. {ONE_PER_CORE}"
+            "-n", "--workers", min=0, help=f"Worker processes; 0: only this process. {WORKERS_DEFAULT_HELP}"
         ),
     ] = None,
     only: Only = None,
@@ -177,7 +195,7 @@ def run(
     limit: Limit = None,
     seed: Seed = None,
     reading: Reading = None,
-    shard: ShardOf = None,
+    shard: Shard = None,
     series_mb: SeriesMb = None,
     engine: Engine = None,
     reviewed: Annotated[
@@ -198,23 +216,25 @@ def run(
     ] = True,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Run or resume a campaign; print its results and write its report."""
     from mutator.cli.progress_display import campaign_progress
 
     terminal = Terminal(as_json)
-    workspace = place.workspace()
-    chosen = mutator.Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
-    chosen = replace(chosen, series_mb=series_mb)
+    workspace = workspace_options.workspace()
+    choices = mutator.Choices(
+        seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard
+    )
+    choices = replace(choices, series_mb=series_mb)
     workers = usable_cores() if workers is None else workers
     try:
         with campaign_progress(terminal) as notify, warnings.catch_warnings():
-            warnings.simplefilter("ignore", mutator.IncompleteRun)  # `_print_end` reports it
-            made = mutator.run(
+            warnings.simplefilter("ignore", mutator.IncompleteRun)  # `_print_summary` reports it
+            finished_run = mutator.run(
                 campaign,
                 out,
-                choices=chosen,
+                choices=choices,
                 workers=workers,
                 engine=engine,
                 reviewed=reviewed,
@@ -224,15 +244,15 @@ def run(
                 progress=notify,
                 workspace=workspace,
             )
-            if stills and made.summary and made.summary.exit_code == 0:
-                _take_stills(terminal, made, notify, workers)
-            written = _report(out, made, notify)
+            if stills and finished_run.summary and finished_run.summary.exit_code == 0:
+                _take_stills(terminal, finished_run, notify, workers)
+            report = _write_report(out, finished_run, notify)
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; finished experiments are kept; resume: {resume_command()}") from None
-    assert made.summary is not None  # `mutator.run` always sets it
-    _print_end(terminal, out, made, made.summary, written)
-    if made.summary.exit_code:
-        raise typer.Exit(made.summary.exit_code)
+    assert finished_run.summary is not None  # `mutator.run` always sets it
+    _print_summary(terminal, out, finished_run, finished_run.summary, report)
+    if finished_run.summary.exit_code:
+        raise typer.Exit(finished_run.summary.exit_code)
 
 
 def _take_stills(terminal: Terminal, run: "Run", notify: "Notify", workers: int) -> None:
@@ -240,7 +260,7 @@ def _take_stills(terminal: Terminal, run: "Run", notify: "Notify", workers: int)
         terminal.note(f"no stills of {problem}")
 
 
-def _report(out: Path, run: "Run", notify: "Notify") -> "WrittenReport | None":
+def _write_report(out: Path, run: "Run", notify: "Notify") -> "WrittenReport | None":
     if not (run.summary and run.summary.results):
         return None
     notify(mutator.Progress(stage="report"))
@@ -256,28 +276,30 @@ def _report(out: Path, run: "Run", notify: "Notify") -> "WrittenReport | None":
         ) from None
 
 
-def _print_end(
-    terminal: Terminal, out: Path, run: "Run", summary: "Summary", written: "WrittenReport | None"
+def _print_summary(
+    terminal: Terminal, out: Path, run: "Run", summary: "Summary", report: "WrittenReport | None"
 ) -> None:
-    report = (
-        [out / path.relative_to(run.path) for path in (written.markdown, written.page)] if written else []
+    report_paths = (
+        [out / path.relative_to(run.path) for path in (report.markdown, report.page)] if report else []
     )
     if terminal.as_json:
         counts = {"planned": summary.planned, "done": summary.done, "ran": summary.ran}
-        paths = {"run": str(out), "report": str(report[0]) if report else None}
+        paths = {"run": str(out), "report": str(report_paths[0]) if report_paths else None}
         errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
-        found = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
-        terminal.emit(counts | paths | found | asdict(summary.seals) | {"not_forked": summary.not_forked})
-    if written:
-        show_counts(terminal, run)
+        outcomes = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
+        terminal.print_json(
+            counts | paths | outcomes | asdict(summary.seals) | {"not_forked": summary.not_forked}
+        )
+    if report:
+        print_counts(terminal, run)
     terminal.say(
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now; "
         f"checks, experiments and proof took {duration(summary.elapsed_s)}"
     )
     if summary.proof_note:
         terminal.say(f"proof: {summary.proof_note}")
-    if written:
-        terminal.say(f"report: {report[0]} and {report[1]}")
+    if report:
+        terminal.say(f"report: {report_paths[0]} and {report_paths[1]}")
     for name, value in summary.seals.texts().items():
         terminal.say(f"{name}: {value}")
     if summary.harness_errors:
@@ -287,7 +309,7 @@ def _print_end(
         for name, detail in summary.harness_errors[:5]:
             terminal.say(f"  {name}: {detail}", style="red")
     if summary.problem:
-        terminal.complain(summary.problem)
+        terminal.print_error(summary.problem)
     if summary.interrupted or summary.done < summary.planned:
         terminal.say(f"resume: {resume_command()}", style="bold", whole=True)
 

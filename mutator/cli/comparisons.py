@@ -15,8 +15,8 @@ from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 if TYPE_CHECKING:
     from mutator.comparison.run_comparison import Comparison, GateFinding
 
-NAMED = 20  # experiments listed in the terminal; the written comparison lists all of them
-GATES = (
+MOST_LISTED = 20  # experiments listed in the terminal; the written comparison lists all of them
+GATES_HELP = (
     "new-hazard, other-hazard, higher-severity, earlier-hazard, lost-alert, worse, new-crash, harness-error, "
     "unmatched, severity:CLASS (S0 to S3: RUN_B has a contact of that class or worse, RUN_A a milder one or "
     "none)"
@@ -63,7 +63,7 @@ def compare(
     only: Only = None,
     fail_on: Annotated[
         list[str] | None,
-        typer.Option("--fail-on", metavar="KIND,...", help=f"Fail on these changes: {GATES}."),
+        typer.Option("--fail-on", metavar="KIND,...", help=f"Fail on these changes: {GATES_HELP}."),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -74,78 +74,88 @@ def compare(
     and CSV.
     """
     terminal = Terminal(as_json)
-    gates = _gates(fail_on or [])
-    with terminal.wait("comparing"):
-        compared = mutator.compare(run_a, run_b, only=only)
-        written = compared.write(out)
-    found, failing = compared.comparison, compared.findings(gates)
+    gates = _parse_gates(fail_on or [])
+    with terminal.show_spinner("comparing"):
+        run_comparison = mutator.compare(run_a, run_b, only=only)
+        written = run_comparison.write(out)
+    comparison, failing = run_comparison.comparison, run_comparison.findings(gates)
     if as_json:
-        terminal.emit(
-            _as_json(compared, failing) | {"page": str(written.page), "pairs_csv": str(written.pairs)}
+        terminal.print_json(
+            _comparison_as_json(run_comparison, failing)
+            | {"page": str(written.page), "pairs_csv": str(written.pairs)}
         )
     else:
-        _show(terminal, compared)
+        _print_comparison(terminal, run_comparison)
         terminal.say(f"comparison: {short_path(written.markdown)} and {short_path(written.page)}")
-    _judge(terminal, found, gates, failing)
+    _fail_on_findings(terminal, comparison, gates, failing)
 
 
-def _gates(texts: list[str]) -> "list[mutator.Gate]":
+def _parse_gates(texts: list[str]) -> "list[mutator.Gate]":
     names = [name.strip() for text in texts for name in text.split(",")]
-    known = [gate.value for gate in mutator.Gate]
-    if strangers := [name for name in names if name not in known]:
-        raise MutatorError(f"'{strangers[0]}'", where="--fail-on", expected=f"one of {', '.join(known)}")
+    gate_names = [gate.value for gate in mutator.Gate]
+    if unknown := [name for name in names if name not in gate_names]:
+        raise MutatorError(f"'{unknown[0]}'", where="--fail-on", expected=f"one of {', '.join(gate_names)}")
     return [mutator.Gate(name) for name in dict.fromkeys(names)]
 
 
-def _show(terminal: Terminal, compared: "mutator.RunComparison") -> None:
-    found = compared.comparison
-    if found.parts_remark:
-        terminal.say(found.parts_remark, style="bold")
+def _print_comparison(terminal: Terminal, run_comparison: "mutator.RunComparison") -> None:
+    comparison = run_comparison.comparison
+    if comparison.parts_remark:
+        terminal.say(comparison.parts_remark, style="bold")
         terminal.say()
-    differing = [(f.name, f.a, f.b) for f in found.facts if f.is_different]
+    differing = [(f.name, f.a, f.b) for f in comparison.facts if f.is_different]
     if differing:
-        terminal.table(["what differs", found.names.a, found.names.b], differing)
-        terminal.say(compared.files_text)
+        terminal.print_table(["what differs", comparison.names.a, comparison.names.b], differing)
+        terminal.say(run_comparison.files_text)
         terminal.say()
-    for sheet in found.sheets:
+    for sheet in comparison.sheets:
         if sheet.name.endswith("_by_fault_type"):
             continue
         terminal.say(sheet.title, style="bold")
         heads, lines = list(sheet.heads), sheet.table().rows
-        terminal.table(heads, lines, right=range(1, len(heads)), total=sheet.name == "changes")
+        terminal.print_table(heads, lines, right=range(1, len(heads)), total=sheet.name == "changes")
         terminal.say()
-    terminal.say(compared.summary)
-    for remark in found.remarks:
-        if remark != found.parts_remark:
+    terminal.say(run_comparison.summary)
+    for remark in comparison.remarks:
+        if remark != comparison.parts_remark:
             terminal.say(remark)
 
 
-def _as_json(compared: "mutator.RunComparison", failing: "tuple[GateFinding, ...]") -> dict[str, object]:
-    found = compared.comparison
+def _comparison_as_json(
+    run_comparison: "mutator.RunComparison", failing: "tuple[GateFinding, ...]"
+) -> dict[str, object]:
+    comparison = run_comparison.comparison
     return {
-        "run_a": str(found.a.folder.path),
-        "run_b": str(found.b.folder.path),
-        "pairs": len(found.pairs),
-        "changed": len(found.changed_pairs),
-        "changes": compared.changes,
-        "not_compared": compared.not_compared,
-        "differs": [fact for fact in found.facts if fact.is_different],
-        "files": found.files,
-        "remarks": list(found.remarks),
-        "tables": {s.name: [dict(zip(s.heads, line, strict=True)) for line in s.lines] for s in found.sheets},
+        "run_a": str(comparison.a.folder.path),
+        "run_b": str(comparison.b.folder.path),
+        "pairs": len(comparison.pairs),
+        "changed": len(comparison.changed_pairs),
+        "changes": run_comparison.changes,
+        "not_compared": run_comparison.not_compared,
+        "differs": [fact for fact in comparison.facts if fact.is_different],
+        "files": comparison.files,
+        "remarks": list(comparison.remarks),
+        "tables": {
+            s.name: [dict(zip(s.heads, line, strict=True)) for line in s.lines] for s in comparison.sheets
+        },
         "failing": failing,
     }
 
 
-def _judge(
-    terminal: Terminal, found: "Comparison", gates: "list[mutator.Gate]", failing: "tuple[GateFinding, ...]"
+def _fail_on_findings(
+    terminal: Terminal,
+    comparison: "Comparison",
+    gates: "list[mutator.Gate]",
+    failing: "tuple[GateFinding, ...]",
 ) -> None:
-    for finding in failing[:NAMED]:
-        terminal.complain(f"{finding.gate.value}: {finding.description} [{finding.experiment_id}]")
-    if more := failing[NAMED:]:
-        terminal.complain(f"and {len(more)} more")
+    for finding in failing[:MOST_LISTED]:
+        terminal.print_error(f"{finding.gate.value}: {finding.description} [{finding.experiment_id}]")
+    if unlisted := failing[MOST_LISTED:]:
+        terminal.print_error(f"and {len(unlisted)} more")
     if failing:
         raise typer.Exit(EXIT_CHECK_FAILED)
-    if gates and found.missing_result_count:
-        terminal.complain(f"{counted(found.missing_result_count, 'result')} missing: finish both runs first")
+    if gates and comparison.missing_result_count:
+        terminal.print_error(
+            f"{counted(comparison.missing_result_count, 'result')} missing: finish both runs first"
+        )
         raise typer.Exit(EXIT_HARNESS_ERRORS)

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 NO_BREAK = "\u00a0"  # printed as a space at which text is not folded
-_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")  # not tabs and new lines
-PIPE_COLUMNS = 100  # line width outside a terminal, unless COLUMNS is set
+_CONTROL_PATTERN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")  # not tabs and new lines
+PIPE_LINE_WIDTH = 100  # line width outside a terminal, unless COLUMNS is set
 
-STYLES = {
+STYLE_BY_ENDING = {
     "ok": "green",
     "hazard": "bold red",
     "sdc": "yellow",
@@ -46,51 +46,51 @@ STYLES = {
 
 @dataclass
 class Terminal:
-    """Standard output and standard error of a command. With `as_json`, only `emit` writes output."""
+    """Standard output and standard error of a command. With `as_json`, only `print_json` writes output."""
 
     as_json: bool = False
 
     @cached_property
     def out(self) -> "Console":
-        return _console(stderr=False)
+        return _build_console(stderr=False)
 
     @cached_property
     def err(self) -> "Console":
-        return _console(stderr=True)
+        return _build_console(stderr=True)
 
     def say(self, text: str = "", style: str | None = None, *, whole: bool = False) -> None:
         """Print text; fold it unless `whole` is set, as for a command to copy."""
         if not self.as_json:
-            _print(self.out, text, style, whole=whole)
+            _print_text(self.out, text, style, whole=whole)
 
-    def result(self, text: str, style: str | None = None) -> None:
+    def print_result(self, text: str, style: str | None = None) -> None:
         """Print the sentence that says what came out of the command."""
         progress_events.report_result(text)
         self.say(text, style)
 
-    def link(self, kind: str, path: Path, text: str | None = None) -> None:
+    def print_link(self, kind: str, path: Path, text: str | None = None) -> None:
         """Print where a file was written: `kind: path`, or `text`."""
         progress_events.report_link(kind, path)
         self.say(text or f"{kind}: {short_path(path)}")
 
     def note(self, text: str) -> None:
         """Print a remark to standard error, so that a pipe gets only the result."""
-        with remarking():
-            _print(self.err, text, "dim")
+        with ignoring_output_errors():
+            _print_text(self.err, text, "dim")
 
-    def complain(self, text: str) -> None:
+    def print_error(self, text: str) -> None:
         """Print an error to standard error."""
         progress_events.report_error(text)
-        with remarking():
-            _print(self.err, f"error: {text}", "bold red")
+        with ignoring_output_errors():
+            _print_text(self.err, f"error: {text}", "bold red")
 
-    def emit(self, data: Any) -> None:
+    def print_json(self, data: Any) -> None:
         """Print the result as one JSON document; infinity and NaN become null."""
         is_narrow = codecs.lookup(sys.stdout.encoding).name != "utf-8"
-        json.dump(_jsonable(data), sys.stdout, indent=2, ensure_ascii=is_narrow, allow_nan=False)
+        json.dump(_as_json(data), sys.stdout, indent=2, ensure_ascii=is_narrow, allow_nan=False)
         sys.stdout.write("\n")
 
-    def table(
+    def print_table(
         self,
         heads: Sequence[str],
         rows: Iterable[Sequence[object]],
@@ -99,15 +99,15 @@ class Terminal:
         total: bool = False,
     ) -> None:
         """Print a table; columns in `right` are right-aligned; `total` sets the last row apart."""
-        cells = [[_cell(c) for c in row] for row in rows]
+        cells = [[_cell_text(c) for c in row] for row in rows]
         if self.as_json:
             return
         if self.out.is_terminal:
-            self.out.print(_rich_table(heads, cells, right, total))
+            self.out.print(_build_rich_table(heads, cells, right, total))
         else:
             self.say(TextTable(heads=heads, rows=cells, right_aligned=right).as_text(), whole=True)
 
-    def diff(self, patch: str) -> None:
+    def print_diff(self, patch: str) -> None:
         """Print a unified diff: coloured in a terminal, elsewhere unchanged, as `patch` needs it."""
         if self.as_json:
             return
@@ -124,7 +124,7 @@ class Terminal:
         self.out.print(text, soft_wrap=True, end="")
 
     @contextmanager
-    def wait(self, text: str) -> Iterator[None]:
+    def show_spinner(self, text: str) -> Iterator[None]:
         progress_events.report_phase(text)
         if self.as_json or not self.err.is_terminal:
             yield
@@ -137,7 +137,7 @@ class Terminal:
             yield
 
     @contextmanager
-    def count(self, total: int, what: str) -> Iterator[Callable[[], None]]:
+    def show_count(self, total: int, what: str) -> Iterator[Callable[[], None]]:
         """Show a progress bar of `total` equal steps; yield the function to call after each step."""
         if self.as_json or not self.err.is_terminal:
             yield lambda: None
@@ -156,7 +156,7 @@ class Terminal:
 
 
 # options whose name differs from the API's argument
-_OPTIONS = {
+_OPTION_BY_ARGUMENT = {
     "armed_after_s": "--armed-after",
     "gates": "--fail-on",
     "reviewed": "--require-reviewed",
@@ -169,27 +169,29 @@ _OPTIONS = {
 }
 
 
-def option(argument: str) -> str:
-    return _OPTIONS.get(argument) or "--" + argument.replace("_", "-")
+def option_of(argument: str) -> str:
+    return _OPTION_BY_ARGUMENT.get(argument) or "--" + argument.replace("_", "-")
 
 
-def with_options(error: MutatorError, own: Mapping[str, str] = MappingProxyType({})) -> MutatorError:
+def with_options(
+    error: MutatorError, command_options: Mapping[str, str] = MappingProxyType({})
+) -> MutatorError:
     """Return the error with options instead of API arguments; `own` has options of a single command."""
     if error.argument is None:
         return error
 
-    def named(argument: str) -> str:
-        return own.get(argument) or option(argument)
+    def option_name(argument: str) -> str:
+        return command_options.get(argument) or option_of(argument)
 
-    remedy = error.remedy and re.sub(r"`([a-z_]+)`", lambda found: named(found[1]), error.remedy)
-    place = error.where or named(error.argument)
+    remedy = error.remedy and re.sub(r"`([a-z_]+)`", lambda match: option_name(match[1]), error.remedy)
+    place = error.where or option_name(error.argument)
     return MutatorError(error.got, where=place, line=error.line, expected=error.expected, remedy=remedy)
 
 
 def show_error(error: MutatorError) -> None:
     terminal, error = Terminal(), with_options(error)
     place = short_path(error.where) + (f":{error.line}" if error.line is not None else "")
-    terminal.complain(f"{place}: {error.got}" if place else error.got)
+    terminal.print_error(f"{place}: {error.got}" if place else error.got)
     if error.expected:
         terminal.note(f"  expected: {error.expected}")
     if error.remedy:
@@ -204,7 +206,7 @@ def error_text(error: MutatorError) -> str:
     )
 
 
-def _rich_table(
+def _build_rich_table(
     heads: Sequence[str], rows: list[list[str]], right: Sequence[int], total: bool
 ) -> "RichTable":
     from rich import box
@@ -215,10 +217,10 @@ def _rich_table(
     for i, head in enumerate(heads):
         table.add_column(Text(head), justify="right" if i in right else "left", overflow="fold")
     for i, row in enumerate(rows):
-        last = total and i == len(rows) - 1
-        if last:
+        is_total = total and i == len(rows) - 1
+        if is_total:
             table.add_section()
-        table.add_row(*(Text(c, style=STYLES.get(c, "bold" if last else "")) for c in row))
+        table.add_row(*(Text(c, style=STYLE_BY_ENDING.get(c, "bold" if is_total else "")) for c in row))
     return table
 
 
@@ -234,22 +236,22 @@ def short_path(where: str | Path | None) -> str:
 
 
 @contextmanager
-def remarking() -> Iterator[None]:
+def ignoring_output_errors() -> Iterator[None]:
     """Ignore failures to write to standard error: they must not stop a command."""
     try:
         yield
     except OSError:
-        discard(sys.stderr)
+        discard_output(sys.stderr)
 
 
-def discard(stream: TextIO) -> None:
+def discard_output(stream: TextIO) -> None:
     """Drop what is buffered in a standard stream and everything written to it later."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
 
 
-def _console(*, stderr: bool) -> "Console":
+def _build_console(*, stderr: bool) -> "Console":
     from rich.console import Console
 
     class Piped(Console):
@@ -261,34 +263,34 @@ def _console(*, stderr: bool) -> "Console":
     return Piped(stderr=stderr, highlight=False, emoji=False)  # keep `:x:` as text
 
 
-def _print(console: "Console", text: str, style: str | None, *, whole: bool = False) -> None:
-    text = _visible(text)
+def _print_text(console: "Console", text: str, style: str | None, *, whole: bool = False) -> None:
+    text = _escape_controls(text)
     if not whole:
-        width = console.width if console.is_terminal else _columns()
+        width = console.width if console.is_terminal else _pipe_line_width()
         text = wrap_text(text, width).replace(NO_BREAK, " ")
     console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
 
 
-def _columns() -> int:
-    told = os.environ.get("COLUMNS", "")
-    return int(told) if told.isdecimal() and int(told) else PIPE_COLUMNS
+def _pipe_line_width() -> int:
+    columns = os.environ.get("COLUMNS", "")
+    return int(columns) if columns.isdecimal() and int(columns) else PIPE_LINE_WIDTH
 
 
-def _cell(value: object) -> str:
-    return "" if value is None else _visible(str(value))
+def _cell_text(value: object) -> str:
+    return "" if value is None else _escape_controls(str(value))
 
 
-def _visible(text: str) -> str:
+def _escape_controls(text: str) -> str:
     """Escape what controls a terminal; texts can come from somebody else's run folder."""
-    return _CONTROL.sub(lambda found: repr(found[0])[1:-1], text)
+    return _CONTROL_PATTERN.sub(lambda match: repr(match[0])[1:-1], text)
 
 
-def _jsonable(value: Any) -> Any:
+def _as_json(value: Any) -> Any:
     value = as_json_types(value)
     if isinstance(value, dict):
-        return {k: _jsonable(v) for k, v in value.items()}
+        return {k: _as_json(v) for k, v in value.items()}
     if isinstance(value, list):
-        return [_jsonable(v) for v in value]
+        return [_as_json(v) for v in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     if isinstance(value, Path):

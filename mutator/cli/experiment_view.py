@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import mutator
 from mutator._common.message_text import counted
-from mutator.api.experiment_results import describe
-from mutator.api.stored_experiments import StoredExperiment, newest_run, stored_run
+from mutator.api.experiment_results import experiment_facts
+from mutator.api.stored_experiments import StoredExperiment, find_newest_run, open_stored_run
 from mutator.api.worst import worst_results
-from mutator.cli.console import NO_BREAK, STYLES, Terminal, short_path
+from mutator.cli.console import NO_BREAK, STYLE_BY_ENDING, Terminal, short_path
 from mutator.errors import MutatorError
 from mutator.mutants.readable_patches import readable_patch
 
@@ -23,39 +23,39 @@ if TYPE_CHECKING:
     from mutator.targets.manifest import TargetManifest
     from mutator.workspace import Workspace
 
-_TIMES = {
+_TIME_LABELS = {
     "fault_tolerant_time_s": "fault-tolerant time (first hazard - activation)",
     "reaction_time_s": "reaction time (first hazard - first alert)",
 }
 
 
-def stored_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> StoredExperiment:
+def find_stored_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> StoredExperiment:
     """Find an experiment of a run, the newest by default, only to read what is stored about it."""
-    return stored_run(run or newest_run(workspace.library.parent), workspace).experiment(prefix)
+    return open_stored_run(run or find_newest_run(workspace.library.parent), workspace).experiment(prefix)
 
 
-def find_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> "RunExperiment":
+def find_run_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> "RunExperiment":
     """Find an experiment of a run, the newest by default, which can be rerun."""
-    return mutator.load_run(run or newest_run(workspace.library.parent), workspace=workspace).experiment(
+    return mutator.load_run(run or find_newest_run(workspace.library.parent), workspace=workspace).experiment(
         prefix
     )
 
 
-def list_worst(
+def print_worst(
     terminal: Terminal, workspace: "Workspace", run: Path | None, only: str | None, limit: int
 ) -> None:
-    folder = run or newest_run(workspace.library.parent)
-    found, count = worst_results(stored_run(folder).path, only, limit)
-    rows = [_line(row) for row in found]
+    folder = run or find_newest_run(workspace.library.parent)
+    worst_rows, count = worst_results(open_stored_run(folder).path, only, limit)
+    rows = [_row_facts(row) for row in worst_rows]
     if terminal.as_json:
-        terminal.emit({"run": str(folder), "count": count, "worst": rows})
+        terminal.print_json({"run": str(folder), "count": count, "worst": rows})
         return
     heads = tuple(rows[0]) if rows else ()
-    terminal.table(heads, [tuple(row.values()) for row in rows], right=(3, 5))
+    terminal.print_table(heads, [tuple(row.values()) for row in rows], right=(3, 5))
     terminal.say(f"{len(rows)} of {counted(count, 'experiment')} in {short_path(folder)}, the worst first")
 
 
-def _line(row: "Row") -> dict[str, object]:
+def _row_facts(row: "Row") -> dict[str, object]:
     return {
         "experiment": row.experiment_id,
         "ending": row.ending,
@@ -73,7 +73,7 @@ def print_experiment(
     terminal: Terminal, experiment: "Experiment", patch: str, *, tried: bool = False
 ) -> None:
     """Print what was injected, and the diff. An experiment run by `try` has no method."""
-    facts = describe(experiment)
+    facts = experiment_facts(experiment)
     if tried:
         del facts["method"]
     width = max(len(name) for name in facts)
@@ -81,7 +81,7 @@ def print_experiment(
         terminal.say(f"{name.ljust(width)}  {value}", style="bold" if name == "fault" else None)
     terminal.say()
     diff, note = readable_patch(patch)
-    terminal.diff(diff)
+    terminal.print_diff(diff)
     terminal.say(note, style="dim")
     terminal.say()
 
@@ -92,55 +92,55 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     """
     record = result.record
     assert record is not None
-    manifest = _manifest(result)
+    manifest = _manifest_if_any(result)
     ending = record.outcome.value if record.outcome else record.status.value
-    terminal.result(f"verdict: {ending}", style=STYLES.get(ending))
+    terminal.print_result(f"verdict: {ending}", style=STYLE_BY_ENDING.get(ending))
     if record.detail:
         terminal.say(record.detail)
     start = record.activation.first if record.activation else None
-    events = _events(record, manifest)
+    events = _list_events(record, manifest)
     if events:
         rows = [
-            (f"{t:.2f}", "" if start is None else f"{t - start:+.2f}", what)
-            for t, what in sorted(events, key=lambda e: e[0])
+            (f"{t:.2f}", "" if start is None else f"{t - start:+.2f}", label)
+            for t, label in sorted(events, key=lambda e: e[0])
         ]
-        terminal.table(["time [s]", "from activation [s]", "what"], rows, right=(0, 1))
-    told = result.verdict
-    if manifest and (note := _no_alert(record, manifest, told["reaction_time_s"])):
+        terminal.print_table(["time [s]", "from activation [s]", "what"], rows, right=(0, 1))
+    verdict = result.verdict
+    if manifest and (note := _missing_alert_note(record, manifest, verdict["reaction_time_s"])):
         terminal.say(note)
-    if told["severity"]:
-        terminal.say(f"severity: {told['severity']}, delta-v {told['metrics']['delta_v']:.2f} m/s")
-    for name, what in _TIMES.items():
-        if told[name] is not None:
-            terminal.say(f"{what}: {told[name]:.2f} s")
-    units = _units(manifest) if manifest else {}
-    deviations = _values(told["difference_in_drive"].items(), units)
+    if verdict["severity"]:
+        terminal.say(f"severity: {verdict['severity']}, delta-v {verdict['metrics']['delta_v']:.2f} m/s")
+    for name, what in _TIME_LABELS.items():
+        if verdict[name] is not None:
+            terminal.say(f"{what}: {verdict[name]:.2f} s")
+    units = _unit_by_name(manifest) if manifest else {}
+    deviations = _describe_values(verdict["difference_in_drive"].items(), units)
     if deviations:
         until = "" if record.t_end is None else " up to the end of the drive"
         terminal.say(f"largest difference from the golden run{until}: {deviations}")
     if record.metrics:
-        terminal.say(f"metrics: {_values(record.metrics, units)}")
+        terminal.say(f"metrics: {_describe_values(record.metrics, units)}")
 
 
-def _manifest(result: "ExperimentResult") -> "TargetManifest | None":
+def _manifest_if_any(result: "ExperimentResult") -> "TargetManifest | None":
     try:
-        return result._target()
+        return result._manifest()
     except MutatorError:  # a run can be shown without its target
         return None
 
 
-def _units(manifest: "TargetManifest") -> dict[str, str]:
+def _unit_by_name(manifest: "TargetManifest") -> dict[str, str]:
     channels = [(channel.name, channel.unit) for channel in manifest.compared]
-    known = channels + [(metric.name, metric.unit) for metric in manifest.measures]
-    return {name: unit for name, unit in known if unit not in ("", "-")}
+    pairs = channels + [(metric.name, metric.unit) for metric in manifest.measures]
+    return {name: unit for name, unit in pairs if unit not in ("", "-")}
 
 
-def _values(values: Iterable[tuple[str, float]], units: Mapping[str, str]) -> str:
+def _describe_values(values: Iterable[tuple[str, float]], units: Mapping[str, str]) -> str:
     texts = (f"{name} {value:.4g} {units.get(name, '')}".rstrip() for name, value in values)
     return ", ".join(text.replace(" ", NO_BREAK) for text in texts)
 
 
-def _no_alert(record: "Record", manifest: "TargetManifest", reaction_s: float | None) -> str:
+def _missing_alert_note(record: "Record", manifest: "TargetManifest", reaction_s: float | None) -> str:
     if not (manifest.alerts and record.outcome and record.activation):
         return ""
     if record.hazards:
@@ -148,17 +148,17 @@ def _no_alert(record: "Record", manifest: "TargetManifest", reaction_s: float | 
     return "" if record.alerts else "no alert"
 
 
-def print_path(terminal: Terminal, found: StoredExperiment) -> None:
-    if (path := found.fault_path) is None:
+def print_fault_path(terminal: Terminal, experiment: StoredExperiment) -> None:
+    if (path := experiment.fault_path) is None:
         return
     terminal.say("path of the fault:")
     for component in path.components:
-        terminal.say(f"  {_component(component)}")
+        terminal.say(f"  {_describe_component(component)}")
     stopped = f", stopped at {' and '.join(path.stopped_at)}" if path.stopped_at else ""
     terminal.say(f"reached: {path.reached or 'no recorded component'}{stopped}")
 
 
-def _component(component: "PathComponent") -> str:
+def _describe_component(component: "PathComponent") -> str:
     """Return a line such as `brakes: reached at 3.50 s`; for an injected component, without a time."""
     what = f"{component.name}: {component.state.value}"
     if component.state.value == "injected":
@@ -168,7 +168,7 @@ def _component(component: "PathComponent") -> str:
     return what if component.t_first is None else f"{what} at {component.t_first:.2f} s"
 
 
-def _events(record: "Record", manifest: "TargetManifest | None") -> list[tuple[float, str]]:
+def _list_events(record: "Record", manifest: "TargetManifest | None") -> list[tuple[float, str]]:
     hazards = {h.name: f": {h.about}" for h in manifest.rules if h.about} if manifest else {}
     events: list[tuple[float, str]] = []
     if record.activation:
@@ -188,14 +188,16 @@ def _events(record: "Record", manifest: "TargetManifest | None") -> list[tuple[f
     ]
 
 
-def show_trial(terminal: Terminal, trial: "Trial") -> None:
+def print_trial(terminal: Terminal, trial: "Trial") -> None:
     """Print an experiment that `try` has just run; write its plot next to its traces."""
-    with terminal.wait("drawing"):
+    with terminal.show_spinner("drawing"):
         drawn = trial.save_plot(trial.folder / "plot.svg")
     if terminal.as_json:
-        facts = {**describe(trial.experiment), **trial.verdict, "patch": trial.patch}
+        facts = {**experiment_facts(trial.experiment), **trial.verdict, "patch": trial.patch}
         facts |= {"golden_hazards_s": dict(trial.golden_hazards)}
-        terminal.emit(facts | {"traces": str(trial.single.faulty), "plot": str(drawn) if drawn else None})
+        terminal.print_json(
+            facts | {"traces": str(trial.single.faulty), "plot": str(drawn) if drawn else None}
+        )
         return
     print_experiment(terminal, trial.experiment, trial.patch, tried=True)
     print_verdict(terminal, trial)
@@ -206,6 +208,6 @@ def show_trial(terminal: Terminal, trial: "Trial") -> None:
         terminal.say("last lines of the run:")
         terminal.say(trial.log.strip(), whole=True)
     if drawn:
-        terminal.link("plot", drawn, f"plot: {drawn}")
+        terminal.print_link("plot", drawn, f"plot: {drawn}")
     else:
         terminal.say("no plot: the run left no trace")

@@ -11,14 +11,14 @@ import typer
 import mutator
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import ExperimentId, Json, Place, Run, with_place
+from mutator.cli.options import ExperimentId, Json, RunFolderOption, WorkspaceOptions, with_workspace_options
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
     from mutator.api.run_experiments import RunExperiment
     from mutator.api.stored_experiments import StoredExperiment
 
-DIFFERS = "the new run differs from the campaign's record: see `mutator rerun`"
+DIFFERS_NOTE = "the new run differs from the campaign's record: see `mutator rerun`"
 
 
 def register(app: typer.Typer) -> None:
@@ -40,7 +40,7 @@ Examples:
 """
 
 
-@with_place
+@with_workspace_options
 def show(
     experiment: Annotated[
         str | None,
@@ -51,7 +51,7 @@ def show(
             autocompletion=completion.experiments,
         ),
     ] = None,
-    run: Run = None,
+    run: RunFolderOption = None,
     plot: Annotated[
         bool,
         typer.Option(help="Plot the golden and the faulty run; rerun the experiment if no trace was kept."),
@@ -80,7 +80,7 @@ def show(
     ] = False,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Show an experiment: diff, times, verdict, path of the fault.
 
@@ -92,92 +92,96 @@ def show(
 
     terminal = Terminal(as_json)
     if experiment is None:
-        experiment_view.list_worst(terminal, place.workspace(), run, only, limit)
+        experiment_view.print_worst(terminal, workspace_options.workspace(), run, only, limit)
         return
-    workspace = place.workspace()
-    found = experiment_view.stored_experiment(workspace, run, experiment)
-    patch = found.patch
+    workspace = workspace_options.workspace()
+    stored = experiment_view.find_stored_experiment(workspace, run, experiment)
+    patch = stored.patch
     if patch_alone:
-        terminal.diff(patch)
+        terminal.print_diff(patch)
         return
-    drawn, filmed = found.plot_file if found.is_drawn else None, list[Path]()
+    plot_path, film_paths = stored.plot_file if stored.is_drawn else None, list[Path]()
     if drive or plot or video or still:
-        drivable = experiment_view.find_experiment(workspace, run, experiment)
-        if (drive or plot) and found.record:
-            drawn = _plot(terminal, drivable, anew=drive)
-        filmed = _film(terminal, drivable, video, still or [])
+        run_experiment = experiment_view.find_run_experiment(workspace, run, experiment)
+        if (drive or plot) and stored.record:
+            plot_path = _rerun_and_plot(terminal, run_experiment, anew=drive)
+        film_paths = _rerun_and_film(terminal, run_experiment, video, still or [])
     if as_json:
-        terminal.emit(_facts(found, patch, drawn) | {"films": filmed})
-    _print(terminal, found, patch)
-    if drawn:
-        terminal.link("plot", drawn)
-    for path in filmed:
-        terminal.link("film", path)
-    if found.record and not drawn and not filmed:
-        terminal.say(f"no plot is stored; to rerun and plot it: {_plot_command(found)}", whole=True)
+        terminal.print_json(_experiment_facts(stored, patch, plot_path) | {"films": film_paths})
+    _print_stored(terminal, stored, patch)
+    if plot_path:
+        terminal.print_link("plot", plot_path)
+    for path in film_paths:
+        terminal.print_link("film", path)
+    if stored.record and not plot_path and not film_paths:
+        terminal.say(f"no plot is stored; to rerun and plot it: {_plot_command(stored)}", whole=True)
 
 
-def _plot_command(found: "StoredExperiment") -> str:
-    return shlex.join(["mutator", "show", found.id, "--run", short_path(found.run.path), "--plot"])
+def _plot_command(experiment: "StoredExperiment") -> str:
+    return shlex.join(["mutator", "show", experiment.id, "--run", short_path(experiment.run.path), "--plot"])
 
 
-def _facts(found: "StoredExperiment", patch: str, drawn: Path | None) -> dict[str, object]:
-    from mutator.api.experiment_results import describe
+def _experiment_facts(
+    experiment: "StoredExperiment", patch: str, plot_path: Path | None
+) -> dict[str, object]:
+    from mutator.api.experiment_results import experiment_facts
 
-    facts = {**describe(found.experiment), **found.verdict, "patch": patch}
-    facts |= {"run": str(found.run.path), "plot": str(drawn) if drawn else None}
-    facts |= {"run_with": found.stretch, "has_series": found.has_series}
-    return facts | {"path": asdict(found.fault_path) if found.fault_path else None}
+    facts = {**experiment_facts(experiment.experiment), **experiment.verdict, "patch": patch}
+    facts |= {"run": str(experiment.run.path), "plot": str(plot_path) if plot_path else None}
+    facts |= {"run_with": experiment.stretch, "has_series": experiment.has_series}
+    return facts | {"path": asdict(experiment.fault_path) if experiment.fault_path else None}
 
 
-def _print(terminal: Terminal, found: "StoredExperiment", patch: str) -> None:
+def _print_stored(terminal: Terminal, experiment: "StoredExperiment", patch: str) -> None:
     from mutator.cli import experiment_view
 
-    experiment_view.print_experiment(terminal, found.experiment, patch)
-    if found.record is None:
-        terminal.say(str(found.not_run()))
+    experiment_view.print_experiment(terminal, experiment.experiment, patch)
+    if experiment.record is None:
+        terminal.say(str(experiment.not_run_error()))
     else:
-        experiment_view.print_verdict(terminal, found)
-        experiment_view.print_path(terminal, found)
-    if found.stretch:
-        terminal.say(f"recorded on: {found.stretch}")
+        experiment_view.print_verdict(terminal, experiment)
+        experiment_view.print_fault_path(terminal, experiment)
+    if experiment.stretch:
+        terminal.say(f"recorded on: {experiment.stretch}")
 
 
-def _plot(terminal: Terminal, found: "RunExperiment", *, anew: bool) -> Path | None:
-    if found.is_drawn and not anew:
-        return found.plot_file
-    with terminal.wait("rerunning" if anew else "no trace was kept: rerunning"):
-        trial = found.rerun(keep=True)
+def _rerun_and_plot(terminal: Terminal, experiment: "RunExperiment", *, anew: bool) -> Path | None:
+    if experiment.is_drawn and not anew:
+        return experiment.plot_file
+    with terminal.show_spinner("rerunning" if anew else "no trace was kept: rerunning"):
+        trial = experiment.rerun(keep=True)
     if trial.same_as_record is False:
-        terminal.note(DIFFERS)
-    return found.plot_file if trial.has_trace else None
+        terminal.note(DIFFERS_NOTE)
+    return experiment.plot_file if trial.has_trace else None
 
 
-def _film(terminal: Terminal, found: "RunExperiment", video: Path | None, stills: list[str]) -> list[Path]:
-    shots = [_still(text, found) for text in stills]
+def _rerun_and_film(
+    terminal: Terminal, experiment: "RunExperiment", video: Path | None, stills: list[str]
+) -> list[Path]:
+    shots = [_parse_still(text, experiment) for text in stills]
     shots += [mutator.Shot(out=video)] if video else []
     if not shots:
         return []
-    with terminal.wait("rerunning and filming"):
-        same = found.film(shots)
-    if not same:
-        terminal.note(DIFFERS)
+    with terminal.show_spinner("rerunning and filming"):
+        is_same = experiment.film(shots)
+    if not is_same:
+        terminal.note(DIFFERS_NOTE)
     return [shot.out for shot in shots]
 
 
-def _still(text: str, found: "RunExperiment") -> "mutator.Shot":
+def _parse_still(text: str, experiment: "RunExperiment") -> "mutator.Shot":
     """Parse `T=FILE` or `T`. With `T` alone, the file goes next to the plots, where the report finds it."""
-    t, named, name = text.partition("=")
+    t, separator, name = text.partition("=")
     try:
         time = float(t)
     except ValueError:
         time = math.nan
-    if not math.isfinite(time) or (named and not name):
+    if not math.isfinite(time) or (separator and not name):
         raise MutatorError(
             f"'{text}'", where="--still", expected="a time in s, alone or with a file: 14.5 or 14.5=early.png"
         )
-    kept = found.plot_file.with_name(f"{found.id}-{time:.2f}s.jpg")
-    return mutator.Shot(out=Path(name) if name else kept, t=time)
+    default_path = experiment.plot_file.with_name(f"{experiment.id}-{time:.2f}s.jpg")
+    return mutator.Shot(out=Path(name) if name else default_path, t=time)
 
 
 RERUN_EXAMPLES = """\b
@@ -187,43 +191,47 @@ Examples:
 """
 
 
-@with_place
+@with_workspace_options
 def rerun(
     experiment: ExperimentId,
     trace: Annotated[bool, typer.Option("--trace", help="Keep trace and plot in the run folder.")] = False,
-    run: Run = None,
+    run: RunFolderOption = None,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Rerun one experiment and compare the result.
 
     The exit code is 1 if the new record differs from the campaign's record.
     """
-    from mutator.api.experiment_results import describe
+    from mutator.api.experiment_results import experiment_facts
     from mutator.cli import experiment_view
 
     terminal = Terminal(as_json)
-    found = experiment_view.find_experiment(place.workspace(), run, experiment)
-    with terminal.wait(f"rerunning {found.experiment.scenario}"):
-        trial = found.rerun(keep=trace)
-    same, traces = trial.same_as_record, trial.single.faulty
-    plot = found.plot_file if trace and trial.has_trace else None
+    run_experiment = experiment_view.find_run_experiment(workspace_options.workspace(), run, experiment)
+    with terminal.show_spinner(f"rerunning {run_experiment.experiment.scenario}"):
+        trial = run_experiment.rerun(keep=trace)
+    is_same, traces = trial.same_as_record, trial.single.faulty
+    plot = run_experiment.plot_file if trace and trial.has_trace else None
     if as_json:
-        facts = {**describe(found.experiment), **trial.verdict, "same_as_record": same}
-        terminal.emit(facts | {"traces": str(traces) if trace else None, "plot": str(plot) if plot else None})
+        facts = {**experiment_facts(run_experiment.experiment), **trial.verdict, "same_as_record": is_same}
+        terminal.print_json(
+            facts | {"traces": str(traces) if trace else None, "plot": str(plot) if plot else None}
+        )
     experiment_view.print_verdict(terminal, trial)
-    terminal.result(_comparison(same), style="bold red" if same is False else None)
+    terminal.print_result(_describe_comparison(is_same), style="bold red" if is_same is False else None)
     if trace:
         terminal.say(f"trace: {short_path(traces)}")
         terminal.say(f"plot: {short_path(plot)}" if plot else "no plot: the run left no trace")
-    if same is False:
+    if is_same is False:
         raise typer.Exit(EXIT_CHECK_FAILED)
 
 
-def _comparison(same: bool | None) -> str:
-    if same is None:
+def _describe_comparison(is_same: bool | None) -> str:
+    if is_same is None:
         return "no record to compare with: the campaign has not run this experiment yet"
     return (
-        "the same as the campaign's record, byte for byte" if same else "DIFFERS from the campaign's record"
+        "the same as the campaign's record, byte for byte"
+        if is_same
+        else "DIFFERS from the campaign's record"
     )

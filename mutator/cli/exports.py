@@ -8,8 +8,8 @@ import typer
 import mutator
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, Place, with_place
-from mutator.cli.run_folders import library_if_any
+from mutator.cli.options import Json, WorkspaceOptions, with_workspace_options
+from mutator.cli.run_folders import workspace_if_any
 from mutator.exports import Format, Table, find_export
 
 
@@ -28,7 +28,7 @@ Examples:
 """
 
 
-@with_place
+@with_workspace_options
 def export(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.", autocompletion=completion.runs)],
     format: Annotated[
@@ -63,7 +63,7 @@ def export(
     table: Annotated[Table, typer.Option(help="CSV and Parquet: which table.")] = Table.RESULTS,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Export a run: mutation report, JUnit, CSV, Parquet, MCAP.
 
@@ -71,15 +71,15 @@ def export(
     faulty run.
     """
     terminal = Terminal(as_json)
-    wanted = find_export(format)
-    workspace = place.workspace() if wanted.needs_library else None
-    if wanted.uses_library:
-        workspace = library_if_any(place)
+    exporter = find_export(format)
+    workspace = workspace_options.workspace() if exporter.needs_library else None
+    if exporter.uses_library:
+        workspace = workspace_if_any(workspace_options)
     endings = [name.strip() for name in failures.split(",")] if failures else []
-    with terminal.wait("writing"):
-        written = mutator.load_run(run, workspace=workspace).export(
+    with terminal.show_spinner("writing"):
+        out_path = mutator.load_run(run, workspace=workspace).export(
             format, out, failures=endings, only=only, table=table
         )
     if as_json:
-        terminal.emit({"format": format, "file": str(written)})
-    terminal.say(f"{format}: {short_path(written)}")
+        terminal.print_json({"format": format, "file": str(out_path)})
+    terminal.say(f"{format}: {short_path(out_path)}")

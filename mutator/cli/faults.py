@@ -12,12 +12,22 @@ from mutator._common.doors import OPERATORS
 from mutator._common.message_text import counted
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
+from mutator.cli.options import (
+    Json,
+    Manifest,
+    Reading,
+    RunFolderOption,
+    Seed,
+    Value,
+    Variant,
+    WorkspaceOptions,
+    with_workspace_options,
+)
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 from mutator.mutants.readable_patches import readable_patch
 
-_TRIED = Path("runs/try")
-EXPERIMENT_ID = re.compile(r"[0-9a-f]{4,16}")
+_DEFAULT_OUT = Path("runs/try")
+EXPERIMENT_ID_PATTERN = re.compile(r"[0-9a-f]{4,16}")
 
 SpecName = Annotated[
     str,
@@ -49,7 +59,7 @@ Examples:
 """
 
 
-@with_place
+@with_workspace_options
 def try_spec(
     spec: SpecName,
     scenario: Annotated[
@@ -76,36 +86,42 @@ def try_spec(
     ] = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder for patch, traces and plot.")
-    ] = _TRIED,
+    ] = _DEFAULT_OUT,
     manifest: Manifest = None,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Inject one fault and run it once: diff, verdict, plot."""
-    from mutator.api.selection import Bench, FaultChoice, one_of_each_variant
-    from mutator.cli.experiment_view import show_trial
+    from mutator.api.selection import FaultChoice, SelectedTarget, middle_of_each_variant
+    from mutator.cli.experiment_view import print_trial
 
     terminal = Terminal(as_json)
-    if out == _TRIED and not is_inside(Path(), out):  # the current folder can be somebody's library
+    if out == _DEFAULT_OUT and not is_inside(Path(), out):  # the current folder can be somebody's library
         raise MutatorError(
             "a link that leads out of the current folder",
             where=out,
             argument="out",
             remedy="name the folder at its end, or another one",
         )
-    bench = Bench.of(place.workspace(), manifest)
+    selected_target = SelectedTarget.of(workspace_options.workspace(), manifest)
     choice = FaultChoice(spec=spec, variant=variant, value=value, seed=seed, reading=reading)
-    faults = bench.faults(choice)
-    fault, _ = one_of_each_variant(faults)[0]
+    faults = selected_target.faults(choice)
+    fault, _ = middle_of_each_variant(faults)[0]
     if len(faults) > 1:
         terminal.note(f"{fault.label}, one of {len(faults)} faults (choose with --variant or --value)")
-    when = bench.trigger(trigger, armed_after)
-    with terminal.wait(f"running {scenario}, fault-free and faulty"):
+    when = selected_target.trigger(trigger, armed_after)
+    with terminal.show_spinner(f"running {scenario}, fault-free and faulty"):
         trial = mutator.try_fault(
-            fault, scenario, when, seed=seed or 0, target=manifest, workspace=bench.workspace, out=out
+            fault,
+            scenario,
+            when,
+            seed=seed or 0,
+            target=manifest,
+            workspace=selected_target.workspace,
+            out=out,
         )
-    show_trial(terminal, trial)
+    print_trial(terminal, trial)
     if trial.status is mutator.Status.HARNESS_ERROR:
         raise typer.Exit(EXIT_HARNESS_ERRORS)
 
@@ -118,7 +134,7 @@ Examples:
 """
 
 
-@with_place
+@with_workspace_options
 def diff(
     what: Annotated[
         str,
@@ -133,7 +149,7 @@ def diff(
     value: Value = None,
     seed: Seed = None,
     reading: Reading = None,
-    run: Run = None,
+    run: RunFolderOption = None,
     patch: Annotated[
         bool,
         typer.Option(
@@ -143,42 +159,42 @@ def diff(
     manifest: Manifest = None,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Show what a fault changes in the source.
 
     For a spec, prints one diff for each variant: all values of a variant have the same diff.
     """
     terminal = Terminal(as_json)
-    workspace = place.workspace()
-    if EXPERIMENT_ID.fullmatch(what) and not Path(what).exists():
-        from mutator.cli.experiment_view import stored_experiment
+    workspace = workspace_options.workspace()
+    if EXPERIMENT_ID_PATTERN.fullmatch(what) and not Path(what).exists():
+        from mutator.cli.experiment_view import find_stored_experiment
 
-        found = stored_experiment(workspace, run, what)
-        _print_diffs(terminal, [(found.fault.label, found.id, found.patch)], whole=patch)
+        experiment = find_stored_experiment(workspace, run, what)
+        _print_diffs(terminal, [(experiment.fault.label, experiment.id, experiment.patch)], whole=patch)
         return
-    from mutator.api.mutants import built
-    from mutator.api.selection import Bench, FaultChoice, one_of_each_variant
+    from mutator.api.mutants import build_selected
+    from mutator.api.selection import FaultChoice, SelectedTarget, middle_of_each_variant
 
-    bench = Bench.of(workspace, manifest)
+    selected_target = SelectedTarget.of(workspace, manifest)
     choice = FaultChoice(spec=what, variant=variant, value=value, seed=seed, reading=reading)
-    when = bench.trigger(trigger)
+    when = selected_target.trigger(trigger)
     diffs = []
-    for fault, of in one_of_each_variant(bench.faults(choice)):
-        mutant = built(bench, fault, when)
-        many = f", one of {of}" if of > 1 else ""
-        diffs.append((fault.label + many, mutant.id, mutant.patch))
+    for fault, fault_count in middle_of_each_variant(selected_target.faults(choice)):
+        mutant = build_selected(selected_target, fault, when)
+        count_note = f", one of {fault_count}" if fault_count > 1 else ""
+        diffs.append((fault.label + count_note, mutant.id, mutant.patch))
     _print_diffs(terminal, diffs, whole=patch)
 
 
 def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole: bool) -> None:
     if terminal.as_json:
-        terminal.emit([{"fault": fault, "id": name, "patch": patch} for fault, name, patch in diffs])
+        terminal.print_json([{"fault": fault, "id": name, "patch": patch} for fault, name, patch in diffs])
     for fault, _, patch in diffs:
         # `patch` skips text before a diff, so piped output can include the heading.
         terminal.say(f"# {fault}", style="bold", whole=True)
         text, note = (patch, "") if whole else readable_patch(patch)
-        terminal.diff(text)
+        terminal.print_diff(text)
         if note:
             terminal.note(note)
 
@@ -195,7 +211,7 @@ Examples:
 """
 
 
-@with_place
+@with_workspace_options
 def generate(
     specs: Annotated[
         list[str] | None,
@@ -251,12 +267,14 @@ def generate(
     manifest: Manifest = None,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Write mutants as patches or source trees, with an index."""
     terminal = Terminal(as_json)
-    workspace = place.workspace()
-    choice = _operator_choice(operators, places, scenario, all_lines, sample, seed, bool(specs or campaign))
+    workspace = workspace_options.workspace()
+    choice = _parse_operator_choice(
+        operators, places, scenario, all_lines, sample, seed, bool(specs or campaign)
+    )
     if campaign and (specs or triggers):
         raise MutatorError(
             "--campaign together with specs or --trigger", expected="one or the other", where="generate"
@@ -266,7 +284,7 @@ def generate(
         mutants = mutator.MutantSet.of_campaign(campaign, choices=choices, workspace=workspace)
     elif choice:
         mutants = mutator.MutantSet.of_operators(choice, triggers or (), target=manifest, workspace=workspace)
-        terminal.note(mutants.told)
+        terminal.note(mutants.note)
     else:
         mutants = mutator.MutantSet.of_specs(
             specs or (),
@@ -276,25 +294,25 @@ def generate(
             target=manifest,
             workspace=workspace,
         )
-    with terminal.count(len(mutants), "mutants") as step:
+    with terminal.show_count(len(mutants), "mutants") as step:
         index = mutants.write(out, trees=trees, step=step)
     if as_json:
-        terminal.emit(index)
+        terminal.print_json(index)
     terminal.say(f"{counted(len(index), 'mutant')} in {out}, listed in {out / 'index.csv'}")
     first = out / index[0]["patch"]
-    root = mutants.bench.manifest.root
-    if mutants.bench.manifest.overlay is None:  # otherwise a patch spans two folders
+    root = mutants.selected_target.manifest.root
+    if mutants.selected_target.manifest.overlay is None:  # otherwise a patch spans two folders
         terminal.say(f"apply one: patch -p1 -d {short_path(root)} < {first}", whole=True)
 
 
-def _operator_choice(
+def _parse_operator_choice(
     operators: str | None,
     places: list[str] | None,
     scenario: str | None,
     all_lines: bool,
     sample: int | None,
     seed: int | None,
-    others: bool,
+    has_other_source: bool,
 ) -> "mutator.OperatorChoice | None":
     """Collect the operator options, if any. `others`: whether specs or a campaign are given as well."""
     if operators is None:
@@ -305,7 +323,7 @@ def _operator_choice(
                 remedy=f"add --operators with any of {OPERATOR_NAMES}, or `all`",
             )
         return None
-    if others or not places or (scenario is None) is not all_lines:
+    if has_other_source or not places or (scenario is None) is not all_lines:
         raise MutatorError(
             "unsuitable options with --operators",
             where="generate",

@@ -9,7 +9,7 @@ import typer
 import mutator
 from mutator._common.message_text import counted
 from mutator.cli.console import Terminal, error_text, short_path
-from mutator.cli.options import Json, Manifest, Place, with_place
+from mutator.cli.options import Json, Manifest, WorkspaceOptions, with_workspace_options
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def register(app: typer.Typer) -> None:
     app.command("stpa", epilog=EXAMPLES)(stpa)
 
 
-@with_place
+@with_workspace_options
 def stpa(
     manifest: Manifest = None,
     svg: Annotated[
@@ -36,23 +36,23 @@ def stpa(
     ] = None,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Print and check the hazard analysis.
 
     Prints each gap or contradiction with its file and line; the exit code is then 1.
     """
     terminal = Terminal(as_json)
-    workspace = place.workspace()
+    workspace = workspace_options.workspace()
     problems = mutator.check_hazard_analysis(workspace, target=manifest)
     analysis = workspace.analysis()
     assert analysis is not None  # the check above fails without an analysis
     if svg:
-        _write(svg, mutator.draw_control_structure(workspace))
+        _write_text(svg, mutator.draw_control_structure(workspace))
     if as_json:
-        found = [{"file": p.where, "line": p.line, "problem": str(p)} for p in problems]
-        terminal.emit(_data(analysis) | {"problems": found})
-    _show(terminal, analysis)
+        problem_facts = [{"file": p.where, "line": p.line, "problem": str(p)} for p in problems]
+        terminal.print_json(_analysis_as_json(analysis) | {"problems": problem_facts})
+    _print_analysis(terminal, analysis)
     if svg:
         terminal.say(f"control structure: {short_path(svg)}")
     for problem in problems:
@@ -68,7 +68,7 @@ def stpa(
     )
 
 
-def _write(path: Path, text: str) -> None:
+def _write_text(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as e:
@@ -77,40 +77,42 @@ def _write(path: Path, text: str) -> None:
         ) from None
 
 
-def _show(terminal: Terminal, analysis: "Analysis") -> None:
+def _print_analysis(terminal: Terminal, analysis: "Analysis") -> None:
     hazards = analysis.hazards
-    _section(terminal, "accidents", ["id", "about"], hazards.accidents.items())
+    _print_section(terminal, "accidents", ["id", "about"], hazards.accidents.items())
     rows: Iterable[tuple[str, ...]] = (
         (name, ", ".join(hazards.leads_to[name]), about) for name, about in hazards.hazards.items()
     )
-    _section(terminal, "hazards", ["id", "leads to", "about"], rows)
-    _show_structure(terminal, analysis)
+    _print_section(terminal, "hazards", ["id", "leads to", "about"], rows)
+    _print_structure(terminal, analysis)
     for table in analysis.tables.values():
-        _show_table(terminal, table)
+        _print_context_table(terminal, table)
     rows = (
-        (name, a.action, a.category.value, ", ".join(a.hazards), _contexts(a.contexts), a.about)
+        (name, a.action, a.category.value, ", ".join(a.hazards), _context_ids(a.contexts), a.about)
         for name, a in analysis.unsafe.items()
     )
     heads = ["id", "action", "unsafe when", "hazards", "contexts", "about"]
-    _section(terminal, "unsafe control actions", heads, rows)
+    _print_section(terminal, "unsafe control actions", heads, rows)
     rows = (
         (name, ", ".join(f.where), ", ".join(f.leads_to), f.about) for name, f in analysis.factors.items()
     )
-    _section(terminal, "causal factors", ["id", "where", "leads to", "about"], rows)
+    _print_section(terminal, "causal factors", ["id", "where", "leads to", "about"], rows)
     rows = (
         (name, ", ".join(f.at), ", ".join(f.faults) or f"none: {f.no_fault}")
         for name, f in analysis.factors.items()
     )
-    _section(terminal, "places and faults of the causal factors", ["id", "in the target", "faults"], rows)
+    _print_section(
+        terminal, "places and faults of the causal factors", ["id", "in the target", "faults"], rows
+    )
 
 
-def _show_structure(terminal: Terminal, analysis: "Analysis") -> None:
+def _print_structure(terminal: Terminal, analysis: "Analysis") -> None:
     structure = analysis.structure
     rows: Iterable[tuple[str, ...]] = (
         (name, component.kind.value, ", ".join(component.process_model), component.about)
         for name, component in structure.components.items()
     )
-    _section(terminal, "control structure", ["component", "kind", "process model", "about"], rows)
+    _print_section(terminal, "control structure", ["component", "kind", "process model", "about"], rows)
     rows = (
         (
             name,
@@ -121,17 +123,17 @@ def _show_structure(terminal: Terminal, analysis: "Analysis") -> None:
         )
         for name, action in structure.control_actions.items()
     )
-    _section(terminal, "control actions", ["action", "from", "to", "channel", "about"], rows)
+    _print_section(terminal, "control actions", ["action", "from", "to", "channel", "about"], rows)
     actions = {action.link for action in structure.control_actions.values()}
     rows = (
         (name, link.from_, link.to, link.label)
         for name, link in structure.links.items()
         if name not in actions
     )
-    _section(terminal, "feedback and other links", ["link", "from", "to", "carries"], rows)
+    _print_section(terminal, "feedback and other links", ["link", "from", "to", "carries"], rows)
 
 
-def _show_table(terminal: Terminal, table: "ContextTable") -> None:
+def _print_context_table(terminal: Terminal, table: "ContextTable") -> None:
     actions = list(table.rows[0].actions)
     heads = ["context", "trigger"]
     heads += [head for action in actions for head in (f"{action}", f"no {action}")] + ["about"]
@@ -141,32 +143,32 @@ def _show_table(terminal: Terminal, table: "ContextTable") -> None:
             verdict for a in actions for verdict in (row.actions[a].provided, row.actions[a].not_provided)
         ]
         rows.append((row.id, row.condition, *(cell or "-" for cell in cells), row.about))
-    _section(terminal, f"contexts of {table.name}", heads, rows, end=_coverage(table))
+    _print_section(terminal, f"contexts of {table.name}", heads, rows, end=_describe_coverage(table))
 
 
-def _coverage(table: "ContextTable") -> str:
-    found = table.coverage
-    if found.beyond:
-        return f"cannot prove that the contexts cover everything exactly once: {found.beyond}"
-    return f"the contexts cover everything exactly once: proved in {found.cells} cells"
+def _describe_coverage(table: "ContextTable") -> str:
+    coverage = table.coverage
+    if coverage.beyond:
+        return f"cannot prove that the contexts cover everything exactly once: {coverage.beyond}"
+    return f"the contexts cover everything exactly once: proved in {coverage.cells} cells"
 
 
-def _contexts(names: list[str]) -> str:
+def _context_ids(names: list[str]) -> str:
     return ", ".join(name.partition("/")[2] for name in names)
 
 
-def _section(
+def _print_section(
     terminal: Terminal, title: str, heads: list[str], rows: Iterable[tuple[str, ...]], end: str = ""
 ) -> None:
     cells = [tuple(" ".join(cell.split()) for cell in row) for row in rows]
     terminal.say(f"{title} ({len(cells)})", style="bold")
-    terminal.table(heads, cells)
+    terminal.print_table(heads, cells)
     if end:
         terminal.say(end)
     terminal.say()
 
 
-def _data(analysis: "Analysis") -> dict[str, Any]:
+def _analysis_as_json(analysis: "Analysis") -> dict[str, Any]:
     hazards = analysis.hazards
     return {
         "accidents": hazards.accidents,
@@ -182,10 +184,10 @@ def _data(analysis: "Analysis") -> dict[str, Any]:
             }
             for table in analysis.tables.values()
         },
-        "unsafe_control_actions": _plain(analysis.unsafe),
-        "causal_factors": _plain(analysis.factors),
+        "unsafe_control_actions": _models_as_json(analysis.unsafe),
+        "causal_factors": _models_as_json(analysis.factors),
     }
 
 
-def _plain(models: Any) -> dict[str, Any]:
+def _models_as_json(models: Any) -> dict[str, Any]:
     return {name: model.model_dump(mode="json") for name, model in models.items()}

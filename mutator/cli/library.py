@@ -12,7 +12,7 @@ import mutator
 from mutator._common.message_text import counted
 from mutator.cli import completion
 from mutator.cli.console import Terminal, error_text, short_path, with_options
-from mutator.cli.options import Json, Manifest, Place, with_place
+from mutator.cli.options import Json, Manifest, WorkspaceOptions, with_workspace_options
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mutator.workspace import Workspace
 
 
-class Kind(StrEnum):
+class EntryKind(StrEnum):
     """The kinds of entries that `list` shows."""
 
     SPECS = "specs"
@@ -31,7 +31,7 @@ class Kind(StrEnum):
     TARGETS = "targets"
 
 
-Table = tuple[list[str], list[dict[str, Any]]]
+ColumnsAndRows = tuple[list[str], list[dict[str, Any]]]
 
 
 def register(app: typer.Typer) -> None:
@@ -48,74 +48,74 @@ Examples:
 """
 
 
-@with_place
+@with_workspace_options
 def list_library(
-    kind: Annotated[Kind | None, typer.Argument(help="Only this kind. Default: all.")] = None,
+    kind: Annotated[EntryKind | None, typer.Argument(help="Only this kind. Default: all.")] = None,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """List specs, scenarios, campaigns, models, triggers, targets."""
     terminal = Terminal(as_json)
-    workspace = place.workspace()
-    tables = {k.value: LISTS[k](workspace) for k in ([kind] if kind else list(Kind))}
+    workspace = workspace_options.workspace()
+    tables = {k.value: LIST_BY_KIND[k](workspace) for k in ([kind] if kind else list(EntryKind))}
     if as_json:
-        terminal.emit({name: rows for name, (_, rows) in tables.items()})
+        terminal.print_json({name: rows for name, (_, rows) in tables.items()})
     for name, (columns, rows) in tables.items():
         numbers = [i for i, c in enumerate(columns) if all(isinstance(r[c], int) for r in rows)]
         terminal.say(f"{name} ({len(rows)})", style="bold")
         if rows:
-            terminal.table(columns, [[r[c] for c in columns] for r in rows], right=numbers)
+            terminal.print_table(columns, [[r[c] for c in columns] for r in rows], right=numbers)
         terminal.say()
 
 
-def _specs(workspace: "Workspace") -> Table:
-    rows = [{"name": s.name, "faults": s.count, "about": _line(s.about)} for s in workspace.specs()]
+def _list_specs(workspace: "Workspace") -> ColumnsAndRows:
+    rows = [{"name": s.name, "faults": s.count, "about": _join_lines(s.about)} for s in workspace.specs()]
     return ["name", "faults", "about"], rows
 
 
-def _scenarios(workspace: "Workspace") -> Table:
-    return _files(workspace.scenarios, "title")
+def _list_scenarios(workspace: "Workspace") -> ColumnsAndRows:
+    return _list_files(workspace.scenarios, "title")
 
 
-def _campaigns(workspace: "Workspace") -> Table:
-    return _files(workspace.campaigns, "about")
+def _list_campaigns(workspace: "Workspace") -> ColumnsAndRows:
+    return _list_files(workspace.campaigns, "about")
 
 
-def _files(files: Mapping[str, Path], key: str) -> Table:
+def _list_files(files: Mapping[str, Path], key: str) -> ColumnsAndRows:
     from mutator.config.yaml_files import load_yaml
 
     rows: list[dict[str, Any]] = []
     for name, path in files.items():
         data = load_yaml(path).data
         about = data.get(key, "") if isinstance(data, dict) else ""
-        rows.append({"name": name, "file": short_path(path), "about": _line(str(about))})
+        rows.append({"name": name, "file": short_path(path), "about": _join_lines(str(about))})
     return ["name", "file", "about"], rows
 
 
-def _models(workspace: "Workspace") -> Table:
+def _list_fault_models(workspace: "Workspace") -> ColumnsAndRows:
     rows = [
         {
             "name": m.name,
             "kind": m.kind.value,
             "parameters": ", ".join(p.name + ("?" if p.optional else "") for p in m.params),
-            "about": _line(m.about),
+            "about": _join_lines(m.about),
         }
         for m in workspace.fault_models()
     ]
     return ["name", "kind", "parameters", "about"], rows
 
 
-def _triggers(workspace: "Workspace") -> Table:
+def _list_triggers(workspace: "Workspace") -> ColumnsAndRows:
     rows = [
-        {"table": table.name, "name": row.id, "condition": row.condition, "about": _line(row.about)}
+        {"table": table.name, "name": row.id, "condition": row.condition, "about": _join_lines(row.about)}
         for table in map(workspace.context_table, workspace.context_tables)
         for row in table.rows
     ]
     return ["table", "name", "condition", "about"], rows
 
 
-def _targets(workspace: "Workspace") -> Table:
+def _list_targets(workspace: "Workspace") -> ColumnsAndRows:
     rows = []
     for name in workspace.targets:
         manifest = workspace.manifest(name)
@@ -124,13 +124,13 @@ def _targets(workspace: "Workspace") -> Table:
     return ["name", "root", "packages", "files"], rows
 
 
-LISTS: dict[Kind, Callable[["Workspace"], Table]] = {
-    Kind.SPECS: _specs,
-    Kind.SCENARIOS: _scenarios,
-    Kind.CAMPAIGNS: _campaigns,
-    Kind.MODELS: _models,
-    Kind.TRIGGERS: _triggers,
-    Kind.TARGETS: _targets,
+LIST_BY_KIND: dict[EntryKind, Callable[["Workspace"], ColumnsAndRows]] = {
+    EntryKind.SPECS: _list_specs,
+    EntryKind.SCENARIOS: _list_scenarios,
+    EntryKind.CAMPAIGNS: _list_campaigns,
+    EntryKind.MODELS: _list_fault_models,
+    EntryKind.TRIGGERS: _list_triggers,
+    EntryKind.TARGETS: _list_targets,
 }
 
 CHECK_EXAMPLES = """\b
@@ -140,10 +140,10 @@ Examples:
   mutator check --drive --scenario S1       only the golden run of this scenario
   mutator --target ~/openpilot check        the same library against another source tree
 """
-LEVEL_STYLES = {"ok": "green", "warning": "yellow", "failed": "red"}
+STYLE_BY_LEVEL = {"ok": "green", "warning": "yellow", "failed": "red"}
 
 
-@with_place
+@with_workspace_options
 def check(
     manifest: Manifest = None,
     drive: Annotated[
@@ -161,7 +161,7 @@ def check(
     ] = None,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Check the library, templates and anchors against the target.
 
@@ -172,68 +172,72 @@ def check(
     terminal = Terminal(as_json)
     if scenario and not drive:
         raise MutatorError("scenarios without --drive", argument="scenario", remedy="add --drive")
-    workspace = place.workspace()
-    with terminal.wait("checking every spec in every reading"):
+    workspace = workspace_options.workspace()
+    with terminal.show_spinner("checking every spec in every reading"):
         problems = mutator.check_library(workspace, target=manifest)
     findings: list[Finding] = []
     if not problems:
-        with terminal.wait("making golden runs" if drive else "loading the target"):
+        with terminal.show_spinner("making golden runs" if drive else "loading the target"):
             findings = mutator.check_target(workspace, target=manifest, drive=drive, scenarios=scenario or ())
     if as_json:
-        told = [{"file": p.where, "line": p.line, "problem": str(p)} for p in problems]
-        terminal.emit({"problems": told, "findings": findings})
+        problem_facts = [{"file": p.where, "line": p.line, "problem": str(p)} for p in problems]
+        terminal.print_json({"problems": problem_facts, "findings": findings})
     for problem in problems:
         terminal.say(error_text(problem), style="red", whole=not terminal.out.is_terminal)
     for finding in findings:
         if drive or finding.level != "ok":
-            _say_finding(terminal, finding)
+            _print_finding(terminal, finding)
     failed = [finding for finding in findings if finding.level == "failed"]
     if problems or failed:
         terminal.say(counted(len(problems) + len(failed), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
     faults = sum(spec.count for spec in workspace.specs())
-    readings = {1: "", 2: ", in both readings"}.get(
+    readings_note = {1: "", 2: ", in both readings"}.get(
         number := len(workspace.readings().names), f", in all {number} readings"
     )
-    warned = sum(finding.level == "warning" for finding in findings)
-    well = f"no problem, {counted(warned, 'warning')}" if warned else "all well"
+    warning_count = sum(finding.level == "warning" for finding in findings)
+    verdict = f"no problem, {counted(warning_count, 'warning')}" if warning_count else "all well"
     specs = counted(len(workspace.spec_files()), "spec")
-    terminal.say(f"{well}: {specs}, {counted(faults, 'fault')}{readings}", style="green")
+    terminal.say(f"{verdict}: {specs}, {counted(faults, 'fault')}{readings_note}", style="green")
 
 
-def _say_finding(terminal: Terminal, finding: "Finding") -> None:
-    terminal.say(f"{finding.name}: {finding.found}", style=LEVEL_STYLES[finding.level])
-    for one in finding.places:
-        file = short_path(Path(one.file)) if Path(one.file).is_absolute() else one.file
-        terminal.say(f"  {replace(one, file=str(file))}")
+def _print_finding(terminal: Terminal, finding: "Finding") -> None:
+    terminal.say(f"{finding.name}: {finding.found}", style=STYLE_BY_LEVEL[finding.level])
+    for finding_place in finding.places:
+        file = (
+            short_path(Path(finding_place.file))
+            if Path(finding_place.file).is_absolute()
+            else finding_place.file
+        )
+        terminal.say(f"  {replace(finding_place, file=str(file))}")
     if finding.remedy:
         terminal.say(f"  to do: {finding.remedy}")
 
 
-def _line(text: str) -> str:
+def _join_lines(text: str) -> str:
     return " ".join(text.split())
 
 
-@with_place
-def doctor(as_json: Json = False, *, place: Place) -> None:
+@with_workspace_options
+def doctor(as_json: Json = False, *, workspace_options: WorkspaceOptions) -> None:
     """Check whether this machine can run campaigns.
 
     Checks the interpreter, packages, machine, library and target. The exit code is 1 if a campaign could not
     run.
     """
     terminal = Terminal(as_json)
-    with terminal.wait("checking"):
+    with terminal.show_spinner("checking"):
         try:
-            findings = mutator.doctor(place.workspace())
+            findings = mutator.doctor(workspace_options.workspace())
         except MutatorError as e:
             findings = mutator.doctor(with_options(e))
     if as_json:
-        terminal.emit(findings)
-    terminal.table(
+        terminal.print_json(findings)
+    terminal.print_table(
         ["what", "state", "found", "to do"], [(f.name, f.level.value, f.found, f.remedy) for f in findings]
     )
-    bad = [f.name for f in findings if f.level == "failed"]
-    if bad:
-        terminal.say(f"not ready: {', '.join(bad)}", style="bold red")
+    failed = [f.name for f in findings if f.level == "failed"]
+    if failed:
+        terminal.say(f"not ready: {', '.join(failed)}", style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
     terminal.say("ready", style="green")

@@ -11,7 +11,7 @@ from mutator.cli.console import Terminal, short_path, with_options
 from mutator.cli.options import Json
 from mutator.errors import MutatorError
 
-INIT_EXAMPLES = """\b
+EXAMPLES = """\b
 Examples:
   mutator init faults                           a copy to edit; its README has the first commands
   mutator init faults --target ../controller    a first library for the controller in that folder
@@ -20,7 +20,7 @@ Examples:
 
 
 def register(app: typer.Typer) -> None:
-    app.command("init", epilog=INIT_EXAMPLES)(init)
+    app.command("init", epilog=EXAMPLES)(init)
 
 
 def init(
@@ -44,12 +44,12 @@ def init(
         mutator.init_library(folder, target=tree)
     except MutatorError as error:
         raise with_options(error, {"target": "--target"}) from None
-    told: dict[str, Any] = {"folder": str(folder)}
-    held = "fault_library/, templates/"
+    facts: dict[str, Any] = {"folder": str(folder)}
+    content = "fault_library/, templates/"
     if tree is not None:
         places = unfilled_places(folder)
-        told["unfilled"] = [{"file": place.where, "line": place.line} for place in places]
-        held = f"fault_library/ with {counted(len(places), 'place')} to fill in,"
+        facts["unfilled"] = [{"file": place.where, "line": place.line} for place in places]
+        content = f"fault_library/ with {counted(len(places), 'place')} to fill in,"
     if as_json:
-        terminal.emit(told)
-    terminal.say(f"{short_path(folder)}: {held} and a README.md with the next steps")
+        terminal.print_json(facts)
+    terminal.say(f"{short_path(folder)}: {content} and a README.md with the next steps")

@@ -1,4 +1,4 @@
-"""Options that several subcommands share, and the place (library, templates, target) that they name."""
+"""Options that several subcommands share, and those that say where the library, templates and target are."""
 
 import functools
 import inspect
@@ -33,7 +33,7 @@ Variant = Annotated[str | None, typer.Option(help="Only this variant of the spec
 Value = Annotated[
     float | None, typer.Option(help="Use this value, in the spec's unit, instead of drawn ones.")
 ]
-Run = Annotated[
+RunFolderOption = Annotated[
     Path | None,
     typer.Option(
         "--run",
@@ -63,7 +63,7 @@ Limit = Annotated[
         "pairs.",
     ),
 ]
-ShardOf = Annotated[
+Shard = Annotated[
     str | None,
     typer.Option("--shard", metavar="K/N", help="Run shard K of N; see `merge`."),
 ]
@@ -103,7 +103,7 @@ InsecureNetwork = Annotated[
         help="Accept a scheduler that others on the network can reach: they can run code on its workers.",
     ),
 ]
-OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run folder.")]
+OutRunFolder = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run folder.")]
 
 
 Root = Annotated[
@@ -132,7 +132,7 @@ Sandbox = Annotated[
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class WorkspaceOptions:
     """The library, templates and target that options name; the environment supplies the rest.
 
     `sandbox` is whether the target's code runs in a sandbox.
@@ -148,34 +148,40 @@ class Place:
         sandbox = bool(self.sandbox)
         return mutator.Workspace.find(self.root, self.library, self.templates, self.target, sandbox=sandbox)
 
-    def over(self, other: "Place") -> "Place":
-        mine = {f.name: getattr(self, f.name) for f in fields(self)}
-        return replace(other, **{k: v for k, v in mine.items() if v is not None})
+    def override(self, other: "WorkspaceOptions") -> "WorkspaceOptions":
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(other, **{k: v for k, v in values.items() if v is not None})
 
 
-def with_place(verb: Callable[..., None]) -> Callable[..., None]:
+def with_workspace_options(verb: Callable[..., None]) -> Callable[..., None]:
     """Replace each parameter that is a dataclass of options by these options, as Typer needs them.
 
-    Options of a place can also stand before the subcommand; those after it win.
+    Options of the workspace can also stand before the subcommand; those after it win.
     """
     signature = inspect.signature(verb, eval_str=True)
-    sets: dict[str, Any] = {
+    class_by_parameter: dict[str, Any] = {
         p.name: p.annotation for p in signature.parameters.values() if is_dataclass(p.annotation)
     }
     context = inspect.Parameter("ctx", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
     parameters = [context]
     for parameter in signature.parameters.values():
-        options = inspect.signature(sets[parameter.name]) if parameter.name in sets else None
-        each = options.parameters.values() if options else [parameter]
-        parameters += [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in each]
+        option_signature = (
+            inspect.signature(class_by_parameter[parameter.name])
+            if parameter.name in class_by_parameter
+            else None
+        )
+        replacements = option_signature.parameters.values() if option_signature else [parameter]
+        parameters += [option.replace(kind=inspect.Parameter.KEYWORD_ONLY) for option in replacements]
 
     @functools.wraps(verb)
-    def run(*, ctx: typer.Context, **values: Any) -> None:
-        for name, options in sets.items():
-            values[name] = options(**{field.name: values.pop(field.name) for field in fields(options)})
-        place = values.pop("place").over(ctx.obj or Place())
-        verb(place=place, **values)
+    def run_verb(*, ctx: typer.Context, **values: Any) -> None:
+        for name, options_class in class_by_parameter.items():
+            values[name] = options_class(
+                **{field.name: values.pop(field.name) for field in fields(options_class)}
+            )
+        workspace_options = values.pop("workspace_options").override(ctx.obj or WorkspaceOptions())
+        verb(workspace_options=workspace_options, **values)
 
-    run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in parameters}
-    return run
+    run_verb.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run_verb.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run_verb

@@ -9,12 +9,12 @@ import typer
 import mutator
 from mutator._common.message_text import counted
 from mutator.cli.console import Terminal
-from mutator.cli.options import Json, Manifest, Place, with_place
+from mutator.cli.options import Json, Manifest, WorkspaceOptions, with_workspace_options
 
 if TYPE_CHECKING:
     from mutator.mutants.possible_places import ListedPlace
 
-PLACES_EXAMPLES = """\b
+EXAMPLES = """\b
 Examples:
   mutator places pkg/sensor.py                      every place in the file
   mutator places pkg/sensor.py::Sensor.measure      only those in one function
@@ -23,10 +23,10 @@ Examples:
 
 
 def register(app: typer.Typer) -> None:
-    app.command("places", epilog=PLACES_EXAMPLES)(list_places)
+    app.command("places", epilog=EXAMPLES)(list_places)
 
 
-@with_place
+@with_workspace_options
 def list_places(
     where: Annotated[
         str, typer.Argument(metavar="FILE[::FUNCTION]", help="A file of the target, or one function in it.")
@@ -34,7 +34,7 @@ def list_places(
     manifest: Manifest = None,
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """List where faults can be injected, and with which models.
 
@@ -42,35 +42,40 @@ def list_places(
     constant, or a default.
     """
     terminal = Terminal(as_json)
-    found = mutator.find_places(where, place.workspace(), target=manifest)
+    places = mutator.find_places(where, workspace_options.workspace(), target=manifest)
     if as_json:
-        terminal.emit([{"line": one.line, "at": one.at, "models": one.models} for one in found])
+        terminal.print_json(
+            [{"line": place.line, "at": place.at, "models": place.models} for place in places]
+        )
         return
-    _print(terminal, found)
+    _print_places(terminal, places)
 
 
-def _print(terminal: Terminal, found: Sequence["ListedPlace"]) -> None:
+def _print_places(terminal: Terminal, places: Sequence["ListedPlace"]) -> None:
     letters: dict[tuple[str, ...], str] = {}
     rows = []
-    for one in found:
-        letter = letters.setdefault(one.models, _letter(len(letters)))
-        rows.append([one.line, _yaml(one.at), letter])
-    terminal.table(["line", "at", "models"], rows, right=[0])
+    for place in places:
+        letter = letters.setdefault(place.models, _letters_of(len(letters)))
+        rows.append([place.line, _anchor_as_yaml(place.at), letter])
+    terminal.print_table(["line", "at", "models"], rows, right=[0])
     terminal.say()
     for models, letter in letters.items():
         terminal.say(f"{letter}: {', '.join(models)}")
-    terminal.say(f"{counted(len(found), 'place')} on {counted(len({one.line for one in found}), 'line')}")
+    lines = {place.line for place in places}
+    terminal.say(f"{counted(len(places), 'place')} on {counted(len(lines), 'line')}")
 
 
-def _letter(number: int) -> str:
+def _letters_of(number: int) -> str:
     """Return A, B, ..., Z, AA, AB, ... for 0, 1, ..."""
     tens, ones = divmod(number, 26)
-    return (_letter(tens - 1) if tens else "") + chr(ord("A") + ones)
+    return (_letters_of(tens - 1) if tens else "") + chr(ord("A") + ones)
 
 
-def _yaml(at: Mapping[str, Any]) -> str:
-    told = {key: value for key, value in at.items() if key != "file"}
+def _anchor_as_yaml(at: Mapping[str, Any]) -> str:
+    anchor = {key: value for key, value in at.items() if key != "file"}
     import yaml
 
-    line = yaml.safe_dump(told, default_flow_style=True, sort_keys=False, width=math.inf, allow_unicode=True)
+    line = yaml.safe_dump(
+        anchor, default_flow_style=True, sort_keys=False, width=math.inf, allow_unicode=True
+    )
     return str(line).strip()

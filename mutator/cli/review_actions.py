@@ -10,7 +10,7 @@ import mutator
 from mutator._common.message_text import counted
 from mutator.cli import review_view
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, Place, with_place
+from mutator.cli.options import Json, WorkspaceOptions, with_workspace_options
 from mutator.cli.review_options import By, Groups, MutantOptions, OnlyGroups, reviewer
 from mutator.errors import MutatorError
 
@@ -27,8 +27,8 @@ Yes = Annotated[
 Remark = Annotated[str, typer.Option(metavar="TEXT", help="Add this remark to each group.")]
 
 
-def _deciding(kind: str, about: str) -> Callable[..., None]:
-    @with_place
+def _build_decision_command(action: str, about: str) -> Callable[..., None]:
+    @with_workspace_options
     def verb(
         groups: SomeGroups = None,
         by: By = None,
@@ -38,23 +38,25 @@ def _deciding(kind: str, about: str) -> Callable[..., None]:
         *,
         mutants: MutantOptions,
         as_json: Json = False,
-        place: Place,
+        workspace_options: WorkspaceOptions,
     ) -> None:
-        terminal, name = Terminal(as_json), reviewer(place, by)
-        found = mutants.load(terminal, place)
-        if chosen := _chosen(found, kind, groups, only, yes=yes):
-            decide = found.approve if kind == "approve" else found.reject
-            _tell(terminal, decide(chosen, name, remark), chosen)
+        terminal, name = Terminal(as_json), reviewer(workspace_options, by)
+        reviewed = mutants.load(terminal, workspace_options)
+        if groups_to_decide := _choose_groups(reviewed, action, groups, only, yes=yes):
+            decide = reviewed.approve if action == "approve" else reviewed.reject
+            _print_decided(terminal, decide(groups_to_decide, name, remark), groups_to_decide)
 
     verb.__doc__ = about
     return verb
 
 
-approve = _deciding("approve", "Approve groups in their current state, by id or by filter.")
-reject = _deciding("reject", "Reject groups in their current state: `run --require-reviewed` refuses them.")
+approve = _build_decision_command("approve", "Approve groups in their current state, by id or by filter.")
+reject = _build_decision_command(
+    "reject", "Reject groups in their current state: `run --require-reviewed` refuses them."
+)
 
 
-@with_place
+@with_workspace_options
 def clear(
     groups: Groups,
     by: By = None,
@@ -62,15 +64,15 @@ def clear(
     *,
     mutants: MutantOptions,
     as_json: Json = False,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Withdraw decisions; remarks and flags stay."""
-    terminal, name = Terminal(as_json), reviewer(place, by)
-    found = mutants.load(terminal, place)
-    _tell(terminal, found.clear(chosen := found.find(groups), name, remark), chosen)
+    terminal, name = Terminal(as_json), reviewer(workspace_options, by)
+    reviewed = mutants.load(terminal, workspace_options)
+    _print_decided(terminal, reviewed.clear(chosen := reviewed.find(groups), name, remark), chosen)
 
 
-@with_place
+@with_workspace_options
 def remark(
     groups: Groups,
     text: Annotated[str, typer.Option("--text", metavar="TEXT", help="The remark, one line.")],
@@ -78,39 +80,44 @@ def remark(
     *,
     mutants: MutantOptions,
     as_json: Json = False,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Add a remark to groups."""
-    terminal, name = Terminal(as_json), reviewer(place, by)
-    found = mutants.load(terminal, place)
-    _tell(terminal, found.remark(chosen := found.find(groups), name, text), chosen)
+    terminal, name = Terminal(as_json), reviewer(workspace_options, by)
+    reviewed = mutants.load(terminal, workspace_options)
+    _print_decided(terminal, reviewed.remark(chosen := reviewed.find(groups), name, text), chosen)
 
 
-def _flagging(flag: bool, about: str) -> Callable[..., None]:
-    @with_place
+def _build_flag_command(flag: bool, about: str) -> Callable[..., None]:
+    @with_workspace_options
     def verb(
         groups: Groups,
         by: By = None,
         *,
         mutants: MutantOptions,
         as_json: Json = False,
-        place: Place,
+        workspace_options: WorkspaceOptions,
     ) -> None:
-        terminal, name = Terminal(as_json), reviewer(place, by)
-        found = mutants.load(terminal, place)
-        chosen = found.find(groups)
-        _tell(terminal, (found.flag if flag else found.unflag)(chosen, name), chosen)
+        terminal, name = Terminal(as_json), reviewer(workspace_options, by)
+        reviewed = mutants.load(terminal, workspace_options)
+        chosen = reviewed.find(groups)
+        _print_decided(terminal, (reviewed.flag if flag else reviewed.unflag)(chosen, name), chosen)
 
     verb.__doc__ = about
     return verb
 
 
-flag = _flagging(True, "Flag groups for another look.")
-unflag = _flagging(False, "Remove flags.")
+flag = _build_flag_command(True, "Flag groups for another look.")
+unflag = _build_flag_command(False, "Remove flags.")
 
 
-def _chosen(
-    found: "mutator.ReviewedGroups", verb: str, starts: Sequence[str] | None, only: str | None, *, yes: bool
+def _choose_groups(
+    reviewed: "mutator.ReviewedGroups",
+    verb: str,
+    starts: Sequence[str] | None,
+    only: str | None,
+    *,
+    yes: bool,
 ) -> "Sequence[Group]":
     """Return the chosen groups, or none without the user's confirmation."""
     if bool(starts) == (only is not None):
@@ -120,32 +127,32 @@ def _chosen(
             expected="either the ids of groups or --only",
         )
     if starts:
-        return found.find(starts)
-    chosen = found.matching(only).groups
+        return reviewed.find(starts)
+    chosen = reviewed.matching(only).groups
     if not chosen:
         raise MutatorError(
             f"no group matches {only}", argument="only", remedy="list the groups: `mutator review`"
         )
-    many = f"{counted(len(chosen), 'group')} ({review_view.counts(found.review, chosen)})"
+    count_text = f"{counted(len(chosen), 'group')} ({review_view.describe_counts(reviewed.review, chosen)})"
     if not yes:
         if not sys.stdin.isatty():
             raise MutatorError(
-                f"no terminal to ask for confirmation of {many}",
+                f"no terminal to ask for confirmation of {count_text}",
                 argument="only",
                 remedy=f"add --yes to {verb} without confirmation",
             )
-        if not typer.confirm(f"{verb} {many}?"):
+        if not typer.confirm(f"{verb} {count_text}?"):
             return ()
     return chosen
 
 
-def _tell(terminal: Terminal, found: "mutator.ReviewedGroups", groups: "Sequence[Group]") -> None:
-    decided = found.review
+def _print_decided(terminal: Terminal, reviewed: "mutator.ReviewedGroups", groups: "Sequence[Group]") -> None:
+    review = reviewed.review
     if terminal.as_json:
-        terminal.emit([review_view.data(decided, group) for group in groups])
+        terminal.print_json([review_view.group_as_json(review, group) for group in groups])
     for group in groups:
-        state = decided.state(group).value
-        words = decided.describe(group) or state
-        words += ", flagged" * (decided.flag(group.id) is not None)
-        terminal.say(f"{group.id} {words}", style=review_view.STYLES[state])
-    terminal.say(f"{short_path(decided.path)}: {review_view.counts(decided, found.groups)}")
+        state = review.state(group).value
+        words = review.describe(group) or state
+        words += ", flagged" * (review.flag(group.id) is not None)
+        terminal.say(f"{group.id} {words}", style=review_view.STYLE_BY_STATE[state])
+    terminal.say(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")

@@ -7,7 +7,7 @@ import typer
 
 import mutator
 from mutator.cli.console import Terminal
-from mutator.cli.options import Manifest, Place, Reading, Seed
+from mutator.cli.options import Manifest, Reading, Seed, WorkspaceOptions
 from mutator.errors import MutatorError
 from mutator.review.group_columns import COLUMNS
 
@@ -45,11 +45,11 @@ class MutantOptions:
     seed: Seed = None
     manifest: Manifest = None
 
-    def load(self, terminal: Terminal, place: Place) -> "mutator.ReviewedGroups":
+    def load(self, terminal: Terminal, workspace_options: WorkspaceOptions) -> "mutator.ReviewedGroups":
         if self.campaign and self.specs:
             raise MutatorError("--campaign together with --spec", expected="one or the other")
-        workspace = place.workspace()
-        with terminal.wait("making the mutants"):
+        workspace = workspace_options.workspace()
+        with terminal.show_spinner("making the mutants"):
             return mutator.load_review(
                 campaign=self.campaign,
                 specs=tuple(self.specs or ()),
@@ -60,10 +60,10 @@ class MutantOptions:
             )
 
 
-def reviewer(place: Place, by: str | None) -> str:
+def reviewer(workspace_options: WorkspaceOptions, by: str | None) -> str:
     from mutator.api.reviews import reviewer_name
 
-    name = reviewer_name(place.workspace()) if by is None else by
+    name = reviewer_name(workspace_options.workspace()) if by is None else by
     if not name or not name.strip():
         raise MutatorError(
             "no reviewer",

@@ -13,45 +13,48 @@ if TYPE_CHECKING:
     from mutator.review.mutant_groups import Group
 
 
-def print_status(terminal: Terminal, found: "mutator.ReviewedGroups", campaign: str | None) -> None:
-    review = found.review
+def print_status(terminal: Terminal, reviewed: "mutator.ReviewedGroups", campaign: str | None) -> None:
+    review = reviewed.review
     if terminal.as_json:
-        terminal.emit(_data(found))
+        terminal.print_json(_status_as_json(reviewed))
         return
-    counts = review_view.counts(review, found.groups)
-    terminal.say(f"{short_path(review.path)}: {counted(len(found.groups), 'group')}: {counts}")
+    counts = review_view.describe_counts(review, reviewed.groups)
+    terminal.say(f"{short_path(review.path)}: {counted(len(reviewed.groups), 'group')}: {counts}")
     if review.four_eyes:
         terminal.say("four eyes: nobody can approve what they changed last")
     if not campaign:
-        told = [(group, review.describe(group)) for group in found.groups if review.changed(group)]
-        _list(terminal, "changed since the decision", told)
-    flags = [(group, review.flag(group.id)) for group in found.groups]
-    _list(terminal, "flagged", [(group, f"by {flag.by}") for group, flag in flags if flag])
+        changed = [(group, review.describe(group)) for group in reviewed.groups if review.changed(group)]
+        _print_groups(terminal, "changed since the decision", changed)
+    flags = [(group, review.flag(group.id)) for group in reviewed.groups]
+    _print_groups(terminal, "flagged", [(group, f"by {flag.by}") for group, flag in flags if flag])
     if campaign:
-        _list(terminal, f"approvals that {campaign} lacks", found.lacking)
-        if not found.lacking:
+        _print_groups(terminal, f"approvals that {campaign} lacks", reviewed.lacking)
+        if not reviewed.lacking:
             terminal.say(f"all groups of {campaign} are approved", style="green")
 
 
-def _data(found: "mutator.ReviewedGroups") -> dict[str, Any]:
-    review, groups = found.review, found.groups
+def _status_as_json(reviewed: "mutator.ReviewedGroups") -> dict[str, Any]:
+    review, groups = reviewed.review, reviewed.groups
     states = Counter(review.state(group).value for group in groups)
-    some = {
+    groups_by_list = {
         "changed": [group for group in groups if review.changed(group)],
         "flagged": [group for group in groups if review.flag(group.id)],
-        "lacking": [group for group, _ in found.lacking],
+        "lacking": [group for group, _ in reviewed.lacking],
     }
     return {
         "file": str(review.path),
         "target": review.target,
         "four_eyes": review.four_eyes,
         "groups": len(groups),
-        "states": {name: states[name] for name in review_view.STYLES},
-        **{name: [review_view.data(review, group) for group in chosen] for name, chosen in some.items()},
+        "states": {name: states[name] for name in review_view.STYLE_BY_STATE},
+        **{
+            name: [review_view.group_as_json(review, group) for group in chosen]
+            for name, chosen in groups_by_list.items()
+        },
     }
 
 
-def _list(terminal: Terminal, head: str, rows: "Sequence[tuple[Group, str]]") -> None:
+def _print_groups(terminal: Terminal, head: str, rows: "Sequence[tuple[Group, str]]") -> None:
     if rows:
         terminal.say(f"{head}:", style="bold")
     for group, words in rows:

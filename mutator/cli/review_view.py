@@ -12,18 +12,18 @@ if TYPE_CHECKING:
     from mutator.review.decisions import Review
     from mutator.review.mutant_groups import Group
 
-STYLES = {"new": "yellow", "changed": "bold yellow", "rejected": "bold red", "approved": "green"}
-ROWS = 24  # rows of values shown in a terminal
-CONDITIONS = 6
+STYLE_BY_STATE = {"new": "yellow", "changed": "bold yellow", "rejected": "bold red", "approved": "green"}
+MOST_VALUE_ROWS = 24  # rows of values shown in a terminal
+MOST_CONDITIONS = 6
 
 
-def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, Any]:
+def group_as_json(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, Any]:
     """Return a group as JSON data; with `whole`, also its diff and values."""
-    from mutator.api.reviews import facts as known
+    from mutator.api.reviews import group_facts as group_facts
     from mutator.review.readable_groups import value_table
 
     decision, flag = review.decision(group.id), review.flag(group.id)
-    facts = {**known(review, group), "what": group.what, "injections": group.injections}
+    facts = {**group_facts(review, group), "what": group.what, "injections": group.injections}
     facts |= {"at": decision.at if decision else None, "changed": review.changed(group)}
     facts |= {"remarks": [asdict(remark) for remark in review.remarks(group.id)]}
     facts |= {"flag": asdict(flag) if flag else None, "bound": asdict(group.bound), "ranges": group.values}
@@ -38,49 +38,59 @@ def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, 
     }
 
 
-def counts(review: "Review", groups: Sequence["Group"]) -> str:
-    found = Counter(review.state(group).value for group in groups)
-    return ", ".join(f"{found[name]} {name}" for name in STYLES if found[name]) or "no groups"
+def describe_counts(review: "Review", groups: Sequence["Group"]) -> str:
+    count_by_state = Counter(review.state(group).value for group in groups)
+    return (
+        ", ".join(f"{count_by_state[name]} {name}" for name in STYLE_BY_STATE if count_by_state[name])
+        or "no groups"
+    )
 
 
 def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) -> None:
     if terminal.as_json:
-        terminal.emit([data(review, group) for group in groups])
+        terminal.print_json([group_as_json(review, group) for group in groups])
         return
     rows = [
-        (g.id, review.state(g).value, "\n".join(map(_short, g.injections)), _when(g), len(g.faults), g.runs)
+        (
+            g.id,
+            review.state(g).value,
+            "\n".join(map(_shorten_injection, g.injections)),
+            _describe_trigger(g),
+            len(g.faults),
+            g.runs,
+        )
         for g in groups
     ]
     if terminal.out.is_terminal:
-        terminal.table(["group", "state", "what", "when", "faults", "runs"], rows, right=(4, 5))
+        terminal.print_table(["group", "state", "what", "when", "faults", "runs"], rows, right=(4, 5))
     else:
         flat = [(*row[:2], row[2].replace("\n", "; "), *row[3:]) for row in rows]
-        terminal.table(["group", "state", "what", "when", "faults", "runs"], flat, right=(4, 5))
-    terminal.say(f"{counted(len(groups), 'group')}: {counts(review, groups)}")
-    gone = review.entries.keys() - {group.id for group in groups}
-    if gone:
-        terminal.note(f"blocks of the review file for groups that are not listed: {len(gone)}")
+        terminal.print_table(["group", "state", "what", "when", "faults", "runs"], flat, right=(4, 5))
+    terminal.say(f"{counted(len(groups), 'group')}: {describe_counts(review, groups)}")
+    unlisted = review.entries.keys() - {group.id for group in groups}
+    if unlisted:
+        terminal.note(f"blocks of the review file for groups that are not listed: {len(unlisted)}")
 
 
-def _short(injection: str) -> str:
+def _shorten_injection(injection: str) -> str:
     """Shorten the file's path to its name."""
     path, space, rest = injection.partition(" ")
     return path.rpartition("/")[2] + space + rest
 
 
-def _when(group: "Group") -> str:
+def _describe_trigger(group: "Group") -> str:
     return f"{group.trigger}, {group.hold}" if group.trigger else "always"
 
 
 def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
     state, flag = review.state(group).value, review.flag(group.id)
-    terminal.say(f"group {group.id}: {state}", style=STYLES[state])
+    terminal.say(f"group {group.id}: {state}", style=STYLE_BY_STATE[state])
     if decision := review.describe(group):
         terminal.say(decision)
     if flag:
         terminal.say(f"flagged by {flag.by} on {flag.at[:10]}")
-    for one in review.remarks(group.id):
-        terminal.say(f"{one.by}{f' on {one.at[:10]}' if one.at else ''}: {one.text}")
+    for remark in review.remarks(group.id):
+        terminal.say(f"{remark.by}{f' on {remark.at[:10]}' if remark.at else ''}: {remark.text}")
 
 
 def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
@@ -88,7 +98,7 @@ def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
     terminal.say(f"  {group.what}", style="bold")
     terminal.say()
     if changes := review.changes(group):
-        terminal.diff(changes)
+        terminal.print_diff(changes)
     elif review.changed(group):
         terminal.say("the diff that the reviewer saw was not kept")
     else:
@@ -107,18 +117,18 @@ def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
     runs = "" if group.runs is None else f", {counted(group.runs, 'experiment')}"
     if group.values:
         terminal.say(f"values: {ranges(group)}")
-    terminal.say(f"when: {_when(group)}; {counted(len(group.faults), 'fault')}{runs}")
+    terminal.say(f"when: {_describe_trigger(group)}; {counted(len(group.faults), 'fault')}{runs}")
     conditions = condition_lines(group.triggers)
-    for line in conditions[:CONDITIONS]:
+    for line in conditions[:MOST_CONDITIONS]:
         terminal.say(f"  {line}")
-    if (more := len(conditions) - CONDITIONS) > 0:
+    if (more := len(conditions) - MOST_CONDITIONS) > 0:
         terminal.say(f"  and {more} more")
     terminal.say()
-    terminal.diff(group.diff)
+    terminal.print_diff(group.diff)
     terminal.say()
     heads, rows = value_table(group)
     if rows:
-        terminal.table(heads, rows[:ROWS], right=range(2, len(heads)))
-        if len(rows) > ROWS:
-            terminal.say(f"{len(rows) - ROWS} more; `--json` has all of them")
+        terminal.print_table(heads, rows[:MOST_VALUE_ROWS], right=range(2, len(heads)))
+        if len(rows) > MOST_VALUE_ROWS:
+            terminal.say(f"{len(rows) - MOST_VALUE_ROWS} more; `--json` has all of them")
     terminal.say()

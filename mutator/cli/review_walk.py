@@ -13,7 +13,7 @@ from mutator.errors import MutatorError
 if TYPE_CHECKING:
     import mutator
 
-KEYS = {"a": "approve", "r": "reject", "s": "skip", "q": "quit"}
+WORD_BY_KEY = {"a": "approve", "r": "reject", "s": "skip", "q": "quit"}
 
 
 def walk_through(
@@ -28,38 +28,38 @@ def walk_through(
             where="mutator review walk",
             remedy="use `mutator review approve GROUP... --by NAME`, or `reject`",
         )
-    by, found = reviewer(), load()
-    waiting = list(enumerate(found.undecided, start=1))
+    by, reviewed = reviewer(), load()
+    waiting = list(enumerate(reviewed.undecided, start=1))
     count = len(waiting)
     while waiting:
         number, group = waiting.pop(0)
-        review_view.print_group(terminal, found.review, group)
-        key = _asked(terminal, f"{number} of {count}")
+        review_view.print_group(terminal, reviewed.review, group)
+        key = _ask_for_key(terminal, f"{number} of {count}")
         if key == "q":
             break
         if key == "s":
             continue
         remark = typer.prompt("remark (Enter: none)", default="", show_default=False)
         try:
-            found = (found.approve if key == "a" else found.reject)([group], by, remark)
+            reviewed = (reviewed.approve if key == "a" else reviewed.reject)([group], by, remark)
         except MutatorError as error:
             show_error(error)
-            found = found.reread()
+            reviewed = reviewed.reread()
             waiting.insert(0, (number, group))
             continue
-        style = review_view.STYLES[found.review.state(group).value]
-        terminal.say(f"{group.id} {found.review.describe(group)}", style=style)
-    review = found.review
-    terminal.say(f"{short_path(review.path)}: {review_view.counts(review, found.groups)}")
+        style = review_view.STYLE_BY_STATE[reviewed.review.state(group).value]
+        terminal.say(f"{group.id} {reviewed.review.describe(group)}", style=style)
+    review = reviewed.review
+    terminal.say(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")
 
 
-def _asked(terminal: Terminal, where: str) -> str:
-    choices = "  ".join(f"[{key}] {word}" for key, word in KEYS.items())
+def _ask_for_key(terminal: Terminal, where: str) -> str:
+    choices = "  ".join(f"[{key}] {word}" for key, word in WORD_BY_KEY.items())
     while True:
         terminal.say(f"{where}:  {choices}", style="bold")
         try:
             key = typer.getchar().lower()
         except EOFError:  # Ctrl-D
             return "q"
-        if key in KEYS:
+        if key in WORD_BY_KEY:
             return key

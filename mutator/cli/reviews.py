@@ -11,7 +11,7 @@ import mutator
 from mutator._common.message_text import counted
 from mutator.cli import review_actions, review_view
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, Place, with_place
+from mutator.cli.options import Json, WorkspaceOptions, with_workspace_options
 from mutator.cli.review_options import (
     By,
     ExcludeGroups,
@@ -46,7 +46,7 @@ that are approved there.
 """
 
 
-class Verbs(TyperGroup):
+class ReviewSubcommands(TyperGroup):
     """The subcommands of `review`; the default is `list`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -58,7 +58,10 @@ class Verbs(TyperGroup):
 
 def register(app: typer.Typer) -> None:
     reviews = typer.Typer(
-        cls=Verbs, rich_markup_mode=None, epilog=EXAMPLES, context_settings={"max_content_width": 110}
+        cls=ReviewSubcommands,
+        rich_markup_mode=None,
+        epilog=EXAMPLES,
+        context_settings={"max_content_width": 110},
     )
     reviews.callback()(review)
     for name, verb in (
@@ -82,22 +85,22 @@ def review() -> None:
     """Review generated mutants: approve or reject groups of diffs."""
 
 
-@with_place
+@with_workspace_options
 def list_groups(
     only: OnlyGroups = None,
     exclude: ExcludeGroups = None,
     *,
     mutants: MutantOptions,
     as_json: Json = False,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """List groups, new and changed ones first (the default)."""
     terminal = Terminal(as_json)
-    found = mutants.load(terminal, place).matching(only, exclude)
-    review_view.print_list(terminal, found.review, found.groups)
+    reviewed = mutants.load(terminal, workspace_options).matching(only, exclude)
+    review_view.print_list(terminal, reviewed.review, reviewed.groups)
 
 
-@with_place
+@with_workspace_options
 def show(
     groups: Groups,
     changes: Annotated[
@@ -110,29 +113,35 @@ def show(
     *,
     mutants: MutantOptions,
     as_json: Json = False,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Show a group: its diff with holes, and the values that fill them."""
     terminal = Terminal(as_json)
-    found = mutants.load(terminal, place)
-    shown = found.find(groups)
-    for group in () if as_json else shown:
-        (review_view.print_changes if changes else review_view.print_group)(terminal, found.review, group)
+    reviewed = mutants.load(terminal, workspace_options)
+    selected = reviewed.find(groups)
+    for group in () if as_json else selected:
+        (review_view.print_changes if changes else review_view.print_group)(terminal, reviewed.review, group)
     written: dict[str, dict[str, str]] = {}
     if pictures:
-        written = _write_pictures(terminal, place, found.review.target, shown, pictures)
+        written = _write_pictures(terminal, workspace_options, reviewed.review.target, selected, pictures)
     if as_json:
-        facts = [review_view.data(found.review, group, whole=True) for group in shown]
-        terminal.emit([{**one, "pictures": written.get(str(one["group"]), {})} for one in facts])
+        facts = [review_view.group_as_json(reviewed.review, group, whole=True) for group in selected]
+        terminal.print_json(
+            [{**group_data, "pictures": written.get(str(group_data["group"]), {})} for group_data in facts]
+        )
 
 
 def _write_pictures(
-    terminal: Terminal, place: Place, target: str, groups: "Sequence[Group]", folder: Path
+    terminal: Terminal,
+    workspace_options: WorkspaceOptions,
+    target: str,
+    groups: "Sequence[Group]",
+    folder: Path,
 ) -> dict[str, dict[str, str]]:
     from mutator.api.reviews import write_pictures
 
-    with terminal.wait("drawing"):
-        written, values = write_pictures(groups, target, folder, workspace=place.workspace())
+    with terminal.show_spinner("drawing"):
+        written, values = write_pictures(groups, target, folder, workspace=workspace_options.workspace())
     for path, value in values.items():
         terminal.say(short_path(Path(path)) + (f": {value}" if value else ""))
     for group in groups:
@@ -141,12 +150,12 @@ def _write_pictures(
     return written
 
 
-@with_place
+@with_workspace_options
 def status(
     *,
     mutants: MutantOptions,
     as_json: Json = False,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Show the review's progress: groups by state, changes since the decision, flags. With --campaign, also
     the approvals that the campaign lacks.
@@ -154,32 +163,32 @@ def status(
     from mutator.cli.review_status import print_status
 
     terminal = Terminal(as_json)
-    found = mutants.load(terminal, place)
-    print_status(terminal, found, mutants.campaign)
+    reviewed = mutants.load(terminal, workspace_options)
+    print_status(terminal, reviewed, mutants.campaign)
 
 
-@with_place
+@with_workspace_options
 def walk(
     by: By = None,
     only: OnlyGroups = None,
     exclude: ExcludeGroups = None,
     *,
     mutants: MutantOptions,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Show new and changed groups one by one, and ask for a decision on each."""
     from mutator.cli.review_walk import walk_through
 
     terminal = Terminal()
 
-    def groups() -> "mutator.ReviewedGroups":
-        found = mutants.load(terminal, place)
-        return found.matching(only, exclude)
+    def load_groups() -> "mutator.ReviewedGroups":
+        reviewed = mutants.load(terminal, workspace_options)
+        return reviewed.matching(only, exclude)
 
-    walk_through(terminal, groups, lambda: reviewer(place, by))
+    walk_through(terminal, load_groups, lambda: reviewer(workspace_options, by))
 
 
-@with_place
+@with_workspace_options
 def page(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The page, an .html file.")],
     only: OnlyGroups = None,
@@ -187,14 +196,14 @@ def page(
     *,
     mutants: MutantOptions,
     as_json: Json = False,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Write all groups to one self-contained page, with commands to copy."""
     terminal = Terminal(as_json)
-    found = mutants.load(terminal, place).matching(only, exclude)
-    found.write_page(out)
+    reviewed = mutants.load(terminal, workspace_options).matching(only, exclude)
+    reviewed.write_page(out)
     if as_json:
-        terminal.emit({"page": str(out), "groups": len(found.groups)})
+        terminal.print_json({"page": str(out), "groups": len(reviewed.groups)})
     terminal.say(
-        f"{counted(len(found.groups), 'group')} in {short_path(out)} ({out.stat().st_size / 1e6:.2f} MB)"
+        f"{counted(len(reviewed.groups), 'group')} in {short_path(out)} ({out.stat().st_size / 1e6:.2f} MB)"
     )

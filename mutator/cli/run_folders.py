@@ -13,7 +13,7 @@ import mutator
 from mutator._common.message_text import counted
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import AcceptVersions, Json, OutRun, Place, with_place
+from mutator.cli.options import AcceptVersions, Json, OutRunFolder, WorkspaceOptions, with_workspace_options
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -27,18 +27,18 @@ def register(app: typer.Typer) -> None:
     app.command("clean", epilog=CLEAN_EXAMPLES)(clean)
 
 
-def show_counts(terminal: Terminal, run: "Run") -> None:
+def print_counts(terminal: Terminal, run: "Run") -> None:
     counts = run.counts()
-    terminal.table(counts.heads, counts.rows, right=tuple(counts.right_aligned), total=True)
+    terminal.print_table(counts.heads, counts.rows, right=tuple(counts.right_aligned), total=True)
     score = run.mutation_totals()
     if score.rows:
-        terminal.table(score.heads, score.rows, right=tuple(score.right_aligned))
+        terminal.print_table(score.heads, score.rows, right=tuple(score.right_aligned))
     with suppress(MutatorError):  # the note needs the library
         if note := run.alerts_note():
             terminal.say(note)
     if run.folder.stop_note:
         terminal.say(run.folder.stop_note)
-    terminal.result(f"outcomes: {', '.join(f'{name} {n}' for name, n in run.endings.items())}")
+    terminal.print_result(f"outcomes: {', '.join(f'{name} {n}' for name, n in run.endings.items())}")
 
 
 MERGE_EXAMPLES = """\b
@@ -52,7 +52,7 @@ def merge(
         list[Path],
         typer.Argument(metavar="DIR", help="The run folder of each shard.", autocompletion=completion.runs),
     ],
-    out: OutRun,
+    out: OutRunFolder,
     accept_versions: AcceptVersions = False,
     as_json: Json = False,
 ) -> None:
@@ -61,12 +61,12 @@ def merge(
     The results are the same, byte for byte, as those of a run on a single machine.
     """
     terminal = Terminal(as_json)
-    with terminal.wait("merging"):
+    with terminal.show_spinner("merging"):
         merged = mutator.merge_runs(shards, out, accept_versions=accept_versions)
         planned, seals = merged.folder.planned_count, merged.seals
     if as_json:
         counts = {"run": str(out), "shards": len(shards), "experiments": planned}
-        terminal.emit(counts | asdict(seals))
+        terminal.print_json(counts | asdict(seals))
     results = short_path(out / "results.csv")
     terminal.say(f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {results}")
     for name, value in seals.texts().items():
@@ -82,7 +82,7 @@ Examples:
 """
 
 
-@with_place
+@with_workspace_options
 def report(
     run: Annotated[
         Path,
@@ -92,7 +92,7 @@ def report(
     ],
     as_json: Json = False,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Write the report of a run, or the history of a folder of runs.
 
@@ -101,37 +101,43 @@ def report(
     """
     terminal = Terminal(as_json)
     if not (run / "run.json").exists() and any(run.glob("*/run.json")):
-        _history(terminal, run)
+        _write_history(terminal, run)
         return
-    loaded = mutator.load_run(run, workspace=library_if_any(place))
-    with terminal.wait("writing the report"):  # this can rerun a few experiments
-        written = loaded.report(anew=True)
+    loaded_run = mutator.load_run(run, workspace=workspace_if_any(workspace_options))
+    with terminal.show_spinner("writing the report"):  # this can rerun a few experiments
+        report_files = loaded_run.report(anew=True)
     if as_json:
-        terminal.emit({"markdown": str(written.markdown), "page": str(written.page), "rows": written.rows})
-    show_counts(terminal, loaded)
-    for summary in written.summaries:
-        terminal.table(summary.heads, summary.rows, right=tuple(summary.right_aligned))
-    terminal.say(f"report: {short_path(written.markdown)} and {short_path(written.page)}")
-    loaded.check_equivalence()
+        terminal.print_json(
+            {
+                "markdown": str(report_files.markdown),
+                "page": str(report_files.page),
+                "rows": report_files.rows,
+            }
+        )
+    print_counts(terminal, loaded_run)
+    for summary in report_files.summaries:
+        terminal.print_table(summary.heads, summary.rows, right=tuple(summary.right_aligned))
+    terminal.say(f"report: {short_path(report_files.markdown)} and {short_path(report_files.page)}")
+    loaded_run.check_equivalence()
 
 
-def _history(terminal: Terminal, folder: Path) -> None:
+def _write_history(terminal: Terminal, folder: Path) -> None:
     written = mutator.write_history(folder)
     paths = {"markdown": str(written.markdown), "page": str(written.page)}
     if terminal.as_json:
-        terminal.emit({**paths, "runs": written.runs, "left_out": list(written.left_out)})
+        terminal.print_json({**paths, "runs": written.runs, "left_out": list(written.left_out)})
     for why in written.left_out:
         terminal.say(f"left out: {why}")
     files = f"{short_path(written.markdown)} and {short_path(written.page)}"
     terminal.say(f"history of {counted(written.runs, 'run')}: {files}")
 
 
-def library_if_any(place: Place) -> "Workspace | None":
+def workspace_if_any(workspace_options: WorkspaceOptions) -> "Workspace | None":
     """Find the workspace; None if no option names one and none is found."""
     try:
-        return place.workspace()
+        return workspace_options.workspace()
     except MutatorError:
-        if place != Place():
+        if workspace_options != WorkspaceOptions():
             raise
         return None
 

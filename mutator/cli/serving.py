@@ -9,7 +9,7 @@ import typer
 
 from mutator.cli import completion
 from mutator.cli.console import Terminal
-from mutator.cli.options import Place, with_place
+from mutator.cli.options import WorkspaceOptions, with_workspace_options
 from mutator.errors import MutatorError
 
 EXAMPLES = """\b
@@ -27,7 +27,7 @@ def register(app: typer.Typer) -> None:
     app.command("serve", epilog=EXAMPLES)(serve)
 
 
-@with_place
+@with_workspace_options
 def serve(
     runs: Annotated[
         list[Path] | None,
@@ -41,7 +41,7 @@ def serve(
     jobs: Annotated[int, typer.Option(min=1, max=16, help="Number of jobs at a time.")] = 1,
     browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
     *,
-    place: Place,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Show reports, review mutants and start jobs in a browser."""
     if not all(map(find_spec, ("starlette", "uvicorn"))):
@@ -59,6 +59,12 @@ def serve(
             webbrowser.open(address)
 
     try:
-        serve_runs(runs or (), port=port, at_once=jobs, ready=ready, workspace=place.workspace())
+        serve_runs(
+            runs or (),
+            port=port,
+            most_parallel_jobs=jobs,
+            on_ready=ready,
+            workspace=workspace_options.workspace(),
+        )
     except KeyboardInterrupt:
         terminal.note("stopped")

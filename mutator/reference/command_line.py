@@ -9,13 +9,13 @@ import pytest
 from typer.main import get_command
 
 from mutator._common.table_rendering import TextTable
-from mutator.cli.app import EXIT_CODES, GROUPS, app
-from mutator.cli.options import Place
+from mutator.cli.app import EXIT_CODES, SUBCOMMAND_GROUPS, app
+from mutator.cli.options import WorkspaceOptions
 from mutator.execution import pytest_plugin
 from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.workspace import Workspace
 
-_PLACE_OPTIONS = {field.name for field in fields(Place)}
+_PLACE_OPTIONS = {field.name for field in fields(WorkspaceOptions)}
 _PLACE_OPTIONS_NOTE = (
     "These options say where the library, templates and target are. Write them before or after the "
     "subcommand.\n"
@@ -27,7 +27,10 @@ def render_command_line_page(workspace: Workspace) -> str:
     parts = [
         generated_page_head("Command line"),
         "`mutator --help` and `mutator SUBCOMMAND --help` print the same information.\n",
-        *(f"* {title}: {', '.join(f'[{name}](#{name})' for name in names)}" for title, names in GROUPS),
+        *(
+            f"* {title}: {', '.join(f'[{name}](#{name})' for name in names)}"
+            for title, names in SUBCOMMAND_GROUPS
+        ),
         "\n## Exit codes\n",
         _table_markdown(("code", "meaning"), [(str(code), meaning) for code, meaning in EXIT_CODES.items()]),
         "\nCode 1 also means that a command found a difference that you asked it to look for. Code 3 also "
@@ -42,7 +45,7 @@ def render_command_line_page(workspace: Workspace) -> str:
         _PLACE_OPTIONS_NOTE,
         *_options_table(command, [p for p in command.params if p.name in _PLACE_OPTIONS]),
     ]
-    for _, names in GROUPS:
+    for _, names in SUBCOMMAND_GROUPS:
         for name in names:
             parts += _subcommand_section(command, name)
     return "\n".join([*parts, *_pytest_section()]).rstrip() + "\n"

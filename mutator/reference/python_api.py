@@ -277,17 +277,17 @@ def render_stub() -> str:
     """Return `mutator/__init__.pyi`: type checkers cannot follow names that are imported on first use."""
     lines = [
         f"from {module} import {name} as {name}"
-        for module, names in sorted(mutator.HOMES.items())
+        for module, names in sorted(mutator.NAMES_BY_MODULE.items())
         for name in sorted(names)
     ]
     exported = ",\n".join(f'    "{name}"' for name in mutator.__all__)
-    head = "# Generated from `HOMES` in __init__.py by `python -m mutator.reference`; do not edit."
+    head = "# Generated from `NAMES_BY_MODULE` in __init__.py by `python -m mutator.reference`; do not edit."
     return "\n".join(
         [
             head,
             *lines,
             "",
-            "HOMES: dict[str, tuple[str, ...]]",
+            "NAMES_BY_MODULE: dict[str, tuple[str, ...]]",
             "__version__: str",
             "",
             f"__all__ = [\n{exported},\n]",

@@ -11,12 +11,12 @@ import pytest
 
 from mutator import __version__
 from mutator.cli import library
-from mutator.cli.app import GROUPS, app, main
+from mutator.cli.app import SUBCOMMAND_GROUPS, app, main
 from mutator.errors import EXIT_CHECK_FAILED, CheckFailed, MutatorError
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
-VERBS = [verb for _, verbs in GROUPS for verb in verbs]
+VERBS = [verb for _, verbs in SUBCOMMAND_GROUPS for verb in verbs]
 HEAVY = ("pandas", "libcst", "matplotlib", "pydantic", "rich", "jinja2", "pyarrow", "numpy", "pytest")
 
 
@@ -25,7 +25,7 @@ def test_every_verb_is_in_the_help_under_a_heading(cli: Cli) -> None:
     assert answer.code == 0
     registered = [*app.registered_commands, *app.registered_groups]
     assert sorted(VERBS) == sorted(verb.name or "" for verb in registered)
-    for title, verbs in GROUPS:
+    for title, verbs in SUBCOMMAND_GROUPS:
         assert f"{title}:" in answer.out
         assert all(f"\n  {verb} " in answer.out for verb in verbs)
 
@@ -118,7 +118,7 @@ def fail_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     def broken(_: object) -> None:
         raise error
 
-    monkeypatch.setitem(library.LISTS, library.Kind.SPECS, broken)
+    monkeypatch.setitem(library.LIST_BY_KIND, library.EntryKind.SPECS, broken)
 
 
 def test_an_error_shows_place_expectation_and_remedy(

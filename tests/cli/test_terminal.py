@@ -140,14 +140,14 @@ def test_output_to_a_pipe_is_folded_at_100_columns_by_default(
     terminal = Terminal()
     terminal.say(LONG)
     terminal.note(LONG)
-    terminal.complain(LONG)
+    terminal.print_error(LONG)
     out, err = capsys.readouterr()
     for line in (out + err).splitlines():
         assert len(line) <= width
     assert max(map(len, out.splitlines())) > width - 20
     assert " ".join(out.split()) == LONG
     terminal.say(LONG, whole=True)
-    terminal.table(["a", "b"], [(LONG, COMMAND)])
+    terminal.print_table(["a", "b"], [(LONG, COMMAND)])
     whole = capsys.readouterr().out.splitlines()
     assert whole[0] == LONG
     assert whole[2].split("  ") == [LONG, COMMAND]
@@ -172,8 +172,8 @@ def test_json_is_never_folded(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPa
 def test_no_text_controls_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     terminal = Terminal()
     terminal.say("kernel \x1b[2J\x9b1m\r\tx")
-    terminal.table(["a"], [["\x1b]0;x\x07"]])
-    terminal.complain("\x08")
+    terminal.print_table(["a"], [["\x1b]0;x\x07"]])
+    terminal.print_error("\x08")
     out, err = capsys.readouterr()
     assert "kernel \\x1b[2J\\x9b1m\\r" in out and "\\x1b]0;x\\x07" in out and "\\x08" in err
     assert not {"\x1b", "\x9b", "\r", "\x07", "\x08"} & {*out, *err}

@@ -53,7 +53,7 @@ def test_the_note_on_alerts_agrees_with_the_reaction_time(
         hazards=() if hazard is None else (("H3", hazard),),
     )
     reaction = reaction_time(made.hazards, made.alerts)
-    assert experiment_view._no_alert(made, toycar.manifest("toycar"), reaction) == note
+    assert experiment_view._missing_alert_note(made, toycar.manifest("toycar"), reaction) == note
 
 
 def test_try_reports_hazards_of_the_fault_free_run(cli: Cli, root: Path) -> None:

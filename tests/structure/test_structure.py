@@ -14,7 +14,7 @@ import pytest
 from typer.main import get_command
 
 from mutator.cli.app import app
-from mutator.cli.options import Place
+from mutator.cli.options import WorkspaceOptions
 from mutator.cli.review_options import MutantOptions
 
 CLONE = Path(__file__).parents[2]
@@ -219,7 +219,7 @@ def test_the_command_line_calls_the_api() -> None:
 
 def test_options_of_every_review_verb_are_declared_once() -> None:
     """A set of options that several subcommands share is one dataclass, not parameters of each."""
-    shared = {*signature(MutantOptions).parameters, *signature(Place).parameters}
+    shared = {*signature(MutantOptions).parameters, *signature(WorkspaceOptions).parameters}
     functions = [
         node
         for name in ("reviews", "review_changes")

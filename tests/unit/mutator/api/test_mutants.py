@@ -8,7 +8,7 @@ import pytest
 
 import mutator
 from mutator.api.mutant_files import pairs_of_campaign, pairs_of_specs, write_mutants
-from mutator.api.selection import Bench
+from mutator.api.selection import SelectedTarget
 from mutator.errors import MutatorError
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
@@ -50,7 +50,7 @@ def test_mutants_of_a_campaign_are_written(toycar: Workspace, tmp_path: Path) ->
 
 
 def test_specs_are_paired_with_every_context(toycar: Workspace) -> None:
-    bench = Bench.of(toycar)
+    bench = SelectedTarget.of(toycar)
     pairs = pairs_of_specs(bench, ["sensor/lane"])
     assert {trigger.name for _, trigger in pairs} == {"near", "far"}
     with pytest.raises(MutatorError, match="no spec matches 'nothing"):

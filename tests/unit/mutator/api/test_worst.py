@@ -27,7 +27,7 @@ def test_filtered_results_are_sorted_by_severity(
     path.write_bytes(
         line_file_bytes(path, {"schema": SCHEMA, "plan": plan.digest}, map(record_as_json, made))
     )
-    monkeypatch.setattr(module, "_BATCH", 7)
+    monkeypatch.setattr(module, "_ROWS_PER_BATCH", 7)
     rows, count = worst_results(run)
     assert count == len(rows) == 24 and [bool(row.hazards) for row in rows] == [True] * 5 + [False] * 19
     some, left = worst_results(run, "t_h3 > 4", 2)

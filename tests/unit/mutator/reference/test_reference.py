@@ -10,7 +10,7 @@ import pytest
 from typer.main import get_command
 
 from mutator._common import shipped_files
-from mutator.cli.app import GROUPS, app
+from mutator.cli.app import SUBCOMMAND_GROUPS, app
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import spec_model
@@ -89,7 +89,7 @@ def test_models_are_in_reading_order() -> None:
 
 def test_every_command_is_in_a_group() -> None:
     command: Any = get_command(app)
-    assert sorted(name for _, names in GROUPS for name in names) == sorted(command.commands)
+    assert sorted(name for _, names in SUBCOMMAND_GROUPS for name in names) == sorted(command.commands)
 
 
 @pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
