@@ -222,7 +222,7 @@ def test_options_of_every_review_verb_are_declared_once() -> None:
     shared = {*signature(MutantOptions).parameters, *signature(WorkspaceOptions).parameters}
     functions = [
         node
-        for name in ("reviews", "review_changes")
+        for name in ("reviews", "review_actions")
         for node in ast.walk(ast.parse((CLONE / f"mutator/cli/{name}.py").read_bytes()))
         if isinstance(node, ast.FunctionDef)
     ]
@@ -230,7 +230,7 @@ def test_options_of_every_review_verb_are_declared_once() -> None:
         f"{function.name}: {one.arg}"
         for function in functions
         for one in (*function.args.args, *function.args.kwonlyargs)
-        if function.args.kwonlyargs and one.arg in shared  # a verb, whose place is a keyword
+        if function.args.kwonlyargs and one.arg in shared  # a verb, whose WorkspaceOptions are a keyword
     ]
     assert repeated == []
     command: Any = get_command(app)
