@@ -170,7 +170,7 @@ def opening(size: int, out: Path) -> dict[str, float]:
 def table(size: int, out: Path) -> dict[str, float]:
     written_run(size, out)
     began = process_time()
-    path = table_building.build(out)
+    path = table_building.build_tables(out)
     built = process_time()
     times = []
     for _ in range(3):

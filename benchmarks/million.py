@@ -58,7 +58,7 @@ def resume(size: int, run: Path) -> None:
 
 
 def table(size: int, run: Path) -> None:
-    table_building.build(run)
+    table_building.build_tables(run)
 
 
 def report(size: int, run: Path) -> None:

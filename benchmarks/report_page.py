@@ -37,7 +37,7 @@ from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.panels.fault_paths_panel import build_fault_paths_panel
 from mutator.report.reported_run import ReportedRun
 from mutator.results import table_building
-from mutator.results.outcome_counting import outcome_counts
+from mutator.results.outcome_counting import count_endings
 from mutator.review.patch_shapes import shapes
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import SCHEMA
@@ -95,7 +95,7 @@ def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
         metrics = tuple(zip(names, map(float, draw.normal(10.0, 5.0, len(names))), strict=True))
         lines.append(asdict(replace(record(experiment, number), metrics=metrics)))
     lines.close()
-    table_building.build(out)
+    table_building.build_tables(out)
     return experiments
 
 
@@ -160,7 +160,7 @@ def write(size: int, out: Path) -> dict[str, float]:
     content = Content(
         name=f"{size} experiments",
         alarm="",
-        outcomes=outcome_counts(run.results),
+        outcomes=count_endings(run.results),
         planned="",
         words=words_of(run),
         study="",

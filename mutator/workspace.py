@@ -22,7 +22,7 @@ from mutator.faults.fault_specs import FaultSpec, load_spec
 from mutator.faults.library_readings import Readings, load_readings
 from mutator.faults.spec_expansion import expand
 from mutator.model import Fault
-from mutator.results.table_columns import check_names
+from mutator.results.table_columns import check_column_names
 from mutator.stpa.analysis_files import Analysis, StructureModel, load_analysis, load_structure
 from mutator.stpa.context_tables import ContextTable, load_context_table
 from mutator.stpa.hazard_list import HazardList, load_hazards
@@ -102,7 +102,7 @@ class Workspace:
         """Return the manifest with this name or path."""
         manifest = load_manifest(self._file("targets", name, "target"), self.target)
         manifest = replace(manifest, sandbox=self.sandbox)
-        check_names(manifest)
+        check_column_names(manifest)
         return manifest
 
     def scale_of(self, manifest: TargetManifest) -> Scale | None:

@@ -7,21 +7,21 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from pyarrow import parquet
 
-from mutator.results.table_files import Column, CsvTable, ParquetTable, csv_lines, record_batch
+from mutator.results.table_files import CsvTable, ParquetTable, TableColumn, csv_lines, parquet_batch
 
 _TYPES = {"text": str, "flag": int, "count": int, "number": float}
 
 
-def write_results(run: Path, columns: Sequence[Column], lines: Iterable[Mapping[str, object]]) -> None:
+def write_results(run: Path, columns: Sequence[TableColumn], lines: Iterable[Mapping[str, object]]) -> None:
     """Write results.parquet and results.csv of a run folder. A missing or empty cell has no value."""
     cells = cells_of(columns, lines)
     with ParquetTable(run / "results.parquet", columns) as file:
-        file.append(record_batch(columns, cells))
+        file.append(parquet_batch(columns, cells))
     with CsvTable(run / "results.csv", columns) as csv:
         csv.append(csv_lines(zip(*cells, strict=True)))
 
 
-def cells_of(columns: Sequence[Column], lines: Iterable[Mapping[str, object]]) -> list[list[object]]:
+def cells_of(columns: Sequence[TableColumn], lines: Iterable[Mapping[str, object]]) -> list[list[object]]:
     """Return the typed cells of each column."""
     found = list(lines)
     texts = [[line.get(column.name, "") for line in found] for column in columns]

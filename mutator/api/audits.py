@@ -11,11 +11,11 @@ from mutator._common.hashing import digest
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.audit.run_audit import Check, audit_checks
-from mutator.audit.run_repair import repair as put_aside
+from mutator.audit.run_audit import AuditCheck, run_audit_checks
+from mutator.audit.run_repair import repair_run as put_aside
 from mutator.audit.seal import Seals, seals_of, unsealed_facts
 from mutator.audit.signatures import sign as write_signature
-from mutator.audit.signatures import signer
+from mutator.audit.signatures import verified_signer
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import drawn, driven_again
 from mutator.report.report_audit import pages
@@ -36,7 +36,7 @@ class Audit:
 
     run: Path  #: the run folder
     facts: Mapping[str, str]  #: facts about the run, by name
-    checks: tuple[Check, ...]  #: the checks: `what`, `count` and `differences` of each
+    checks: tuple[AuditCheck, ...]  #: the checks: `what`, `count` and `differences` of each
     seals: Seals  #: the digests computed from the content
     not_sealed: Mapping[str, str]  #: facts that neither the seal nor a check covers, by name
     compared: bool = False  #: whether the run was compared with an expected or signed digest
@@ -118,12 +118,12 @@ def verify(
         _check_digest(name, value)
     folder = RunFolder.open_unverified(Path(run))
     opened_workspace = _open_workspace_if_any(workspace)
-    checks = audit_checks(folder, opened_workspace)
+    checks = run_audit_checks(folder, opened_workspace)
     facts = _run_facts(folder)
     if rerun:
         checks.append(_rerun_check(folder, opened_workspace, rerun, facts))
     seals = _seals_if_undamaged(folder, checks)
-    facts |= {"seal": "none"} | seals.texts()
+    facts |= {"seal": "none"} | seals.digest_by_name()
     if expect is not None:
         facts["expected"] = expect
         checks.append(_expected_digest_check(folder, seals, expect))
@@ -137,7 +137,7 @@ def verify(
         checks.append(check)
     if report:
         checks.append(
-            Check.of("pages of the report that follow from the run", *pages(folder, opened_workspace))
+            AuditCheck.from_problems("pages of the report that follow from the run", *pages(folder, opened_workspace))
         )
     damaged = any(check.differences for check in checks)
     repaired = put_aside(folder, opened_workspace) if repair and damaged else []
@@ -176,16 +176,16 @@ def _check_digest(argument: str, value: str | None) -> None:
             raise MutatorError(f"'{value}'", argument=argument, expected="a digest: 64 hex digits")
 
 
-def _expected_digest_check(folder: RunFolder, seals: Seals, expect: str) -> Check:
+def _expected_digest_check(folder: RunFolder, seals: Seals, expect: str) -> AuditCheck:
     """Compare with the seal or the results digest, whichever it is."""
     if expect == seals.results_digest:
         return _digest_check(folder, "results digest", expect, expect)
     return _digest_check(folder, "seal", seals.seal, expect)
 
 
-def _digest_check(folder: RunFolder, digest_name: str, actual: str | None, expect: str) -> Check:
+def _digest_check(folder: RunFolder, digest_name: str, actual: str | None, expect: str) -> AuditCheck:
     wrong = MutatorError(f"{digest_name} {actual or 'none'}", where=folder.path, expected=expect)
-    return Check(what=f"{digest_name} as expected", count=1, differences=() if actual == expect else (wrong,))
+    return AuditCheck(what=f"{digest_name} as expected", count=1, differences=() if actual == expect else (wrong,))
 
 
 def _open_workspace_if_any(workspace: WorkspaceLike) -> Workspace | None:
@@ -197,27 +197,27 @@ def _open_workspace_if_any(workspace: WorkspaceLike) -> Workspace | None:
         return None
 
 
-def _rerun_check(folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]) -> Check:
+def _rerun_check(folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]) -> AuditCheck:
     what = "experiments rerun on the reference engine"
     if workspace is None:
         raise MutatorError("no library found", argument="rerun", expected="the library of the run")
     try:
         ids = drawn(folder, count)
     except MutatorError as err:
-        return Check(what=what, count=0, differences=(err,))
+        return AuditCheck(what=what, count=0, differences=(err,))
     facts["drawn at random"] = ", ".join(ids)
-    return Check.of(what, len(ids), driven_again(workspace, folder, ids))
+    return AuditCheck.from_problems(what, len(ids), driven_again(workspace, folder, ids))
 
 
-def _signature_check(folder: RunFolder, seals: Seals, allowed_signers: Path) -> tuple[Check, str | None]:
+def _signature_check(folder: RunFolder, seals: Seals, allowed_signers: Path) -> tuple[AuditCheck, str | None]:
     try:
-        identity = signer(folder, seals, allowed_signers)
+        identity = verified_signer(folder, seals, allowed_signers)
     except CheckFailed as err:
-        return Check(what="digests as signed", count=1, differences=(err,)), None
-    return Check(what="digests as signed", count=1), identity
+        return AuditCheck(what="digests as signed", count=1, differences=(err,)), None
+    return AuditCheck(what="digests as signed", count=1), identity
 
 
-def _seals_if_undamaged(folder: RunFolder, checks: list[Check]) -> Seals:
+def _seals_if_undamaged(folder: RunFolder, checks: list[AuditCheck]) -> Seals:
     try:
         return seals_of(folder)
     except (MutatorError, OSError):

@@ -96,7 +96,7 @@ class Run(RunContents):
         frame = self._results_frame
         hazards, counts = (
             outcome_counting.hazard_names(frame),
-            outcome_counting.counts_by(frame, outcome_counting.kinds(frame)),
+            outcome_counting.counts_by_group(frame, outcome_counting.fault_types_of(frame)),
         )
         heads, rows = outcome_counting.count_table(
             counts, "fault type", hazards, alerts=self.folder.has_alerts
@@ -169,7 +169,7 @@ class Run(RunContents):
         workspace = self._workspace_if_any()
         if not anew:
             return report_builder.ensure_report(self.path, workspace)
-        results_table.build(self.path)
+        results_table.build_tables(self.path)
         return report_builder.write_report(self.path, workspace)
 
     def take_stills(self, progress: Notify | None = None, *, workers: int = 1) -> str:

@@ -3,21 +3,23 @@
 from pathlib import Path
 
 from mutator.campaigns.filters import compile_filter
-from mutator.results.ranking import places
-from mutator.results.result_rows import Row, cells_by_row, rows_of
+from mutator.results.ranking import ranks_of_rows
+from mutator.results.result_rows import ResultRow, cells_by_row, rows_of
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
 
 _ROWS_PER_BATCH = 10_000  # rows filtered at a time
 
 
-def worst_results(run: Path, only: str | None = None, limit: int | None = None) -> tuple[list[Row], int]:
+def worst_results(
+    run: Path, only: str | None = None, limit: int | None = None
+) -> tuple[list[ResultRow], int]:
     """Return at most `limit` results of a run folder, worst first, and the number of all that match.
 
     `only` is a filter over the columns of the results. MutatorError for an invalid filter.
     """
     frame = Results.up_to_date(run).frame()
-    order = places(frame).argsort().tolist()  # sort all rows first, because filtering keeps the order
+    order = ranks_of_rows(frame).argsort().tolist()  # sort all rows first, because filtering keeps the order
     if only is not None:
         accepts = compile_filter(only, list(frame.columns))
         batches = range(0, len(frame), _ROWS_PER_BATCH)

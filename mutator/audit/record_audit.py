@@ -22,24 +22,24 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import RunHead
 from mutator.targets.manifest import TargetManifest
 
-_DIGEST = 64  # hex digits
-_TINY = 1e-9  # s
+_DIGEST_DIGITS = 64  # hex digits
+_TIME_SLACK_S = 1e-9  # s
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class StoredRecord:
     path: Path
     line: int
     record: Record
 
-    def difference(self, got: str, expected: str) -> MutatorError:
+    def difference_error(self, got: str, expected: str) -> MutatorError:
         name = self.record.experiment_id
         return MutatorError(f"{name}: {got}", where=self.path, line=self.line, expected=expected)
 
 
-def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
+def load_stored_records(folder: RunFolder, kind: str) -> list[StoredRecord]:
     """Return the readable records of one kind, without harness errors."""
-    found = []
+    records = []
     for path in sorted(path for path in path_below(folder.path, kind).glob("*.jsonl") if path.is_file()):
         segment = read_segment(path)
         for number in segment.lines:
@@ -53,41 +53,49 @@ def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
             ):  # a head, or damage that is reported elsewhere
                 continue
             if record.status is not Status.HARNESS_ERROR:
-                found.append(Recorded(path, number, record))
-    return found
+                records.append(StoredRecord(path, number, record))
+    return records
 
 
-def mutants(
-    folder: RunFolder, records: Sequence[Recorded], manifest: TargetManifest, models: FaultModels
+def mutant_problems(
+    folder: RunFolder, records: Sequence[StoredRecord], manifest: TargetManifest, models: FaultModels
 ) -> Iterator[MutatorError]:
     """Rebuild the mutants. Yield an error for each record with another tree or patch, and for each stored
     patch that differs, is missing, or belongs to no experiment.
     """
     experiments = {experiment.id: experiment for experiment in plan_file.load_experiments(folder.path)}
     built: dict[tuple[str, Trigger], tuple[str, str]] = {}
-    for one in records:
-        if (experiment := experiments.get(one.record.experiment_id)) is None:
+    for recorded in records:
+        if (experiment := experiments.get(recorded.record.experiment_id)) is None:
             continue
         key = (experiment.fault.id, experiment.trigger)
         if key not in built:
-            built[key] = _built(manifest, models, experiment.fault, experiment.trigger)
+            built[key] = _rebuilt_digests(manifest, models, experiment.fault, experiment.trigger)
         tree, patch = built[key]
-        if one.record.tree != tree:
-            yield one.difference(f"tree {one.record.tree[:16] or 'none'}", tree[:16] or "none")
-        if one.record.patch != patch:
-            yield one.difference(f"patch {one.record.patch[:16] or 'none'}", patch[:16] or "none")
-        stored = folder.patches.read(one.record.experiment_id)
-        found = "" if stored is None else digest(stored)
-        if found != patch:
-            name = one.record.experiment_id
-            got = f"a patch of {name} with SHA-256 {found[:16]}" if found else f"no patch of {name}"
-            where = folder.patches.file_of(one.record.experiment_id)
+        if recorded.record.tree != tree:
+            yield recorded.difference_error(
+                f"tree {recorded.record.tree[:16] or 'none'}", tree[:16] or "none"
+            )
+        if recorded.record.patch != patch:
+            yield recorded.difference_error(
+                f"patch {recorded.record.patch[:16] or 'none'}", patch[:16] or "none"
+            )
+        stored_patch = folder.patches.read(recorded.record.experiment_id)
+        stored_digest = "" if stored_patch is None else digest(stored_patch)
+        if stored_digest != patch:
+            name = recorded.record.experiment_id
+            got = (
+                f"a patch of {name} with SHA-256 {stored_digest[:16]}"
+                if stored_digest
+                else f"no patch of {name}"
+            )
+            where = folder.patches.file_of(recorded.record.experiment_id)
             none = "no patch, because the mutant cannot be built"
             expected = f"the mutant's patch, {patch[:16]}" if patch else none
             yield MutatorError(got, where=where, expected=expected)
-    known = {one.record.experiment_id for one in records}
+    recorded_ids = {stored_record.record.experiment_id for stored_record in records}
     for name in folder.patches if folder.is_finished else ():
-        if name not in known:
+        if name not in recorded_ids:
             got, where = (
                 f"a patch of {name}, which is not an experiment of this run",
                 folder.patches.file_of(name),
@@ -95,7 +103,9 @@ def mutants(
             yield MutatorError(got, where=where, expected="patches only of experiments that ran")
 
 
-def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger: Trigger) -> tuple[str, str]:
+def _rebuilt_digests(
+    manifest: TargetManifest, models: FaultModels, fault: Fault, trigger: Trigger
+) -> tuple[str, str]:
     """Digests of a mutant's tree and patch; empty if it cannot be built."""
     try:
         mutant = build(manifest, models, fault, trigger)
@@ -104,40 +114,44 @@ def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger:
     return mutant.tree_digest, digest(mutant.patch_bytes)
 
 
-def verdicts(
-    head: RunHead, records: Sequence[Recorded], manifest: TargetManifest | None
+def verdict_problems(
+    head: RunHead, records: Sequence[StoredRecord], manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
     """Yield an error for each field that contradicts another field, run.json or the manifest."""
     tolerances = {channel.name: channel.tolerance for channel in manifest.compared} if manifest else {}
-    for one in records:
-        flaws = _flaws_of_end(one.record) if one.record.status is Status.OK else _flaws_of_bad_end(one.record)
-        flaws_of_names = _flaws_of_names(one.record, head, tolerances)
-        for got, expected in (*flaws, *flaws_of_names, *_flaws_of_path(one.record, head)):
-            yield one.difference(got, expected)
+    for stored in records:
+        flaws = (
+            _verdict_contradictions(stored.record)
+            if stored.record.status is Status.OK
+            else _failed_run_contradictions(stored.record)
+        )
+        flaws_of_names = _target_contradictions(stored.record, head, tolerances)
+        for got, expected in (*flaws, *flaws_of_names, *_departure_contradictions(stored.record, head)):
+            yield stored.difference_error(got, expected)
 
 
-Flaws = Iterator[tuple[str, str]]  # found, expected
+_Contradictions = Iterator[tuple[str, str]]  # found, expected
 
 
-def _flaws_of_end(record: Record) -> Flaws:
+def _verdict_contradictions(record: Record) -> _Contradictions:
     activation = record.activation
-    follows = judge(activation=activation, t_manifest=record.t_manifest, hazards=record.hazards)
-    if record.outcome != follows:
-        yield f"outcome {record.outcome}", f"{follows}, which follows from the recorded times"
+    expected = judge(activation=activation, t_manifest=record.t_manifest, hazards=record.hazards)
+    if record.outcome != expected:
+        yield f"outcome {record.outcome}", f"{expected}, which follows from the recorded times"
     if record.t_manifest is not None and (activation is None or record.t_manifest < activation.first):
         yield f"manifested at {record.t_manifest} s", "a time at or after the activation"
     for what, events in (("hazards", record.hazards), ("alerts", record.alerts)):
-        if not _in_order(events, activation):
+        if not _is_in_order(events, activation):
             yield f"{what} {events}", "each once, in order, at or after the activation"
     if activation and not (activation.first <= activation.last and activation.count > 0):
         got = f"active {counted(activation.count, 'time')}, from {activation.first} s to {activation.last} s"
         yield got, "at least one activation, the first not after the last"
-    if len(record.trace_digest) != _DIGEST:
+    if len(record.trace_digest) != _DIGEST_DIGITS:
         yield f"trace digest '{record.trace_digest}'", "that of the recorded trace"
 
 
-def _flaws_of_bad_end(record: Record) -> Flaws:
-    told = {
+def _failed_run_contradictions(record: Record) -> _Contradictions:
+    values = {
         "outcome": record.outcome,
         "t_manifest": record.t_manifest,
         "max_dev": record.max_dev,
@@ -149,18 +163,18 @@ def _flaws_of_bad_end(record: Record) -> Flaws:
         "alerts": record.alerts,
         "trace_digest": record.trace_digest,
     }
-    for name, value in told.items():
+    for name, value in values.items():
         if value:
             yield f"{name} {value}", f"none, because the experiment ended as {record.status.value}"
 
 
-def _flaws_of_names(record: Record, head: RunHead, tolerances: Mapping[str, float]) -> Flaws:
+def _target_contradictions(record: Record, head: RunHead, tolerances: Mapping[str, float]) -> _Contradictions:
     """Hazards or channels that the target does not have, and differences beyond the tolerance without a
     manifestation.
     """
-    strangers = [name for name, _ in record.hazards if name not in head.hazards]
-    if strangers:
-        yield f"hazard {strangers[0]}", f"one of {', '.join(head.hazards)}"
+    unknown = [name for name, _ in record.hazards if name not in head.hazards]
+    if unknown:
+        yield f"hazard {unknown[0]}", f"one of {', '.join(head.hazards)}"
     channels = [name for name, _ in record.max_dev]
     if record.status is Status.OK and channels != list(head.compared):
         yield f"differences of {', '.join(channels)}", f"those of {', '.join(head.compared)}"
@@ -172,15 +186,15 @@ def _flaws_of_names(record: Record, head: RunHead, tolerances: Mapping[str, floa
         yield f"{beyond[0]} differs, but no manifestation is recorded", "the time of the first difference"
 
 
-def _flaws_of_path(record: Record, head: RunHead) -> Flaws:
+def _departure_contradictions(record: Record, head: RunHead) -> _Contradictions:
     """Channels that the target does not have, times after the end of the drive, and a manifestation time that
     is not the first time at which an actuator differs from the golden run.
     """
-    end = inf if record.t_end is None else record.t_end + _TINY
-    known = [channel.name for channel in head.channels]
+    end = inf if record.t_end is None else record.t_end + _TIME_SLACK_S
+    channel_names = [channel.name for channel in head.channels]
     for name, first, _ in record.left:
-        if name not in known:
-            yield f"channel {name} left golden", f"one of {', '.join(known)}"
+        if name not in channel_names:
+            yield f"channel {name} left golden", f"one of {', '.join(channel_names)}"
         elif first > end:
             yield (
                 f"{name} left golden at {first} s",
@@ -193,7 +207,7 @@ def _flaws_of_path(record: Record, head: RunHead) -> Flaws:
         yield f"actuators left golden at {times or 'no time'}", f"{when}, as recorded"
 
 
-def _in_order(events: Events, activation: Activation | None) -> bool:
+def _is_in_order(events: Events, activation: Activation | None) -> bool:
     if activation is None:
         return not events
     times = [time for _, time in events]
@@ -201,30 +215,32 @@ def _in_order(events: Events, activation: Activation | None) -> bool:
     return once and times == sorted(times) and all(time >= activation.first for time in times)
 
 
-def proof(
-    folder: RunFolder, records: Sequence[Recorded], proven: Sequence[Recorded]
+def proof_problems(
+    folder: RunFolder, records: Sequence[StoredRecord], proven: Sequence[StoredRecord]
 ) -> Iterator[MutatorError]:
     """Yield records of the proof that differ from those of the run or are not in the sample, and experiments
     of the sample that have no record.
     """
-    place = folder.path / PROOF_FOLDER
-    if not place.is_dir():
+    proof_folder = folder.path / PROOF_FOLDER
+    if not proof_folder.is_dir():
         modes = {str(line["engine"]) for line in folder.timings().values()}
         if forked := sorted(modes & FAST):
-            yield MutatorError("missing", where=place, expected=f"a proof of the engine `{forked[0]}`")
+            yield MutatorError("missing", where=proof_folder, expected=f"a proof of the engine `{forked[0]}`")
         return
-    known = {one.record.experiment_id: one.record for one in records}
+    record_by_id = {stored.record.experiment_id: stored.record for stored in records}
     sampled = set(equivalence_check.sample_ids(folder))
-    for one in proven:
-        record = known.get(one.record.experiment_id)
-        if record is not None and record != one.record:
-            yield one.difference(
-                equivalence_check.describe_difference(one.record, record), "what the run recorded"
+    for proven_record in proven:
+        record = record_by_id.get(proven_record.record.experiment_id)
+        if record is not None and record != proven_record.record:
+            yield proven_record.difference_error(
+                equivalence_check.describe_difference(proven_record.record, record), "what the run recorded"
             )
-        if one.record.experiment_id not in sampled:
-            yield one.difference("in the proof", "only experiments of the sample that the plan determines")
-    missing = sorted(sampled - {one.record.experiment_id for one in proven})
+        if proven_record.record.experiment_id not in sampled:
+            yield proven_record.difference_error(
+                "in the proof", "only experiments of the sample that the plan determines"
+            )
+    missing = sorted(sampled - {proven_again.record.experiment_id for proven_again in proven})
     if folder.is_finished and missing:
         yield MutatorError(
-            f"no record of {missing[0]}", where=place, expected="a record of each sampled experiment"
+            f"no record of {missing[0]}", where=proof_folder, expected="a record of each sampled experiment"
         )

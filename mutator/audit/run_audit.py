@@ -8,19 +8,19 @@ from pathlib import Path
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator._common.hashing import digest
-from mutator.audit.head_audit import checks as checks_of
+from mutator.audit.head_audit import check_result_problems as checks_of
 from mutator.audit.head_audit import (
-    chunks_of,
-    engines,
-    facts_of_target,
-    idle_runs,
-    seeds_and_sessions,
-    short,
+    idle_run_problems,
+    recomputed_chunks,
+    seed_and_session_problems,
+    shortened,
+    target_fact_problems,
+    unproven_engine_problem,
 )
-from mutator.audit.record_audit import mutants, proof, recorded, verdicts
+from mutator.audit.record_audit import load_stored_records, mutant_problems, proof_problems, verdict_problems
 from mutator.audit.seal import golden_digests
-from mutator.audit.series_audit import series
-from mutator.audit.table_audit import tables
+from mutator.audit.series_audit import audit_series
+from mutator.audit.table_audit import audit_tables
 from mutator.campaigns.freezing import CSV, plan_csv
 from mutator.campaigns.plan import load_plan
 from mutator.campaigns.plan_parts import plan_digest
@@ -39,7 +39,7 @@ Problems = Iterator[MutatorError]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Check:
+class AuditCheck:
     """One step of an audit. `what` describes the `count` parts of the run that were checked."""
 
     what: str
@@ -47,14 +47,14 @@ class Check:
     differences: tuple[MutatorError, ...] = ()
 
     @classmethod
-    def of(cls, what: str, count: int, problems: Problems) -> "Check":
+    def from_problems(cls, what: str, count: int, problems: Problems) -> "AuditCheck":
         """Collect all problems in a check. An error that `problems` raises becomes the last problem."""
-        found = []
+        problems_so_far = []
         try:
             for problem in problems:
-                found.append(problem)
+                problems_so_far.append(problem)
         except MutatorError as err:
-            found.append(err)
+            problems_so_far.append(err)
         except (
             OSError,
             LookupError,
@@ -62,56 +62,68 @@ class Check:
             ValueError,
             AttributeError,
         ) as err:  # damaged data
-            found.append(MutatorError(f"the check '{what}' failed ({type(err).__name__}: {err})"))
-        return cls(what=what, count=count, differences=tuple(found))
+            problems_so_far.append(MutatorError(f"the check '{what}' failed ({type(err).__name__}: {err})"))
+        return cls(what=what, count=count, differences=tuple(problems_so_far))
 
 
-def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
+def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[AuditCheck]:
     """Run all checks of an audit.
 
     Trees and patches are compared only if `workspace` has the run's sources; otherwise, a difference is
     reported.
     """
     head = folder.head
-    here = Check.of("sources that match those of the run", len(head.sources), _sources(folder, workspace))
-    manifest = workspace.manifest(head.target) if workspace and not here.differences else None
-    records, proven = recorded(folder, "records"), recorded(folder, "proof")
-    idle = idle_runs(folder, manifest, records) if manifest else ()
+    source_check = AuditCheck.from_problems(
+        "sources that match those of the run", len(head.sources), _source_problems(folder, workspace)
+    )
+    manifest = workspace.manifest(head.target) if workspace and not source_check.differences else None
+    records, proven = load_stored_records(folder, "records"), load_stored_records(folder, "proof")
+    idle = idle_run_problems(folder, manifest, records) if manifest else ()
     checks = [
-        Check.of("files, lines and ids that are unchanged", _files(folder), _content(folder)),
-        Check.of(
+        AuditCheck.from_problems(
+            "files, lines and ids that are unchanged", _digested_file_count(folder), _content_problems(folder)
+        ),
+        AuditCheck.from_problems(
             "ids, plan digest and run.json that follow from the plan",
             head.experiments,
-            chain(_plan(folder), seeds_and_sessions(folder)),
+            chain(_plan_problems(folder), seed_and_session_problems(folder)),
         ),
-        Check.of(
+        AuditCheck.from_problems(
             "golden runs that match the checks",
             len(head.goldens),
-            chain(checks_of(folder), _goldens(folder), idle),
+            chain(checks_of(folder), _golden_problems(folder), idle),
         ),
-        here,
+        source_check,
     ]
     if workspace and manifest:
-        told = facts_of_target(folder, workspace, manifest)
-        checks.append(Check.of("facts about the target that follow from the library", 1, told))
-        compared = mutants(folder, records, manifest, workspace.fault_models())
-        checks.append(Check.of("trees and patches that follow from plan and sources", len(records), compared))
+        fact_problems = target_fact_problems(folder, workspace, manifest)
+        checks.append(
+            AuditCheck.from_problems("facts about the target that follow from the library", 1, fact_problems)
+        )
+        mutant_differences = mutant_problems(folder, records, manifest, workspace.fault_models())
+        checks.append(
+            AuditCheck.from_problems(
+                "trees and patches that follow from plan and sources", len(records), mutant_differences
+            )
+        )
     checks += [
-        Check.of(
-            "verdicts that follow from what was recorded", len(records), verdicts(head, records, manifest)
+        AuditCheck.from_problems(
+            "verdicts that follow from what was recorded",
+            len(records),
+            verdict_problems(head, records, manifest),
         ),
-        Check.of(
+        AuditCheck.from_problems(
             "records of the proof that match those of the run",
             len(proven),
-            chain(proof(folder, records, proven), engines(folder, records)),
+            chain(proof_problems(folder, records, proven), unproven_engine_problem(folder, records)),
         ),
-        Check.of("series that are unchanged", *series(folder, manifest)),
-        Check.of("tables that follow from the records", *tables(folder)),
+        AuditCheck.from_problems("series that are unchanged", *audit_series(folder, manifest)),
+        AuditCheck.from_problems("tables that follow from the records", *audit_tables(folder)),
     ]
     return checks
 
 
-def _files(folder: RunFolder) -> int:
+def _digested_file_count(folder: RunFolder) -> int:
     """Return the number of files with digests."""
     try:
         return len(file_digests.load_ledger(folder.path).names)
@@ -119,7 +131,7 @@ def _files(folder: RunFolder) -> int:
         return 0
 
 
-def _content(folder: RunFolder) -> Problems:
+def _content_problems(folder: RunFolder) -> Problems:
     yield from folder.problems(ignore_cache=True)
     for path in filter(Path.is_file, folder.patches.block_files()):
         if read_blocks(path).is_damaged:
@@ -131,7 +143,7 @@ def _content(folder: RunFolder) -> Problems:
             )
 
 
-def _plan(folder: RunFolder) -> Problems:
+def _plan_problems(folder: RunFolder) -> Problems:
     """Check that ids follow from the plan's lines, the digest from the ids, and run.json and plan.csv from
     both.
     """
@@ -139,7 +151,7 @@ def _plan(folder: RunFolder) -> Problems:
     yield from plan_file.plan_problems(run)
     plan = load_plan(folder)
     campaign = plan.campaign
-    follows = replace(
+    expected_head = replace(
         head,
         plan=plan_digest([e.id for e in plan.experiments], plan.chunks, plan.canary.id, campaign),
         experiments=len(plan.experiments),
@@ -147,21 +159,21 @@ def _plan(folder: RunFolder) -> Problems:
         campaign_digest=digest(campaign.source),
         study=campaign.study,
         target=campaign.target,
-        chunks=chunks_of(folder),
+        chunks=recomputed_chunks(folder),
         limits=campaign.limits,
-        goldens=tuple(one.to_stored() for one in plan.goldens()),
+        goldens=tuple(golden_run.to_stored() for golden_run in plan.goldens()),
         canary_hazard=campaign.canary.hazard,
     )
-    for key, found, value in head.differences(follows):
-        expected = f"{short(value)}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
-        yield MutatorError(f"{key} {short(found)}", where=run / HEAD, expected=expected)
+    for key, stored, value in head.differences(expected_head):
+        expected = f"{shortened(value)}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
+        yield MutatorError(f"{key} {shortened(stored)}", where=run / HEAD, expected=expected)
     if FileDigest.of_file(run / CSV) != FileDigest.of_bytes(plan_csv(plan)):
         yield MutatorError(
             "differs from the plan", where=run / CSV, expected=f"the rows of {plan_file.EXPERIMENTS}"
         )
 
 
-def _goldens(folder: RunFolder) -> Problems:
+def _golden_problems(folder: RunFolder) -> Problems:
     """Check that every check passed, and that the golden runs are the ones checked."""
     path = folder.path / CHECKS
     if not path.exists():  # no experiment has run yet
@@ -170,14 +182,14 @@ def _goldens(folder: RunFolder) -> Problems:
     for result in checks["results"]:
         if not result["passed"]:
             yield MutatorError(f"check `{result['name']}` failed: {result['detail']}", where=path)
-    for name, found in golden_digests(folder, folder.head.golden_files).items():
-        if checks["goldens"].get(name) != found:
-            known = str(checks["goldens"].get(name))
-            got = f"golden run {name} with digest {found[:16]}"
-            yield MutatorError(got, where=path_below(folder.path / "golden", name), expected=known[:16])
+    for name, current in golden_digests(folder, folder.head.golden_files).items():
+        if checks["goldens"].get(name) != current:
+            checked = str(checks["goldens"].get(name))
+            got = f"golden run {name} with digest {current[:16]}"
+            yield MutatorError(got, where=path_below(folder.path / "golden", name), expected=checked[:16])
 
 
-def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
+def _source_problems(folder: RunFolder, workspace: Workspace | None) -> Problems:
     where, head = folder.path / HEAD, folder.head
     if workspace is None:
         yield MutatorError(
@@ -187,17 +199,17 @@ def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
         )
         return
     manifest = workspace.manifest(head.target)
-    now = RunInputs.of(workspace, manifest, folder.scenarios).digests()
-    for name, known in head.sources.items():
-        if now.get(name) != known:
+    current_digests = RunInputs.of(workspace, manifest, folder.scenarios).digests()
+    for name, recorded in head.sources.items():
+        if current_digests.get(name) != recorded:
             yield MutatorError(
-                f"{name} {known[:16]}",
+                f"{name} {recorded[:16]}",
                 where=where,
-                expected=f"{str(now.get(name))[:16]}, the digest here",
+                expected=f"{str(current_digests.get(name))[:16]}, the digest here",
                 remedy="verify with the run's sources (trees and patches were not compared)",
             )
-    for path, known in head.target_files.items():
-        if (found := manifest.tree.digests.get(path)) != known:
+    for path, recorded in head.target_files.items():
+        if (current := manifest.tree.digests.get(path)) != recorded:
             yield MutatorError(
-                f"{path} {known[:16]}", where=where, expected=f"{str(found)[:16]}, the digest here"
+                f"{path} {recorded[:16]}", where=where, expected=f"{str(current)[:16]}, the digest here"
             )

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from mutator._common.confined_files import check_name, path_below, unlink_below, write_below
-from mutator.audit.series_audit import series
+from mutator.audit.series_audit import audit_series
 from mutator.errors import MutatorError
 from mutator.outcomes.hazards_and_metrics import load_channels
 from mutator.outcomes.series_sampling import Sampler
@@ -20,37 +20,37 @@ from mutator.workspace import Workspace
 
 
 def repair_series(
-    folder: RunFolder, workspace: Workspace | None, put_aside: Callable[[str], None]
+    folder: RunFolder, workspace: Workspace | None, set_aside: Callable[[str], None]
 ) -> Iterator[str]:
     """Set aside damaged series, and yield a sentence for each action.
 
-    `put_aside` copies a file of the run folder. Golden runs can be read only with a `workspace`.
+    `set_aside` copies a file of the run folder. Golden runs can be read only with a `workspace`.
     """
-    run, there = folder.path, SeriesFolder(folder.path)
-    paths = {Path(problem.where) for problem in series(folder)[1] if problem.where}
+    run, series_folder = folder.path, SeriesFolder(folder.path)
+    paths = {Path(problem.where) for problem in audit_series(folder)[1] if problem.where}
     index = None
-    if there.path / f"{INDEX_NAME}.js" in paths:  # the content of the chunks is unknown
-        paths |= {*there.path.glob("*.js")}
+    if series_folder.path / f"{INDEX_NAME}.js" in paths:  # the content of the chunks is unknown
+        paths |= {*series_folder.path.glob("*.js")}
     elif paths:
-        index = there.index
+        index = series_folder.index
     for path in sorted(paths):
         name = path.relative_to(run).as_posix()
         check_name(name, run)
-        found = "set aside" if os.path.lexists(path) else "is gone"
-        put_aside(name)
+        what_happened = "set aside" if os.path.lexists(path) else "is gone"
+        set_aside(name)
         if path.suffix == SUFFIX:
             yield f"{name}: damaged blocks set aside; `mutator run` packs the others"
-        elif index and (data := _golden_chunk(folder, workspace, index, path.stem)):
+        elif index and (data := _rebuilt_golden_chunk(folder, workspace, index, path.stem)):
             write_below(run, name, script_bytes(path.stem, data))
             yield f"{name} rebuilt from the golden runs"
         else:
             unlink_below(run, name)
-            yield f"{name} {found}: {rerun_command(run)} recreates the series of an experiment"
+            yield f"{name} {what_happened}: {rerun_command(run)} recreates the series of an experiment"
     if index:
         repack_series(run, index)
 
 
-def _golden_chunk(
+def _rebuilt_golden_chunk(
     folder: RunFolder, workspace: Workspace | None, index: SeriesIndex, name: str
 ) -> bytes | None:
     """Return the rebuilt content of a chunk of golden series, if that is still possible."""

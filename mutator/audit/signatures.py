@@ -19,14 +19,14 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.store.run_folder import RunFolder
 
 SCHEMA = "signed-seal/1"
-FILE, SIGNATURE = "seal.json", "seal.json.sig"
-NAMESPACE = "mutator-seal"  # signatures for other purposes do not count
-_PATIENCE_S = 60.0  # somebody may have to type a passphrase or to touch a key
-_MOST = 100_000  # bytes of either file
-_SIGN = "`mutator seal RUN --sign KEY` signs the run as it is now"
+SEAL_FILE, SIGNATURE_FILE = "seal.json", "seal.json.sig"
+SIGNATURE_NAMESPACE = "mutator-seal"  # signatures for other purposes do not count
+_SSH_KEYGEN_TIMEOUT_S = 60.0  # somebody may have to type a passphrase or to touch a key
+_MOST_FILE_BYTES = 100_000  # bytes of either file
+_SIGN_REMEDY = "`mutator seal RUN --sign KEY` signs the run as it is now"
 
 
-def statement(folder: RunFolder, seals: Seals) -> bytes:
+def signed_statement(folder: RunFolder, seals: Seals) -> bytes:
     """Return what a signature of a run says; MutatorError for a run without a seal."""
     if seals.seal is None:
         raise MutatorError(
@@ -35,7 +35,7 @@ def statement(folder: RunFolder, seals: Seals) -> bytes:
             expected="a finished run",
             remedy="finish it with the command that started it",
         )
-    said = {
+    facts = {
         "schema": SCHEMA,
         "seal": seals.seal,
         "results_digest": seals.results_digest,
@@ -43,7 +43,7 @@ def statement(folder: RunFolder, seals: Seals) -> bytes:
         "plan": folder.head.plan,
         "mutator": folder.head.provenance.mutator,
     }
-    return canonical_json(said).encode() + b"\n"
+    return canonical_json(facts).encode() + b"\n"
 
 
 def sign(folder: RunFolder, seals: Seals, key: Path) -> None:
@@ -53,20 +53,20 @@ def sign(folder: RunFolder, seals: Seals, key: Path) -> None:
     """
     if not key.is_file():
         raise MutatorError("no such file", where=key, argument="sign", expected="the file of an SSH key")
-    said = statement(folder, seals)
-    done = _ssh_keygen("sign", ["-f", str(key.resolve()), "-n", NAMESPACE], said)
-    if done.returncode or not done.stdout.startswith(b"-----BEGIN SSH SIGNATURE-----"):
+    signed = signed_statement(folder, seals)
+    process = _ssh_keygen("sign", ["-f", str(key.resolve()), "-n", SIGNATURE_NAMESPACE], signed)
+    if process.returncode or not process.stdout.startswith(b"-----BEGIN SSH SIGNATURE-----"):
         raise MutatorError(
-            f"ssh-keygen could not sign ({_said(done)})",
+            f"ssh-keygen could not sign ({_last_error_line(process)})",
             where=key,
             argument="sign",
             expected="a private SSH key, or a public one whose private key is in ssh-agent",
         )
-    write_below(folder.path, FILE, said)
-    write_below(folder.path, SIGNATURE, done.stdout)
+    write_below(folder.path, SEAL_FILE, signed)
+    write_below(folder.path, SIGNATURE_FILE, process.stdout)
 
 
-def signer(folder: RunFolder, seals: Seals, allowed_signers: Path) -> str:
+def verified_signer(folder: RunFolder, seals: Seals, allowed_signers: Path) -> str:
     """Return the identities in `allowed_signers` whose key signed the digests of a run: those of the first
     line with which the signature is valid. A pattern such as `*@example.com` stands for itself.
 
@@ -79,75 +79,79 @@ def signer(folder: RunFolder, seals: Seals, allowed_signers: Path) -> str:
             argument="signed_by",
             expected="a file of allowed signers: lines of an identity and a public SSH key",
         )
-    said, signature = (_content(folder, name) for name in (FILE, SIGNATURE))
-    identity, whys = "", []
-    for line in read_bounded(allowed_signers, _MOST).splitlines():
+    signed, signature = (_read_signed_file(folder, name) for name in (SEAL_FILE, SIGNATURE_FILE))
+    identity, reasons = "", []
+    for line in read_bounded(allowed_signers, _MOST_FILE_BYTES).splitlines():
         if line.strip() and not line.lstrip().startswith(b"#"):
-            identity, why = _identities(line, said, signature)
-            whys += [why] if why else []
+            identity, reason = _valid_identities(line, signed, signature)
+            reasons += [reason] if reason else []
         if identity:
             break
     if not identity:
         raise CheckFailed(
-            f"signed by nobody in the list ({whys[0] if whys else 'no signer matches'})",
-            where=folder.path / SIGNATURE,
-            expected=f"the signature of {FILE} by one of {allowed_signers}",
-            remedy=f"add the signer's identity and public key, if you trust them; {_SIGN}",
+            f"signed by nobody in the list ({reasons[0] if reasons else 'no signer matches'})",
+            where=folder.path / SIGNATURE_FILE,
+            expected=f"the signature of {SEAL_FILE} by one of {allowed_signers}",
+            remedy=f"add the signer's identity and public key, if you trust them; {_SIGN_REMEDY}",
         )
-    if said != statement(folder, seals):
+    if signed != signed_statement(folder, seals):
         raise CheckFailed(
             f"{identity} signed other digests than those of this folder",
-            where=folder.path / FILE,
-            expected=statement(folder, seals).decode().strip(),
-            remedy=f"do not trust this folder; if you changed it yourself, {_SIGN}",
+            where=folder.path / SEAL_FILE,
+            expected=signed_statement(folder, seals).decode().strip(),
+            remedy=f"do not trust this folder; if you changed it yourself, {_SIGN_REMEDY}",
         )
     return identity
 
 
-def _identities(line: bytes, said: bytes, signature: bytes) -> tuple[str, str]:
+def _valid_identities(line: bytes, signed: bytes, signature: bytes) -> tuple[str, str]:
     """Return the identities on a line of allowed signers with which a signature is valid, or else why the
     signature of the line's key is not. ssh-keygen itself names only the first line with the key.
     """
     with (
-        NamedTemporaryFile(prefix="mutator-seal-") as copy,
-        NamedTemporaryFile(prefix="mutator-seal-") as one,
+        NamedTemporaryFile(prefix="mutator-seal-") as signature_file,
+        NamedTemporaryFile(prefix="mutator-seal-") as signers_file,
     ):
-        for file, content in ((copy, signature), (one, line + b"\n")):
+        for file, content in ((signature_file, signature), (signers_file, line + b"\n")):
             file.write(content)
             file.flush()
-        of = ["-f", one.name, "-s", copy.name]
-        found = _ssh_keygen("find-principals", of)
-        names = found.stdout.decode("utf-8", "replace").replace(",", "\n").splitlines()
+        signer_arguments = ["-f", signers_file.name, "-s", signature_file.name]
+        principals = _ssh_keygen("find-principals", signer_arguments)
+        names = principals.stdout.decode("utf-8", "replace").replace(",", "\n").splitlines()
         names = [name for name in names if name.isprintable() and not name.startswith("!")]
-        if found.returncode or not names:
-            return "", _about_line(found, one.name)
-        tried = {name: _ssh_keygen("verify", [*of, "-I", name, "-n", NAMESPACE], said) for name in names}
-    valid = [name for name, done in tried.items() if not done.returncode]
-    done = tried[names[0]]
-    why = f"not a valid signature of {names[0]}: {_about_line(done, one.name) or _said(done)}"
-    return ", ".join(valid), "" if valid else why
+        if principals.returncode or not names:
+            return "", _message_on_line(principals, signers_file.name)
+        checks = {
+            name: _ssh_keygen("verify", [*signer_arguments, "-I", name, "-n", SIGNATURE_NAMESPACE], signed)
+            for name in names
+        }
+    valid = [name for name, process in checks.items() if not process.returncode]
+    verification = checks[names[0]]
+    message = _message_on_line(verification, signers_file.name) or _last_error_line(verification)
+    reason = f"not a valid signature of {names[0]}: {message}"
+    return ", ".join(valid), "" if valid else reason
 
 
-def _about_line(done: subprocess.CompletedProcess[bytes], file: str) -> str:
+def _message_on_line(process: subprocess.CompletedProcess[bytes], file: str) -> str:
     """Return what ssh-keygen said about the only line of a file, such as that its key has expired."""
-    found = re.search(f"^{re.escape(file)}:1: (.*)", done.stderr.decode("utf-8", "replace"), re.MULTILINE)
-    return found[1].strip() if found else ""
+    match = re.search(f"^{re.escape(file)}:1: (.*)", process.stderr.decode("utf-8", "replace"), re.MULTILINE)
+    return match[1].strip() if match else ""
 
 
-def _content(folder: RunFolder, name: str) -> bytes:
+def _read_signed_file(folder: RunFolder, name: str) -> bytes:
     with suppress(FileNotFoundError), open_below(folder.path, name) as file:
-        if len(data := file.read(_MOST + 1)) <= _MOST:
+        if len(data := file.read(_MOST_FILE_BYTES + 1)) <= _MOST_FILE_BYTES:
             return data
-    raise CheckFailed("not signed", where=folder.path / name, expected="a signed run", remedy=_SIGN)
+    raise CheckFailed("not signed", where=folder.path / name, expected="a signed run", remedy=_SIGN_REMEDY)
 
 
-def _ssh_keygen(verb: str, words: Sequence[str], data: bytes = b"") -> subprocess.CompletedProcess[bytes]:
+def _ssh_keygen(verb: str, arguments: Sequence[str], data: bytes = b"") -> subprocess.CompletedProcess[bytes]:
     try:
         return subprocess.run(
-            ["ssh-keygen", "-Y", verb, *words],
+            ["ssh-keygen", "-Y", verb, *arguments],
             input=data,
             capture_output=True,
-            timeout=_PATIENCE_S,
+            timeout=_SSH_KEYGEN_TIMEOUT_S,
             cwd="/",
             check=False,
         )
@@ -159,11 +163,11 @@ def _ssh_keygen(verb: str, words: Sequence[str], data: bytes = b"") -> subproces
         ) from None
     except subprocess.TimeoutExpired:
         raise MutatorError(
-            f"ssh-keygen did not answer within {_PATIENCE_S:g} s",
+            f"ssh-keygen did not answer within {_SSH_KEYGEN_TIMEOUT_S:g} s",
             expected="a key without a passphrase, or one in ssh-agent",
         ) from None
 
 
-def _said(done: subprocess.CompletedProcess[bytes]) -> str:
-    lines = [line for line in done.stderr.decode("utf-8", "replace").splitlines() if line.strip()]
-    return lines[-1] if lines else f"exit code {done.returncode}"
+def _last_error_line(process: subprocess.CompletedProcess[bytes]) -> str:
+    lines = [line for line in process.stderr.decode("utf-8", "replace").splitlines() if line.strip()]
+    return lines[-1] if lines else f"exit code {process.returncode}"

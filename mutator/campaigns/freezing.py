@@ -23,7 +23,7 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.errors import MutatorError
 from mutator.model import Experiment
-from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
+from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.store import file_digests, plan_file
 from mutator.store.allowed_contents import check_contents
 from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
@@ -199,8 +199,8 @@ def target_facts(workspace: Workspace, manifest: TargetManifest) -> TargetFacts:
 def csv_bytes(experiments: Iterable[Experiment], *, head: bool = False) -> bytes:
     writer = csv.writer(text := io.StringIO(), lineterminator="\n")
     if head:
-        writer.writerow(PLAN_COLUMNS)
-    cells = itemgetter(*PLAN_COLUMNS)
+        writer.writerow(PLAN_COLUMN_NAMES)
+    cells = itemgetter(*PLAN_COLUMN_NAMES)
     writer.writerows(cells(plan_row(experiment)) for experiment in experiments)
     return text.getvalue().encode()
 

@@ -22,7 +22,7 @@ from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment
-from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
+from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.store import plan_file
 from mutator.store.check_results import measured_cpu_s
 from mutator.store.plan_choices import Choices
@@ -255,7 +255,7 @@ def _choose(
         experiments = _sample(experiments, campaign, campaign.sample, seed)
     for text, wanted in ((choices.only, True), (choices.exclude, False)):
         if text is not None:
-            accepts = compile_filter(text, PLAN_COLUMNS)
+            accepts = compile_filter(text, PLAN_COLUMN_NAMES)
             experiments = tuple(e for e in experiments if accepts(plan_row(e)) is wanted)
     return experiments if most is None else pick_pairs(experiments, most, seed)
 

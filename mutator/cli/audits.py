@@ -105,7 +105,7 @@ def seal(
         seals = mutator.seal(run, sign=sign)
     if as_json:
         terminal.print_json({"run": str(run), "signed": sign is not None, **asdict(seals)})
-    for name, value in seals.texts().items():
+    for name, value in seals.digest_by_name().items():
         terminal.say(f"{name}: {value}")
     if sign:
         terminal.say(f"signed: {short_path(run / 'seal.json.sig')}")

@@ -300,7 +300,7 @@ def _print_summary(
         terminal.say(f"proof: {summary.proof_note}")
     if report:
         terminal.say(f"report: {report_paths[0]} and {report_paths[1]}")
-    for name, value in summary.seals.texts().items():
+    for name, value in summary.seals.digest_by_name().items():
         terminal.say(f"{name}: {value}")
     if summary.harness_errors:
         terminal.say(

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mutator.api.trials import Trial
     from mutator.model import Experiment, Record
     from mutator.outcomes.fault_paths import PathComponent
-    from mutator.results.result_rows import Row
+    from mutator.results.result_rows import ResultRow
     from mutator.targets.manifest import TargetManifest
     from mutator.workspace import Workspace
 
@@ -55,7 +55,7 @@ def print_worst(
     terminal.say(f"{len(rows)} of {counted(count, 'experiment')} in {short_path(folder)}, the worst first")
 
 
-def _row_facts(row: "Row") -> dict[str, object]:
+def _row_facts(row: "ResultRow") -> dict[str, object]:
     return {
         "experiment": row.experiment_id,
         "ending": row.ending,

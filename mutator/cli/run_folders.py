@@ -69,7 +69,7 @@ def merge(
         terminal.print_json(counts | asdict(seals))
     results = short_path(out / "results.csv")
     terminal.say(f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {results}")
-    for name, value in seals.texts().items():
+    for name, value in seals.digest_by_name().items():
         terminal.say(f"{name}: {value}")
     terminal.say(f"report: {shlex.join(['mutator', 'report', str(out)])}", whole=True)
 

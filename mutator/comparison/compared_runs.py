@@ -7,9 +7,9 @@ from typing import NamedTuple
 from mutator.campaigns.filters import compile_filter
 from mutator.model import Experiment, Record, Value
 from mutator.preflight import equivalence_check
-from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
-from mutator.results.result_rows import Row, rows_of
-from mutator.results.table_reader import frame_of
+from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
+from mutator.results.result_rows import ResultRow, rows_of
+from mutator.results.table_reader import frame_of_experiments
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.contact_severity import Scale
@@ -36,7 +36,7 @@ class ComparedRun:
 
     folder: RunFolder
     experiments: tuple[Experiment, ...]
-    row_by_id: dict[str, Row]
+    row_by_id: dict[str, ResultRow]
     metrics_by_id: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property
@@ -62,7 +62,7 @@ def load_compared_run(run: Path, only: str | None = None) -> ComparedRun:
     folder = RunFolder.open(run)
     records = folder.records()
     equivalence_check.compare_sample(folder, records)
-    accepts = compile_filter(only, PLAN_COLUMNS) if only else None
+    accepts = compile_filter(only, PLAN_COLUMN_NAMES) if only else None
     experiments = tuple(
         e for e in plan_file.load_experiments(folder.path) if accepts is None or accepts(plan_row(e))
     )
@@ -70,7 +70,9 @@ def load_compared_run(run: Path, only: str | None = None) -> ComparedRun:
     return ComparedRun(
         folder=folder,
         experiments=experiments,
-        row_by_id={row.experiment_id: row for row in rows_of(frame_of(folder, experiments), faults)},
+        row_by_id={
+            row.experiment_id: row for row in rows_of(frame_of_experiments(folder, experiments), faults)
+        },
         metrics_by_id={e.id: _metrics_of(records[e.id]) for e in experiments if e.id in records},
     )
 

@@ -15,7 +15,7 @@ from mutator.comparison.input_differences import InputFact
 from mutator.comparison.pairs import ExperimentPair, ResultChange, time_to_hazard
 from mutator.comparison.run_comparison import Comparison, Gate, describe_ending_change
 from mutator.results.plan_columns import plan_row
-from mutator.results.result_rows import Row
+from mutator.results.result_rows import ResultRow
 from mutator.web import asset, load_order
 
 MOST_LISTED_EXPERIMENTS = (
@@ -189,7 +189,7 @@ def _changed_row(pair: ExperimentPair) -> tuple[str, ...]:
     )
 
 
-def _ending_html(row: Row) -> str:
+def _ending_html(row: ResultRow) -> str:
     from markupsafe import Markup
 
     details = [name for name, _ in row.hazards] + [f"alert {name}" for name in row.alerts]
@@ -200,7 +200,7 @@ def _ending_html(row: Row) -> str:
     return Markup('<span class="ending {0}">{0}</span> {1}').format(row.ending, ", ".join(details))
 
 
-def _hazard_time_text(row: Row) -> str:
+def _hazard_time_text(row: ResultRow) -> str:
     time = time_to_hazard(row)
     return "" if time is None else f"{time:.2f}"
 
@@ -220,7 +220,7 @@ def pair_cells(pair: ExperimentPair) -> dict[str, object]:
     return line | {f"{k}_{s}": side[k] for k in sides[0] for s, side in zip("ab", sides, strict=True)}
 
 
-def _side_cells(row: Row) -> Iterator[tuple[str, object]]:
+def _side_cells(row: ResultRow) -> Iterator[tuple[str, object]]:
     yield "ending", row.ending
     yield "t_activation", row.t_activation
     yield "t_manifest", row.t_manifest

@@ -9,7 +9,7 @@ import pandas as pd
 
 from mutator.comparison.pairs import ExperimentPair, ResultChange, time_to_hazard
 from mutator.model import Outcome, Status
-from mutator.results.result_rows import Row
+from mutator.results.result_rows import ResultRow
 from mutator.statistics.guided_against_random import holm_adjusted
 from mutator.statistics.paired_statistics import mcnemar, paired_times, rate_difference
 from mutator.statistics.shares import share
@@ -47,7 +47,7 @@ def pairs_frame(pairs: Sequence[ExperimentPair]) -> pd.DataFrame:
     return frame.astype(dict.fromkeys(flags, bool) | {n: float for n in names if n not in flags})
 
 
-def _event_cells(row: Row, side: str) -> dict[str, object]:
+def _event_cells(row: ResultRow, side: str) -> dict[str, object]:
     start, alert = row.t_activation, row.t_alert
     hazard = row.hazards[0][1] if row.hazards else None
     spans = (

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from mutator.comparison.compared_runs import ComparedRun, experiment_key
 from mutator.model import Experiment, Outcome, Status
-from mutator.results.result_rows import Row
+from mutator.results.result_rows import ResultRow
 
 _HARM_BY_OUTCOME = {Outcome.NOT_ACTIVATED: 0, Outcome.MASKED: 0, Outcome.SDC: 1, Outcome.HAZARD: 2}
 _TIME_DECIMALS = 6  # decimals of a time from activation; absorbs rounding errors
@@ -43,8 +43,8 @@ class ExperimentPair:
 
     a: Experiment
     b: Experiment
-    row_a: Row
-    row_b: Row
+    row_a: ResultRow
+    row_b: ResultRow
 
     @property
     def is_usable(self) -> bool:
@@ -101,7 +101,7 @@ def match_experiments(a: ComparedRun, b: ComparedRun) -> ExperimentMatching:
     )
 
 
-def _changes_between(a: Row, b: Row) -> Iterable[ResultChange]:
+def _changes_between(a: ResultRow, b: ResultRow) -> Iterable[ResultChange]:
     if not (a.usable and b.usable):
         if a.usable != b.usable:
             yield ResultChange.HARNESS_ERROR if a.usable else ResultChange.MENDED
@@ -123,11 +123,11 @@ def _change_by_harm(difference: int) -> ResultChange:
     return ResultChange.OTHERWISE
 
 
-def _harm(row: Row) -> int:
+def _harm(row: ResultRow) -> int:
     return _HARM_BY_OUTCOME[row.outcome] if row.outcome else 0
 
 
-def _hazard_changes(a: Row, b: Row) -> Iterable[ResultChange]:
+def _hazard_changes(a: ResultRow, b: ResultRow) -> Iterable[ResultChange]:
     if bool(a.hazards) != bool(b.hazards):
         yield ResultChange.HAZARD_GONE if a.hazards else ResultChange.NEW_HAZARD
     elif a.hazards:
@@ -138,7 +138,7 @@ def _hazard_changes(a: Row, b: Row) -> Iterable[ResultChange]:
             yield ResultChange.EARLIER_HAZARD if after < before else ResultChange.LATER_HAZARD
 
 
-def time_to_hazard(row: Row) -> float | None:
+def time_to_hazard(row: ResultRow) -> float | None:
     """Time from activation to the first hazard, s; None without a hazard."""
     if not row.hazards or row.t_activation is None:
         return None

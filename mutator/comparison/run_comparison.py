@@ -34,7 +34,7 @@ from mutator.comparison.pairs import (
 )
 from mutator.errors import MutatorError
 from mutator.model import Experiment
-from mutator.results.result_rows import Row
+from mutator.results.result_rows import ResultRow
 from mutator.statistics.statistics_sheet import Sheet
 
 
@@ -234,7 +234,7 @@ def describe_ending_change(pair: ExperimentPair) -> str:
     return f"{_describe_ending(pair.row_a)} -> {_describe_ending(pair.row_b)}"
 
 
-def _describe_ending(row: Row) -> str:
+def _describe_ending(row: ResultRow) -> str:
     time = time_to_hazard(row)
     details = []
     if row.hazards:

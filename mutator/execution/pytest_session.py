@@ -256,6 +256,6 @@ def _lines(summary: Summary) -> list[str]:
         *(f"{name}: {what}" for name, what in summary.harness_errors),
         f"proof: {summary.proof_note}" if summary.proof_note else "",
         f"results: {summary.results}" if summary.results else "",
-        *(f"{name}: {value}" for name, value in summary.seals.texts().items()),
+        *(f"{name}: {value}" for name, value in summary.seals.digest_by_name().items()),
     ]
     return [line for line in lines if line]

@@ -41,7 +41,7 @@ from mutator.preflight.preflight_checks import (
     run_checks,
 )
 from mutator.results import table_building
-from mutator.results.ranking import worth
+from mutator.results.ranking import rank_by_experiment
 from mutator.results.table_reader import Results
 from mutator.store import file_digests
 from mutator.store.check_results import golden_digests
@@ -215,7 +215,7 @@ class Session:
         built = None
         with self._noting_full_disk():
             self._close_segments()
-            built = table_building.ensure(self.folder.path)
+            built = table_building.ensure_tables(self.folder.path)
             self._pack_series()
         proven = equivalence_check.compare_sample(self.folder, records)
         not_forked = "" if proven else self._not_forked
@@ -271,7 +271,7 @@ class Session:
     def _finish_again(self, known: Ended) -> Summary:
         built = None
         with self._noting_full_disk():
-            built = table_building.ensure(self.folder.path)
+            built = table_building.ensure_tables(self.folder.path)
             self._pack_series()
         return Summary(
             planned=self.folder.planned_count,
@@ -304,7 +304,7 @@ class Session:
         """Pack the workers' series. While a worker is still running, leave this to the next session."""
         folder = self.folder
         if list_worker_files(folder.path) and not wait_for_workers(folder.path):
-            ranks = worth(Results(folder.path).frame())
+            ranks = rank_by_experiment(Results(folder.path).frame())
             pack_series(folder.path, folder.head.plan, ranks, folder.series_budget_mb)
 
 

@@ -11,14 +11,14 @@ from mutator._common.confined_files import open_below, path_below
 from mutator._common.files import raising_disk_full, read_json, write_atomic, writing_atomic
 from mutator._common.folder_locks import owning_run_folder
 from mutator._common.message_text import counted
-from mutator.audit.seal import OUTSIDE, without
+from mutator.audit.seal import UNSEALED_KEYS, without_keys
 from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.run_provenance import other_versions
 from mutator.errors import CheckFailed, MutatorError
 from mutator.preflight import equivalence_check
 from mutator.results import table_building
-from mutator.results.ranking import worth
-from mutator.results.table_reader import frame_of
+from mutator.results.ranking import rank_by_experiment
+from mutator.results.table_reader import frame_of_experiments
 from mutator.store import cleaning, file_digests, integrity, plan_file
 from mutator.store.allowed_contents import check_contents
 from mutator.store.approvals import FILE as REVIEWED
@@ -70,7 +70,7 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
             with raising_disk_full(out):
                 path_below(out, f"{_MARK}{os.getpid()}").touch()
                 _copy(folders, out, stretches)
-            return table_building.build(out)
+            return table_building.build_tables(out)
         except BaseException:
             cleaning.delete_unfinished_run(out)
             raise
@@ -101,7 +101,7 @@ def _check_plans(folders: Sequence[RunFolder]) -> None:
                     expected="shards of one plan, with the same target, templates and scenarios",
                     remedy=_REMEDY,
                 )
-        one, other = (without(shard.head.as_json(), OUTSIDE[HEAD]) for shard in (first, folder))
+        one, other = (without_keys(shard.head.as_json(), UNSEALED_KEYS[HEAD]) for shard in (first, folder))
         if differ := [key for key in {**one, **other} if one.get(key) != other.get(key)]:
             raise MutatorError(
                 f"'{differ[0]}' differs from {first.path / HEAD}",
@@ -239,6 +239,8 @@ def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
         import pandas as pd
 
         first = folders[0]
-        frames = [frame_of(folder, plan_file.iterate_experiments(folder.path)) for folder in folders]
-        ranks = worth(pd.concat(frames, ignore_index=True))
+        frames = [
+            frame_of_experiments(folder, plan_file.iterate_experiments(folder.path)) for folder in folders
+        ]
+        ranks = rank_by_experiment(pd.concat(frames, ignore_index=True))
         pack_series(out, first.head.plan, ranks, first.series_budget_mb, other_runs=shards)

@@ -4,10 +4,10 @@ from collections.abc import Iterable, Iterator
 
 from mutator._common.table_rendering import TextTable
 from mutator.reference.yaml_key_tables import generated_page_head
-from mutator.results.plan_columns import PLAN_COLUMNS
-from mutator.results.propagation_columns import COLUMNS as PROPAGATION
-from mutator.results.table_columns import TIMINGS, result_columns, severity_columns
-from mutator.results.table_files import ARROW_TYPES, Column
+from mutator.results.plan_columns import PLAN_COLUMN_NAMES
+from mutator.results.propagation_columns import PROPAGATION_COLUMNS as PROPAGATION
+from mutator.results.table_columns import TIMING_COLUMNS, result_columns, severity_columns
+from mutator.results.table_files import ARROW_TYPES, TableColumn
 from mutator.targets.channels import Channel
 from mutator.targets.contact_severity import DELTA_V
 from mutator.targets.criteria import Hazard, Metric
@@ -18,7 +18,7 @@ from mutator.workspace import Workspace
 
 
 def render_results_page(workspace: Workspace) -> str:
-    left_out = ", ".join(f"`{name}`" for name in PLAN_COLUMNS)
+    left_out = ", ".join(f"`{name}`" for name in PLAN_COLUMN_NAMES)
     manifests = [workspace.manifest(name) for name in workspace.targets]
     return "\n".join(
         [
@@ -44,7 +44,7 @@ def render_results_page(workspace: Workspace) -> str:
             "## timings.parquet\n",
             "The cost of each experiment in its newest run. It is a separate table because it varies from "
             "run to run.\n",
-            *_columns_table(TIMINGS),
+            *_columns_table(TIMING_COLUMNS),
         ]
     )
 
@@ -57,7 +57,7 @@ def _result_columns_section(manifest: TargetManifest) -> Iterator[str]:
     yield from _columns_table(result_columns(*columns, paths=True))
 
 
-def _columns_table(columns: Iterable[Column]) -> Iterator[str]:
+def _columns_table(columns: Iterable[TableColumn]) -> Iterator[str]:
     heads = ("column", "type", "Parquet", "unit", "meaning")
     rows = [(f"`{c.name}`", c.type, ARROW_TYPES[c.type], c.unit or "-", c.about) for c in columns]
     yield TextTable(heads=heads, rows=rows).as_markdown(escape=False)

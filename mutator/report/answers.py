@@ -28,7 +28,7 @@ from mutator.report.experiment_facts import PLACE, UNTIMED_PATH
 from mutator.report.fix_order import first_to_fix
 from mutator.report.most_dangerous import dangerous, worst_of
 from mutator.report.reported_run import ReportedRun
-from mutator.results.result_rows import Row, rows_of
+from mutator.results.result_rows import ResultRow, rows_of
 
 TYPES = 6  # maximum number of fault types that an answer lists
 
@@ -65,7 +65,7 @@ def _told(run: ReportedRun) -> pd.DataFrame:
     return told.assign(**{name: told["experiment_id"].map(word) for name, word in words.items()})
 
 
-def _warned(row: Row) -> str:
+def _warned(row: ResultRow) -> str:
     """Return the first alert and its time before the hazard; `only after` if it came later; `none` without
     one.
     """

@@ -9,7 +9,7 @@ import numpy as np
 from mutator._common.helper_processes import map_in_processes, process_count_for
 from mutator.model import Fault, Record
 from mutator.outcomes.fault_paths import FaultPaths, PathInputs, UntimedPath
-from mutator.results.ranking import places
+from mutator.results.ranking import ranks_of_rows
 from mutator.statistics.event_times import AlertsByExperiment
 from mutator.store.run_folder import RunFolder
 
@@ -57,7 +57,7 @@ class Seen:
                     if code == len(untimed_paths):
                         untimed_paths.append(untimed_path)
         return cls(
-            places=places(results),
+            places=ranks_of_rows(results),
             path_numbers=path_numbers,
             untimed_paths=tuple(untimed_paths),
             alerts=alerts,

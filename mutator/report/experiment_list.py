@@ -27,8 +27,14 @@ from mutator.report.page_series import series_facts
 from mutator.report.panel import FOLDER
 from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines import SourceLines
-from mutator.results.outcome_counting import endings, hazard_names, hazard_times, hazards_joined, kinds
-from mutator.results.result_rows import Row, rows_of
+from mutator.results.outcome_counting import (
+    endings_of_rows,
+    fault_types_of,
+    hazard_names,
+    hazard_times,
+    joined_hazards,
+)
+from mutator.results.result_rows import ResultRow, rows_of
 from mutator.review.patch_shapes import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
@@ -143,11 +149,11 @@ def table(
     columns: dict[str, Iterable[Any]] = {
         str(name): results[name] for name in results.columns if name not in left_out
     }
-    columns["kind"] = kinds(results)
+    columns["kind"] = fault_types_of(results)
     rows = rows_of(results, faults)
     columns["fault"] = [row.fault for row in rows]
-    columns["ending"] = endings(results)
-    columns["hazards"] = hazards_joined(results)
+    columns["ending"] = endings_of_rows(results)
+    columns["hazards"] = joined_hazards(results)
     if alerts:
         columns["warning"] = warnings_of(results)
     columns["rank"] = results[PLACE] + 1
@@ -162,7 +168,9 @@ def table(
     return {"schema": SCHEMA, "count": len(results), "checked": checked, "labels": labels, "columns": made}
 
 
-def _of_operators(source: SourceLines, results: "DataFrame", rows: Sequence[Row]) -> dict[str, list[str]]:
+def _of_operators(
+    source: SourceLines, results: "DataFrame", rows: Sequence[ResultRow]
+) -> dict[str, list[str]]:
     """Return the columns that differ for mutants of operators. Their `value` is the change in the source."""
     faults = results["fault_id"].tolist()
     changes = [source.changes.get(name, "") for name in faults]

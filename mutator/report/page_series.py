@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from mutator.errors import MutatorError
 from mutator.execution.run_traces import Traces
 from mutator.outcomes.series_sampling import keep_series
-from mutator.results.table_columns import deviation_columns
+from mutator.results.table_columns import deviation_column_by_channel
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder
 
@@ -20,7 +20,7 @@ def series_facts(folder: RunFolder) -> dict[str, Any]:
     the browser's console would show an error.
     """
     series = SeriesFolder(folder.path)
-    columns = dict(deviation_columns(folder.head.compared))
+    columns = dict(deviation_column_by_channel(folder.head.compared))
     return {"packed": series.is_packed, "kept": series.kept_ids(), "deviations": columns}
 
 

@@ -19,7 +19,7 @@ from mutator.report.panels import PANELS, build_study_panels
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.report_digests import is_current, made_from, write_files
 from mutator.report.reported_run import ReportedRun
-from mutator.results.outcome_counting import outcome_counts
+from mutator.results.outcome_counting import count_endings
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -54,7 +54,7 @@ def ensure_report(run: Path, workspace: Workspace | None) -> WrittenReport:
     """Write the report of a run folder unless it is up to date."""
     if not is_current(run, made_from(RunFolder.open(run), workspace)):
         return write_report(run, workspace)
-    return _written_report(run, Results(run).count())
+    return _written_report(run, Results(run).row_count())
 
 
 def write_report(run: Path, workspace: Workspace | None) -> WrittenReport:
@@ -99,7 +99,7 @@ def _build_content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:
     return Content(
         name=run.folder.head.campaign,
         alarm=run.engines.proof if run.engines and run.engines.failed else "",
-        outcomes=outcome_counts(run.results),
+        outcomes=count_endings(run.results),
         planned=_describe_plan(run.folder),
         words=words_of(run),
         study=run.study.about if run.study and run.compared else "",

@@ -16,7 +16,7 @@ from mutator.report.experiment_facts import PLACE, UNTIMED_PATH, Seen
 from mutator.report.fault_path_data import RunPaths
 from mutator.report.panel import Panel
 from mutator.report.source_lines import SourceLines
-from mutator.results.result_rows import Row, rows_of
+from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import Results
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.results_frame import prepare_results
@@ -76,7 +76,7 @@ class ReportedRun:
         )
 
     @property
-    def rows(self) -> tuple[Row, ...]:
+    def rows(self) -> tuple[ResultRow, ...]:
         """The results as objects. For large runs use `results` or `frame`."""
         return tuple(rows_of(self.results, self.faults))
 

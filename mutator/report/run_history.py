@@ -16,7 +16,7 @@ from mutator.errors import MutatorError
 from mutator.execution.progress_text import duration
 from mutator.model import Outcome
 from mutator.report.panel import FOLDER, rendered
-from mutator.results.result_rows import Row
+from mutator.results.result_rows import ResultRow
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.web import asset
@@ -41,7 +41,7 @@ class PastRun:
     folder: RunFolder
     date: datetime
     commit: str
-    rows: Mapping[str, Row]
+    rows: Mapping[str, ResultRow]
     cpu_s: float
 
     @property
@@ -49,7 +49,7 @@ class PastRun:
         return self.folder.path.name
 
     @property
-    def hazards(self) -> list[Row]:
+    def hazards(self) -> list[ResultRow]:
         return [row for row in self.rows.values() if row.outcome is Outcome.HAZARD]
 
     @property

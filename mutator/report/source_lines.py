@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mutator.errors import MutatorError
 from mutator.model import OPERATORS, Fault, Outcome, Status
 from mutator.mutants.anchors import ParsedFile, parsed_file
-from mutator.results.outcome_counting import endings
+from mutator.results.outcome_counting import endings_of_rows
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -132,7 +132,9 @@ def _marks(
     worst experiment.
     """
     found: dict[tuple[tuple[str, int], str], dict[str, int]] = {}
-    for name, trigger, ending in zip(results["fault_id"], results["trigger"], endings(results), strict=True):
+    for name, trigger, ending in zip(
+        results["fault_id"], results["trigger"], endings_of_rows(results), strict=True
+    ):
         if name in at and ending in ENDINGS:
             ranks = found.setdefault((at[name], PERMANENT if trigger == ALWAYS else TRANSIENT), {})
             ranks[name] = min(ENDINGS.index(ending), ranks.get(name, len(ENDINGS)))

@@ -11,7 +11,7 @@ from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
 from mutator.report.film import Filming, Shot
-from mutator.results.ranking import places
+from mutator.results.ranking import ranks_of_rows
 from mutator.results.table_reader import Results
 from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import GoldenRun, RunFolder
@@ -81,7 +81,7 @@ def _due(
     seeing = set(pictures)
     frame = Results(folder.path).frame()
     moved = ((frame["status"] == Status.OK.value) & frame["t_manifest"].notna()).to_numpy()
-    order = [row for row in places(frame).argsort() if moved[row]]
+    order = [row for row in ranks_of_rows(frame).argsort() if moved[row]]
     ids = (str(frame["experiment_id"].iloc[row]) for row in order)
     wanted = (name for name in ids if seeing & set(experiments[name].changes))
     chosen = islice(wanted, min(MOST, folder.planned_count // ONE_IN))

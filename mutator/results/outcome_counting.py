@@ -9,16 +9,16 @@ from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Outcome, Status
-from mutator.results.table_columns import hazards_of
+from mutator.results.table_columns import hazards_of_frame
 
 if TYPE_CHECKING:
     import pandas as pd
 
-UNUSABLE = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
+UNUSABLE_STATUSES = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Count:
+class GroupCount:
     """Counts over the usable experiments of one group. `unusable` counts the other experiments."""
 
     group: str
@@ -34,28 +34,30 @@ class Count:
     unusable: int
 
 
-def endings(frame: "pd.DataFrame") -> "pd.Series[str]":
+def endings_of_rows(frame: "pd.DataFrame") -> "pd.Series[str]":
     """Return the outcome of each row, or the status if the run failed."""
     worked = (frame["status"] == Status.OK.value) & (frame["outcome"] != "")
     return frame["outcome"].where(worked, frame["status"])
 
 
-def outcome_counts(frame: "pd.DataFrame") -> dict[str, int]:
-    seen = endings(frame).value_counts()
+def count_endings(frame: "pd.DataFrame") -> dict[str, int]:
+    count_by_ending = endings_of_rows(frame).value_counts()
     order = [o.value for o in Outcome] + [s.value for s in Status if s is not Status.OK]
-    return {name: int(seen[name]) for name in order if name in seen}
+    return {name: int(count_by_ending[name]) for name in order if name in count_by_ending}
 
 
 def hazard_names(frame: "pd.DataFrame") -> tuple[str, ...]:
     """Return the hazards that were checked, including those that never occurred."""
-    return tuple(sorted(name for name in hazards_of(frame) if frame[name.lower()].notna().any()))
+    return tuple(sorted(name for name in hazards_of_frame(frame) if frame[name.lower()].notna().any()))
 
 
 def hazard_times(frame: "pd.DataFrame") -> "pd.DataFrame":
     """Return the first time of each hazard, a column for each. NaN if it did not occur or the run failed."""
     import pandas as pd
 
-    columns = {name: (frame[f"t_{name.lower()}"], frame[name.lower()].notna()) for name in hazards_of(frame)}
+    columns = {
+        name: (frame[f"t_{name.lower()}"], frame[name.lower()].notna()) for name in hazards_of_frame(frame)
+    }
     times = {name: time.where(is_checked) for name, (time, is_checked) in columns.items()}
     return pd.DataFrame(times, index=frame.index, dtype=float)
 
@@ -66,59 +68,64 @@ def hazard_margins(frame: "pd.DataFrame") -> "pd.DataFrame":
     """
     import pandas as pd
 
-    had = hazard_times(frame).notna()
-    had_none = ~had.any(axis=1)
+    occurred = hazard_times(frame).notna()
+    none_occurred = ~occurred.any(axis=1)
     margins = {}
-    for name in hazards_of(frame):
+    for name in hazards_of_frame(frame):
         if (column := f"margin_{name.lower()}") in frame:
-            margins[name] = frame[column].where(had[name] | had_none & frame[name.lower()].notna())
+            margins[name] = frame[column].where(occurred[name] | none_occurred & frame[name.lower()].notna())
     return pd.DataFrame(margins, index=frame.index, dtype=float)
 
 
-def hazards_joined(frame: "pd.DataFrame") -> list[str]:
+def joined_hazards(frame: "pd.DataFrame") -> list[str]:
     """Return the names of the hazards that occurred in each row, sorted and joined by `;`."""
-    had = hazard_times(frame).notna()
-    names = sorted(hazards_of(frame))
-    return [";".join(compress(names, row)) for row in had[names].to_numpy()]
+    occurred = hazard_times(frame).notna()
+    names = sorted(hazards_of_frame(frame))
+    return [";".join(compress(names, row)) for row in occurred[names].to_numpy()]
 
 
-def kinds(frame: "pd.DataFrame") -> "pd.Series[str]":
+def fault_types_of(frame: "pd.DataFrame") -> "pd.Series[str]":
     """Return the fault type of each row: `sensor/bias`."""
     return frame["module"] + "/" + frame["fault_type"]
 
 
-def counts_by(frame: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[Count, ...]:
+def counts_by_group(frame: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[GroupCount, ...]:
     """Return a count for each of the `groups`, sorted by name, then the total."""
     import pandas as pd
 
     hazards = hazard_names(frame)
-    usable = ~frame["status"].isin([status.value for status in UNUSABLE])
-    had = hazard_times(frame).notna()
-    any_hazard, alert = had.any(axis=1), frame["alerts"] != ""
+    usable = ~frame["status"].isin([status.value for status in UNUSABLE_STATUSES])
+    occurred = hazard_times(frame).notna()
+    any_hazard, alert = occurred.any(axis=1), frame["alerts"] != ""
     flags = {
         "injected": usable,
         "activated": frame["t_activation"].notna(),
         "manifested": frame["t_manifest"].notna(),
-        **{f"hazard {name}": had[name] for name in hazards},
+        **{f"hazard {name}": occurred[name] for name in hazards},
         "any_hazard": any_hazard,
         "alerts": alert,
         "hazards_without_alert": any_hazard & ~alert,
         "crashed": frame["status"] == Status.CRASHED.value,
         "timeout": frame["status"] == Status.TIMEOUT.value,
     }
-    found = pd.DataFrame({name: flag & usable for name, flag in flags.items()} | {"unusable": ~usable})
-    sums = found.groupby(groups.to_numpy(), sort=True).sum()
+    flags_by_column = pd.DataFrame(
+        {name: flag & usable for name, flag in flags.items()} | {"unusable": ~usable}
+    )
+    sums = flags_by_column.groupby(groups.to_numpy(), sort=True).sum()
     lines = [(str(name), line) for name, line in sums.to_dict("index").items()]
-    return tuple(_count(name, line, hazards) for name, line in (*lines, ("total", found.sum().to_dict())))
+    return tuple(
+        _group_count(name, line, hazards)
+        for name, line in (*lines, ("total", flags_by_column.sum().to_dict()))
+    )
 
 
-def _count(group: str, line: Mapping[Any, int], hazards: tuple[str, ...]) -> Count:
+def _group_count(group: str, line: Mapping[Any, int], hazards: tuple[str, ...]) -> GroupCount:
     plain = {name: int(number) for name, number in line.items() if not name.startswith("hazard ")}
-    return Count(group=group, hazards=tuple(int(line[f"hazard {name}"]) for name in hazards), **plain)
+    return GroupCount(group=group, hazards=tuple(int(line[f"hazard {name}"]) for name in hazards), **plain)
 
 
 def count_table(
-    counts: Sequence[Count], head: str, hazards: Sequence[str], *, alerts: bool = True
+    counts: Sequence[GroupCount], head: str, hazards: Sequence[str], *, alerts: bool = True
 ) -> tuple[list[str], list[list[str]]]:
     """Return a table of counts. It has columns for crashes, timeouts and unusable runs only if any exist."""
     heads = [head, "injected", "activated", "manifested", *hazards]

@@ -6,17 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from mutator.model import Experiment, Fault, Value, fault_label
-from mutator.results.table_files import Column
+from mutator.results.table_files import TableColumn
 
 
 @dataclass(frozen=True, slots=True)
-class PlanColumn(Column):
+class PlanColumn(TableColumn):
     """A column that is known before a run."""
 
-    of: Callable[[Experiment], object]
+    cell_of: Callable[[Experiment], object]
 
 
-def number_of(fault: Fault) -> Value:
+def numeric_value_of(fault: Fault) -> Value:
     """Return the fault's value; None if it is text, which is part of `variant`."""
     return None if isinstance(fault.value, str) else fault.value
 
@@ -28,7 +28,7 @@ def _variant(experiment: Experiment) -> str:
     return fault_label(variant, fault.value, fault.unit) if isinstance(fault.value, str) else variant
 
 
-FIRST_PLANNED = (
+FIRST_PLAN_COLUMNS = (
     PlanColumn(
         "experiment_id",
         "text",
@@ -51,7 +51,7 @@ FIRST_PLANNED = (
         "number",
         "as the column `unit` says",
         "the drawn value; empty for a fault without a value",
-        lambda e: number_of(e.fault),
+        lambda e: numeric_value_of(e.fault),
     ),
     PlanColumn(
         "unit",
@@ -77,7 +77,7 @@ FIRST_PLANNED = (
     ),
     PlanColumn("seed", "count", "", "the seed of all draws", lambda e: e.seed),
 )
-LAST_PLANNED = (
+LAST_PLAN_COLUMNS = (
     PlanColumn(
         "variant",
         "text",
@@ -88,10 +88,10 @@ LAST_PLANNED = (
     PlanColumn("aim", "text", "", "the hazard that the fault aims at", lambda e: e.fault.aim),
     PlanColumn("condition", "text", "", "the condition of the trigger", lambda e: e.trigger.condition),
 )
-_PLANNED = (*FIRST_PLANNED, *LAST_PLANNED)
-PLAN_COLUMNS = tuple(column.name for column in _PLANNED)
+_ALL_PLAN_COLUMNS = (*FIRST_PLAN_COLUMNS, *LAST_PLAN_COLUMNS)
+PLAN_COLUMN_NAMES = tuple(column.name for column in _ALL_PLAN_COLUMNS)
 
 
 def plan_row(experiment: Experiment) -> dict[str, object]:
-    """Return the `PLAN_COLUMNS` of one experiment. If the fault's value is text, it is part of `variant`."""
-    return {column.name: column.of(experiment) for column in _PLANNED}
+    """Return the cells of an experiment by column. If the fault's value is text, it is part of `variant`."""
+    return {column.name: column.cell_of(experiment) for column in _ALL_PLAN_COLUMNS}

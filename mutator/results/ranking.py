@@ -3,14 +3,14 @@
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
-from mutator.results.outcome_counting import endings, hazard_margins
+from mutator.results.outcome_counting import endings_of_rows, hazard_margins
 from mutator.targets.contact_severity import CLASSES, DELTA_V
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
-_ENDINGS = (  # worst first
+_ENDINGS_WORST_FIRST = (  # worst first
     Outcome.HAZARD.value,
     Status.CRASHED.value,
     Status.TIMEOUT.value,
@@ -22,7 +22,7 @@ _ENDINGS = (  # worst first
 )
 
 
-def places(frame: "pd.DataFrame") -> "np.ndarray":
+def ranks_of_rows(frame: "pd.DataFrame") -> "np.ndarray":
     """Return the rank (from 0: the worst) of each row of a frame of results, whatever the order of the rows.
 
     Rows with a severity class come first, by class and then by delta-v. The others follow by outcome and then
@@ -32,23 +32,23 @@ def places(frame: "pd.DataFrame") -> "np.ndarray":
     import numpy as np
     import pandas as pd
 
-    ending = pd.Index(_ENDINGS).get_indexer(pd.Index(endings(frame)))
+    ending_rank = pd.Index(_ENDINGS_WORST_FIRST).get_indexer(pd.Index(endings_of_rows(frame)))
     severity = frame["severity"] if "severity" in frame else pd.Series("", frame.index)
-    classed = pd.Index(CLASSES).get_indexer(pd.Index(severity))
-    has_class = classed >= 0
-    by_id = np.empty(len(frame), dtype=np.int64)
-    by_id[np.argsort(frame["experiment_id"].to_numpy(dtype=object), kind="stable")] = np.arange(len(frame))
-    turn = np.where(has_class, 0.0, _turns(frame, ending, has_class, by_id))
+    severity_rank = pd.Index(CLASSES).get_indexer(pd.Index(severity))
+    has_class = severity_rank >= 0
+    id_rank = np.empty(len(frame), dtype=np.int64)
+    id_rank[np.argsort(frame["experiment_id"].to_numpy(dtype=object), kind="stable")] = np.arange(len(frame))
+    margin_rank = np.where(has_class, 0.0, _margin_ranks(frame, ending_rank, has_class, id_rank))
     speed = frame[DELTA_V].fillna(-1.0).to_numpy() if DELTA_V in frame else np.full(len(frame), -1.0)
     delta_v = np.where(has_class, -speed, 0.0)
-    order = np.lexsort((by_id, turn, ending, delta_v, -classed, ~has_class))
-    found = np.empty(len(frame), dtype=np.int64)
-    found[order] = np.arange(len(frame))
-    return found
+    order = np.lexsort((id_rank, margin_rank, ending_rank, delta_v, -severity_rank, ~has_class))
+    ranks = np.empty(len(frame), dtype=np.int64)
+    ranks[order] = np.arange(len(frame))
+    return ranks
 
 
-def _turns(
-    frame: "pd.DataFrame", ending: "np.ndarray", has_class: "np.ndarray", by_id: "np.ndarray"
+def _margin_ranks(
+    frame: "pd.DataFrame", ending_rank: "np.ndarray", has_class: "np.ndarray", id_rank: "np.ndarray"
 ) -> "np.ndarray":
     """Rank rows without a severity class among those with the same outcome, by `hazard_margins`.
 
@@ -56,20 +56,20 @@ def _turns(
     """
     import numpy as np
 
-    turn = np.full(len(frame), np.inf)
+    margin_rank = np.full(len(frame), np.inf)
     for _, margins in hazard_margins(frame).items():
         margin = margins.to_numpy()
         rows = np.flatnonzero(~has_class & ~np.isnan(margin))
-        rows = rows[np.lexsort((by_id[rows], margin[rows], ending[rows]))]
-        _, first, sizes = np.unique(ending[rows], return_index=True, return_counts=True)
-        turn[rows] = np.minimum(turn[rows], np.arange(len(rows)) - np.repeat(first, sizes))
-    return turn
+        rows = rows[np.lexsort((id_rank[rows], margin[rows], ending_rank[rows]))]
+        _, first, sizes = np.unique(ending_rank[rows], return_index=True, return_counts=True)
+        margin_rank[rows] = np.minimum(margin_rank[rows], np.arange(len(rows)) - np.repeat(first, sizes))
+    return margin_rank
 
 
-def worth(frame: "pd.DataFrame") -> dict[str, int]:
+def rank_by_experiment(frame: "pd.DataFrame") -> dict[str, int]:
     """Return the rank of each experiment with status `ok` (0 is the worst). If there is no room for all
     series, those of the worst experiments are kept.
     """
-    found = places(frame)
+    ranks = ranks_of_rows(frame)
     ended = (frame["status"] == Status.OK.value).to_numpy()
-    return dict(zip(frame["experiment_id"][ended], found[ended].tolist(), strict=True))
+    return dict(zip(frame["experiment_id"][ended], ranks[ended].tolist(), strict=True))

@@ -6,9 +6,15 @@ from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Fault, Outcome, Status, Value, fault_label
-from mutator.results.outcome_counting import UNUSABLE, endings, hazard_margins, hazard_times, kinds
-from mutator.results.plan_columns import number_of
-from mutator.results.table_columns import alerts_of
+from mutator.results.outcome_counting import (
+    UNUSABLE_STATUSES,
+    endings_of_rows,
+    fault_types_of,
+    hazard_margins,
+    hazard_times,
+)
+from mutator.results.plan_columns import numeric_value_of
+from mutator.results.table_columns import alert_names_in
 from mutator.targets.contact_severity import DELTA_V
 
 if TYPE_CHECKING:
@@ -16,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class ResultRow:
     """One row of the results table. Times are in simulated seconds; None: the event did not happen."""
 
     experiment_id: str
@@ -47,7 +53,7 @@ class Row:
 
     @property
     def usable(self) -> bool:
-        return self.status not in UNUSABLE
+        return self.status not in UNUSABLE_STATUSES
 
     @property
     def fault(self) -> str:
@@ -63,17 +69,20 @@ def cells_by_row(frame: "pd.DataFrame") -> list[dict[str, Any]]:
     return [dict(zip(columns, cells, strict=True)) for cells in zip(*columns.values(), strict=True)]
 
 
-def rows_of(frame: "pd.DataFrame", faults: Mapping[str, Fault]) -> list[Row]:
+def rows_of(frame: "pd.DataFrame", faults: Mapping[str, Fault]) -> list[ResultRow]:
     """Return the rows of a frame of results. `faults` are those of the plan, by id, which has the digits of
     each value (35), while the table has a float.
     """
-    lines = cells_by_row(frame.assign(kind=kinds(frame), ending=endings(frame)))
-    hazards, margins = _by_row(hazard_times(frame)), _by_row(hazard_margins(frame))
+    lines = cells_by_row(frame.assign(kind=fault_types_of(frame), ending=endings_of_rows(frame)))
+    hazards, margins = _cells_with_value(hazard_times(frame)), _cells_with_value(hazard_margins(frame))
     rows = zip(lines, hazards, margins, strict=True)
-    return [_row(cells, came, near, faults.get(cells["fault_id"])) for cells, came, near in rows]
+    return [
+        _build_row(cells, row_hazards, row_margins, faults.get(cells["fault_id"]))
+        for cells, row_hazards, row_margins in rows
+    ]
 
 
-def _by_row(frame: "pd.DataFrame") -> list[tuple[tuple[str, float], ...]]:
+def _cells_with_value(frame: "pd.DataFrame") -> list[tuple[tuple[str, float], ...]]:
     """Return the names and the cells of each row. Cells without a value are left out."""
     columns = [(str(name), cells.tolist()) for name, cells in frame.items()]
     return [
@@ -82,17 +91,17 @@ def _by_row(frame: "pd.DataFrame") -> list[tuple[tuple[str, float], ...]]:
     ]
 
 
-def _row(
+def _build_row(
     cells: Mapping[str, Any],
     hazards: tuple[tuple[str, float], ...],
     margins: tuple[tuple[str, float], ...],
     fault: Fault | None,
-) -> Row:
-    return Row(
+) -> ResultRow:
+    return ResultRow(
         experiment_id=cells["experiment_id"],
         kind=cells["kind"],
         variant=cells["variant"],
-        value=number_of(fault) if fault else cells["value"],
+        value=numeric_value_of(fault) if fault else cells["value"],
         unit=cells["unit"],
         scenario=cells["scenario"],
         trigger=cells["trigger"],
@@ -102,7 +111,7 @@ def _row(
         t_activation=cells["t_activation"],
         t_manifest=cells["t_manifest"],
         hazards=tuple(sorted(hazards, key=lambda hazard: hazard[1])),
-        alerts=alerts_of(cells["alerts"]),
+        alerts=alert_names_in(cells["alerts"]),
         t_alert=cells["t_alert"],
         reaction_time=cells["reaction_time"],
         detail=cells["detail"],

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
 from mutator.outcomes.verdict_rules import reaction_time, severity_of, since_activation, since_manifestation
-from mutator.results.plan_columns import FIRST_PLANNED, LAST_PLANNED, PlanColumn
-from mutator.results.table_files import Column
+from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
+from mutator.results.table_files import TableColumn
 from mutator.targets.contact_severity import Scale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.target_facts import T_END, MetricFacts
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from mutator.outcomes.fault_paths import FaultPaths
     from mutator.store.run_head import RunHead
 
-AS_CHANNEL = "as its channel"  # a unit
+UNIT_OF_CHANNEL = "as its channel"  # a unit
 _TIME_DIGITS = 6  # decimals of a time in s: finer than any step, coarser than a double's precision
 
 
-class Finished:
+class FinishedExperiment:
     """An experiment with its record, from which the cells of its row follow."""
 
     def __init__(
@@ -38,26 +38,26 @@ class Finished:
         scale: Scale | None = None,
         fault_paths: "FaultPaths | None" = None,
     ) -> None:
-        self.experiment, self.record, self.scale = experiment, record, scale
+        self.experiment, self.record, self.severity_scale = experiment, record, scale
         self.is_ok = record.status is Status.OK
         self.hazards, self.metrics = dict(record.hazards), dict(record.metrics)
         self.max_dev = dict(record.max_dev)
         self.dev = self.max_dev | dict(record.dev)  # up to the end of the drive, where a hazard ended it
-        self.path = fault_paths.untimed_path(experiment.fault, record) if fault_paths else None
+        self.untimed_path = fault_paths.untimed_path(experiment.fault, record) if fault_paths else None
 
 
 @dataclass(frozen=True, slots=True)
-class ResultColumn(Column):
+class ResultColumn(TableColumn):
     """A column that is known after a run. None is an empty cell."""
 
-    of: Callable[[Finished], object]
+    cell_of: Callable[[FinishedExperiment], object]
 
 
-def _time(value: float | None) -> float | None:
+def _rounded_time(value: float | None) -> float | None:
     return None if value is None else round(value, _TIME_DIGITS)
 
 
-_TO_MANIFESTATION = (
+_COLUMNS_TO_MANIFESTATION = (
     ResultColumn(
         "status", "text", "", "whether the experiment itself worked", lambda f: f.record.status.value
     ),
@@ -80,7 +80,7 @@ _TO_MANIFESTATION = (
         "number",
         "s",
         "time of the first activation",
-        lambda f: _time(f.record.activation.first) if f.record.activation else None,
+        lambda f: _rounded_time(f.record.activation.first) if f.record.activation else None,
     ),
     ResultColumn(
         "activations",
@@ -101,10 +101,10 @@ _TO_MANIFESTATION = (
         "number",
         "s",
         "when an actuator output first differed from golden after the activation",
-        lambda f: _time(f.record.t_manifest),
+        lambda f: _rounded_time(f.record.t_manifest),
     ),
 )
-_TO_REACTION = (
+_COLUMNS_TO_REACTION = (
     ResultColumn(
         "alerts",
         "text",
@@ -117,65 +117,78 @@ _TO_REACTION = (
         "number",
         "s",
         "time of the first alert",
-        lambda f: _time(f.record.alerts[0][1]) if f.record.alerts else None,
+        lambda f: _rounded_time(f.record.alerts[0][1]) if f.record.alerts else None,
     ),
     ResultColumn(
         "reaction_time",
         "number",
         "s",
         "time from the first alert to the first hazard; empty unless the alert came first",
-        lambda f: _time(reaction_time(f.record.hazards, f.record.alerts)),
+        lambda f: _rounded_time(reaction_time(f.record.hazards, f.record.alerts)),
     ),
 )
-SEVERITY = ResultColumn(
+SEVERITY_COLUMN = ResultColumn(
     "severity",
     "text",
     "",
     "class of the contact that ended the drive; empty without a contact",
-    lambda f: severity_of(f.record, f.scale),
+    lambda f: severity_of(f.record, f.severity_scale),
 )
-SINCE = (
+TIME_TO_HAZARD_COLUMNS = (
     ResultColumn(
         "fault_tolerant_time",
         "number",
         "s",
         "time from the activation to the first hazard",
-        lambda f: _time(since_activation(f.record)),
+        lambda f: _rounded_time(since_activation(f.record)),
     ),
     ResultColumn(
         "manifest_to_hazard",
         "number",
         "s",
         "time from the manifestation to the first hazard; empty if the hazard came first",
-        lambda f: _time(since_manifestation(f.record)),
+        lambda f: _rounded_time(since_manifestation(f.record)),
     ),
 )
-OF_PATHS = (
+PATH_COLUMNS = (
     ResultColumn(
         "reached",
         "text",
         "",
         "the component farthest along the fault's path that left golden",
-        lambda f: f.path.reached or None if f.path else None,
+        lambda f: f.untimed_path.reached or None if f.untimed_path else None,
     ),
     ResultColumn(
         "stopped_at",
         "text",
         "",
         "the components that stopped a masked fault, joined by `;`",
-        lambda f: ";".join(f.path.stopped_at) or None if f.path else None,
+        lambda f: ";".join(f.untimed_path.stopped_at) or None if f.untimed_path else None,
     ),
 )
-DETAIL = ResultColumn("detail", "text", "", "why the status is not `ok`", lambda f: f.record.detail or None)
-TIMINGS = (
-    Column("experiment_id", "text", "", "the experiment"),
-    Column("cpu_s", "number", "s", "CPU time of the experiment's run"),
-    Column("wall_s", "number", "s", "wall time of the experiment's run"),
-    Column("host", "text", "", "the machine that ran the experiment"),
-    Column("worker", "text", "", "the worker that ran the experiment"),
+DETAIL_COLUMN = ResultColumn(
+    "detail", "text", "", "why the status is not `ok`", lambda f: f.record.detail or None
+)
+TIMING_COLUMNS = (
+    TableColumn("experiment_id", "text", "", "the experiment"),
+    TableColumn("cpu_s", "number", "s", "CPU time of the experiment's run"),
+    TableColumn("wall_s", "number", "s", "wall time of the experiment's run"),
+    TableColumn("host", "text", "", "the machine that ran the experiment"),
+    TableColumn("worker", "text", "", "the worker that ran the experiment"),
 )
 # Columns that are added when the table is read. No hazard can have one of these names.
-DERIVED = ("kind", "fault", "row", "ending", "hazards", "warning", "through", "rank", "hazard", "t_hazard")
+DERIVED_COLUMN_NAMES = (
+    "kind",
+    "fault",
+    "row",
+    "ending",
+    "hazards",
+    "warning",
+    "through",
+    "rank",
+    "hazard",
+    "t_hazard",
+)
 
 
 def result_columns(
@@ -192,21 +205,25 @@ def result_columns(
     """
     ends = T_END in (metric.name for metric in metrics)
     return (
-        *FIRST_PLANNED,
-        *_TO_MANIFESTATION,
+        *FIRST_PLAN_COLUMNS,
+        *_COLUMNS_TO_MANIFESTATION,
         *(column for name in hazards for column in hazard_columns(name)),
-        *_TO_REACTION,
-        *(_deviation(name, column) for name, column in deviation_columns(compared).items()),
-        *map(_metric, metrics),
-        *(_driven_deviation(name, column) for name, column in driven_columns(compared).items() if ends),
+        *_COLUMNS_TO_REACTION,
+        *(_deviation_column(name, column) for name, column in deviation_column_by_channel(compared).items()),
+        *map(_metric_column, metrics),
+        *(
+            _driven_deviation_column(name, column)
+            for name, column in driven_column_by_channel(compared).items()
+            if ends
+        ),
         *severity,
-        *(OF_PATHS if paths else ()),
-        *LAST_PLANNED,
-        DETAIL,
+        *(PATH_COLUMNS if paths else ()),
+        *LAST_PLAN_COLUMNS,
+        DETAIL_COLUMN,
     )
 
 
-def columns_of(head: "RunHead") -> tuple[PlanColumn | ResultColumn, ...]:
+def result_columns_of(head: "RunHead") -> tuple[PlanColumn | ResultColumn, ...]:
     """Return the columns of a run's results.csv, in order."""
     paths = any(channel.component for channel in head.channels)
     severity = severity_columns(has_classes=head.severity is not None)
@@ -214,35 +231,39 @@ def columns_of(head: "RunHead") -> tuple[PlanColumn | ResultColumn, ...]:
 
 
 def cells_of(
-    columns: Iterable[PlanColumn | ResultColumn], finished: Sequence[Finished]
+    columns: Iterable[PlanColumn | ResultColumn], finished: Sequence[FinishedExperiment]
 ) -> list[list[object]]:
     """Return the cells of each column, with a row for each finished experiment."""
-    planned = [one.experiment for one in finished]
+    planned = [experiment.experiment for experiment in finished]
     return [
-        list(map(column.of, planned)) if isinstance(column, PlanColumn) else list(map(column.of, finished))
+        list(map(column.cell_of, planned))
+        if isinstance(column, PlanColumn)
+        else list(map(column.cell_of, finished))
         for column in columns
     ]
 
 
 def severity_columns(*, has_classes: bool) -> tuple[ResultColumn, ...]:
     """Return the columns of a target whose contacts have classes of severity, or have none."""
-    return (SEVERITY, *SINCE) if has_classes else SINCE
+    return (SEVERITY_COLUMN, *TIME_TO_HAZARD_COLUMNS) if has_classes else TIME_TO_HAZARD_COLUMNS
 
 
-def _deviation(channel: str, column: str) -> ResultColumn:
+def _deviation_column(channel: str, column: str) -> ResultColumn:
     about = f"largest difference of `{channel}` from golden"
-    return ResultColumn(column, "number", AS_CHANNEL, about, lambda f: f.max_dev.get(channel))
+    return ResultColumn(column, "number", UNIT_OF_CHANNEL, about, lambda f: f.max_dev.get(channel))
 
 
-def _driven_deviation(channel: str, column: str) -> ResultColumn:
+def _driven_deviation_column(channel: str, column: str) -> ResultColumn:
     about = f"largest difference of `{channel}` from golden, up to `{T_END}`"
-    return ResultColumn(column, "number", AS_CHANNEL, about, lambda f: f.dev.get(channel))
+    return ResultColumn(column, "number", UNIT_OF_CHANNEL, about, lambda f: f.dev.get(channel))
 
 
-def _metric(metric: MetricFacts) -> ResultColumn:
+def _metric_column(metric: MetricFacts) -> ResultColumn:
     name = metric.name
     if name == T_END:
-        return ResultColumn(name, "number", metric.unit, metric.about, lambda f: _time(f.record.t_end))
+        return ResultColumn(
+            name, "number", metric.unit, metric.about, lambda f: _rounded_time(f.record.t_end)
+        )
     return ResultColumn(name, "number", metric.unit, metric.about, lambda f: f.metrics.get(name))
 
 
@@ -263,17 +284,17 @@ def hazard_columns(hazard: str) -> tuple[ResultColumn, ResultColumn]:
             "number",
             "s",
             "time of its first occurrence",
-            lambda f: _time(f.hazards.get(hazard)),
+            lambda f: _rounded_time(f.hazards.get(hazard)),
         ),
     )
 
 
-def alerts_of(cell: str) -> tuple[str, ...]:
+def alert_names_in(cell: str) -> tuple[str, ...]:
     """Return the names in a cell of the column `alerts`."""
     return tuple(filter(None, cell.split(";")))
 
 
-def hazards_of(frame: "pd.DataFrame") -> tuple[str, ...]:
+def hazards_of_frame(frame: "pd.DataFrame") -> tuple[str, ...]:
     """Return the hazards of a frame that `Results` read, in the order of run.json. MutatorError for a frame
     without them.
     """
@@ -287,15 +308,15 @@ def hazards_of(frame: "pd.DataFrame") -> tuple[str, ...]:
         ) from None
 
 
-def deviation_columns(channels: Sequence[str]) -> Mapping[str, str]:
+def deviation_column_by_channel(channels: Sequence[str]) -> Mapping[str, str]:
     """Map each compared channel to its column: `max_dev_` and the first word of its name (`wheel` for
     `wheel_turn`), or the whole name if another channel begins with the same word.
     """
-    return _deviation_columns(tuple(channels))
+    return _cached_deviation_columns(tuple(channels))
 
 
 @lru_cache(maxsize=64)
-def _deviation_columns(channels: tuple[str, ...]) -> Mapping[str, str]:
+def _cached_deviation_columns(channels: tuple[str, ...]) -> Mapping[str, str]:
     words = [name.split("_")[0] for name in channels]
     return {
         name: f"max_dev_{word if words.count(word) == 1 else name}"
@@ -303,36 +324,38 @@ def _deviation_columns(channels: tuple[str, ...]) -> Mapping[str, str]:
     }
 
 
-def driven_columns(channels: Sequence[str]) -> dict[str, str]:
+def driven_column_by_channel(channels: Sequence[str]) -> dict[str, str]:
     """Map each compared channel to its `dev_` column, which exists if a hazard can end the drive."""
-    return {name: column.removeprefix("max_") for name, column in deviation_columns(channels).items()}
+    return {
+        name: column.removeprefix("max_") for name, column in deviation_column_by_channel(channels).items()
+    }
 
 
-def check_names(manifest: TargetManifest) -> None:
+def check_column_names(manifest: TargetManifest) -> None:
     """Raise MutatorError if a column of a hazard or metric has the name of another column, or if a metric's
     column could be taken for a hazard's.
     """
     compared = [channel.name for channel in manifest.compared]
-    taken = {column.name for column in result_columns((), compared, paths=True)}
-    taken |= {SEVERITY.name, *(column.name for column in SINCE)}
-    taken |= {*DERIVED, T_END, *driven_columns(compared).values()}
-    named = isinstance(manifest.source.data.get("hazards"), dict)
+    used_names = {column.name for column in result_columns((), compared, paths=True)}
+    used_names |= {SEVERITY_COLUMN.name, *(column.name for column in TIME_TO_HAZARD_COLUMNS)}
+    used_names |= {*DERIVED_COLUMN_NAMES, T_END, *driven_column_by_channel(compared).values()}
+    is_mapping = isinstance(manifest.source.data.get("hazards"), dict)
     for i, hazard in enumerate(manifest.hazards):
         names = {column.name for column in hazard_columns(hazard)}
-        if names & taken:
+        if names & used_names:
             raise manifest.source.error(
-                ("hazards", hazard if named else i),
+                ("hazards", hazard if is_mapping else i),
                 f"hazard '{hazard}' clashes with another column of the results",
                 expected=f"a name whose columns ({' and '.join(sorted(names))}) do not exist yet",
                 remedy="rename it",
             )
-        taken |= names
+        used_names |= names
     for metric in manifest.measures:
-        if {metric.name, f"t_{metric.name}", metric.name.removeprefix("t_")} & taken:
+        if {metric.name, f"t_{metric.name}", metric.name.removeprefix("t_")} & used_names:
             raise manifest.source.error(
                 ("metrics", metric.name),
                 f"metric '{metric.name}' clashes with another column of the results",
                 expected="a name that no other column has, with or without the prefix `t_`",
                 remedy="rename it",
             )
-        taken.add(metric.name)
+        used_names.add(metric.name)

@@ -10,15 +10,15 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
 
-_ROWS = 1 << 20  # maximum number of rows in a row group (pyarrow's default)
-_CELLS = 1 << 23  # maximum number of cells in a row group, because a whole group is in memory
+_MOST_GROUP_ROWS = 1 << 20  # maximum number of rows in a row group (pyarrow's default)
+_MOST_GROUP_CELLS = 1 << 23  # maximum number of cells in a row group, because a whole group is in memory
 
 ColumnType = Literal["text", "flag", "count", "number"]
 ARROW_TYPES = {"text": "string", "flag": "int8", "count": "int64", "number": "double"}
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class TableColumn:
     """A column of a table. A `flag` is 0 or 1."""
 
     name: str
@@ -34,16 +34,18 @@ def csv_lines(rows: Iterable[Sequence[object]]) -> bytes:
     return text.getvalue().encode()
 
 
-def record_batch(columns: Sequence[Column], values: Sequence[Sequence[object]]) -> Any:
+def parquet_batch(columns: Sequence[TableColumn], values: Sequence[Sequence[object]]) -> Any:
     """Return Parquet rows, given the values of each column."""
     import pyarrow as pa  # type: ignore[import-untyped]
 
-    schema = schema_of(columns)
-    arrays = [pa.array(some, field.type) for some, field in zip(values, schema, strict=True)]
+    schema = parquet_schema(columns)
+    arrays = [
+        pa.array(column_values, field.type) for column_values, field in zip(values, schema, strict=True)
+    ]
     return pa.record_batch(arrays, schema=schema)
 
 
-def schema_of(columns: Sequence[Column]) -> Any:
+def parquet_schema(columns: Sequence[TableColumn]) -> Any:
     """Return the Parquet schema of columns."""
     import pyarrow as pa
 
@@ -53,7 +55,7 @@ def schema_of(columns: Sequence[Column]) -> Any:
 class CsvTable:
     """A CSV file that begins with its column names."""
 
-    def __init__(self, path: Path, columns: Sequence[Column]) -> None:
+    def __init__(self, path: Path, columns: Sequence[TableColumn]) -> None:
         self._file = path.open("wb")
         self.append(csv_lines([[column.name for column in columns]]))
 
@@ -70,37 +72,37 @@ class CsvTable:
 class ParquetTable:
     """A Parquet file. Equal rows give equal bytes, regardless of the batches."""
 
-    def __init__(self, path: Path, columns: Sequence[Column]) -> None:
+    def __init__(self, path: Path, columns: Sequence[TableColumn]) -> None:
         import pyarrow as pa
         from pyarrow import parquet
 
         self._pa = pa
-        self._schema = schema_of(columns)
+        self._schema = parquet_schema(columns)
         self._writer = parquet.ParquetWriter(path, self._schema, compression="zstd")
-        self._group = min(_ROWS, _CELLS // len(columns))
-        self._held: list[Any] = []
-        self._count = 0  # number of rows not yet written
+        self._rows_per_group = min(_MOST_GROUP_ROWS, _MOST_GROUP_CELLS // len(columns))
+        self._pending_batches: list[Any] = []
+        self._pending_rows = 0  # number of rows not yet written
         self._is_empty = True
 
     def __enter__(self) -> "ParquetTable":
         return self
 
     def append(self, batch: Any) -> None:
-        self._held.append(batch)
-        self._count += batch.num_rows
-        while self._count >= self._group:
-            self._write(self._group)
+        self._pending_batches.append(batch)
+        self._pending_rows += batch.num_rows
+        while self._pending_rows >= self._rows_per_group:
+            self._write_rows(self._rows_per_group)
 
-    def _write(self, count: int) -> None:
-        held = self._pa.Table.from_batches(self._held, self._schema)
-        self._writer.write_table(held.slice(0, count).combine_chunks(), self._group)
-        self._held = held.slice(count).to_batches()
-        self._count -= count
+    def _write_rows(self, count: int) -> None:
+        pending = self._pa.Table.from_batches(self._pending_batches, self._schema)
+        self._writer.write_table(pending.slice(0, count).combine_chunks(), self._rows_per_group)
+        self._pending_batches = pending.slice(count).to_batches()
+        self._pending_rows -= count
         self._is_empty = False
 
     def __exit__(
         self, kind: type[BaseException] | None, *error: BaseException | TracebackType | None
     ) -> None:
-        if kind is None and (self._count or self._is_empty):
-            self._write(self._count)
+        if kind is None and (self._pending_rows or self._is_empty):
+            self._write_rows(self._pending_rows)
         self._writer.close()

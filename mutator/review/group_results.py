@@ -8,9 +8,9 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from mutator.model import Fault, Outcome, Status
-from mutator.results.outcome_counting import UNUSABLE, endings
-from mutator.results.ranking import places
-from mutator.results.result_rows import Row, rows_of
+from mutator.results.outcome_counting import UNUSABLE_STATUSES, endings_of_rows
+from mutator.results.ranking import ranks_of_rows
+from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import Results
 from mutator.review.mutant_groups import Group
 from mutator.review.patch_shapes import group_label
@@ -71,9 +71,9 @@ def _of_run(path: Path, written: int) -> dict[str, Typical]:
     labels = {name: group_label(fault) for name, fault in faults.items()}
     known = [labels.get(name, "") for name in frame["fault_id"]]
     rows: dict[str, list[int]] = {}
-    for row in np.argsort(places(frame)).tolist():  # worst first
+    for row in np.argsort(ranks_of_rows(frame)).tolist():  # worst first
         rows.setdefault(known[row], []).append(row)
-    ended = endings(frame).tolist()
+    ended = endings_of_rows(frame).tolist()
     return {label: _typical(frame, ended, own, about, faults) for label, own in rows.items() if label}
 
 
@@ -90,7 +90,7 @@ def _typical(
     by_ending: dict[str, list[int]] = {}
     for row in rows:
         by_ending.setdefault(ended[row], []).append(row)
-    usable = {name: own for name, own in by_ending.items() if name not in UNUSABLE} or by_ending
+    usable = {name: own for name, own in by_ending.items() if name not in UNUSABLE_STATUSES} or by_ending
     most = max(usable.values(), key=len)
     order = [*Outcome, *Status]
     counts = {name.value: len(by_ending[name.value]) for name in order if name.value in by_ending}
@@ -99,7 +99,7 @@ def _typical(
     return Typical(experiments=len(rows), outcomes=counts, typical=typical, worst=worst)
 
 
-def _case(row: Row, about: Mapping[str, str]) -> Case:
+def _case(row: ResultRow, about: Mapping[str, str]) -> Case:
     return Case(
         id=row.experiment_id,
         label=f"{row.fault}, {row.scenario}, {row.trigger}",
@@ -108,7 +108,7 @@ def _case(row: Row, about: Mapping[str, str]) -> Case:
     )
 
 
-def verdict_of(row: Row, about: Mapping[str, str]) -> str:
+def verdict_of(row: ResultRow, about: Mapping[str, str]) -> str:
     """Return an experiment's result as text; `about` explains the hazards."""
     if row.ending in _PLAIN:
         return _PLAIN[row.ending]

@@ -17,7 +17,7 @@ from mutator._common.message_text import describe_choices, suggestion
 from mutator.campaigns.filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
-from mutator.results.plan_columns import PLAN_COLUMNS
+from mutator.results.plan_columns import PLAN_COLUMN_NAMES
 from mutator.serve.served_runs import Runs, report_of
 from mutator.store import plan_file
 from mutator.triggers.conditions import canonical_condition
@@ -192,7 +192,7 @@ class Desk:
         if order.campaign not in self.workspace.campaigns:
             raise _unknown("campaign", order.campaign, self.workspace.campaigns)
         if order.only is not None:
-            compile_filter(order.only, PLAN_COLUMNS)
+            compile_filter(order.only, PLAN_COLUMN_NAMES)
         folder = self._new(order.name)
         given_options = {
             "--out": folder,

@@ -9,7 +9,7 @@ from starlette.responses import HTMLResponse, Response
 from mutator._common.bounded_reading import read_open_file
 from mutator._common.confined_files import check_only_plain_files
 from mutator._common.hashing import digest
-from mutator.audit.table_audit import tables
+from mutator.audit.table_audit import audit_tables
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
 from mutator.errors import Absent, MutatorError
@@ -89,7 +89,7 @@ class Shown:
         the report shows them beside the run's seal.
         """
         if folder.is_finished:
-            for problem in tables(folder)[1]:
+            for problem in audit_tables(folder)[1]:
                 raise problem
         return report_builder.build_report(folder, self._workspace).files
 

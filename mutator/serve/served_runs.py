@@ -11,7 +11,7 @@ from urllib.parse import quote
 from mutator._common.confined_files import open_below
 from mutator._common.folder_search import RUN_HEAD_FILE
 from mutator.errors import Absent, MutatorError, Outside
-from mutator.results.outcome_counting import outcome_counts
+from mutator.results.outcome_counting import count_endings
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 
@@ -101,7 +101,7 @@ def told(key: str, path: Path) -> dict[str, Any]:
 @lru_cache(maxsize=1000)
 def _outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
     """Count how the experiments ended. `mtime_ns` and `size` of the table are only keys of the cache."""
-    return outcome_counts(Results(run).frame("status", "outcome"))
+    return count_endings(Results(run).frame("status", "outcome"))
 
 
 def open_in_run(run: Path, name: str) -> BinaryIO:

@@ -13,7 +13,7 @@ import pandas as pd
 
 from mutator._common.table_rendering import TextTable
 from mutator.model import OPERATORS, Fault, Status
-from mutator.results.table_columns import alerts_of
+from mutator.results.table_columns import alert_names_in
 from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.shares import Share, share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell, cell_text
@@ -89,7 +89,7 @@ def _has_new_alerts(mutant_runs: pd.DataFrame, golden_alerts: AlertsByGoldenRun)
     rows = zip(mutant_runs["scenario"], mutant_runs["seed"].astype(str), mutant_runs["alerts"], strict=True)
     return [
         not golden_alerts.get((scenario, seed), golden_alerts.get((scenario, ""), frozenset())).issuperset(
-            alerts_of(alerts)
+            alert_names_in(alerts)
         )
         for scenario, seed, alerts in rows
     ]

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator.results.outcome_counting import UNUSABLE
-from mutator.results.table_columns import hazards_of
+from mutator.results.outcome_counting import UNUSABLE_STATUSES
+from mutator.results.table_columns import hazards_of_frame
 from mutator.results.table_reader import Results
 
 _RANDOM_PREFIX = "random/"  # prefix of a random run's trigger: random/C1
@@ -28,7 +28,7 @@ def load_usable_results(results: Path) -> pd.DataFrame:
 
 def prepare_results(frame: pd.DataFrame) -> pd.DataFrame:
     """Select the usable experiments of a frame from `Results.frame`, and add the derived columns."""
-    unusable = frame["status"].isin([str(status) for status in UNUSABLE])
+    unusable = frame["status"].isin([str(status) for status in UNUSABLE_STATUSES])
     if unusable.any():
         frame = frame[~unusable]
     frame = frame.reset_index(drop=True)
@@ -70,4 +70,4 @@ def select_columns(frame: pd.DataFrame, *more_columns: str) -> pd.DataFrame:
 
 def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:
     """Return the hazards in the table, sorted. A hazard NEAR has a flag `near` and a time `t_near`."""
-    return tuple(sorted(hazards_of(frame)))
+    return tuple(sorted(hazards_of_frame(frame)))

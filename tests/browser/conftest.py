@@ -95,7 +95,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
         patches.append(experiment.id, data)
     lines.close()
     patches.close()
-    table_building.build(out.path)
+    table_building.build_tables(out.path)
     t = np.arange(0.0, 6.0, 0.05)
     names = ("gas", "brake", "wheel_turn", "gap", "speed")
     golden = {"time": t, **{name: np.sin(t + i) for i, name in enumerate(names)}}

@@ -61,7 +61,7 @@ def report(
     manifest.write_text(text)
     (workspace.library / "stpa" / "control_structure.yaml").write_text(STRUCTURE)
     run = write_run(workspace, folder / "run", result_of)
-    table_building.build(run)
+    table_building.build_tables(run)
     with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
         patch.setattr(figures_panel, "draw_figures", lambda frame: ())
         report_builder.write_report(run, None)

@@ -32,7 +32,7 @@ def report(
     folder = tmp_path_factory.mktemp("source")
     workspace = copy_toycar(folder)
     out = write_run(workspace, folder / "run", result_of, changed=of_operators(workspace, "toycar/driver.py"))
-    table_building.build(out)
+    table_building.build_tables(out)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures_panel, "draw_figures", lambda frame: ())
         report_builder.write_report(out, workspace)

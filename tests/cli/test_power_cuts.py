@@ -11,7 +11,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.execution.session import Session
-from mutator.results.ranking import worth
+from mutator.results.ranking import rank_by_experiment
 from mutator.results.table_reader import Results
 from mutator.store import checksummed_blocks, checksummed_lines
 from mutator.store.checksummed_blocks import read_blocks
@@ -138,7 +138,9 @@ def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
     path.write_bytes(data[: last_block(path) + 30])
     ran = cli(*WORDS)
     assert ran.code == 0, ran.err
-    assert [one for one in worth(Results(cut).frame()) if not SeriesFolder(cut).has_series(one)] == names[-1:]
+    assert [
+        one for one in rank_by_experiment(Results(cut).frame()) if not SeriesFolder(cut).has_series(one)
+    ] == names[-1:]
     assert cli("verify", "run").code == 0
     assert cli("rerun", names[-1], "--trace", "--run", "run").code == 0
     assert SeriesFolder(cut).is_readable(names[-1], records[names[-1]])

@@ -81,9 +81,9 @@ def test_a_killed_merge_loses_no_series(runs: Runs, tmp_path: Path, monkeypatch:
 
     def build(run: Path) -> Path:
         seen.append(len(list((run / "series").iterdir())))
-        return table_building.build(run)
+        return table_building.build_tables(run)
 
-    monkeypatch.setattr(shard_merging, "table_building", SimpleNamespace(build=build))
+    monkeypatch.setattr(shard_merging, "table_building", SimpleNamespace(build_tables=build))
     merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
     assert seen == [3]
 
@@ -240,7 +240,7 @@ def test_a_failed_merge_leaves_nothing_and_can_be_repeated(
     runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch, pytest.raises(RuntimeError):
-        patch.setattr("mutator.results.table_building.build", fail)
+        patch.setattr("mutator.results.table_building.build_tables", fail)
         merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
     assert not (tmp_path / "out").exists()
     assert merge([runs["1/2"], runs["2/2"]], tmp_path / "out").is_file()

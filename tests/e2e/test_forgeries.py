@@ -328,13 +328,13 @@ def test_the_seal_reveals_a_forgery_with_consistent_digests(
     forge(run, True)
     if forge is not the_table:
         reseal(run)
-        for name in (table_building.STAMP, table_building.CSV, table_building.PARQUET):
+        for name in (table_building.STAMP_FILE, table_building.CSV_FILE, table_building.PARQUET_FILE):
             (run / name).unlink()
-        table_building.ensure(run)
+        table_building.ensure_tables(run)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert RunFolder.open(run).is_finished
-        table_building.ensure(run)
+        table_building.ensure_tables(run)
     found = mutator.verify(run, expect=known, workspace=genuine[0])
     assert not found.passed
     assert (found.seal == known) == (forge is the_table)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mutator.comparison.pairs import ExperimentPair, ResultChange
 from mutator.model import Outcome, Status
-from mutator.results.result_rows import Row
+from mutator.results.result_rows import ResultRow
 
 MIRROR = {
     ResultChange.NEW_HAZARD: ResultChange.HAZARD_GONE,
@@ -23,13 +23,13 @@ TIME = st.sampled_from([2.0, 2.5, 3.0, 7.25])
 
 
 @st.composite
-def rows(draw: st.DrawFn) -> Row:
+def rows(draw: st.DrawFn) -> ResultRow:
     """Draw a row, including some that no campaign can produce."""
     names = draw(st.lists(st.sampled_from(["H1", "H2"]), unique=True))
     hazards = tuple(sorted(((name, draw(TIME)) for name in names), key=lambda h: h[1]))
     status = draw(st.sampled_from(Status))
     outcome = draw(st.sampled_from(Outcome)) if status is Status.OK else None
-    return Row(
+    return ResultRow(
         **dict.fromkeys(("experiment_id", "kind", "variant", "value", "unit"), "x"),
         **dict.fromkeys(("scenario", "trigger", "detail"), "x"),
         status=status,
@@ -45,12 +45,12 @@ def rows(draw: st.DrawFn) -> Row:
 
 
 @given(rows())
-def test_a_run_does_not_differ_from_itself(row: Row) -> None:
+def test_a_run_does_not_differ_from_itself(row: ResultRow) -> None:
     assert ExperimentPair(None, None, row, dataclasses.replace(row)).changes == set()  # type: ignore[arg-type]
 
 
 @given(rows(), rows())
-def test_swapping_two_runs_swaps_better_and_worse(a: Row, b: Row) -> None:
+def test_swapping_two_runs_swaps_better_and_worse(a: ResultRow, b: ResultRow) -> None:
     """A different hazard has no opposite change."""
     there = ExperimentPair(None, None, a, b).changes - {ResultChange.OTHER_HAZARD}  # type: ignore[arg-type]
     back = ExperimentPair(None, None, b, a).changes - {ResultChange.OTHER_HAZARD}  # type: ignore[arg-type]

@@ -27,7 +27,7 @@ from mutator.execution.cluster.parcel import pack, unpack
 from mutator.execution.cluster.unpacked_bundle import META, SCHEMA, Site
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FILES
-from mutator.results.table_columns import check_names
+from mutator.results.table_columns import check_column_names
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.run_folder import RunFolder
@@ -148,7 +148,7 @@ def read_inputs(site: Site) -> RunInputs:
         site.place / "target",
         overlay if overlay.is_dir() else None,
     )
-    check_names(manifest)
+    check_column_names(manifest)
     return RunInputs(
         manifest=replace(manifest, sandbox=site.meta["sandbox"]),
         models=load_fault_models(site.place / "templates"),

@@ -12,7 +12,7 @@ from mutator.errors import MutatorError
 from mutator.exports import Export, ExportRequest
 from mutator.model import Experiment, Outcome, Status
 from mutator.results.plan_columns import plan_row
-from mutator.results.result_rows import Row
+from mutator.results.result_rows import ResultRow
 from mutator.results.table_reader import Results
 from mutator.store.plan_file import load_experiments
 
@@ -43,7 +43,7 @@ def _content(request: ExportRequest) -> bytes:
     return data + b"\n"
 
 
-def _case(experiment: Experiment, row: Row | None, failures: Collection[str]) -> ET.Element:
+def _case(experiment: Experiment, row: ResultRow | None, failures: Collection[str]) -> ET.Element:
     case = ET.Element("testcase", classname=experiment.fault.spec.replace("/", "."), name=experiment.label)
     facts = {"experiment": experiment.id, "ending": row.ending if row else "not run"}
     if row:

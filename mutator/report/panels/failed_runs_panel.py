@@ -8,7 +8,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.model import Status
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
-from mutator.results.result_rows import Row, rows_of
+from mutator.results.result_rows import ResultRow, rows_of
 
 _HEADS = ("status", "experiment", "fault", "scenario", "message")
 LISTED, PAGE_LISTED = 30, 200  # maximum number of runs in Markdown and on the page, whose search finds all
@@ -39,14 +39,14 @@ def build_failed_runs_panel(run: ReportedRun) -> Panel | None:
     )
 
 
-def _markdown(failed: Sequence[Row], count: int) -> str:
+def _markdown(failed: Sequence[ResultRow], count: int) -> str:
     rows = [(r.status.value, r.experiment_id, r.fault, r.scenario, r.detail) for r in failed[:LISTED]]
     table = TextTable(heads=_HEADS, rows=rows).as_markdown()
     more = count - LISTED
     return f"{table}\n\nOthers in `results.csv`: {more}." if more > 0 else table
 
 
-def _linked(failed: Sequence[Row]) -> TextTable:
+def _linked(failed: Sequence[ResultRow]) -> TextTable:
     from markupsafe import Markup
 
     ending = Markup('<span class="ending {0}">{0}</span>').format

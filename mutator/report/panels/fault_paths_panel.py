@@ -7,7 +7,7 @@ from mutator.report.fault_path_data import ALL, PathCounts, RunPaths, counts_by_
 from mutator.report.panel import Panel, rendered
 from mutator.report.path_drawing import draw_path_counts, drawn_counts, share_text
 from mutator.report.reported_run import ReportedRun
-from mutator.results.outcome_counting import kinds
+from mutator.results.outcome_counting import fault_types_of
 from mutator.web import plainly_embedded
 
 _ABOUT = (
@@ -60,7 +60,7 @@ names all components that stopped it.</p>
 def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the counts of links and components; None if no path is known."""
     paths = run.paths
-    counts = counts_by_fault_type(kinds(run.results), run.seen.path_numbers, paths) if paths else {}
+    counts = counts_by_fault_type(fault_types_of(run.results), run.seen.path_numbers, paths) if paths else {}
     if paths is None or not counts:
         return None
     links = _links(paths)

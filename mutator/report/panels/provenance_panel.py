@@ -1,7 +1,7 @@
 """The provenance panel: how the experiments were executed, and what is needed to reproduce them."""
 
 from mutator._common.table_rendering import TextTable
-from mutator.audit.seal import OUTSIDE, seal_or_why_not, unsealed_facts, without
+from mutator.audit.seal import UNSEALED_KEYS, digests_or_why_no_seal, unsealed_facts, without_keys
 from mutator.campaigns.installed_studies import study_problems
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
@@ -50,12 +50,12 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
     folder = run.folder
     reviewed = approval_summary(folder.path)
     head, packages = folder.head, package_versions(folder.stretches)
-    chosen = without(head.as_json(), OUTSIDE[HEAD])["choices"]
+    chosen = without_keys(head.as_json(), UNSEALED_KEYS[HEAD])["choices"]
     facts = {
         "experiments": f"{len(run.results)} of {folder.planned_count} planned",
         **({"proof": run.engines.state} if run.engines else {}),
         **({"reviewed": reviewed} if reviewed else {}),
-        **seal_or_why_not(folder),
+        **digests_or_why_no_seal(folder),
         "campaign": head.campaign,
         **_study(run),
         "plan": head.plan,

@@ -8,7 +8,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.outcomes.fault_free_runs import fault_free_table, own_alerts
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
-from mutator.results.outcome_counting import count_table, counts_by, hazard_names, kinds
+from mutator.results.outcome_counting import count_table, counts_by_group, fault_types_of, hazard_names
 from mutator.statistics.metric_tables import fault_tolerant_times_sheet, metrics_sheet, severity_sheet
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.sheet_selection import run_sheets
@@ -24,7 +24,7 @@ NOTES = (
 NO_ALERT = " *Hazard, no alert*: no alert at all, before or after the hazard."
 FAULT_FREE = "The golden runs: first times of alerts and hazards, and the range of each plotted channel."
 _GROUPS = (
-    ("By fault type", "fault type", kinds),
+    ("By fault type", "fault type", fault_types_of),
     ("By scenario", "scenario", itemgetter("scenario")),
     ("By method", "method", itemgetter("method")),
 )
@@ -113,7 +113,7 @@ def _counts(run: ReportedRun) -> list[tuple[str, TextTable]]:
     hazards = hazard_names(run.results)
     made = []
     for title, head, groups in _GROUPS:
-        counts = counts_by(run.results, groups(run.results))
+        counts = counts_by_group(run.results, groups(run.results))
         heads, lines = count_table(counts, head, hazards, alerts=run.folder.has_alerts)
         made.append((title, TextTable(heads=heads, rows=lines, right_aligned=range(1, len(heads)))))
     return made

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mutator.audit.record_audit import Recorded, verdicts
+from mutator.audit.record_audit import StoredRecord, verdict_problems
 from mutator.model import Activation, Outcome, Record, Status
 from mutator.targets.channels import Channel, Role
 from mutator.targets.target_facts import ChannelFacts
@@ -25,7 +25,7 @@ BAD_END = {"outcome": None, "activation": None, "max_dev": (), "trace_digest": "
 
 
 def flaws(record: Record) -> list[str]:
-    return [str(one) for one in verdicts(HEAD, [Recorded(Path("r.jsonl"), 7, record)], MANIFEST)]
+    return [str(one) for one in verdict_problems(HEAD, [StoredRecord(Path("r.jsonl"), 7, record)], MANIFEST)]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common.folder_locks import owning_run_folder
-from mutator.audit.run_repair import _put_aside, repair
+from mutator.audit.run_repair import _set_aside, repair_run
 from mutator.errors import MutatorError, Outside
 from mutator.store import file_digests, plan_file
 from mutator.store.checksummed_lines import line_file_bytes, read_segment
@@ -36,7 +36,7 @@ def run(made: Path, tmp_path: Path) -> Path:
 
 
 def repaired(run: Path) -> tuple[list[str], RunFolder]:
-    said = repair(RunFolder.open_unverified(run))
+    said = repair_run(RunFolder.open_unverified(run))
     return said, RunFolder.open(run)
 
 
@@ -167,16 +167,16 @@ def test_a_damaged_ledger_is_rebuilt_from_the_files(run: Path, content: bytes | 
 def test_a_damaged_campaign_file_or_plan_is_not_repaired(run: Path) -> None:
     """A user can replace the file with a copy."""
     (run / "campaign.yaml").write_text("other")
-    assert repair(RunFolder.open_unverified(run)) == []
+    assert repair_run(RunFolder.open_unverified(run)) == []
     assert (run / "campaign.yaml").read_text() == "other"
     edit(run / plan_file.EXPERIMENTS, lambda x: x[:-1])
     with pytest.raises(MutatorError, match="23 experiments"):
-        repair(RunFolder.open_unverified(run))
+        repair_run(RunFolder.open_unverified(run))
 
 
 def test_an_intact_run_is_not_changed(run: Path) -> None:
     before = (run / file_digests.FILE).stat().st_mtime_ns
-    assert repair(RunFolder.open_unverified(run)) == []
+    assert repair_run(RunFolder.open_unverified(run)) == []
     assert (run / file_digests.FILE).stat().st_mtime_ns == before and not (run / "damaged").exists()
 
 
@@ -184,7 +184,7 @@ def test_a_run_resumes_after_a_killed_repair(run: Path, monkeypatch: pytest.Monk
     edit(run / RECORDS, lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]])
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
         patched.setattr(file_digests, "close_segments", kill)
-        repair(RunFolder.open_unverified(run))
+        repair_run(RunFolder.open_unverified(run))
     folder = RunFolder.open(run)
     assert (len(folder.records()), folder.is_finished) == (23, False)
 
@@ -195,7 +195,7 @@ def kill(*_: object, **__: object) -> None:
 
 def test_a_folder_in_use_is_refused(run: Path) -> None:
     with owning_run_folder(run), pytest.raises(MutatorError, match="in use"):
-        repair(RunFolder.open_unverified(run))
+        repair_run(RunFolder.open_unverified(run))
 
 
 @pytest.mark.parametrize("name", NO_FILES)
@@ -221,7 +221,7 @@ def test_links_are_not_followed(run: Path, name: str) -> None:
         (run / name).symlink_to(mine)
     before = {path: path.read_bytes() for path in mine.iterdir()}
     with pytest.raises(Outside, match="a link, a pipe"):
-        repair(RunFolder.open_unverified(run))
+        repair_run(RunFolder.open_unverified(run))
     assert {path: path.read_bytes() for path in mine.iterdir()} == before
 
 
@@ -234,7 +234,7 @@ def test_a_file_outside_that_the_ledger_names_stays(run: Path, name: str) -> Non
         run, DigestLedger(files={**ledger.files, name: FileDigest.of_bytes(b"not mine")}, finished=True)
     )
     with pytest.raises(Outside, match=r"digests\.json"):
-        repair(RunFolder.open_unverified(run))
+        repair_run(RunFolder.open_unverified(run))
     assert (run.parent / "setup.py").read_text() == "mine"
 
 
@@ -278,6 +278,6 @@ def test_a_file_with_holes_is_moved_and_not_copied(run: Path) -> None:
     (run / "series").mkdir()
     with (run / name).open("wb") as file:
         file.truncate(1 << 40)
-    _put_aside(run, name)
+    _set_aside(run, name)
     aside = run / "damaged" / name
     assert not (run / name).exists() and aside.stat().st_size == 1 << 40 and aside.stat().st_blocks < 100

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common.hashing import canonical_json
-from mutator.audit.seal import seal_or_why_not, seals_of, unsealed_facts
+from mutator.audit.seal import digests_or_why_no_seal, seals_of, unsealed_facts
 from mutator.store import file_digests
 from mutator.store.approvals import write_approvals
 from mutator.store.checksummed_lines import line_file_bytes
@@ -143,7 +143,7 @@ def test_an_unfinished_run_has_no_seal(run: Path) -> None:
     file_digests.close_segments(run, finished=False)
     folder = RunFolder.open(run)
     none = {"seal": "none: the run is not finished"}
-    assert (seals_of(folder).seal, seal_or_why_not(folder)) == (None, none)
+    assert (seals_of(folder).seal, digests_or_why_no_seal(folder)) == (None, none)
 
 
 def test_the_seal_covers_records_as_they_were_written(made: Path, run: Path) -> None:

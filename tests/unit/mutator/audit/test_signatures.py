@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mutator.audit.seal import Seals, seals_of
-from mutator.audit.signatures import sign, signer
+from mutator.audit.signatures import sign, verified_signer
 from mutator.errors import CheckFailed
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -57,7 +57,7 @@ def test_every_line_of_the_list_is_tried(
     folder, seals, public = signed
     text, identity = VALID[case]
     (tmp_path / "list").write_text(text.format(**public))
-    assert signer(folder, seals, tmp_path / "list") == identity
+    assert verified_signer(folder, seals, tmp_path / "list") == identity
 
 
 INVALID = {
@@ -77,4 +77,4 @@ def test_a_line_that_does_not_allow_the_signature_does_not_count(
     folder, seals, public = signed
     (tmp_path / "list").write_text(text.format(**public))
     with pytest.raises(CheckFailed, match=f"signed by nobody in the list .*{INVALID[text]}"):
-        signer(folder, seals, tmp_path / "list")
+        verified_signer(folder, seals, tmp_path / "list")

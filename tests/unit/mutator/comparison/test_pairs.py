@@ -10,13 +10,13 @@ import pytest
 from mutator.comparison.compared_runs import ComparedRun
 from mutator.comparison.pairs import ExperimentPair, ResultChange, match_experiments
 from mutator.model import Experiment, Method, Outcome, Status
-from mutator.results.result_rows import Row
+from mutator.results.result_rows import ResultRow
 from mutator.store.run_folder import RunFolder
 
 Make = Callable[..., Experiment]
 
 
-def row(experiment_id: str = "e", **given: Any) -> Row:
+def row(experiment_id: str = "e", **given: Any) -> ResultRow:
     fields: dict[str, Any] = {
         "experiment_id": experiment_id,
         **dict.fromkeys(("kind", "variant", "value", "unit", "scenario", "trigger"), "x"),
@@ -31,7 +31,7 @@ def row(experiment_id: str = "e", **given: Any) -> Row:
         "detail": "",
     }
     fields |= given
-    return Row(ending=(fields["outcome"] or fields["status"]).value, **fields)
+    return ResultRow(ending=(fields["outcome"] or fields["status"]).value, **fields)
 
 
 def side(*experiments: Experiment, without: tuple[Experiment, ...] = ()) -> ComparedRun:

@@ -7,7 +7,7 @@ from mutator._common.typed_json import from_json_types
 from mutator.model import Activation, Outcome, Record, Status
 from mutator.outcomes.channel_departures import departures
 from mutator.outcomes.golden_comparison import compare
-from mutator.results.propagation_columns import COLUMNS, columns_of
+from mutator.results.propagation_columns import PROPAGATION_COLUMNS, propagation_cells
 from mutator.targets.channels import Channel
 from mutator.targets.target_facts import ChannelFacts
 
@@ -97,8 +97,8 @@ def test_the_table_keeps_the_order_of_records_and_departures() -> None:
         left=(("seen", 0.1 + 0.2, 2.5), ("gas", 0.4, 1.0)),
     )
     facts = [["gas", "-", "actuator", "pedals", ""], ["seen", "m", "internal", "eyes", ""]]
-    found = columns_of([record], from_json_types(tuple[ChannelFacts, ...], facts))
-    assert list(found) == [column.name for column in COLUMNS]
+    found = propagation_cells([record], from_json_types(tuple[ChannelFacts, ...], facts))
+    assert list(found) == [column.name for column in PROPAGATION_COLUMNS]
     assert list(zip(*found.values(), strict=True)) == [
         ("e1", "seen", "eyes", "internal", 0.3, 2.5),
         ("e1", "gas", "pedals", "actuator", 0.4, 1.0),

@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 from mutator._common.hashing import as_json_types
-from mutator.results.table_columns import SINCE, result_columns
+from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import DigestLedger
 from mutator.store.plan_choices import Choices
@@ -14,7 +14,7 @@ from tests.made_head import made_head
 from tests.made_up_results import write_results
 
 COMPARED = ("gas", "brake", "steer_torque")
-COLUMNS = result_columns(("H1", "H2", "H3"), COMPARED, (), SINCE)
+COLUMNS = result_columns(("H1", "H2", "H3"), COMPARED, (), TIME_TO_HAZARD_COLUMNS)
 HEAD = made_head(
     campaign="night_<b>drive</b>",
     compared=COMPARED,

@@ -17,7 +17,7 @@ from mutator.report.fix_order import first_to_fix
 from mutator.report.most_dangerous import dangerous
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.reported_run import ReportedRun
-from mutator.results.table_columns import SINCE, result_columns
+from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.store.checksummed_lines import line_file_bytes
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA
@@ -56,7 +56,7 @@ def run(tmp_path: Path) -> ReportedRun:
         line |= {"seed": 1, "t_manifest": 2.5 if outcome in ("hazard", "sdc") else "", "variant": "x"}
         line |= {"reaction_time": hazard - alert if alerts and alert < hazard else ""}
         lines.append(line)
-    write_results(tmp_path, result_columns(("H1",), ("gas",), METRICS, SINCE), lines)
+    write_results(tmp_path, result_columns(("H1",), ("gas",), METRICS, TIME_TO_HAZARD_COLUMNS), lines)
     costs = [
         {"experiment_id": f"{i}" * 16, "cpu_s": 2.0**i, "wall_s": 1.0, "host": "h", "worker": f"w{i % 2}"}
         | {"engine": "fork", "why": ""}

@@ -12,7 +12,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.report import engine_summary, report_builder, report_digests
 from mutator.report.experiment_facts import timings_of
-from mutator.results.table_building import build
+from mutator.results.table_building import build_tables
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.plan_choices import Choices
 from mutator.store.records import SCHEMA
@@ -159,7 +159,7 @@ def test_a_large_campaign_without_forks_has_no_note_on_its_size(
 
 def test_a_failed_proof_is_reported_first(finish: Finish) -> None:
     run = finish(4, change=lambda r: replace(r, trace_digest="0" * 64))
-    build(run)
+    build_tables(run)
     written = report_builder.write_report(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         assert text.index("The equivalence check failed") < text.index("Planned: ")
@@ -170,7 +170,7 @@ def test_a_failed_proof_is_reported_first(finish: Finish) -> None:
 
 def test_new_results_of_the_proof_make_a_report_out_of_date(finish: Finish) -> None:
     run = finish(3)
-    build(run)
+    build_tables(run)
     before = report_digests.made_from(RunFolder.open(run), None)
     assert before == report_digests.made_from(RunFolder.open(run), None)
     write(run / "proof/0002-main.jsonl", SCHEMA, [])
@@ -182,12 +182,12 @@ def test_a_changed_trace_digest_makes_a_report_out_of_date(
 ) -> None:
     """The results do not contain the digests of traces."""
     run = finish(4)
-    build(run)
+    build_tables(run)
     results, before = (run / "results.csv").read_bytes(), report_digests.made_from(RunFolder.open(run), None)
     path = run / "records/0001-main.jsonl"
     path.write_text(path.read_text().replace('"trace_digest":""', '"trace_digest":"0"'))
     reseal(run)
-    build(run)
+    build_tables(run)
     assert (run / "results.csv").read_bytes() == results
     assert before != report_digests.made_from(RunFolder.open(run), None)
 

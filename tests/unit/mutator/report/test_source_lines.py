@@ -47,7 +47,7 @@ def run(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path], of_operators: Callable[..., Any]
 ) -> Path:
     out = write_run(toycar, tmp_path / "run", result_of, changed=of_operators(toycar, DRIVER))
-    table_building.build(out)
+    table_building.build_tables(out)
     (out / "report").mkdir()
     return out
 
@@ -116,7 +116,7 @@ def test_a_run_without_operators_has_no_source_view_and_no_score(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
     out = write_run(toycar, tmp_path / "run")
-    table_building.build(out)
+    table_building.build_tables(out)
     reported = ReportedRun.open(RunFolder.open(out), toycar)
     assert build_source_panel(reported) is None and build_mutation_score_panel(reported) is None
     assert not {"line", "lasting"} & {c["name"] for c in _table(reported, _listed(reported))["columns"]}

@@ -9,9 +9,9 @@ from pathlib import Path
 import pandas as pd
 
 from mutator.model import Status
-from mutator.results.ranking import places, worth
-from mutator.results.result_rows import Row, rows_of
-from mutator.results.table_columns import SEVERITY, SINCE, result_columns
+from mutator.results.ranking import rank_by_experiment, ranks_of_rows
+from mutator.results.result_rows import ResultRow, rows_of
+from mutator.results.table_columns import SEVERITY_COLUMN, TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.results.table_reader import Results
 from mutator.targets.contact_severity import CLASSES
 from mutator.targets.target_facts import MetricFacts
@@ -19,7 +19,7 @@ from tests.made_head import made_head
 from tests.made_up_results import write_results
 
 METRICS = [MetricFacts(name, "-", "", "lower") for name in ("margin_h1", "margin_h2", "margin_h3", "delta_v")]
-COLUMNS = result_columns(("H1", "H2", "H3"), ("gas",), METRICS, (SEVERITY, *SINCE))
+COLUMNS = result_columns(("H1", "H2", "H3"), ("gas",), METRICS, (SEVERITY_COLUMN, *TIME_TO_HAZARD_COLUMNS))
 HEAD = made_head(
     compared=["gas"],
     metrics=METRICS,
@@ -76,7 +76,7 @@ def test_the_worst_results_come_first(tmp_path: Path) -> None:
     lines = [line | {"experiment_id": name} for name, line in WORST_FIRST.items()]
     random.Random(1).shuffle(lines)
     frame = frame_of(tmp_path, lines)
-    assert list(frame["experiment_id"].to_numpy()[places(frame).argsort()]) == list(WORST_FIRST)
+    assert list(frame["experiment_id"].to_numpy()[ranks_of_rows(frame).argsort()]) == list(WORST_FIRST)
 
 
 _ENDINGS = [
@@ -91,7 +91,7 @@ _ENDINGS = [
 ]
 
 
-def ranked_one_by_one(rows: Sequence[Row]) -> list[Row]:
+def ranked_one_by_one(rows: Sequence[ResultRow]) -> list[ResultRow]:
     """Rank rows by the same rules, without columns."""
     lines: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for row in rows:
@@ -102,7 +102,7 @@ def ranked_one_by_one(rows: Sequence[Row]) -> list[Row]:
         for turn, (_, name) in enumerate(sorted(line)):
             turns[name] = min(turn, turns.get(name, turn))
 
-    def badness(row: Row) -> tuple[float | str, ...]:
+    def badness(row: ResultRow) -> tuple[float | str, ...]:
         ending = _ENDINGS.index(row.ending)
         if row.severity not in CLASSES:
             return (1, 0.0, 0.0, ending, turns.get(row.experiment_id, math.inf), row.experiment_id)
@@ -122,7 +122,9 @@ def test_many_results_are_ranked_by_the_same_rules(tmp_path: Path) -> None:
             if draw.random() < 0.3:
                 line[name] = str(draw.randint(-3, 3))
     frame = frame_of(tmp_path, lines)
-    order = frame["experiment_id"].to_numpy()[places(frame).argsort()]
+    order = frame["experiment_id"].to_numpy()[ranks_of_rows(frame).argsort()]
     ranked = ranked_one_by_one(rows_of(frame, {}))
     assert list(order) == [row.experiment_id for row in ranked]
-    assert worth(frame) == {r.experiment_id: i for i, r in enumerate(ranked) if r.status is Status.OK}
+    assert rank_by_experiment(frame) == {
+        r.experiment_id: i for i, r in enumerate(ranked) if r.status is Status.OK
+    }

@@ -22,12 +22,12 @@ from mutator.model import Record
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.results import propagation_columns, table_building, table_files
 from mutator.results.table_columns import (
-    TIMINGS,
-    Finished,
+    TIMING_COLUMNS,
+    FinishedExperiment,
     cells_of,
-    columns_of,
+    result_columns_of,
 )
-from mutator.results.table_files import Column
+from mutator.results.table_files import TableColumn
 from mutator.store import plan_file
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import SCHEMA
@@ -60,7 +60,7 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
 
 
 def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
-    rows = list(csv.DictReader(table_building.build(folder.path).open()))
+    rows = list(csv.DictReader(table_building.build_tables(folder.path).open()))
     assert (len(rows), folder.planned_count) == (22, 24)
     ids = [row["experiment_id"] for row in rows]
     assert ids == sorted(ids)
@@ -85,14 +85,14 @@ def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
 
 
 def test_building_again_gives_the_same_bytes(folder: RunFolder, reseal: Callable[[Path], None]) -> None:
-    tables = table_building.build(folder.path), folder.path / "results.parquet"
+    tables = table_building.build_tables(folder.path), folder.path / "results.parquet"
     before = [table.read_bytes() for table in tables]
     one, two = sorted((folder.path / "records").iterdir())
     heads, lines = zip(*(path.read_text().split("\n", 1) for path in (one, two)), strict=True)
     for path, head, line in zip((one, two), heads, reversed(lines), strict=True):
         path.write_text("\n".join((head, line)))
     reseal(folder.path)
-    table_building.build(folder.path)
+    table_building.build_tables(folder.path)
     assert [table.read_bytes() for table in tables] == before
 
 
@@ -100,10 +100,11 @@ def made_at_once(folder: RunFolder) -> dict[str, bytes]:
     records = folder.records()
     planned = sorted(plan_file.load_experiments(folder.path), key=lambda e: e.id)
     done = [(e, records[e.id]) for e in planned if e.id in records]
-    columns = columns_of(folder.head)
+    columns = result_columns_of(folder.head)
     names = [column.name for column in columns]
     made = [
-        cells_of(columns, [Finished(*one, folder.severity_scale, fault_paths_of(folder))]) for one in done
+        cells_of(columns, [FinishedExperiment(*one, folder.severity_scale, fault_paths_of(folder))])
+        for one in done
     ]
     rows = [{name: cell for name, (cell,) in zip(names, cells, strict=True)} for cells in made]
     text = io.StringIO()
@@ -114,18 +115,19 @@ def made_at_once(folder: RunFolder) -> dict[str, bytes]:
     left = [(r.experiment_id, *one) for _, r in done for one in r.left]
     facts = {channel.name: (channel.component, channel.role.value) for channel in folder.head.channels}
     cells = [(name, ch, *facts.get(ch, ("", "")), round(first, 6), most) for name, ch, first, most in left]
-    left_names = [column.name for column in propagation_columns.COLUMNS]
+    left_names = [column.name for column in propagation_columns.PROPAGATION_COLUMNS]
     return {
-        table_building.CSV: text.getvalue().encode(),
-        table_building.PARQUET: parquet_at_once(rows, columns),
-        table_building.TIMINGS_PARQUET: parquet_at_once(lines, TIMINGS),
-        table_building.PROPAGATION: parquet_at_once(
-            [dict(zip(left_names, one, strict=True)) for one in cells], propagation_columns.COLUMNS
+        table_building.CSV_FILE: text.getvalue().encode(),
+        table_building.PARQUET_FILE: parquet_at_once(rows, columns),
+        table_building.TIMINGS_FILE: parquet_at_once(lines, TIMING_COLUMNS),
+        table_building.PROPAGATION_FILE: parquet_at_once(
+            [dict(zip(left_names, one, strict=True)) for one in cells],
+            propagation_columns.PROPAGATION_COLUMNS,
         ),
     }
 
 
-def parquet_at_once(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> bytes:
+def parquet_at_once(rows: Sequence[Mapping[str, Any]], columns: Sequence[TableColumn]) -> bytes:
     types = {"text": pa.string(), "flag": pa.int8(), "count": pa.int64(), "number": pa.float64()}
     schema = pa.schema([(column.name, types[column.type]) for column in columns])
     arrays = {c.name: pa.array([row.get(c.name) for row in rows], types[c.type]) for c in columns}
@@ -145,11 +147,11 @@ def test_tables_built_in_batches_have_the_same_bytes(
     )
     lines.append(asdict(record(last.id, left=left, detail='a "b",\nc', t_manifest=2.05)))
     lines.close()
-    monkeypatch.setattr(table_building, "_BATCH", batch)
+    monkeypatch.setattr(table_building, "_EXPERIMENTS_PER_BATCH", batch)
     monkeypatch.setattr(table_building, "processes_for", lambda experiments: processes)
     for _ in range(2):
-        table_building.build(folder.path)
-        made = {name: (folder.path / name).read_bytes() for name in table_building.TABLES}
+        table_building.build_tables(folder.path)
+        made = {name: (folder.path / name).read_bytes() for name in table_building.TABLE_FILES}
         assert made == made_at_once(folder)
         for kind in ("records", "timings"):
             for path in (folder.path / kind).iterdir():
@@ -159,14 +161,14 @@ def test_tables_built_in_batches_have_the_same_bytes(
 def test_row_groups_of_a_long_table_have_the_same_size(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(table_files, "_ROWS", 4)
-    columns = (Column("n", "count", "", ""),)
+    monkeypatch.setattr(table_files, "_MOST_GROUP_ROWS", 4)
+    columns = (TableColumn("n", "count", "", ""),)
     for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
         for batch in (1, 3, 20):
             with table_files.ParquetTable(tmp_path / "t.parquet", columns) as file:
                 for first in range(0, size, batch):
                     some = range(first, min(size, first + batch))
-                    file.append(table_files.record_batch(columns, [some]))
+                    file.append(table_files.parquet_batch(columns, [some]))
             found = pq.ParquetFile(tmp_path / "t.parquet")
             assert [found.metadata.row_group(i).num_rows for i in range(found.num_row_groups)] == groups
             assert found.read()["n"].to_pylist() == list(range(size))
@@ -174,15 +176,17 @@ def test_row_groups_of_a_long_table_have_the_same_size(
 
 def is_rebuilt(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> bool:
     built: list[Path] = []
-    monkeypatch.setattr(table_building, "build", lambda run: built.append(run) or run / table_building.CSV)
-    assert table_building.ensure(folder.path) == folder.path / table_building.CSV
+    monkeypatch.setattr(
+        table_building, "build_tables", lambda run: built.append(run) or run / table_building.CSV_FILE
+    )
+    assert table_building.ensure_tables(folder.path) == folder.path / table_building.CSV_FILE
     return bool(built)
 
 
 def test_nothing_is_built_while_the_digests_are_the_same(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    table_building.build(folder.path)
+    table_building.build_tables(folder.path)
     os.utime(folder.path / "records" / "0001-gw0.jsonl")
     os.utime(folder.path / "results.csv", (1, 1))
     assert not is_rebuilt(folder, monkeypatch)
@@ -196,7 +200,7 @@ def test_nothing_is_built_while_the_digests_are_the_same(
 def test_tables_are_rebuilt_after_any_change(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, changed: str, gone: bool
 ) -> None:
-    table_building.build(folder.path)
+    table_building.build_tables(folder.path)
     if changed == "more records":
         head = {"schema": SCHEMA, "plan": folder.head.plan}
         LineWriter(folder.path / "records" / "0002-gw0.jsonl", head).close()
@@ -221,29 +225,29 @@ def test_tables_are_rebuilt_after_a_change_of_columns(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, change: Callable[..., Any]
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(table_building, "columns_of", lambda head: change(columns_of(head)))
-        table_building.build(folder.path)
+        patch.setattr(table_building, "result_columns_of", lambda head: change(result_columns_of(head)))
+        table_building.build_tables(folder.path)
     assert is_rebuilt(folder, monkeypatch)
 
 
 @pytest.mark.parametrize("stamp", [True, False])
 def test_replacing_an_edited_table_is_reported(folder: RunFolder, stamp: bool) -> None:
-    table = table_building.build(folder.path)
+    table = table_building.build_tables(folder.path)
     made = table.read_bytes()
     table.write_bytes(made.replace(b"masked", b"hazard", 1))
     if not stamp:
-        (folder.path / table_building.STAMP).unlink()
+        (folder.path / table_building.STAMP_FILE).unlink()
     with pytest.warns(MutatorWarning, match=r"results\.csv: the table did not match the plan and records"):
-        table_building.ensure(folder.path)
+        table_building.ensure_tables(folder.path)
     assert table.read_bytes() == made
 
 
 def test_an_interrupted_build_is_not_reported_as_an_edited_table(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord
 ) -> None:
-    table_building.build(folder.path)
+    table_building.build_tables(folder.path)
     planned = plan_file.load_experiments(folder.path)
-    for killed_before, number in ((table_building.CSV, 2), (table_building.PARQUET, 3)):
+    for killed_before, number in ((table_building.CSV_FILE, 2), (table_building.PARQUET_FILE, 3)):
         head = {"schema": SCHEMA, "plan": folder.head.plan}
         lines = LineWriter(folder.path / "records" / f"000{number}-gw0.jsonl", head)
         lines.append(asdict(record(planned[20 + number].id, max_dev=(("gas", 0.5),))))
@@ -258,8 +262,8 @@ def test_an_interrupted_build_is_not_reported_as_an_edited_table(
 
         with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
             patch.setattr(table_building, "half_written", written)
-            table_building.ensure(folder.path)
+            table_building.ensure_tables(folder.path)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        table_building.ensure(folder.path)
-    assert (folder.path / table_building.CSV).read_bytes().count(b"\n") == 25
+        table_building.ensure_tables(folder.path)
+    assert (folder.path / table_building.CSV_FILE).read_bytes().count(b"\n") == 25

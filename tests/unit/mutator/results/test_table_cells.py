@@ -9,9 +9,9 @@ from mutator._common.hashing import as_json_types
 from mutator._common.typed_json import from_json_types
 from mutator.model import Experiment, Method, Outcome, Record, Status
 from mutator.results.table_columns import (
-    SEVERITY,
-    SINCE,
-    Finished,
+    SEVERITY_COLUMN,
+    TIME_TO_HAZARD_COLUMNS,
+    FinishedExperiment,
     cells_of,
     result_columns,
     severity_columns,
@@ -19,12 +19,14 @@ from mutator.results.table_columns import (
 from mutator.targets.contact_severity import Scale
 
 HAZARDS = ("H1", "H2", "H3")
-COLUMNS = result_columns(HAZARDS, ("gas", "brake", "steer_torque"), (), (SEVERITY, *SINCE))
+COLUMNS = result_columns(
+    HAZARDS, ("gas", "brake", "steer_torque"), (), (SEVERITY_COLUMN, *TIME_TO_HAZARD_COLUMNS)
+)
 MakeRecord = Callable[..., Record]
 
 
 def row_of(experiment: Experiment, record: Record, scale: Scale | None = None) -> dict[str, object]:
-    cells = cells_of(COLUMNS, [Finished(experiment, record, scale)])
+    cells = cells_of(COLUMNS, [FinishedExperiment(experiment, record, scale)])
     return {column.name: cell for column, (cell,) in zip(COLUMNS, cells, strict=True)}
 
 

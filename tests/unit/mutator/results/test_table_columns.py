@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.results.table_columns import deviation_columns, result_columns
+from mutator.results.table_columns import deviation_column_by_channel, result_columns
 from mutator.workspace import Workspace
 
 OF_OPENPILOT = (
@@ -54,7 +54,7 @@ def test_hazard_columns_keep_the_order_of_the_manifest() -> None:
     ],
 )
 def test_deviation_columns_use_the_first_word_of_a_channel(channels: list[str], columns: list[str]) -> None:
-    assert list(deviation_columns(channels).values()) == columns
+    assert list(deviation_column_by_channel(channels).values()) == columns
 
 
 @pytest.mark.parametrize(

@@ -25,15 +25,15 @@ from mutator.report import report_builder
 from mutator.results import table_building
 from mutator.results.outcome_counting import hazard_names as checked_hazards
 from mutator.results.table_columns import (
-    SEVERITY,
-    SINCE,
-    Finished,
+    SEVERITY_COLUMN,
+    TIME_TO_HAZARD_COLUMNS,
+    FinishedExperiment,
     cells_of,
-    columns_of,
-    hazards_of,
+    hazards_of_frame,
     result_columns,
+    result_columns_of,
 )
-from mutator.results.table_reader import Results, _table, frame_of, same_parquet
+from mutator.results.table_reader import Results, _load_columns, frame_of_experiments, is_same_parquet
 from mutator.statistics.results_frame import hazard_names, load_usable_results, prepare_results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
@@ -77,9 +77,9 @@ ALONE = """
 import sys
 from pathlib import Path
 from mutator.results.outcome_counting import hazard_names as checked_hazards
-from mutator.results.table_reader import Results, same_parquet
+from mutator.results.table_reader import Results, is_same_parquet
 table = Results(Path(sys.argv[1]))
-assert same_parquet(table.path, table.path)
+assert is_same_parquet(table.path, table.path)
 table.frame(), table.indexed_frame(), table.timings(), table.propagation()
 print(*(path.read_text().strip() for path in Path("/proc/self/task").glob("*/comm")))
 """
@@ -88,7 +88,7 @@ print(*(path.read_text().strip() for path in Path("/proc/self/task").glob("*/com
 def test_reading_tables_leaves_no_thread(run: Path) -> None:
     """A pyarrow thread that releases Python memory during shutdown kills the process. Threads of the
     allocator and of BLAS do not use Python."""
-    table_building.build(run)
+    table_building.build_tables(run)
     words, env = [sys.executable, "-c", ALONE, str(run)], os.environ | dict.fromkeys(THREADS, "1")
     ended = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120, env=env)
     assert [name for name in ended.stdout.split() if name != "jemalloc_bg_thd"] == [ended.stdout.split()[0]]
@@ -157,7 +157,7 @@ def test_a_target_without_hazards_has_no_hazard_in_any_row(run: Path, reseal: Ca
     head = run / "run.json"
     head.write_text(re.sub(r'"hazards":\s*\[[^]]*\]', '"hazards": []', head.read_text()))
     reseal(run)
-    table_building.build(run)
+    table_building.build_tables(run)
     table = Results(run)
     frame = table.indexed_frame()
     assert frame["hazard"].dropna().eq(False).all()
@@ -187,8 +187,10 @@ def test_a_real_run_fills_each_column(crane: Workspace, tmp_path: Path, write_ru
     record = run_single(crane, manifest, experiment, tmp_path / "single").record
     assert record.status is Status.OK
     compared = [channel.name for channel in manifest.compared]
-    columns = result_columns(manifest.hazards, compared, metric_facts(manifest), (SEVERITY, *SINCE))
-    cells = cells_of(columns, [Finished(experiment, record, crane.scale_of(manifest))])
+    columns = result_columns(
+        manifest.hazards, compared, metric_facts(manifest), (SEVERITY_COLUMN, *TIME_TO_HAZARD_COLUMNS)
+    )
+    cells = cells_of(columns, [FinishedExperiment(experiment, record, crane.scale_of(manifest))])
     row = {column.name: cell for column, (cell,) in zip(columns, cells, strict=True)}
     assert row["max_dev_wheel"]
 
@@ -261,8 +263,8 @@ def test_the_types_of_a_frame_are_those_of_the_table(run: Path) -> None:
     table = Results.up_to_date(run)
     (run / "results.csv").unlink()
     frame = table.frame()
-    kinds = {c.name: frame[c.name].dtype for c in columns_of(load_head(run))}
-    texts = {c.name for c in columns_of(load_head(run)) if c.type == "text"}
+    kinds = {c.name: frame[c.name].dtype for c in result_columns_of(load_head(run))}
+    texts = {c.name for c in result_columns_of(load_head(run)) if c.type == "text"}
     assert {name for name, kind in kinds.items() if kind == "str"} == texts
     assert all(kind.kind in "if" for name, kind in kinds.items() if name not in texts)
     assert set(frame["alerts"]) == {""} and frame["t_alert"].isna().all()
@@ -272,11 +274,14 @@ def test_the_types_of_a_frame_are_those_of_the_table(run: Path) -> None:
 def test_a_frame_computed_from_records_equals_the_stored_one(run: Path) -> None:
     """Without the columns of the fault's path, which take longest."""
     folder = RunFolder.open(run)
-    stored, computed = Results.up_to_date(run).frame(), frame_of(folder, plan_file.load_experiments(run))
+    stored, computed = (
+        Results.up_to_date(run).frame(),
+        frame_of_experiments(folder, plan_file.load_experiments(run)),
+    )
     names = [name for name in stored if name not in ("reached", "stopped_at")]
     computed = computed.sort_values("experiment_id", ignore_index=True)
     pd.testing.assert_frame_equal(computed[names], stored[names])
-    assert hazards_of(computed) == hazards_of(stored)
+    assert hazards_of_frame(computed) == hazards_of_frame(stored)
 
 
 def test_no_other_module_opens_the_tables() -> None:
@@ -293,7 +298,7 @@ def test_no_other_module_opens_the_tables() -> None:
 
 def test_metadata_of_a_table_give_no_column_another_name(run: Path) -> None:
     """The cells of the forged table are the genuine ones."""
-    table_building.build(run)
+    table_building.build_tables(run)
     path = run / "results.parquet"
     genuine, table = Results(run).frame(), parquet.read_table(path)
     swap = {"DROPPED": "CRUSHED", "CRUSHED": "DROPPED"}
@@ -304,7 +309,7 @@ def test_metadata_of_a_table_give_no_column_another_name(run: Path) -> None:
     about = {"index_columns": [], "column_indexes": [], "columns": columns, "pandas_version": "2.2.0"}
     forged = path.with_name("forged.parquet")
     parquet.write_table(table.replace_schema_metadata({"pandas": json.dumps(about)}), forged)
-    assert not same_parquet(forged, path)
+    assert not is_same_parquet(forged, path)
     forged.replace(path)
     assert Results(run).frame().equals(genuine)
 
@@ -320,9 +325,9 @@ def test_a_long_text_that_is_stored_once_is_not_copied_into_each_row(tmp_path: P
     _bomb(path, 20_000, 50_000)
     _bomb(genuine, 20_000, 5)
     assert path.stat().st_size < 10_000
-    assert "bytes of text" in is_refused(lambda: _table(path))
-    is_cheap(lambda: same_parquet(path, genuine))
-    assert not same_parquet(path, genuine) and same_parquet(genuine, genuine)
+    assert "bytes of text" in is_refused(lambda: _load_columns(path))
+    is_cheap(lambda: is_same_parquet(path, genuine))
+    assert not is_same_parquet(path, genuine) and is_same_parquet(genuine, genuine)
 
 
 def test_hazards_have_the_names_of_run_json(run: Path, reseal: Callable[[Path], None]) -> None:
@@ -332,10 +337,12 @@ def test_hazards_have_the_names_of_run_json(run: Path, reseal: Callable[[Path], 
     metrics = [[name, "-", "-", "lower"] for name in ("way", "t_way")]
     head.write_text(json.dumps(facts | {"hazards": ["Dropped", "CRUSHED"], "metrics": metrics}))
     reseal(run)
-    table_building.build(run)
+    table_building.build_tables(run)
     table = Results(run)
     assert checked_hazards(table.frame()) == ("CRUSHED", "Dropped")
-    assert hazards_of(table.frame()) == hazards_of(table.indexed_frame()) == ("Dropped", "CRUSHED")
+    assert (
+        hazards_of_frame(table.frame()) == hazards_of_frame(table.indexed_frame()) == ("Dropped", "CRUSHED")
+    )
     assert hazard_names(load_usable_results(table.path)) == ("CRUSHED", "Dropped")
     assert "way" in table.frame()
 
@@ -352,6 +359,6 @@ def test_a_table_without_a_hazard_of_run_json_is_refused(run: Path) -> None:
 def test_a_frame_without_its_hazards_is_refused(run: Path) -> None:
     """Pandas keeps them in frames made from a frame of a run, but another frame has none."""
     frame = Results.up_to_date(run).frame()
-    assert hazards_of(frame[frame["status"] == "ok"].reset_index(drop=True)) == hazards_of(frame)
+    assert hazards_of_frame(frame[frame["status"] == "ok"].reset_index(drop=True)) == hazards_of_frame(frame)
     with pytest.raises(MutatorError, match="without the names of its hazards"):
         prepare_results(pd.DataFrame(frame.to_dict("list")))

@@ -13,7 +13,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.model import Outcome, Status
 from mutator.results import table_building
-from mutator.results.result_rows import Row
+from mutator.results.result_rows import ResultRow
 from mutator.results.table_reader import Results
 from mutator.review.group_results import of_group, verdict_of
 from mutator.review.mutant_groups import of_plan
@@ -33,7 +33,7 @@ def test_a_group_has_counts_a_typical_and_a_worst_experiment(
     lane = [e.id for e in plan.experiments if e.fault.fault_type == "lane"]
     bad = {name: {"hazards": (("H3", 3.0 + i),), **HAZARD} for i, name in enumerate(lane[:2])}
     run = write_run(toycar, tmp_path / "run", lambda e: bad.get(e.id, {}))
-    table_building.ensure(run)
+    table_building.ensure_tables(run)
     group = next(g for g in of_plan(toycar, plan) if "offset: offset" in g.what)
     found = of_group(RunFolder.open(run), group)
     assert found is not None
@@ -51,7 +51,7 @@ def test_a_group_without_experiments_has_no_verdict(
 ) -> None:
     """The group of the probe has no experiments, because all mutants share the probe."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run", only='fault_type == "silence"'))
-    table_building.ensure(run.path)
+    table_building.ensure_tables(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
     told = {group.models for group in groups if of_group(run, group)}
     assert told == {("omission",)}
@@ -62,10 +62,10 @@ def test_later_results_are_counted(toycar: Workspace, tmp_path: Path, write_run:
     write_run(toycar, tmp_path / "run", lambda e: None)
     with pytest.raises(MutatorError, match="no results here"):
         of_group(RunFolder.open(tmp_path / "run"), group)
-    table_building.ensure(tmp_path / "run")
+    table_building.ensure_tables(tmp_path / "run")
     assert of_group(RunFolder.open(tmp_path / "run"), group) is None
     shutil.rmtree(tmp_path / "run")
-    table_building.ensure(write_run(toycar, tmp_path / "run"))
+    table_building.ensure_tables(write_run(toycar, tmp_path / "run"))
     assert of_group(RunFolder.open(tmp_path / "run"), group)
 
 
@@ -74,7 +74,7 @@ def test_the_results_are_read_once_for_many_groups(
 ) -> None:
     """Reading a large table takes seconds and much memory."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run"))
-    table_building.ensure(run.path)
+    table_building.ensure_tables(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
     read: list[Results] = []
     frame = Results.frame
@@ -90,7 +90,7 @@ def test_the_results_are_read_once_for_many_groups(
     assert len(read) == 1 < len([one for one in found if one])
 
 
-def row(**given: Any) -> Row:
+def row(**given: Any) -> ResultRow:
     fields: dict[str, Any] = {
         "experiment_id": "e", "kind": "m/f", "variant": "v", "value": "", "unit": "",
         "scenario": "A", "trigger": "C1", "status": Status.OK, "outcome": None,
@@ -98,7 +98,7 @@ def row(**given: Any) -> Row:
         "reaction_time": None, "detail": "",
     }  # fmt: skip
     fields |= given
-    return Row(ending=(fields["outcome"] or fields["status"]).value, **fields)
+    return ResultRow(ending=(fields["outcome"] or fields["status"]).value, **fields)
 
 
 @pytest.mark.parametrize(

@@ -237,7 +237,7 @@ def test_a_changed_run_gets_a_new_report(client: Client, linked: Path) -> None:
 def test_an_edited_table_is_not_shown_beside_the_seal_of_a_finished_run(
     toycar: Workspace, tmp_path: Path, write_finished: Callable[..., Path]
 ) -> None:
-    table = table_building.build(write_finished(toycar, tmp_path / "night"))
+    table = table_building.build_tables(write_finished(toycar, tmp_path / "night"))
     shown = Shown(toycar, Runs((tmp_path,)), PageTokens(b"secret"))
     assert shown.file("night", "report/index.html").status_code == 200
     table.write_text(table.read_text().replace(",masked,", ",sdc,", 1))

@@ -10,7 +10,7 @@ from markupsafe import escape
 from mutator.report.panel import Panel
 from mutator.report.panels.tables_panel import build_tables_panel
 from mutator.report.reported_run import ReportedRun
-from mutator.results.table_columns import SINCE, result_columns
+from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -43,7 +43,7 @@ def run(tmp_path: Path) -> RunFolder:
     (tmp_path / "run.json").write_text(json.dumps(head))
     plan_file.write_plan(tmp_path, [], [])
     lines = [HAZARD | {"experiment_id": method, "method": method} for method in ("guided", "random")]
-    write_results(tmp_path, result_columns(("H1",), (), (), SINCE), lines)
+    write_results(tmp_path, result_columns(("H1",), (), (), TIME_TO_HAZARD_COLUMNS), lines)
     (tmp_path / "golden" / "S1").mkdir(parents=True)
     np.savez(tmp_path / "golden" / "S1" / "trace.npz", t=np.arange(3000) / 100)
     return RunFolder.open_unverified(tmp_path)
