@@ -137,7 +137,9 @@ def verify(
         checks.append(check)
     if report:
         checks.append(
-            AuditCheck.from_problems("pages of the report that follow from the run", *pages(folder, opened_workspace))
+            AuditCheck.from_problems(
+                "pages of the report that follow from the run", *pages(folder, opened_workspace)
+            )
         )
     damaged = any(check.differences for check in checks)
     repaired = put_aside(folder, opened_workspace) if repair and damaged else []
@@ -185,7 +187,9 @@ def _expected_digest_check(folder: RunFolder, seals: Seals, expect: str) -> Audi
 
 def _digest_check(folder: RunFolder, digest_name: str, actual: str | None, expect: str) -> AuditCheck:
     wrong = MutatorError(f"{digest_name} {actual or 'none'}", where=folder.path, expected=expect)
-    return AuditCheck(what=f"{digest_name} as expected", count=1, differences=() if actual == expect else (wrong,))
+    return AuditCheck(
+        what=f"{digest_name} as expected", count=1, differences=() if actual == expect else (wrong,)
+    )
 
 
 def _open_workspace_if_any(workspace: WorkspaceLike) -> Workspace | None:
@@ -197,7 +201,9 @@ def _open_workspace_if_any(workspace: WorkspaceLike) -> Workspace | None:
         return None
 
 
-def _rerun_check(folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]) -> AuditCheck:
+def _rerun_check(
+    folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]
+) -> AuditCheck:
     what = "experiments rerun on the reference engine"
     if workspace is None:
         raise MutatorError("no library found", argument="rerun", expected="the library of the run")
