@@ -31,7 +31,7 @@ from mutator.execution.single_run import run_golden
 from mutator.model import Experiment, Record
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.golden_comparison import load_trace
-from mutator.outcomes.series_sampling import Sampler
+from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.preflight import equivalence_check
 from mutator.preflight.preflight_rules import output_digest_of
 from mutator.store import file_digests, plan_file
@@ -258,14 +258,16 @@ def write_series(
     place.mkdir()
     first = folder.golden_runs[0]
     golden = dict(load_trace(manifest, folder.golden_folder(*first)))
-    sampler, draw = Sampler(manifest, golden), np.random.default_rng(1)
+    sampler, draw = SeriesSampler(manifest, golden), np.random.default_rng(1)
     names = [channel.name for channel in manifest.compared]
-    made = [sampler.encoded]
+    made = [sampler.encoded_golden]
     for number in range(SERIES):
         change = {name: golden[name] + draw.normal(size=len(golden[name])).cumsum() / 100 for name in names}
         made.append(
             encode_series(
-                sampler.series(golden | change, record(experiments[number % len(experiments)], number)),
+                sampler.faulty_series(
+                    golden | change, record(experiments[number % len(experiments)], number)
+                ),
                 sampler.golden,
             )
         )

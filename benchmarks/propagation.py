@@ -12,9 +12,9 @@ from resource import RUSAGE_CHILDREN, getrusage
 from time import process_time
 
 import mutator
-from mutator.outcomes.channel_departures import departures
-from mutator.outcomes.golden_comparison import compare, load_trace
-from mutator.outcomes.hazards_and_metrics import load_channels
+from mutator.outcomes.channel_departures import departures_from_golden
+from mutator.outcomes.golden_comparison import compare_traces, load_trace
+from mutator.outcomes.hazards_and_metrics import load_manifest_channels
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -39,15 +39,18 @@ def main() -> int:
     after = getrusage(RUSAGE_CHILDREN)
     run_ms = 1000 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime) / 2  # two runs
     manifest, out = workspace.manifest("openpilot"), trial.folder / "faulty"
-    golden, faulty = load_channels(manifest, trial.single.golden), load_channels(manifest, out)
+    golden, faulty = (
+        load_manifest_channels(manifest, trial.single.golden),
+        load_manifest_channels(manifest, out),
+    )
     needed = [*dict.fromkeys((*manifest.compared, *manifest.judged))]
     time = manifest.time_channel
     parts = {
         "load what a verdict needs": cpu_ms(lambda: load_trace(manifest, out, needed), repeat),
-        "load all channels": cpu_ms(lambda: load_channels(manifest, out), repeat),
-        "compare actuators": cpu_ms(lambda: compare(golden, faulty, manifest.compared, time), repeat),
+        "load all channels": cpu_ms(lambda: load_manifest_channels(manifest, out), repeat),
+        "compare actuators": cpu_ms(lambda: compare_traces(golden, faulty, manifest.compared, time), repeat),
         "compare all channels": cpu_ms(
-            lambda: departures(golden, faulty, manifest.channels, time, None), repeat
+            lambda: departures_from_golden(golden, faulty, manifest.channels, time, None), repeat
         ),
     }
     for name, ms in parts.items():

@@ -26,7 +26,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.mutants.readable_patches import readable_patch
-from mutator.outcomes.series_sampling import Sampler
+from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.report import experiment_list as report_browse
 from mutator.report import markdown_and_html as report_page
 from mutator.report.experiment_facts import PLACE, UNTIMED_PATH
@@ -119,16 +119,16 @@ def write_series(workspace: Workspace, records: Sequence[Record], out: Path) -> 
     names = [channel.name for channel in manifest.channels]
     time = {manifest.time_channel: np.arange(3000) / 100}
     golden = time | {name: draw.normal(size=3000).cumsum().cumsum() for name in names}
-    sampler, made = Sampler(manifest, golden), []
+    sampler, made = SeriesSampler(manifest, golden), []
     for one in records[:SERIES]:
         change = draw.normal(size=2000).cumsum().cumsum()  # a value per step after the activation
         faulty = golden | {
             name: golden[name] + np.concatenate((np.zeros(1000), change)) for name in names[:7]
         }
-        made.append(encode_series(sampler.series(faulty, one), sampler.golden))
+        made.append(encode_series(sampler.faulty_series(faulty, one), sampler.golden))
     writer = SeriesWriter(out, "0001-main")
     for number, one in enumerate(records):
-        data = EncodedSeries(golden_key="S1", golden=sampler.encoded, faulty=made[number % len(made)])
+        data = EncodedSeries(golden_key="S1", golden=sampler.encoded_golden, faulty=made[number % len(made)])
         writer.append(one.experiment_id, data)
     writer.close()
     pack_series(out, "plan", {one.experiment_id: number for number, one in enumerate(records)}, 500)

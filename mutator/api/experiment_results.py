@@ -9,9 +9,14 @@ from mutator.api.notebook_html import diff_html, facts_html, text_html
 from mutator.figures.run_plot import draw_run, marks_of
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.readable_patches import readable_patch
-from mutator.outcomes.golden_comparison import Trace, on_steps
+from mutator.outcomes.golden_comparison import Trace, values_on_steps
 from mutator.outcomes.trace_files import own_times
-from mutator.outcomes.verdict_rules import reaction_time, severity_of, since_activation, since_manifestation
+from mutator.outcomes.verdict_rules import (
+    fault_tolerant_time,
+    manifestation_to_hazard_time,
+    reaction_time,
+    severity_class_of,
+)
 from mutator.targets.contact_severity import Scale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.target_facts import ChannelFacts
@@ -160,7 +165,7 @@ def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
     time = manifest.time_channel
     time_channels = {own_times(name) for name in trace}
     names = [name for name in trace if name != time and name not in time_channels]
-    columns = {name: on_steps(trace, name, trace[time]) for name in names}
+    columns = {name: values_on_steps(trace, name, trace[time]) for name in names}
     frame = pd.DataFrame(columns, index=pd.Index(trace[time], name=time))
     frame.attrs["units"] = {c.name: c.unit for c in (*manifest.compared, *manifest.plotted)}
     return frame
@@ -202,9 +207,9 @@ def verdict_facts(record: Record, scale: Scale | None) -> dict[str, Any]:
         "hazards_s": dict(record.hazards),
         "alerts_s": dict(record.alerts),
         "reaction_time_s": reaction_time(record.hazards, record.alerts),
-        "severity": severity_of(record, scale),
-        "fault_tolerant_time_s": since_activation(record),
-        "manifest_to_hazard_s": since_manifestation(record),
+        "severity": severity_class_of(record, scale),
+        "fault_tolerant_time_s": fault_tolerant_time(record),
+        "manifest_to_hazard_s": manifestation_to_hazard_time(record),
         "largest_difference": dict(record.max_dev),
         "difference_in_drive": dict(record.max_dev) | dict(record.dev),
         "drive_ended_s": record.t_end,

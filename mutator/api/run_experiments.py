@@ -12,7 +12,7 @@ from mutator.api.trials import Trial, build_trial
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.outcomes.golden_comparison import Trace, load_trace
-from mutator.outcomes.series_sampling import keep_series
+from mutator.outcomes.series_sampling import write_sampled_series
 from mutator.report.film import Filming, Shot
 
 
@@ -66,7 +66,7 @@ class RunExperiment(StoredExperiment):
         )
         if keep and trial.save_plot(self.plot_file) and same:  # keep a series only if it matches the record
             golden, faulty = (load_trace(manifest, place) for place in (single.golden, single.faulty))
-            keep_series(folder.path, manifest, golden, faulty, single.record)
+            write_sampled_series(folder.path, manifest, golden, faulty, single.record)
         return trial
 
     def film(self, shots: Sequence[Shot]) -> bool:

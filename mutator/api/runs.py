@@ -22,7 +22,12 @@ from mutator.exports import Format, Parts, find_export
 from mutator.exports import Table as ExportedTable
 from mutator.exports.write import export
 from mutator.model import OPERATORS
-from mutator.outcomes.fault_free_runs import FaultFreeRun, alerts_by_drive, load_fault_free_runs, own_alerts
+from mutator.outcomes.fault_free_runs import (
+    FaultFreeRun,
+    alerts_by_drive,
+    fault_free_alerts_note,
+    load_fault_free_runs,
+)
 from mutator.outcomes.golden_comparison import load_trace
 from mutator.preflight import equivalence_check
 from mutator.report import report_builder
@@ -126,7 +131,7 @@ class Run(RunContents):
 
     def alerts_note(self) -> str:
         """Return a sentence on the alerts that golden runs also raise; empty if there are none."""
-        return own_alerts(self.fault_free())
+        return fault_free_alerts_note(self.fault_free())
 
     def experiment(self, id: str) -> RunExperiment:
         """Return the planned experiment whose id starts with `id`; MutatorError for none or several."""

@@ -15,7 +15,7 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Record
 from mutator.outcomes.fault_paths import FaultPath, FaultPaths, fault_paths_of
 from mutator.outcomes.golden_comparison import Trace
-from mutator.outcomes.series_sampling import sampled_traces
+from mutator.outcomes.series_sampling import traces_of_series
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, rerun_command
@@ -155,7 +155,7 @@ class StoredExperiment(ExperimentResult):
         never active, or if the run has no outcome.
         """
         fault_paths = self.run.fault_paths
-        return fault_paths.path(self.experiment, self.record) if fault_paths and self.record else None
+        return fault_paths.fault_path(self.experiment, self.record) if fault_paths and self.record else None
 
     def _channels(self) -> Sequence[ChannelFacts]:
         return self.run.folder.head.channels
@@ -170,4 +170,4 @@ class StoredExperiment(ExperimentResult):
         if series is None:
             remedy = f"rerun the experiment: {rerun_command(self.run.path, self.id)}"
             raise MutatorError(f"no series of {self.id}", where=self.run.path, remedy=remedy)
-        return sampled_traces(*series, self._manifest().time_channel)
+        return traces_of_series(*series, self._manifest().time_channel)

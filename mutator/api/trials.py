@@ -15,7 +15,7 @@ from mutator.execution.single_run import Single, run_single
 from mutator.figures.run_plot import save
 from mutator.model import Experiment, Method, Record
 from mutator.outcomes.golden_comparison import Trace, load_trace
-from mutator.outcomes.hazards_and_metrics import load_judged
+from mutator.outcomes.hazards_and_metrics import load_judged_run
 from mutator.targets.contact_severity import Scale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.target_facts import ChannelFacts, channel_facts
@@ -61,7 +61,7 @@ class Trial(ExperimentResult):
         """Hazards (name, time in s) that the golden run also reaches, so the fault is not their cause.
         MutatorError if the golden run cannot be read.
         """
-        _, judged = load_judged(self.manifest, self.single.golden)
+        _, judged = load_judged_run(self.manifest, self.single.golden)
         return tuple(sorted(judged.hazards, key=lambda hazard: hazard[1]))
 
     def traces(self) -> TraceFrames:

@@ -13,7 +13,7 @@ from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, Fault, Record, Status, Trigger
 from mutator.mutants.mutant_building import build
-from mutator.outcomes.verdict_rules import Events, judge
+from mutator.outcomes.verdict_rules import EventTimes, outcome_of
 from mutator.preflight import equivalence_check
 from mutator.store import plan_file
 from mutator.store.checksummed_lines import read_segment
@@ -135,7 +135,7 @@ _Contradictions = Iterator[tuple[str, str]]  # found, expected
 
 def _verdict_contradictions(record: Record) -> _Contradictions:
     activation = record.activation
-    expected = judge(activation=activation, t_manifest=record.t_manifest, hazards=record.hazards)
+    expected = outcome_of(activation=activation, t_manifest=record.t_manifest, hazards=record.hazards)
     if record.outcome != expected:
         yield f"outcome {record.outcome}", f"{expected}, which follows from the recorded times"
     if record.t_manifest is not None and (activation is None or record.t_manifest < activation.first):
@@ -207,7 +207,7 @@ def _departure_contradictions(record: Record, head: RunHead) -> _Contradictions:
         yield f"actuators left golden at {times or 'no time'}", f"{when}, as recorded"
 
 
-def _is_in_order(events: Events, activation: Activation | None) -> bool:
+def _is_in_order(events: EventTimes, activation: Activation | None) -> bool:
     if activation is None:
         return not events
     times = [time for _, time in events]

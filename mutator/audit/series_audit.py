@@ -6,8 +6,8 @@ import numpy as np
 
 from mutator._common.confined_files import path_below
 from mutator.errors import MutatorError
-from mutator.outcomes.hazards_and_metrics import load_channels
-from mutator.outcomes.series_sampling import Sampler
+from mutator.outcomes.hazards_and_metrics import load_manifest_channels
+from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.store import plan_file
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.run_folder import RunFolder
@@ -74,7 +74,9 @@ def _kept_series_problems(
                 check_deviations(golden, faulty, record, path)
             if name in planned and (run := folder.golden_folder_of(planned[name])).is_dir():
                 assert manifest is not None
-                if not _is_same_series(golden, Sampler(manifest, load_channels(manifest, run)).golden):
+                if not _is_same_series(
+                    golden, SeriesSampler(manifest, load_manifest_channels(manifest, run)).golden
+                ):
                     raise MutatorError(
                         "differs", where=path, expected=f"the series of {run.relative_to(folder.path)}"
                     )
@@ -152,8 +154,8 @@ def _other_golden_problems(
         path = path_below(series_folder.path, f"{index.entry_places[number][0]}.js")
         try:
             stored = decode_series(series_folder.read_entry(number))
-            golden = Sampler(
-                manifest, load_channels(manifest, path_below(folder.path, f"golden/{key}"))
+            golden = SeriesSampler(
+                manifest, load_manifest_channels(manifest, path_below(folder.path, f"golden/{key}"))
             ).golden
         except MutatorError:  # reported elsewhere
             continue

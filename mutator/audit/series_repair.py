@@ -10,8 +10,8 @@ from pathlib import Path
 from mutator._common.confined_files import check_name, path_below, unlink_below, write_below
 from mutator.audit.series_audit import audit_series
 from mutator.errors import MutatorError
-from mutator.outcomes.hazards_and_metrics import load_channels
-from mutator.outcomes.series_sampling import Sampler
+from mutator.outcomes.hazards_and_metrics import load_manifest_channels
+from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import INDEX_NAME, SeriesFolder, SeriesIndex, rerun_command
 from mutator.store.series_packing import SUFFIX, repack_series
@@ -61,9 +61,10 @@ def _rebuilt_golden_chunk(
     try:
         manifest = workspace.manifest(folder.head.target)
         goldens = [
-            load_channels(manifest, path_below(folder.path / "golden", keys[number])) for number in numbers
+            load_manifest_channels(manifest, path_below(folder.path / "golden", keys[number]))
+            for number in numbers
         ]
     except MutatorError:
         return None
-    data = b"".join(Sampler(manifest, golden).encoded for golden in goldens)
+    data = b"".join(SeriesSampler(manifest, golden).encoded_golden for golden in goldens)
     return data if script_name_of(data) == name else None

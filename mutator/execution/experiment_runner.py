@@ -19,12 +19,12 @@ from mutator.model import Activation, AfterHazard, Experiment, Record, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden_comparison
-from mutator.outcomes.channel_departures import departures
-from mutator.outcomes.failure_cause import assign_blame, error_of
+from mutator.outcomes.channel_departures import departures_from_golden
+from mutator.outcomes.failure_cause import run_error, status_by_cause
 from mutator.outcomes.golden_comparison import Trace
-from mutator.outcomes.hazards_and_metrics import Judged, load_channels, load_judged
-from mutator.outcomes.series_sampling import Sampler
-from mutator.outcomes.verdict_rules import first_events, judge
+from mutator.outcomes.hazards_and_metrics import RunJudgement, load_judged_run, load_manifest_channels
+from mutator.outcomes.series_sampling import SeriesSampler
+from mutator.outcomes.verdict_rules import first_events_after, outcome_of
 from mutator.preflight.preflight_rules import output_digest_of
 from mutator.store.run_folder import GoldenRun
 from mutator.store.series_format import encode_series
@@ -72,9 +72,9 @@ class Goldens:
         self._several_seeds = several_seeds
         self._digests = digests  # what `digest_of` must return, by folder
         self._files = lru_cache(_KEPT)(self._watched)
-        self._trace = lru_cache(_KEPT)(lambda folder: self._unchanged(folder, load_channels))
-        self._sampler = lru_cache(_KEPT)(lambda folder: Sampler(manifest, self._trace(folder)))
-        self._judged = lru_cache(_KEPT)(lambda folder: self._unchanged(folder, load_judged)[1])
+        self._trace = lru_cache(_KEPT)(lambda folder: self._unchanged(folder, load_manifest_channels))
+        self._sampler = lru_cache(_KEPT)(lambda folder: SeriesSampler(manifest, self._trace(folder)))
+        self._judged = lru_cache(_KEPT)(lambda folder: self._unchanged(folder, load_judged_run)[1])
 
     def begin(self, experiment: Experiment) -> None:
         """Read the golden run's files before they are used. MutatorError if their digest is another."""
@@ -107,7 +107,7 @@ class Goldens:
     def ends(self, experiment: Experiment) -> bool:
         return self._judged(self.folder(experiment)).t_end is not None
 
-    def sampler(self, experiment: Experiment) -> Sampler:
+    def sampler(self, experiment: Experiment) -> SeriesSampler:
         return self._sampler(self.folder(experiment))
 
 
@@ -222,8 +222,8 @@ class Runner:
         sampler = self.goldens.sampler(experiment)
         return EncodedSeries(
             golden_key=self.goldens.key(experiment),
-            golden=sampler.encoded,
-            faulty=encode_series(sampler.series(faulty, record), sampler.golden),
+            golden=sampler.encoded_golden,
+            faulty=encode_series(sampler.faulty_series(faulty, record), sampler.golden),
         )
 
     def _raising(self, experiment: Experiment, built: Mutant) -> set[str]:
@@ -238,7 +238,7 @@ class Runner:
         activation = activation_of(execution.probe)
         reference = self.goldens.trace(experiment)
         try:
-            faulty, judged = load_judged(self.manifest, execution.out, reference)
+            faulty, judged = load_judged_run(self.manifest, execution.out, reference)
         except BadOutput as err:
             if activation is None:
                 raise
@@ -247,7 +247,7 @@ class Runner:
         return record, faulty if record.status is Status.OK else None
 
     def _judged(
-        self, experiment: Experiment, built: Mutant, execution: Execution, faulty: Trace, judged: Judged
+        self, experiment: Experiment, built: Mutant, execution: Execution, faulty: Trace, judged: RunJudgement
     ) -> Record:
         activation = activation_of(execution.probe or {})
         reference, time = self.goldens.trace(experiment), self.manifest.time_channel
@@ -255,37 +255,39 @@ class Runner:
             if judged.t_end is None:
                 why = "was stopped, but no terminal hazard is in its trace"
                 return _bare(experiment, Status.HARNESS_ERROR, why, built)
-            reference = golden_comparison.until(reference, faulty[time][-1], time)
-        faulty = golden_comparison.sharing_times(reference, faulty, time)
-        difference = golden_comparison.compare(reference, faulty, self.manifest.compared, time, judged.t_end)
+            reference = golden_comparison.trace_until(reference, faulty[time][-1], time)
+        faulty = golden_comparison.with_golden_times(reference, faulty, time)
+        difference = golden_comparison.compare_traces(
+            reference, faulty, self.manifest.compared, time, judged.t_end
+        )
         if problem := _not_by_the_fault(difference.t_first, activation):
             return _bare(experiment, Status.HARNESS_ERROR, problem, built)
-        hazards = first_events(judged.hazards, activation)
+        hazards = first_events_after(judged.hazards, activation)
         return Record(
             experiment_id=experiment.id,
             status=Status.OK,
-            outcome=judge(activation=activation, t_manifest=difference.t_first, hazards=hazards),
+            outcome=outcome_of(activation=activation, t_manifest=difference.t_first, hazards=hazards),
             detail="",
             tree=built.tree_digest,
             activation=activation,
             t_manifest=difference.t_first,
             max_dev=difference.max_dev,
             hazards=tuple(hazards),
-            alerts=tuple(first_events(judged.alerts, activation)),
+            alerts=tuple(first_events_after(judged.alerts, activation)),
             trace_digest=golden_comparison.trace_digest(self.manifest, execution.out),
             patch=digest(built.patch_bytes),
             t_end=judged.t_end,
             dev=() if judged.t_end is None else difference.dev,
             metrics=judged.metrics,
-            left=departures(reference, faulty, self.manifest.channels, time, judged.t_end),
+            left=departures_from_golden(reference, faulty, self.manifest.channels, time, judged.t_end),
         )
 
     def _failed(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
-        status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
+        status, detail = status_by_cause(execution, built.files, self._raising(experiment, built))
         # the number of activations before a crash is reproducible; before a timeout it is not
         activation = activation_of(execution.probe or {}) if status is Status.CRASHED else None
         bare = _bare(experiment, status, detail, built, activation)
-        return replace(bare, error=error_of(execution.raised))
+        return replace(bare, error=run_error(execution.raised))
 
 
 def _changed(path: Path) -> MutatorError:

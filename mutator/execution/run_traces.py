@@ -9,7 +9,7 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.model import Experiment, Record
 from mutator.outcomes.golden_comparison import Trace, load_trace, trace_digest
-from mutator.outcomes.series_sampling import keep_series, sampled_traces
+from mutator.outcomes.series_sampling import traces_of_series, write_sampled_series
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, rerun_command
@@ -69,7 +69,7 @@ class Traces:
         record = self.record(experiment_id)
         found = series.load_series(experiment_id, record)
         if found is None and drive:
-            keep_series(self.folder.path, self.manifest, *self.of(experiment_id), record)
+            write_sampled_series(self.folder.path, self.manifest, *self.of(experiment_id), record)
             found = series.load_series(experiment_id, record)
         if found is None:
             raise MutatorError(
@@ -77,7 +77,7 @@ class Traces:
                 where=self.folder.path,
                 remedy=f"rerun the experiment: {rerun_command(self.folder.path, experiment_id)}",
             )
-        return sampled_traces(*found, self.manifest.time_channel)
+        return traces_of_series(*found, self.manifest.time_channel)
 
     def is_kept(self, experiment_id: str) -> bool:
         """Return whether a stored faulty trace matches the record."""

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mutator._common.table_rendering import TextTable
-from mutator.outcomes.golden_comparison import load_record, load_trace
+from mutator.outcomes.golden_comparison import load_target_record, load_trace
 from mutator.outcomes.hazards_and_metrics import judge_run
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
 
-Events = tuple[tuple[str, float], ...]  # (name, simulated time in s)
+EventTimes = tuple[tuple[str, float], ...]  # (name, simulated time in s)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,44 +19,50 @@ class FaultFreeRun:
     scenario: str
     changes: tuple[str, ...]
     seed: int | None  # None: the seed of the run folder
-    hazards: Events
-    alerts: Events
-    ranges: tuple[tuple[str, float, float], ...]  # name, minimum and maximum of recorded plotted channels
+    hazards: EventTimes
+    alerts: EventTimes
+    channel_ranges: tuple[
+        tuple[str, float, float], ...
+    ]  # name, minimum and maximum of recorded plotted channels
 
 
 def load_fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
     """Return the fault-free runs of a run folder, sorted by name. MutatorError if one cannot be read."""
-    found = []
-    for one in sorted(folder.golden_runs):
-        place = folder.golden_folder(*one)
-        trace = load_trace(manifest, place)
-        judged = judge_run(manifest, trace, load_record(manifest, place))
+    runs = []
+    for golden_run in sorted(folder.golden_runs):
+        run_folder = folder.golden_folder(*golden_run)
+        trace = load_trace(manifest, run_folder)
+        judged = judge_run(manifest, trace, load_target_record(manifest, run_folder))
         plotted = [channel.name for channel in manifest.plotted if channel.name in trace]
-        found.append(
+        runs.append(
             FaultFreeRun(
-                **one._asdict(),
+                **golden_run._asdict(),
                 hazards=judged.hazards,
                 alerts=judged.alerts,
-                ranges=tuple((name, *_range(trace[name])) for name in plotted),
+                channel_ranges=tuple((name, *_finite_range(trace[name])) for name in plotted),
             )
         )
-    return tuple(found)
+    return tuple(runs)
 
 
 def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> TextTable:
     """Return the table of fault-free runs: first times of hazards and alerts, and channel ranges."""
-    channels = list(dict.fromkeys(name for run in runs for name, _, _ in run.ranges))
+    channels = list(dict.fromkeys(name for run in runs for name, _, _ in run.channel_ranges))
     rows = []
     for run in runs:
-        ranges = {name: f"{least:.4g} to {largest:.4g}" for name, least, largest in run.ranges}
+        ranges = {name: f"{least:.4g} to {largest:.4g}" for name, least, largest in run.channel_ranges}
         key = GoldenRun(run.scenario, run.changes, run.seed).key
-        events = [_told(run.alerts), _told(run.hazards)] if alerts else [_told(run.hazards)]
+        events = (
+            [_describe_first_times(run.alerts), _describe_first_times(run.hazards)]
+            if alerts
+            else [_describe_first_times(run.hazards)]
+        )
         rows.append([key, *events, *(ranges.get(name, "") for name in channels)])
     events = ["alerts", "hazards"] if alerts else ["hazards"]
     return TextTable(heads=["fault-free run", *events, *channels], rows=rows)
 
 
-def own_alerts(runs: Iterable[FaultFreeRun]) -> str:
+def fault_free_alerts_note(runs: Iterable[FaultFreeRun]) -> str:
     """Return a note on the alerts that fault-free runs raise, for tables that count alerts; '' if none."""
     scenarios: dict[str, dict[str, None]] = {}
     for run in runs:
@@ -64,8 +70,8 @@ def own_alerts(runs: Iterable[FaultFreeRun]) -> str:
             scenarios.setdefault(name, {})[run.scenario] = None
     if not scenarios:
         return ""
-    told = "; ".join(f"{name} in {', '.join(scenarios[name])}" for name in sorted(scenarios))
-    return f"Not every alert is caused by a fault: fault-free runs raise {told}."
+    alert_texts = "; ".join(f"{name} in {', '.join(scenarios[name])}" for name in sorted(scenarios))
+    return f"Not every alert is caused by a fault: fault-free runs raise {alert_texts}."
 
 
 def alerts_by_drive(runs: Iterable[FaultFreeRun]) -> dict[tuple[str, str], frozenset[str]]:
@@ -80,12 +86,12 @@ def alerts_by_drive(runs: Iterable[FaultFreeRun]) -> dict[tuple[str, str], froze
     return names
 
 
-def _range(values: np.ndarray) -> tuple[float, float]:
-    known = values[np.isfinite(values)]
-    return (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)
+def _finite_range(values: np.ndarray) -> tuple[float, float]:
+    finite = values[np.isfinite(values)]
+    return (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
 
 
-def _told(events: Events) -> str:
+def _describe_first_times(events: EventTimes) -> str:
     first: dict[str, float] = {}
     for name, t in events:
         first[name] = min(t, first.get(name, t))

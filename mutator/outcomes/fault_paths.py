@@ -15,7 +15,13 @@ from typing import NamedTuple
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Outcome, Record
 from mutator.outcomes.channel_departures import Departure
-from mutator.outcomes.fault_routes import PossibleRoute, chained, links_of, steps_from, structured
+from mutator.outcomes.fault_routes import (
+    PossibleRoute,
+    chain_route,
+    distances_from,
+    structure_route,
+    studied_links,
+)
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, REMEDY
 from mutator.stpa.analysis_files import Kind, StructureModel
@@ -30,8 +36,8 @@ class ComponentState(StrEnum):
     REACHED = "reached"  # one of its channels left golden
     PASSED = "passed"  # none of its channels left golden, but a component that only it feeds did
     FEEDBACK = "feedback"  # one of its channels left golden, but only after the process
-    HELD = "held"  # it has channels, and none left golden
-    UNSEEN = "unseen"  # it has no recorded channels
+    UNCHANGED = "held"  # it has channels, and none left golden
+    UNRECORDED = "unseen"  # it has no recorded channels
 
 
 class LinkState(StrEnum):
@@ -82,7 +88,9 @@ class FaultPath:
 
     @property
     def injected(self) -> tuple[str, ...]:
-        return tuple(one.name for one in self.components if one.state is ComponentState.INJECTED)
+        return tuple(
+            component.name for component in self.components if component.state is ComponentState.INJECTED
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,28 +98,31 @@ class UntimedPath:
     """A path without times. Paths have the same untimed path if they have the same injected components, and
     components left golden in the same order.
 
-    `late` has the components that must have changed before their own channels did, each with the rank of
-    `PathComponent.t_by` among all times. `entered` is the link by which the fault reached the first actuator.
+    `late_ranks` has the components that must have changed before their own channels did, each with the rank
+    of `PathComponent.t_by` among all times. `entry_link` is the link by which the fault reached the first
+    actuator.
     """
 
-    states: Mapping[str, ComponentState]  # in causal order
-    late: Mapping[str, int]
+    state_by_component: Mapping[str, ComponentState]  # in causal order
+    late_ranks: Mapping[str, int]
     links: tuple[PathLink, ...]
     reached: str
     stopped_at: tuple[str, ...]
-    entered: PathLink | None
+    entry_link: PathLink | None
 
     @property
     def injected(self) -> tuple[str, ...]:
-        return tuple(name for name, state in self.states.items() if state is ComponentState.INJECTED)
+        return tuple(
+            name for name, state in self.state_by_component.items() if state is ComponentState.INJECTED
+        )
 
 
 class PathInputs(NamedTuple):
     """The facts about an experiment that determine its untimed path."""
 
     injected: frozenset[str]
-    order: tuple[tuple[str, int], ...]  # the rank of the time at which each component left golden
-    masked: bool
+    departure_ranks: tuple[tuple[str, int], ...]  # the rank of the time at which each component left golden
+    is_masked: bool
 
 
 class FaultPaths:
@@ -122,31 +133,37 @@ class FaultPaths:
     """
 
     def __init__(self, channels: Sequence[ChannelFacts], structure: StructureModel | None) -> None:
-        self.component_of = {channel.name: channel.component for channel in channels}
-        self._roles = {c.component: c.role for c in channels if c.component}
+        self.component_by_channel = {channel.name: channel.component for channel in channels}
+        self._role_by_component = {c.component: c.role for c in channels if c.component}
         self._actuators = {c.component for c in channels if c.role is Role.ACTUATOR}
         self.structure = structure
-        self._links = links_of(structure) if structure else {}
+        self._links = studied_links(structure) if structure else {}
         # links from unrecorded components back to the components that feed them
-        self._back = [(tip, tail) for tail, tip in self._links.values() if tip not in self._roles]
-        self._untimed_path = lru_cache(maxsize=None)(self._untimed_path_of)
-        self._where: dict[str, frozenset[str]] = {}  # the components of each fault, by fault id
+        self._links_back = [
+            (tip, tail) for tail, tip in self._links.values() if tip not in self._role_by_component
+        ]
+        self._cached_untimed_path = lru_cache(maxsize=None)(self._build_untimed_path)
+        self._injected_by_fault: dict[str, frozenset[str]] = {}  # the components of each fault, by fault id
 
     @property
     def processes(self) -> frozenset[str]:
         if self.structure is None:
-            return frozenset(name for name, role in self._roles.items() if role == Role.TRUTH.value)
+            return frozenset(
+                name for name, role in self._role_by_component.items() if role == Role.TRUTH.value
+            )
         return frozenset(n for n, c in self.structure.components.items() if c.kind is Kind.PROCESS)
 
-    def _injected(self, fault: Fault) -> frozenset[str]:
-        if fault.id not in self._where:
+    def _injected_components(self, fault: Fault) -> frozenset[str]:
+        if fault.id not in self._injected_by_fault:
             files = {injection.location.path for injection in fault.injections}
             components = self.structure.components if self.structure else {}
-            found = frozenset(name for name, one in components.items() if files.intersection(one.modules))
-            self._where[fault.id] = found
-        return self._where[fault.id]
+            injected = frozenset(
+                name for name, component in components.items() if files.intersection(component.modules)
+            )
+            self._injected_by_fault[fault.id] = injected
+        return self._injected_by_fault[fault.id]
 
-    def path(self, experiment: Experiment, record: Record) -> FaultPath | None:
+    def fault_path(self, experiment: Experiment, record: Record) -> FaultPath | None:
         """Return the path of an experiment.
 
         None if the fault was not active, if the run has no outcome, or if the fault is in no known component.
@@ -154,18 +171,20 @@ class FaultPaths:
         untimed_path = self.untimed_path(experiment.fault, record)
         if untimed_path is None:
             return None
-        left: dict[str, list[Departure]] = {}
+        departures_by_component: dict[str, list[Departure]] = {}
         for departure in record.left:
-            left.setdefault(self.component_of.get(departure[0], ""), []).append(departure)
-        times = sorted({min(t for _, t, _ in found) for found in left.values()})
+            departures_by_component.setdefault(self.component_by_channel.get(departure[0], ""), []).append(
+                departure
+            )
+        times = sorted({min(t for _, t, _ in departures) for departures in departures_by_component.values()})
         components = [
             PathComponent(
                 name=name,
                 state=state,
-                channels=tuple(left.get(name, ())),
-                t_by=times[untimed_path.late[name]] if name in untimed_path.late else None,
+                channels=tuple(departures_by_component.get(name, ())),
+                t_by=times[untimed_path.late_ranks[name]] if name in untimed_path.late_ranks else None,
             )
-            for name, state in untimed_path.states.items()
+            for name, state in untimed_path.state_by_component.items()
         ]
         return FaultPath(
             components=tuple(components),
@@ -175,40 +194,44 @@ class FaultPaths:
         )
 
     def untimed_path(self, fault: Fault, record: Record) -> UntimedPath | None:
-        """Return the untimed path of an experiment; None in the same cases as `path`."""
-        inputs = self.inputs_of(fault, record)
-        return inputs and self.untimed_path_of(inputs)
+        """Return the untimed path of an experiment; None in the same cases as `fault_path`."""
+        inputs = self.path_inputs(fault, record)
+        return inputs and self.untimed_path_from(inputs)
 
-    def untimed_path_of(self, inputs: PathInputs) -> UntimedPath | None:
-        return self._untimed_path(*inputs)
+    def untimed_path_from(self, inputs: PathInputs) -> UntimedPath | None:
+        return self._cached_untimed_path(*inputs)
 
-    def inputs_of(self, fault: Fault, record: Record) -> PathInputs | None:
+    def path_inputs(self, fault: Fault, record: Record) -> PathInputs | None:
         """Return the inputs of an untimed path; None if the fault was not active or without an outcome."""
         if record.outcome in (None, Outcome.NOT_ACTIVATED):
             return None
         firsts: dict[str, float] = {}
         for channel, first, _ in record.left:
-            component = self.component_of.get(channel, "")
+            component = self.component_by_channel.get(channel, "")
             if first < firsts.get(component, inf):
                 firsts[component] = first
-        place = {time: i for i, time in enumerate(sorted(set(firsts.values())))}
-        order = tuple(sorted((name, place[time]) for name, time in firsts.items()))
-        return PathInputs(self._injected(fault), order, record.outcome is Outcome.MASKED)
+        rank = {time: i for i, time in enumerate(sorted(set(firsts.values())))}
+        order = tuple(sorted((name, rank[time]) for name, time in firsts.items()))
+        return PathInputs(self._injected_components(fault), order, record.outcome is Outcome.MASKED)
 
-    def _untimed_path_of(
-        self, injected: frozenset[str], order: tuple[tuple[str, int], ...], masked: bool
+    def _build_untimed_path(
+        self, injected: frozenset[str], departure_ranks: tuple[tuple[str, int], ...], masked: bool
     ) -> UntimedPath | None:
         route = self._route_of(injected)
         if not route.components:
             return None
-        times = dict(order)
-        latest = self._latest(route, times)
-        states, arrived = self._states(route, times.keys(), latest)
-        late = {name: _sooner(latest, times, name) for name, state in states.items() if state in _CHANGED}
+        ranks = dict(departure_ranks)
+        latest_ranks = self._latest_ranks(route, ranks)
+        states, arrived = self._component_states(route, ranks.keys(), latest_ranks)
+        late = {
+            name: _rank_if_earlier(latest_ranks, ranks, name)
+            for name, state in states.items()
+            if state in _CHANGED_STATES
+        }
         changed = [
             n
             for n, state in states.items()
-            if n in times and state in (ComponentState.INJECTED, ComponentState.REACHED)
+            if n in ranks and state in (ComponentState.INJECTED, ComponentState.REACHED)
         ]
         links = tuple(
             PathLink(name=name, tail=tail, tip=tip, state=_link_state(tail, tip, states, arrived))
@@ -216,76 +239,82 @@ class FaultPaths:
         )
         through = [c for c in links if c.tip in self._actuators and c.state is LinkState.THROUGH]
         return UntimedPath(
-            states=states,
-            late={name: int(place) for name, place in late.items() if place is not None},
+            state_by_component=states,
+            late_ranks={name: int(place) for name, place in late.items() if place is not None},
             links=links,
-            reached=min(reversed(changed), key=route.steps.__getitem__, default=""),
-            stopped_at=_holding(route, states, arrived) if masked else (),
-            entered=min(through, key=lambda c: times.get(c.tip, inf), default=None),
+            reached=min(reversed(changed), key=route.steps_to_process.__getitem__, default=""),
+            stopped_at=_holding_components(route, states, arrived) if masked else (),
+            entry_link=min(through, key=lambda c: ranks.get(c.tip, inf), default=None),
         )
 
-    def _states(
-        self, route: PossibleRoute, shown: Collection[str], left: Mapping[str, float]
+    def _component_states(
+        self, route: PossibleRoute, departed: Collection[str], ranks: Mapping[str, float]
     ) -> tuple[dict[str, ComponentState], set[str]]:
         """Return the state of each component of a route, and the components that the fault reached.
 
-        `left` has the rank of the time by which each component left golden. Components in `shown` have
+        `ranks` has the rank of the time by which each component left golden. Components in `departed` have
         channels that left golden. The fault reaches an unrecorded component if it reached one that feeds it.
         """
-        moved = self._moved(left)
+        process_rank = self._process_rank(ranks)
         states: dict[str, ComponentState] = {}
         arrived: set[str] = set()
         for name in route.components:
-            came = name in route.sources or bool(route.feeders(name) & arrived)
-            if route.injected and name in route.sources:
+            has_arrived = name in route.entry_components or bool(route.feeders_on_route(name) & arrived)
+            if route.is_injection_known and name in route.entry_components:
                 states[name] = ComponentState.INJECTED
-            elif name not in self._roles:
-                states[name] = ComponentState.UNSEEN
-            elif name not in left:
-                states[name] = ComponentState.HELD
-            elif left[name] <= moved:
-                states[name] = ComponentState.REACHED if name in shown else ComponentState.PASSED
+            elif name not in self._role_by_component:
+                states[name] = ComponentState.UNRECORDED
+            elif name not in ranks:
+                states[name] = ComponentState.UNCHANGED
+            elif ranks[name] <= process_rank:
+                states[name] = ComponentState.REACHED if name in departed else ComponentState.PASSED
             else:
-                back = self._fed_back(route.fed.get(name, ()), left)
-                along = min((left[f] for f in route.feeders(name) & arrived if f in left), default=inf)
-                by_loop = not came or (back <= left[name] and back <= along)
+                feedback_rank = self._earliest_feedback_rank(route.feeders_off_route.get(name, ()), ranks)
+                forward_rank = min(
+                    (ranks[f] for f in route.feeders_on_route(name) & arrived if f in ranks), default=inf
+                )
+                by_loop = not has_arrived or (feedback_rank <= ranks[name] and feedback_rank <= forward_rank)
                 states[name] = ComponentState.FEEDBACK if by_loop else ComponentState.REACHED
-            if states[name] in _CAME or (states[name] is ComponentState.UNSEEN and came):
+            if states[name] in _STATES_REACHED_BY_FAULT or (
+                states[name] is ComponentState.UNRECORDED and has_arrived
+            ):
                 arrived.add(name)
         return states, arrived
 
-    def _moved(self, left: Mapping[str, float]) -> float:
+    def _process_rank(self, ranks: Mapping[str, float]) -> float:
         """Return the rank of the time at which the process left golden; infinite if it did not."""
-        return min((left[name] for name in self.processes if name in left), default=inf)
+        return min((ranks[name] for name in self.processes if name in ranks), default=inf)
 
-    def _latest(self, route: PossibleRoute, left: Mapping[str, float]) -> dict[str, float]:
+    def _latest_ranks(self, route: PossibleRoute, ranks: Mapping[str, float]) -> dict[str, float]:
         """Return the rank of the time by which each component left golden.
 
         If a component is the only one that feeds another, it left golden no later than the other did, unless
         feedback could have reached the other. If the place of injection is unknown, nothing is inferred.
         """
-        moved, times = self._moved(left), dict(left)
-        for name in reversed(route.components if route.injected else ()):
-            only = route.feeders(name) | route.fed.get(name, frozenset())
-            if name in times and len(only) == 1 and name not in route.sources:
-                (feeder,) = only
-                if feeder in left or times[name] <= moved:
+        process_rank, times = self._process_rank(ranks), dict(ranks)
+        for name in reversed(route.components if route.is_injection_known else ()):
+            feeders = route.feeders_on_route(name) | route.feeders_off_route.get(name, frozenset())
+            if name in times and len(feeders) == 1 and name not in route.entry_components:
+                (feeder,) = feeders
+                if feeder in ranks or times[name] <= process_rank:
                     times[feeder] = min(times.get(feeder, inf), times[name])
         return times
 
     def _route_of(self, injected: frozenset[str]) -> PossibleRoute:
         if self.structure is None:
-            return chained(self._roles, self.processes)
-        return structured(self.structure.components, self._links, self.processes, injected)
+            return chain_route(self._role_by_component, self.processes)
+        return structure_route(self.structure.components, self._links, self.processes, injected)
 
-    def _fed_back(self, names: Collection[str], left: Mapping[str, float]) -> float:
+    def _earliest_feedback_rank(self, names: Collection[str], ranks: Mapping[str, float]) -> float:
         """Return the rank of the earliest time of feedback through one of these components, or infinity.
 
         A recorded component feeds back once it has left golden, an unrecorded one once a component that leads
         to it has left golden.
         """
-        unseen = steps_from([name for name in names if name not in self._roles], self._back).keys()
-        return min((left[name] for name in {*names, *unseen} if name in left), default=inf)
+        behind_unrecorded = distances_from(
+            [name for name in names if name not in self._role_by_component], self._links_back
+        ).keys()
+        return min((ranks[name] for name in {*names, *behind_unrecorded} if name in ranks), default=inf)
 
 
 def fault_paths_of(folder: RunFolder) -> FaultPaths | None:
@@ -300,12 +329,12 @@ def fault_paths_of(folder: RunFolder) -> FaultPaths | None:
     return FaultPaths(head.channels, structure)
 
 
-_CHANGED = (ComponentState.REACHED, ComponentState.PASSED, ComponentState.FEEDBACK)
-_CAME = (ComponentState.INJECTED, ComponentState.REACHED, ComponentState.PASSED)
+_CHANGED_STATES = (ComponentState.REACHED, ComponentState.PASSED, ComponentState.FEEDBACK)
+_STATES_REACHED_BY_FAULT = (ComponentState.INJECTED, ComponentState.REACHED, ComponentState.PASSED)
 
 
-def _sooner(some: Mapping[str, float], others: Mapping[str, float], name: str) -> float | None:
-    return some[name] if some.get(name, inf) < others.get(name, inf) else None
+def _rank_if_earlier(ranks: Mapping[str, float], other_ranks: Mapping[str, float], name: str) -> float | None:
+    return ranks[name] if ranks.get(name, inf) < other_ranks.get(name, inf) else None
 
 
 def _link_state(
@@ -313,18 +342,21 @@ def _link_state(
 ) -> LinkState:
     if tail not in arrived or states[tip] is ComponentState.INJECTED:
         return LinkState.NONE
-    if states[tip] is ComponentState.UNSEEN:
+    if states[tip] is ComponentState.UNRECORDED:
         return LinkState.UNKNOWN
-    return LinkState.THROUGH if states[tip] in _CAME else LinkState.STOPPED
+    return LinkState.THROUGH if states[tip] in _STATES_REACHED_BY_FAULT else LinkState.STOPPED
 
 
-def _holding(
+def _holding_components(
     route: PossibleRoute, states: Mapping[str, ComponentState], arrived: Collection[str]
 ) -> tuple[str, ...]:
     """Return the components that held a fault: those fed by a component that the fault reached or, if there
     are none, the first ones on its path.
     """
-    held = [name for name in route.components if states[name] is ComponentState.HELD]
+    holding = [name for name in route.components if states[name] is ComponentState.UNCHANGED]
     reached = {name for name in route.components if states[name] is ComponentState.REACHED}
-    after_reached = [name for name in held if route.feeders(name) & reached]
-    return tuple(after_reached or (n for n in held if n in route.sources or route.feeders(n) & {*arrived}))
+    after_reached = [name for name in holding if route.feeders_on_route(name) & reached]
+    return tuple(
+        after_reached
+        or (n for n in holding if n in route.entry_components or route.feeders_on_route(n) & {*arrived})
+    )

@@ -14,16 +14,18 @@ class PossibleRoute:
 
     components: tuple[str, ...]
     links: Mapping[str, tuple[str, str]]
-    sources: frozenset[str]  # components at which the fault enters
-    injected: bool  # whether the sources are known to be the place of injection
-    fed: Mapping[str, frozenset[str]]  # by component: the components not on the route that lead to it
-    steps: Mapping[str, int]  # by component: number of links to the process
+    entry_components: frozenset[str]  # components at which the fault enters
+    is_injection_known: bool  # whether the sources are known to be the place of injection
+    feeders_off_route: Mapping[
+        str, frozenset[str]
+    ]  # by component: the components not on the route that lead to it
+    steps_to_process: Mapping[str, int]  # by component: number of links to the process
 
-    def feeders(self, component: str) -> set[str]:
+    def feeders_on_route(self, component: str) -> set[str]:
         return {tail for tail, tip in self.links.values() if tip == component}
 
 
-def chained(roles: Mapping[str, str], processes: frozenset[str]) -> PossibleRoute:
+def chain_route(roles: Mapping[str, str], processes: frozenset[str]) -> PossibleRoute:
     """Return the chain of components, ordered by their channels' roles. The place of injection is unknown."""
     order = [role.value for role in (Role.INTERNAL, Role.ACTUATOR, Role.TRUTH)]
     chain = sorted(roles, key=lambda name: order.index(roles[name]))
@@ -32,14 +34,14 @@ def chained(roles: Mapping[str, str], processes: frozenset[str]) -> PossibleRout
     return PossibleRoute(
         components=tuple(chain),
         links=links,
-        sources=frozenset(chain[:1]),
-        injected=False,
-        fed=dict.fromkeys(chain[:1], processes),
-        steps={name: len(chain) - place for place, name in enumerate(chain)},
+        entry_components=frozenset(chain[:1]),
+        is_injection_known=False,
+        feeders_off_route=dict.fromkeys(chain[:1], processes),
+        steps_to_process={name: len(chain) - place for place, name in enumerate(chain)},
     )
 
 
-def structured(
+def structure_route(
     components: Collection[str],
     links: Mapping[str, tuple[str, str]],
     processes: frozenset[str],
@@ -47,36 +49,36 @@ def structured(
 ) -> PossibleRoute:
     """Return the route from the injected components along `links`, without links out of a process."""
     forward = {name: ends for name, ends in links.items() if ends[0] not in processes}
-    steps = steps_from(processes, [(tip, tail) for tail, tip in forward.values()])
-    on_route = (steps_from(injected, forward.values()).keys() & steps.keys()) | injected
-    own = {name: pair for name, pair in forward.items() if on_route.issuperset(pair)}
-    fed = {
+    steps = distances_from(processes, [(tip, tail) for tail, tip in forward.values()])
+    on_route = (distances_from(injected, forward.values()).keys() & steps.keys()) | injected
+    route_links = {name: pair for name, pair in forward.items() if on_route.issuperset(pair)}
+    off_route = {
         name: frozenset(tail for tail, tip in links.values() if tip == name and tail not in on_route)
         for name in on_route
     }
     return PossibleRoute(
-        components=_in_causal_order([name for name in components if name in on_route], own, steps),
-        links=own,
-        sources=injected,
-        injected=True,
-        fed=fed,
-        steps={name: steps.get(name, len(on_route)) for name in on_route},
+        components=_in_causal_order([name for name in components if name in on_route], route_links, steps),
+        links=route_links,
+        entry_components=injected,
+        is_injection_known=True,
+        feeders_off_route=off_route,
+        steps_to_process={name: steps.get(name, len(on_route)) for name in on_route},
     )
 
 
-def links_of(structure: StructureModel) -> dict[str, tuple[str, str]]:
+def studied_links(structure: StructureModel) -> dict[str, tuple[str, str]]:
     """Return the ends of each studied link that does not involve people."""
-    people = {name for name, one in structure.components.items() if one.kind is Kind.HUMAN}
+    people = {name for name, component in structure.components.items() if component.kind is Kind.HUMAN}
     ends = ((name, (link.from_, link.to)) for name, link in structure.links.items() if link.studied)
     return {name: pair for name, pair in ends if not people.intersection(pair)}
 
 
-def steps_from(start: Collection[str], links: Collection[tuple[str, str]]) -> dict[str, int]:
+def distances_from(start: Collection[str], links: Collection[tuple[str, str]]) -> dict[str, int]:
     """Return the distance from `start`, in links, of everything that is reachable, including `start`."""
-    found = dict.fromkeys(start, 0)
-    while more := {tip for tail, tip in links if tail in found} - found.keys():
-        found |= dict.fromkeys(more, max(found.values()) + 1)
-    return found
+    distances = dict.fromkeys(start, 0)
+    while next_components := {tip for tail, tip in links if tail in distances} - distances.keys():
+        distances |= dict.fromkeys(next_components, max(distances.values()) + 1)
+    return distances
 
 
 def _in_causal_order(
@@ -87,11 +89,11 @@ def _in_causal_order(
     If several nodes can come next, or none because of a cycle, the one with the most `steps` to the process
     comes next.
     """
-    left = sorted(nodes, key=lambda name: -steps.get(name, len(nodes)))
+    remaining = sorted(nodes, key=lambda name: -steps.get(name, len(nodes)))
     order: list[str] = []
-    while left:
-        waiting = {tip for tail, tip in links.values() if tail in left and tail != tip}
-        chosen = next((name for name in left if name not in waiting), left[0])
-        left.remove(chosen)
+    while remaining:
+        waiting = {tip for tail, tip in links.values() if tail in remaining and tail != tip}
+        chosen = next((name for name in remaining if name not in waiting), remaining[0])
+        remaining.remove(chosen)
         order.append(chosen)
     return tuple(order)

@@ -24,13 +24,13 @@ from mutator.targets.manifest import TargetManifest
 Trace = Mapping[str, np.ndarray]  # channel name -> a value for each step or for each of its own times
 
 
-_LARGEST = sys.float_info.max
-_TRIAL = 64 << 20  # bytes
-_TINY = 1e-9  # s
+_LARGEST_TIME_S = sys.float_info.max
+_MEMORY_TRIAL_BYTES = 64 << 20  # bytes
+_TIME_SLACK_S = 1e-9  # s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Difference:
+class TraceDifference:
     """How a trace differs from the golden trace."""
 
     t_first: float | None  # time (s) of the first difference beyond tolerance
@@ -42,7 +42,7 @@ def trace_digest(manifest: TargetManifest, out: Path) -> str:
     try:
         return digest(read_bounded(path_below(out, manifest.trace_file)))
     except OSError as err:
-        _check_is_of_output(err)
+        _check_no_shortage(err)
         raise BadOutput("the run left no trace", where=path_below(out, manifest.trace_file)) from None
 
 
@@ -50,35 +50,39 @@ def load_trace(
     manifest: TargetManifest,
     out: Path,
     channels: Sequence[Channel] | None = None,
-    also: Sequence[Channel] = (),
+    optional: Sequence[Channel] = (),
 ) -> Trace:
-    """Load channels (default: all) and times of the trace in `out`. Channels in `also` can be missing."""
+    """Load channels (default: all) and times of the trace in `out`. Channels in `optional` can be missing."""
     path = path_below(out, manifest.trace_file)
-    kind = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
+    expected_file = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
     try:
-        trace = trace_files.read(path, manifest, channels, also)
+        trace = trace_files.read_trace(path, manifest, channels, optional)
     except BadTrace as err:
         raise BadOutput(err.got, where=path, expected=err.expected) from None
     except KeyError as err:
-        _check_is_of_run(err, manifest, path)
+        _check_importer_works(err, manifest, path)
         raise BadOutput(f"no channel {err}", where=path, expected="the manifest's channels") from None
     except MutatorError:
         raise
     except Exception as err:  # a run can write anything, so readers can fail in many ways
-        _check_is_of_output(err)
-        _check_is_of_run(err, manifest, path)
-        raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected=kind) from None
+        _check_no_shortage(err)
+        _check_importer_works(err, manifest, path)
+        raise BadOutput(
+            f"not a readable trace ({_error_text(err)})", where=path, expected=expected_file
+        ) from None
     _check_arrays(trace, manifest, path)
     return trace
 
 
-def _check_is_of_run(err: Exception, manifest: TargetManifest, path: Path) -> None:
+def _check_importer_works(err: Exception, manifest: TargetManifest, path: Path) -> None:
     """Raise BadAddition if an importer of another package failed: nobody knows whether the run did."""
-    names = {name for one in manifest.channels for name in (one.in_trace, one.time)}
-    lacks = isinstance(err, KeyError) and err.args[:1] and err.args[0] in {manifest.time_channel, *names}
+    names = {name for channel in manifest.channels for name in (channel.in_trace, channel.time)}
+    is_missing_channel = (
+        isinstance(err, KeyError) and err.args[:1] and err.args[0] in {manifest.time_channel, *names}
+    )
     if (
         path.is_file()
-        and not lacks
+        and not is_missing_channel
         and (failure := IMPORTERS.addition_error(path.suffix.removeprefix("."), err))
     ):
         raise failure from err
@@ -89,8 +93,8 @@ def _check_arrays(trace: Trace, manifest: TargetManifest, path: Path) -> None:
     for name, values in trace.items():
         if values.dtype.kind not in "biuf":
             raise BadOutput(f"channel {name} is not numeric", where=path)
-        wanted = values if name in times else times_of(trace, name, manifest.time_channel)
-        if values.ndim != 1 or values.shape != wanted.shape:
+        expected = values if name in times else times_of(trace, name, manifest.time_channel)
+        if values.ndim != 1 or values.shape != expected.shape:
             raise BadOutput("channels of different lengths", where=path, expected="one value per step")
     for name in (times & trace.keys()) | {manifest.time_channel}:
         values = trace[name].astype(float)
@@ -101,33 +105,37 @@ def _check_arrays(trace: Trace, manifest: TargetManifest, path: Path) -> None:
             )
 
 
-def times_of(trace: Trace, channel: str, time: str) -> np.ndarray:
+def times_of(trace: Trace, channel: str, time_channel: str) -> np.ndarray:
     """Return the times (s) of a channel's values: its own times, or else those of the steps."""
-    return trace.get(own_times(channel), trace[time])
+    return trace.get(own_times(channel), trace[time_channel])
 
 
-def until(trace: Trace, end: float, time: str) -> Trace:
-    cut = {}
+def trace_until(trace: Trace, end: float, time_channel: str) -> Trace:
+    shortened = {}
     for name, values in trace.items():
-        times = values if name.endswith(own_times("")) else times_of(trace, name, time)
-        cut[name] = values[times <= end]
-    return cut
+        times = values if name.endswith(own_times("")) else times_of(trace, name, time_channel)
+        shortened[name] = values[times <= end]
+    return shortened
 
 
-def on_steps(trace: Trace, channel: str, steps: np.ndarray) -> np.ndarray:
+def values_on_steps(trace: Trace, channel: str, steps: np.ndarray) -> np.ndarray:
     """Return a channel's value at each step.
 
     A channel with its own times keeps its newest value. Before its first value it is NaN.
     """
-    own = trace.get(own_times(channel))
-    return trace[channel] if own is None else _newest(own, trace[channel], steps)
+    own_times_of_channel = trace.get(own_times(channel))
+    return (
+        trace[channel]
+        if own_times_of_channel is None
+        else _newest_values(own_times_of_channel, trace[channel], steps)
+    )
 
 
-def _newest(times: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    return np.concatenate(([np.nan], values))[np.searchsorted(times, at + _TINY, side="right")]
+def _newest_values(times: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    return np.concatenate(([np.nan], values))[np.searchsorted(times, at + _TIME_SLACK_S, side="right")]
 
 
-def at_steps_of_other(times: np.ndarray, values: np.ndarray, steps: np.ndarray) -> np.ndarray:
+def values_at_other_steps(times: np.ndarray, values: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return a run's values, one for each of its `times`, at the steps of another run (s).
 
     Steps that differ get the newest value. Before its first step and after its last one, it is NaN.
@@ -135,10 +143,10 @@ def at_steps_of_other(times: np.ndarray, values: np.ndarray, steps: np.ndarray) 
     rows = min(len(times), len(steps))
     if np.array_equal(times[:rows], steps[:rows]):
         return np.concatenate((values[:rows], np.full(len(steps) - rows, np.nan)))
-    return np.where(steps > times[-1] + _TINY, np.nan, _newest(times, values, steps))
+    return np.where(steps > times[-1] + _TIME_SLACK_S, np.nan, _newest_values(times, values, steps))
 
 
-def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
+def load_target_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
     """Load the record that the target wrote in `out`, or an empty one if the manifest names no record."""
     if manifest.record_file is None:
         return {"hazards": {}, "alerts": []}
@@ -146,34 +154,34 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
     try:
         data = json.loads(read_bounded(path, MOST_JSON_BYTES))
     except (OSError, ValueError, RecursionError) as err:
-        _check_is_of_output(err)
+        _check_no_shortage(err)
         raise BadOutput(
-            f"not a readable record ({_why(err)})", where=path, expected="a JSON object"
+            f"not a readable record ({_error_text(err)})", where=path, expected="a JSON object"
         ) from None
     judges = any(hazard.recorded for hazard in manifest.rules)
-    if not isinstance(data, dict) or not _has_times(data, judges=judges):
+    if not isinstance(data, dict) or not _has_event_times(data, needs_hazards=judges):
         expected = "{hazards: {NAME: time or null}, alerts: [{name: NAME, t: time}]}"
         raise BadOutput("no hazards and alerts with their times", where=path, expected=expected)
     return data
 
 
-def _check_is_of_output(err: Exception) -> None:
+def _check_no_shortage(err: Exception) -> None:
     """Raise Shortage if mutator itself ran out of memory or file handles, so the output can be valid."""
     if short := find_shortage(err):
         if isinstance(err, MemoryError):
             with suppress(MemoryError):
-                bytes(_TRIAL)
+                bytes(_MEMORY_TRIAL_BYTES)
                 return  # there is enough memory, so the trace claims an impossible size
         raise short from err
 
 
-def _why(err: Exception) -> str:
+def _error_text(err: Exception) -> str:
     """Return the error's text without the path, which differs between runs."""
     return str(err.strerror if isinstance(err, OSError) and err.strerror else err)
 
 
-def _has_times(record: dict[str, Any], *, judges: bool) -> bool:
-    hazards, events = record.get("hazards", None if judges else {}), _events(record)
+def _has_event_times(record: dict[str, Any], *, needs_hazards: bool) -> bool:
+    hazards, events = record.get("hazards", None if needs_hazards else {}), _alert_events(record)
     if not isinstance(hazards, dict) or not isinstance(events, list):
         return False
     times = [time for time in hazards.values() if time is not None]
@@ -181,72 +189,76 @@ def _has_times(record: dict[str, Any], *, judges: bool) -> bool:
         if not isinstance(event, dict) or not isinstance(event.get("name"), str):
             return False
         times.append(event.get("t"))
-    return all(type(time) in (int, float) and abs(time) <= _LARGEST for time in times)
+    return all(type(time) in (int, float) and abs(time) <= _LARGEST_TIME_S for time in times)
 
 
-def _events(record: Mapping[str, Any]) -> Any:
+def _alert_events(record: Mapping[str, Any]) -> Any:
     """Return all times at which alerts were raised or, if the record lacks them, the first of each alert."""
     return record.get("alert_events") or record.get("alerts") or []
 
 
-def alerts_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[str, float]]:
-    return [(event["name"], event["t"]) for event in _events(record) if event["name"] in counted]
+def alert_times(record: Mapping[str, Any], names: Sequence[str]) -> list[tuple[str, float]]:
+    return [(event["name"], event["t"]) for event in _alert_events(record) if event["name"] in names]
 
 
-def sharing_times(golden: Trace, faulty: Trace, time: str) -> Trace:
+def with_golden_times(golden: Trace, faulty: Trace, time_channel: str) -> Trace:
     """Return the faulty trace with the golden time array if both are equal, which speeds up comparisons."""
-    return {**faulty, time: golden[time]} if np.array_equal(golden[time], faulty[time]) else faulty
+    return (
+        {**faulty, time_channel: golden[time_channel]}
+        if np.array_equal(golden[time_channel], faulty[time_channel])
+        else faulty
+    )
 
 
-def compare(
-    golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str, t_end: float | None = None
-) -> Difference:
+def compare_traces(
+    golden: Trace, faulty: Trace, channels: Sequence[Channel], time_channel: str, t_end: float | None = None
+) -> TraceDifference:
     """Compare channels value by value. NaN equals NaN.
 
     If one trace is shorter, the traces differ from its end onward; if their times differ, from the first
     different time onward. `t_end` is the end of the drive if that is before the end of the run.
     """
-    end = np.inf if t_end is None else t_end + _TINY
-    first = end_of_shorter(golden[time], faulty[time])
-    largest: list[tuple[str, float]] = []
-    driven: list[tuple[str, float]] = []
+    end = np.inf if t_end is None else t_end + _TIME_SLACK_S
+    first = end_of_shorter(golden[time_channel], faulty[time_channel])
+    max_dev: list[tuple[str, float]] = []
+    dev: list[tuple[str, float]] = []
     for channel in channels:
-        found = deviation(golden, faulty, channel, time)
-        first = min(first, found.t_first)
-        largest.append((channel.name, found.largest()))
-        driven.append((channel.name, found.largest(end)))
+        channel_difference = channel_deviation(golden, faulty, channel, time_channel)
+        first = min(first, channel_difference.t_first)
+        max_dev.append((channel.name, channel_difference.largest()))
+        dev.append((channel.name, channel_difference.largest(end)))
     t_first = None if first == np.inf else first
-    return Difference(t_first=t_first, max_dev=tuple(largest), dev=tuple(driven))
+    return TraceDifference(t_first=t_first, max_dev=tuple(max_dev), dev=tuple(dev))
 
 
 @dataclass(frozen=True, slots=True)
-class Deviation:
+class ChannelDeviation:
     """The absolute difference |faulty - golden| of a channel at the times of both runs."""
 
-    at: np.ndarray
+    common_times: np.ndarray
     values: np.ndarray
     t_first: float  # when it first exceeds the tolerance or the times differ; infinite if never
 
     def largest(self, end: float = np.inf) -> float:
-        return float(self.values[self.at <= end].max(initial=0.0))
+        return float(self.values[self.common_times <= end].max(initial=0.0))
 
 
-def deviation(golden: Trace, faulty: Trace, channel: Channel, time: str) -> Deviation:
-    times = [times_of(trace, channel.name, time) for trace in (golden, faulty)]
+def channel_deviation(golden: Trace, faulty: Trace, channel: Channel, time_channel: str) -> ChannelDeviation:
+    times = [times_of(trace, channel.name, time_channel) for trace in (golden, faulty)]
     values = [golden[channel.name], faulty[channel.name]]
     at, values = _on_same_times(times, values)
-    apart = values[0] != values[1]
-    begin = int(apart.argmax()) if apart.size else 0
-    if not apart[begin : begin + 1].any():  # true of most channels
-        return Deviation(at[:0], at[:0], _other_times(*times))
-    at, values = at[begin:], [one[begin:] for one in values]
-    values_apart = _deviation(*values)
-    beyond = np.flatnonzero(values_apart > channel.tolerance)
+    differs = values[0] != values[1]
+    begin = int(differs.argmax()) if differs.size else 0
+    if not differs[begin : begin + 1].any():  # true of most channels
+        return ChannelDeviation(at[:0], at[:0], _first_unequal_time(*times))
+    at, values = at[begin:], [values_of_run[begin:] for values_of_run in values]
+    differences = _absolute_difference(*values)
+    beyond = np.flatnonzero(differences > channel.tolerance)
     first = float(at[beyond[0]]) if beyond.size else np.inf
-    return Deviation(at, values_apart, min(first, _other_times(*times)))
+    return ChannelDeviation(at, differences, min(first, _first_unequal_time(*times)))
 
 
-def _other_times(golden: np.ndarray, faulty: np.ndarray) -> float:
+def _first_unequal_time(golden: np.ndarray, faulty: np.ndarray) -> float:
     """Return the time at which the times of two runs first differ or one run ends, or infinity."""
     if golden is faulty:
         return np.inf
@@ -273,12 +285,15 @@ def _on_same_times(times: list[np.ndarray], values: list[np.ndarray]) -> tuple[n
         return times[0], values
     rows = min(map(len, times))
     if np.array_equal(times[0][:rows], times[1][:rows]):
-        return times[0][:rows], [one[:rows] for one in values]
+        return times[0][:rows], [values_of_run[:rows] for values_of_run in values]
     at = np.union1d(*times)
-    return at, [_newest(own, one, at) for own, one in zip(times, values, strict=True)]
+    return at, [
+        _newest_values(times_of_run, values_of_run, at)
+        for times_of_run, values_of_run in zip(times, values, strict=True)
+    ]
 
 
-def _deviation(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
+def _absolute_difference(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
     """Return |faulty - golden|; equal infinities and two NaNs differ by 0, NaN and a number by infinity."""
     golden, faulty = golden.astype(float), faulty.astype(float)
     same = (golden == faulty) | (np.isnan(golden) & np.isnan(faulty))

@@ -11,11 +11,11 @@ import numpy as np
 from mutator.errors import BadOutput, MutatorError
 from mutator.outcomes.golden_comparison import (
     Trace,
-    alerts_of,
-    at_steps_of_other,
-    load_record,
+    alert_times,
+    load_target_record,
     load_trace,
-    on_steps,
+    values_at_other_steps,
+    values_on_steps,
 )
 from mutator.targets.contact_severity import DELTA_V
 from mutator.targets.criteria import Hazard, Metric
@@ -23,13 +23,13 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers import temporal_logic, trace_formulas
 from mutator.triggers.conditions import GOLDEN_PREFIX, TIME, names_in
 
-Values = Mapping[str, np.ndarray]
+ValuesByName = Mapping[str, np.ndarray]
 
-_TINY = 1e-9  # s; times are sums of steps
+_TIME_SLACK_S = 1e-9  # s; times are sums of steps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judged:
+class RunJudgement:
     """The judgement of a run. Times are in s."""
 
     hazards: tuple[tuple[str, float], ...]  # name, first time
@@ -38,16 +38,18 @@ class Judged:
     metrics: tuple[tuple[str, float], ...]  # including margins; metrics without a value are omitted
 
 
-def load_judged(manifest: TargetManifest, out: Path, golden: Trace | None = None) -> tuple[Trace, Judged]:
+def load_judged_run(
+    manifest: TargetManifest, out: Path, golden: Trace | None = None
+) -> tuple[Trace, RunJudgement]:
     """Load and judge the run in `out`; `golden` is as in `judge_run`.
 
     BadOutput if trace or record is missing or cannot be judged.
     """
-    trace = load_channels(manifest, out)
-    return trace, judge_run(manifest, trace, load_record(manifest, out), golden)
+    trace = load_manifest_channels(manifest, out)
+    return trace, judge_run(manifest, trace, load_target_record(manifest, out), golden)
 
 
-def load_channels(manifest: TargetManifest, out: Path) -> Trace:
+def load_manifest_channels(manifest: TargetManifest, out: Path) -> Trace:
     """Load the manifest's channels that the run in `out` recorded.
 
     BadOutput if a channel that the verdict needs is missing.
@@ -59,44 +61,48 @@ def load_channels(manifest: TargetManifest, out: Path) -> Trace:
 
 def judge_run(
     manifest: TargetManifest, trace: Trace, record: Mapping[str, Any], golden: Trace | None = None
-) -> Judged:
+) -> RunJudgement:
     """Judge a run. Its trace and that of its golden run must have the channels that the manifest needs for
     judging. Without a golden run (this is one), metrics that use it have no value.
     """
-    values = values_of(manifest, trace)
+    values = formula_values(manifest, trace)
     if golden is not None and any(metric.uses_golden for metric in manifest.metrics):
-        values = {**values, **_golden_values(values_of(manifest, golden), values[TIME])}
+        values = {**values, **_golden_values(formula_values(manifest, golden), values[TIME])}
     hazards, metrics = [], []
     ends: dict[str, float] = {}
     for hazard in manifest.rules:
-        robust = _robustness(hazard, values, manifest) if hazard.stl else None
-        first = _first(hazard, values, robust, record)
+        robustness = _robustness(hazard, values, manifest) if hazard.stl else None
+        first = _first_hazard_time(hazard, values, robustness, record)
         if first is not None:
             hazards.append((hazard.name, first))
-        if (end := _end(hazard, first, values)) is not None:
+        if (end := _drive_end(hazard, first, values)) is not None:
             ends[hazard.name] = end
         if hazard.metric is not None:
             numbers = (
-                robust if robust is not None else trace_formulas.formula_at_each_step(hazard.margin, values)
+                robustness
+                if robustness is not None
+                else trace_formulas.formula_at_each_step(hazard.margin, values)
             )
             metrics.append((hazard.metric, numbers))
     measured = [metric for metric in manifest.metrics if golden is not None or not metric.uses_golden]
-    metrics += [(metric, _numbers(metric, values)) for metric in measured]
+    metrics += [(metric, _metric_values(metric, values)) for metric in measured]
     t_end = min(ends.values(), default=None)
-    found = {metric.name: _aggregate(metric, numbers, values, t_end) for metric, numbers in metrics}
+    value_by_metric = {
+        metric.name: _aggregate_metric(metric, numbers, values, t_end) for metric, numbers in metrics
+    }
     contact = manifest.contact
     if contact and t_end is not None and ends.get(contact.hazard) == t_end:
-        speed = found.get(contact.speed)
-        found[DELTA_V] = None if speed is None else contact.delta_v(speed)
-    return Judged(
+        speed = value_by_metric.get(contact.speed)
+        value_by_metric[DELTA_V] = None if speed is None else contact.delta_v(speed)
+    return RunJudgement(
         hazards=tuple(hazards),
-        alerts=tuple(alerts_of(record, manifest.alerts)),
+        alerts=tuple(alert_times(record, manifest.alerts)),
         t_end=t_end,
-        metrics=tuple((name, value) for name, value in found.items() if value is not None),
+        metrics=tuple((name, value) for name, value in value_by_metric.items() if value is not None),
     )
 
 
-def values_of(manifest: TargetManifest, trace: Trace) -> Values:
+def formula_values(manifest: TargetManifest, trace: Trace) -> ValuesByName:
     """Return the variables of the manifest's formulas, with a number for each step.
 
     A channel with its own times keeps its newest value. Before its first value it is NaN.
@@ -104,22 +110,22 @@ def values_of(manifest: TargetManifest, trace: Trace) -> Values:
     time = np.asarray(trace[manifest.time_channel], dtype=float)
     values = {TIME: time}
     for channel in manifest.judged:
-        values[channel.name] = on_steps(trace, channel.name, time).astype(float)
+        values[channel.name] = values_on_steps(trace, channel.name, time).astype(float)
     for value in manifest.observation.derived:
         if value.name not in values and all(name in values for name in names_in(value.text)):
             values[value.name] = trace_formulas.formula_at_each_step(value.text, values)
     return values
 
 
-def _golden_values(golden: Values, steps: np.ndarray) -> Values:
+def _golden_values(golden: ValuesByName, steps: np.ndarray) -> ValuesByName:
     """Return the values of the golden run at the steps of another run; NaN at steps that it does not have."""
     return {
-        GOLDEN_PREFIX + name: at_steps_of_other(golden[TIME], numbers, steps)
+        GOLDEN_PREFIX + name: values_at_other_steps(golden[TIME], numbers, steps)
         for name, numbers in golden.items()
     }
 
 
-def _robustness(hazard: Hazard, values: Values, manifest: TargetManifest) -> np.ndarray:
+def _robustness(hazard: Hazard, values: ValuesByName, manifest: TargetManifest) -> np.ndarray:
     try:
         return temporal_logic.robustness(hazard.stl, values, manifest.step_s)
     except MutatorError as error:
@@ -127,37 +133,41 @@ def _robustness(hazard: Hazard, values: Values, manifest: TargetManifest) -> np.
         raise BadOutput(error.got, where=where, expected=error.expected, remedy=error.remedy) from None
 
 
-def _first(
-    hazard: Hazard, values: Values, robust: np.ndarray | None, record: Mapping[str, Any]
+def _first_hazard_time(
+    hazard: Hazard, values: ValuesByName, robustness: np.ndarray | None, record: Mapping[str, Any]
 ) -> float | None:
     if hazard.recorded:
         return record.get("hazards", {}).get(hazard.name)  # type: ignore[no-any-return]
-    holds = robust < 0.0 if robust is not None else trace_formulas.condition_at_each_step(hazard.when, values)
-    return _first_of(_lasting(holds, values[TIME], hazard.for_s), values[TIME])
+    holds = (
+        robustness < 0.0
+        if robustness is not None
+        else trace_formulas.condition_at_each_step(hazard.when, values)
+    )
+    return _first_true_time(_lasting_for(holds, values[TIME], hazard.for_s), values[TIME])
 
 
-def _lasting(holds: np.ndarray, time: np.ndarray, for_s: float) -> np.ndarray:
+def _lasting_for(holds: np.ndarray, time: np.ndarray, for_s: float) -> np.ndarray:
     if not for_s:
         return holds
     begins = holds & ~np.concatenate(([False], holds[:-1]))
     since = np.maximum.accumulate(np.where(begins, time, -np.inf))
-    return holds & (time - since >= for_s - _TINY)
+    return holds & (time - since >= for_s - _TIME_SLACK_S)
 
 
-def _first_of(holds: np.ndarray, time: np.ndarray) -> float | None:
+def _first_true_time(holds: np.ndarray, time: np.ndarray) -> float | None:
     at = np.flatnonzero(holds)
     return float(time[at[0]]) if at.size else None
 
 
-def _end(hazard: Hazard, first: float | None, values: Values) -> float | None:
+def _drive_end(hazard: Hazard, first: float | None, values: ValuesByName) -> float | None:
     if hazard.terminal == "True":
         return first
     if not hazard.terminal:
         return None
-    return _first_of(trace_formulas.condition_at_each_step(hazard.terminal, values), values[TIME])
+    return _first_true_time(trace_formulas.condition_at_each_step(hazard.terminal, values), values[TIME])
 
 
-def _numbers(metric: Metric, values: Values) -> np.ndarray:
+def _metric_values(metric: Metric, values: ValuesByName) -> np.ndarray:
     """Return a metric's value at each step; NaN, which is not aggregated, if it needs a golden step that is
     missing.
     """
@@ -170,13 +180,15 @@ def _numbers(metric: Metric, values: Values) -> np.ndarray:
     )
 
 
-def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float | None) -> float | None:
+def _aggregate_metric(
+    metric: Metric, numbers: np.ndarray, values: ValuesByName, t_end: float | None
+) -> float | None:
     """Return the aggregate of a metric up to the end of the drive, or None without values.
 
     Sums are exact (`fsum`), so that they do not depend on the processor.
     """
     time = values[TIME]
-    driven = time <= (math.inf if t_end is None else t_end + _TINY)
+    driven = time <= (math.inf if t_end is None else t_end + _TIME_SLACK_S)
     if metric.aggregate == "at_end":
         driven &= t_end is not None and time == time[driven].max(initial=-math.inf)
     counts = np.isfinite(numbers) & driven
@@ -186,9 +198,9 @@ def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float
         until = np.append(time[1:], time[-1:])  # each value lasts until the next step or the end of the drive
         lengths = np.minimum(until, math.inf if t_end is None else max(t_end, time[0])) - time
         return math.fsum((numbers[counts] * lengths[counts]).tolist())
-    kept = numbers[counts]
-    if not kept.size:
+    aggregated = numbers[counts]
+    if not aggregated.size:
         return None
     if metric.aggregate == "mean":
-        return math.fsum(kept.tolist()) / int(kept.size)
-    return float({"min": kept.min(), "max": kept.max()}.get(metric.aggregate, kept[-1]))
+        return math.fsum(aggregated.tolist()) / int(aggregated.size)
+    return float({"min": aggregated.min(), "max": aggregated.max()}.get(metric.aggregate, aggregated[-1]))

@@ -13,38 +13,42 @@ from typing import Any
 import numpy as np
 
 from mutator.model import Record
-from mutator.outcomes.golden_comparison import Trace, on_steps
+from mutator.outcomes.golden_comparison import Trace, values_on_steps
 from mutator.outcomes.trace_files import own_times
 from mutator.store.series_folder import SeriesFolder, run_facts, write_kept_series
 from mutator.store.series_format import ExtraPoints, Series, encode_series
 from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
 
-RATE = 20.0  # maximum number of samples per second
-_EVERY = {Role.ACTUATOR: 1, Role.TRUTH: 1, Role.INTERNAL: 2}  # a channel keeps every n-th sample
-_HALF = np.uint32(8)  # half of the lowest bit that is kept
-_TINY = 1e-9  # s; times are sums of steps
+MOST_SAMPLES_PER_S = 20.0  # maximum number of samples per second
+_SAMPLE_EVERY_BY_ROLE = {
+    Role.ACTUATOR: 1,
+    Role.TRUTH: 1,
+    Role.INTERNAL: 2,
+}  # a channel keeps every n-th sample
+_HALF_OF_LAST_BIT = np.uint32(8)  # half of the lowest bit that is kept
+_TIME_SLACK_S = 1e-9  # s; times are sums of steps
 
 
-class Sampler:
+class SeriesSampler:
     """Builds the series of a golden run, and the series of the faulty runs compared with it."""
 
     def __init__(self, manifest: TargetManifest, golden: Trace) -> None:
         self._channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden]
         self._clock = manifest.time_channel
         self._time = np.asarray(golden[self._clock], dtype=float)
-        self._values = self._on(golden, self._time)
-        self._every = [_EVERY[channel.role] for channel in self._channels]
-        self._at = _thinned(self._time)
+        self._values = self._values_on(golden, self._time)
+        self._sample_every = [_SAMPLE_EVERY_BY_ROLE[channel.role] for channel in self._channels]
+        self._sample_steps = _thinned_steps(self._time)
         self.golden = Series(
-            t=self._time[self._at],
-            channel_values=self._rows(self._values[:, self._at]),
-            sample_every=self._every,
+            t=self._time[self._sample_steps],
+            channel_values=self._sampled_rows(self._values[:, self._sample_steps]),
+            sample_every=self._sample_every,
             facts={
                 "start": float(self._time[0]),
                 "end": float(self._time[-1]),
                 "channels": [
-                    _told(channel, manifest)
+                    _channel_as_json(channel, manifest)
                     | ({"own_times": True} if own_times(channel.name) in golden else {})
                     for channel in self._channels
                 ],
@@ -52,112 +56,131 @@ class Sampler:
         )
 
     @cached_property
-    def encoded(self) -> bytes:
+    def encoded_golden(self) -> bytes:
         return encode_series(self.golden)
 
-    def series(self, faulty: Trace, record: Record) -> Series:
-        own = np.asarray(faulty[self._clock], dtype=float)
-        last = own[-1] if len(own) else -np.inf
-        is_prefix = _is_prefix(own, self._time)
-        time, golden, values = self._together(faulty, own)
-        known = self.golden.t[self.golden.t <= last + _TINY]
-        late = np.flatnonzero(time > self._time[-1] + _TINY)
-        at = np.concatenate((np.searchsorted(time, known), late[_thinned(time[late])])).astype(int)
+    def faulty_series(self, faulty: Trace, record: Record) -> Series:
+        faulty_time = np.asarray(faulty[self._clock], dtype=float)
+        last = faulty_time[-1] if len(faulty_time) else -np.inf
+        is_prefix = _share_times(faulty_time, self._time)
+        time, golden, values = self._on_common_times(faulty, faulty_time)
+        golden_samples = self.golden.t[self.golden.t <= last + _TIME_SLACK_S]
+        late_steps = np.flatnonzero(time > self._time[-1] + _TIME_SLACK_S)
+        steps = np.concatenate(
+            (np.searchsorted(time, golden_samples), late_steps[_thinned_steps(time[late_steps])])
+        ).astype(int)
         end = int(np.searchsorted(time, min(last, self._time[-1]), side="right")) - 1
         compared = end + 1 if is_prefix else len(time)  # as `golden.deviation` compares them
         return Series(
-            t=time[at],
-            channel_values=self._rows(values[:, at]),
-            sample_every=self._every,
+            t=time[steps],
+            channel_values=self._sampled_rows(values[:, steps]),
+            sample_every=self._sample_every,
             facts=run_facts(record) | {"end": float(max(self._time[-1], last))},
-            points=_points(
-                time, golden[:, :compared], values[:, :compared], self._sampled(len(time), at), end, record
+            points=_extra_points(
+                time,
+                golden[:, :compared],
+                values[:, :compared],
+                self._sample_mask(len(time), steps),
+                end,
+                record,
             ),
         )
 
-    def _sampled(self, count: int, at: np.ndarray) -> np.ndarray:
-        if count == len(self._time) and len(at) == len(self._at):
-            return self._usual
-        return self._marked(count, at)
+    def _sample_mask(self, step_count: int, steps: np.ndarray) -> np.ndarray:
+        if step_count == len(self._time) and len(steps) == len(self._sample_steps):
+            return self._golden_sample_mask
+        return self._build_sample_mask(step_count, steps)
 
     @cached_property
-    def _usual(self) -> np.ndarray:
-        return self._marked(len(self._time), self._at)
+    def _golden_sample_mask(self) -> np.ndarray:
+        return self._build_sample_mask(len(self._time), self._sample_steps)
 
-    def _marked(self, count: int, at: np.ndarray) -> np.ndarray:
-        sampled = np.zeros((len(self._every), count), dtype=bool)
-        for row, every in zip(sampled, self._every, strict=True):
-            row[at[::every]] = True
+    def _build_sample_mask(self, step_count: int, steps: np.ndarray) -> np.ndarray:
+        sampled = np.zeros((len(self._sample_every), step_count), dtype=bool)
+        for row, every in zip(sampled, self._sample_every, strict=True):
+            row[steps[::every]] = True
         return sampled
 
-    def _rows(self, values: np.ndarray) -> list[np.ndarray]:
-        single = _single(values)
-        return [np.ascontiguousarray(row[::every]) for row, every in zip(single, self._every, strict=True)]
+    def _sampled_rows(self, values: np.ndarray) -> list[np.ndarray]:
+        single = _rounded_singles(values)
+        return [
+            np.ascontiguousarray(row[::every]) for row, every in zip(single, self._sample_every, strict=True)
+        ]
 
-    def _together(self, faulty: Trace, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _on_common_times(
+        self, faulty: Trace, faulty_time: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the union of both runs' step times, and each run's values. After its end, a run has no value
         (NaN) or, if the runs have different times, its last one.
         """
-        if _is_prefix(own, self._time):
-            time = max(own, self._time, key=len)
-            return time, _filled(self._values, len(time)), _filled(self._on(faulty, own), len(time))
-        time = np.union1d(own, self._time)
-        return time, self._held(self._values, self._time, time), self._held(self._on(faulty, own), own, time)
+        if _share_times(faulty_time, self._time):
+            time = max(faulty_time, self._time, key=len)
+            return (
+                time,
+                _padded_with_nan(self._values, len(time)),
+                _padded_with_nan(self._values_on(faulty, faulty_time), len(time)),
+            )
+        time = np.union1d(faulty_time, self._time)
+        return (
+            time,
+            self._newest_values(self._values, self._time, time),
+            self._newest_values(self._values_on(faulty, faulty_time), faulty_time, time),
+        )
 
-    def _on(self, trace: Trace, time: np.ndarray) -> np.ndarray:
+    def _values_on(self, trace: Trace, time: np.ndarray) -> np.ndarray:
         """Return an array with a row for each channel and a column for each step. Missing channels: NaN."""
         rows = np.full((len(self._channels), len(time)), np.nan)
         for row, channel in zip(rows, self._channels, strict=True):
             if channel.name in trace:
-                row[:] = on_steps(trace, channel.name, time)
+                row[:] = values_on_steps(trace, channel.name, time)
         return rows
 
     @staticmethod
-    def _held(values: np.ndarray, own: np.ndarray, time: np.ndarray) -> np.ndarray:
+    def _newest_values(values: np.ndarray, times_of_run: np.ndarray, time: np.ndarray) -> np.ndarray:
         """Return the newest value of each row at the given times; NaN before its first."""
-        place = np.searchsorted(own, time + _TINY, side="right") - 1
+        place = np.searchsorted(times_of_run, time + _TIME_SLACK_S, side="right") - 1
         return np.where(place >= 0, values[:, np.maximum(place, 0)], np.nan)
 
 
-def _is_prefix(own: np.ndarray, other: np.ndarray) -> bool:
+def _share_times(times: np.ndarray, other_times: np.ndarray) -> bool:
     """Whether two runs have the same times up to the end of the shorter one."""
-    rows = min(len(own), len(other))
-    return bool(np.array_equal(own[:rows], other[:rows]))
+    rows = min(len(times), len(other_times))
+    return bool(np.array_equal(times[:rows], other_times[:rows]))
 
 
-def _thinned(time: np.ndarray) -> np.ndarray:
+def _thinned_steps(time: np.ndarray) -> np.ndarray:
     """Return the steps to keep: the first, the last, and at most RATE a second in between."""
-    kept: list[int] = []
+    steps: list[int] = []
     due = -np.inf
     for place, t in enumerate(time.tolist()):
         if t >= due:
-            due = t + 1.0 / RATE - _TINY
-            kept.append(place)
-    if kept and kept[-1] != len(time) - 1:
-        kept.append(len(time) - 1)
-    return np.array(kept, dtype=int)
+            due = t + 1.0 / MOST_SAMPLES_PER_S - _TIME_SLACK_S
+            steps.append(place)
+    if steps and steps[-1] != len(time) - 1:
+        steps.append(len(time) - 1)
+    return np.array(steps, dtype=int)
 
 
-def _filled(values: np.ndarray, count: int) -> np.ndarray:
+def _padded_with_nan(values: np.ndarray, count: int) -> np.ndarray:
     missing = count - values.shape[1]
     if not missing:
         return values
     return np.concatenate((values, np.full((len(values), missing), np.nan)), axis=1)
 
 
-def _single(values: np.ndarray) -> np.ndarray:
+def _rounded_singles(values: np.ndarray) -> np.ndarray:
     """Round the values to single precision and six digits (20 bits). More digits would make a series a tenth
     larger.
     """
     with np.errstate(over="ignore"):  # overflow becomes infinity
         single = values.astype("<f4")
-        words = (single.view("<u4") + _HALF) & ~np.uint32(2 * _HALF - 1)
+        words = (single.view("<u4") + _HALF_OF_LAST_BIT) & ~np.uint32(2 * _HALF_OF_LAST_BIT - 1)
     finite = np.isfinite(single)
     single[np.isnan(single)] = np.nan  # the same bit pattern for every NaN
     return np.where(finite, words.view("<f4"), single)
 
 
-def _points(
+def _extra_points(
     time: np.ndarray,
     golden: np.ndarray,
     faulty: np.ndarray,
@@ -169,30 +192,38 @@ def _points(
 
     `end` is the last step that both runs have. `golden` and `faulty` end with the last step that is compared.
     """
-    drive = end + 1 if record.t_end is None else _until(time, record.t_end)
-    hazards = {_until(time, t) - 1 for _, t in record.hazards} & set(range(end + 1))
-    found: list[tuple[int, int]] = []
+    drive = end + 1 if record.t_end is None else _step_count_until(time, record.t_end)
+    hazards = {_step_count_until(time, t) - 1 for _, t in record.hazards} & set(range(end + 1))
+    points: list[tuple[int, int]] = []
     for row, differs in enumerate((golden != faulty).any(axis=1).tolist()):
         steps = set(hazards)
         if differs:
-            gap = _gap(golden[row], faulty[row])  # row by row: all rows would not fit into the CPU cache
+            gap = _absolute_difference(
+                golden[row], faulty[row]
+            )  # row by row: all rows would not fit into the CPU cache
             apart = gap > 0.0
             peaks = {int(np.argmax(apart)), int(np.argmax(gap[: max(drive, 1)])), int(np.argmax(gap)), end}
             steps |= {step for step in peaks if apart[step]}
-        found += [(row, step) for step in sorted(steps) if not sampled[row, step]]
-    rows, places = np.array(found, dtype=int).reshape(-1, 2).T
-    one, other = _single(golden[rows, places]), _single(faulty[rows, places])
-    shown = (one.view("<u4") != other.view("<u4")) | np.isin(places, list(hazards))
+        points += [(row, step) for step in sorted(steps) if not sampled[row, step]]
+    rows, places = np.array(points, dtype=int).reshape(-1, 2).T
+    golden_points, faulty_points = (
+        _rounded_singles(golden[rows, places]),
+        _rounded_singles(faulty[rows, places]),
+    )
+    is_visible = (golden_points.view("<u4") != faulty_points.view("<u4")) | np.isin(places, list(hazards))
     return ExtraPoints(
-        channel_numbers=rows[shown], t=time[places[shown]], golden=one[shown], faulty=other[shown]
+        channel_numbers=rows[is_visible],
+        t=time[places[is_visible]],
+        golden=golden_points[is_visible],
+        faulty=faulty_points[is_visible],
     )
 
 
-def _until(time: np.ndarray, t: float) -> int:
-    return int(np.searchsorted(time, t + _TINY, side="right"))
+def _step_count_until(time: np.ndarray, t: float) -> int:
+    return int(np.searchsorted(time, t + _TIME_SLACK_S, side="right"))
 
 
-def _gap(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
+def _absolute_difference(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
     """Return the absolute difference of two runs at each step; infinite if only one has a value."""
     with np.errstate(invalid="ignore", over="ignore"):
         gap: np.ndarray = np.abs(faulty - golden)
@@ -203,7 +234,7 @@ def _gap(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
     return gap
 
 
-def _told(channel: Channel, manifest: TargetManifest) -> dict[str, Any]:
+def _channel_as_json(channel: Channel, manifest: TargetManifest) -> dict[str, Any]:
     return {
         "name": channel.name,
         "unit": channel.unit,
@@ -214,7 +245,7 @@ def _told(channel: Channel, manifest: TargetManifest) -> dict[str, Any]:
     }
 
 
-def sampled_traces(golden: Series, faulty: Series, time: str) -> tuple[Trace, Trace]:
+def traces_of_series(golden: Series, faulty: Series, time: str) -> tuple[Trace, Trace]:
     """Return the runs of a series as traces. Between its samples, a channel holds its value."""
     names = [str(channel["name"]) for channel in golden.facts["channels"]]
 
@@ -228,7 +259,9 @@ def sampled_traces(golden: Series, faulty: Series, time: str) -> tuple[Trace, Tr
     return trace(golden), trace(faulty)
 
 
-def keep_series(run: Path, manifest: TargetManifest, golden: Trace, faulty: Trace, record: Record) -> None:
-    sampler = Sampler(manifest, golden)
-    data = encode_series(sampler.series(faulty, record), sampler.golden)
-    write_kept_series(SeriesFolder(run).kept_path(record.experiment_id), sampler.encoded, data)
+def write_sampled_series(
+    run: Path, manifest: TargetManifest, golden: Trace, faulty: Trace, record: Record
+) -> None:
+    sampler = SeriesSampler(manifest, golden)
+    data = encode_series(sampler.faulty_series(faulty, record), sampler.golden)
+    write_kept_series(SeriesFolder(run).kept_path(record.experiment_id), sampler.encoded_golden, data)

@@ -19,31 +19,31 @@ from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 
 Arrays = dict[str, np.ndarray]
-MOST_TRACE = MOST_FILE_BYTES  # bytes of a trace, also when unpacked
+MOST_TRACE_BYTES = MOST_FILE_BYTES  # bytes of a trace, also when unpacked
 MOST_COLUMNS = 10_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TraceRequest:
-    """What to read from a file: `channels` and the step times, which are in the channel `time`.
+    """What to read from a file: `channels` and the step times, which are in `time_channel`.
 
-    Channels in `also` can be missing. With `everything`, also the names that are no channels.
+    Channels in `optional` can be missing. With `everything`, also the names that are no channels.
     """
 
     path: Path
-    time: str
+    time_channel: str
     channels: Sequence[Channel]
-    also: Sequence[Channel] = ()
+    optional: Sequence[Channel] = ()
     everything: bool = False
 
-    def choose(self, there: Collection[str]) -> dict[str, None]:
-        """Return the names to read from a file that contains `there`, and those that it must not lack."""
+    def choose_names(self, available: Collection[str]) -> dict[str, None]:
+        """Return the names to read from a file that has the `available` ones, and those that it must have."""
         if self.everything:
-            return dict.fromkeys(there)
+            return dict.fromkeys(available)
         of_time = [channel.time for channel in self.channels if channel.time]
-        names = [self.time, *of_time, *(channel.in_trace for channel in self.channels)]
-        may_miss = {name for channel in self.also for name in (channel.in_trace, channel.time)}
-        return {name: None for name in names if name in there or name not in may_miss}
+        names = [self.time_channel, *of_time, *(channel.in_trace for channel in self.channels)]
+        optional_names = {name for channel in self.optional for name in (channel.in_trace, channel.time)}
+        return {name: None for name in names if name in available or name not in optional_names}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,16 +61,16 @@ class Importer:
 
 
 @cache
-def _importer(name: str) -> Importer:
-    found = IMPORTERS.load(name)
-    assert isinstance(found, Importer)
-    return found
+def _importer_for(name: str) -> Importer:
+    importer = IMPORTERS.load(name)
+    assert isinstance(importer, Importer)
+    return importer
 
 
 def check_size(size: int) -> None:
     """Raise BadTrace if a trace unpacks to too many bytes."""
-    if size > MOST_TRACE:
-        raise BadTrace(f"{size:,} bytes when unpacked", f"at most {MOST_TRACE:,}")
+    if size > MOST_TRACE_BYTES:
+        raise BadTrace(f"{size:,} bytes when unpacked", f"at most {MOST_TRACE_BYTES:,}")
 
 
 def own_times(name: str) -> str:
@@ -78,29 +78,29 @@ def own_times(name: str) -> str:
     return f"{name}@"
 
 
-def read(
-    path: Path, manifest: TargetManifest, channels: Iterable[Channel] | None, also: Sequence[Channel] = ()
+def read_trace(
+    path: Path, manifest: TargetManifest, channels: Iterable[Channel] | None, optional: Sequence[Channel] = ()
 ) -> Arrays:
     """Read the channels and step times of a trace, by manifest name. A channel that lacks values at some
     steps has its own times, named by `own_times`.
 
-    Without `channels`, read everything, including names that are not in the manifest. Channels in `also` can
-    be missing. BadTrace for an invalid file, KeyError for any other missing channel. Other errors of the
+    Without `channels`, read everything, including names that are not in the manifest. Channels in `optional`
+    can be missing. BadTrace for an invalid file, KeyError for any other missing channel. Other errors of the
     importer are not caught.
     """
-    wanted = manifest.channels if channels is None else (*channels, *also)
+    requested = manifest.channels if channels is None else (*channels, *optional)
     request = TraceRequest(
         path=path,
-        time=manifest.time_channel,
-        channels=wanted,
-        also=also,
+        time_channel=manifest.time_channel,
+        channels=requested,
+        optional=optional,
         everything=channels is None,
     )
-    arrays = _importer(path.suffix.removeprefix(".")).read(request)
-    needed = () if request.everything else [channel.name for channel in wanted if channel not in also]
-    lacking = {request.time, *needed} - arrays.keys()
-    if lacking or not all(isinstance(array, np.ndarray) for array in arrays.values()):
-        raise TypeError(f"no array for {', '.join(sorted(lacking)) or 'some channels'}")
+    arrays = _importer_for(path.suffix.removeprefix(".")).read(request)
+    needed = () if request.everything else [channel.name for channel in requested if channel not in optional]
+    missing = {request.time_channel, *needed} - arrays.keys()
+    if missing or not all(isinstance(array, np.ndarray) for array in arrays.values()):
+        raise TypeError(f"no array for {', '.join(sorted(missing)) or 'some channels'}")
     return arrays
 
 
@@ -109,26 +109,28 @@ def by_channel(columns: Arrays, request: TraceRequest, *, has_empty_cells: bool 
 
     With `has_empty_cells`, rows without a step time belong to channels with their own times.
     """
-    known = {c.in_trace for c in request.channels} | {c.time for c in request.channels if c.time}
-    rest = {name: column for name, column in columns.items() if request.everything and name not in known}
-    time = columns[request.time]
-    steps = ~_empty(time) if has_empty_cells else slice(None)
-    values = {name: column[steps] for name, column in rest.items()} | {request.time: time[steps]}
+    channel_names = {c.in_trace for c in request.channels} | {c.time for c in request.channels if c.time}
+    rest = {
+        name: column for name, column in columns.items() if request.everything and name not in channel_names
+    }
+    time = columns[request.time_channel]
+    steps = ~_empty_mask(time) if has_empty_cells else slice(None)
+    values = {name: column[steps] for name, column in rest.items()} | {request.time_channel: time[steps]}
     for channel in request.channels:
-        if channel.in_trace not in columns and (request.everything or channel in request.also):
+        if channel.in_trace not in columns and (request.everything or channel in request.optional):
             continue
         column = columns[channel.in_trace]
-        there = steps
+        rows = steps
         if channel.time:
-            there = ~_empty(column) if has_empty_cells else slice(None)
-            values[own_times(channel.name)] = columns[channel.time][there]
-        values[channel.name] = column[there]
+            rows = ~_empty_mask(column) if has_empty_cells else slice(None)
+            values[own_times(channel.name)] = columns[channel.time][rows]
+        values[channel.name] = column[rows]
     return values
 
 
 def frame_columns(frame: Any, request: TraceRequest) -> Arrays:
-    return {str(name): frame[name].to_numpy() for name in request.choose(frame.columns)}
+    return {str(name): frame[name].to_numpy() for name in request.choose_names(frame.columns)}
 
 
-def _empty(values: np.ndarray) -> np.ndarray:
+def _empty_mask(values: np.ndarray) -> np.ndarray:
     return np.isnan(values) if values.dtype.kind == "f" else np.zeros(values.shape, dtype=bool)

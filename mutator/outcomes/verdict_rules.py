@@ -5,10 +5,10 @@ from collections.abc import Iterable, Sequence
 from mutator.model import Activation, Outcome, Record
 from mutator.targets.contact_severity import DELTA_V, Scale
 
-Events = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
+EventTimes = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
 
 
-def first_events(events: Iterable[tuple[str, float]], activation: Activation | None) -> Events:
+def first_events_after(events: Iterable[tuple[str, float]], activation: Activation | None) -> EventTimes:
     """Return the first event of each name at or after activation, by time and then name.
 
     The fault cannot have caused earlier events.
@@ -22,7 +22,7 @@ def first_events(events: Iterable[tuple[str, float]], activation: Activation | N
     return tuple(sorted(first.items(), key=lambda event: (event[1], event[0])))
 
 
-def judge(*, activation: Activation | None, t_manifest: float | None, hazards: Events) -> Outcome:
+def outcome_of(*, activation: Activation | None, t_manifest: float | None, hazards: EventTimes) -> Outcome:
     """Return the first of not_activated, hazard, sdc and masked that applies.
 
     `hazards` are those at or after activation. A hazard applies even without an actuator difference, because
@@ -35,7 +35,7 @@ def judge(*, activation: Activation | None, t_manifest: float | None, hazards: E
     return Outcome.MASKED if t_manifest is None else Outcome.SDC
 
 
-def reaction_time(hazards: Events, alerts: Events) -> float | None:
+def reaction_time(hazards: EventTimes, alerts: EventTimes) -> float | None:
     """Return the time (s) that a driver has to react: from the first alert to the first hazard.
 
     None unless both happened and the alert came first.
@@ -45,21 +45,21 @@ def reaction_time(hazards: Events, alerts: Events) -> float | None:
     return hazards[0][1] - alerts[0][1]
 
 
-def since_activation(record: Record) -> float | None:
+def fault_tolerant_time(record: Record) -> float | None:
     """Return the fault-tolerant time: from activation to the first hazard, in s. None without a hazard."""
     if not record.hazards or record.activation is None:
         return None
     return record.hazards[0][1] - record.activation.first
 
 
-def since_manifestation(record: Record) -> float | None:
+def manifestation_to_hazard_time(record: Record) -> float | None:
     """Return the time (s) from manifestation to the first hazard. None unless both happened in this order."""
     if not record.hazards or record.t_manifest is None or record.t_manifest > record.hazards[0][1]:
         return None
     return record.hazards[0][1] - record.t_manifest
 
 
-def severity_of(record: Record, scale: Scale | None) -> str | None:
+def severity_class_of(record: Record, scale: Scale | None) -> str | None:
     """Return the class of the contact that ended the drive. None without a contact after activation."""
     delta_v = dict(record.metrics).get(DELTA_V)
     if scale is None or delta_v is None or record.activation is None or record.t_end is None:

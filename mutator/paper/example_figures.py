@@ -10,7 +10,7 @@ from mutator.errors import MutatorError
 from mutator.execution.run_traces import Traces
 from mutator.figures.drawings import Drawing
 from mutator.figures.run_plot import marks_of
-from mutator.outcomes.series_sampling import RATE
+from mutator.outcomes.series_sampling import MOST_SAMPLES_PER_S
 from mutator.paper.run_pair_plot import plot_run_pair
 from mutator.paper.unsafe_actions import ACTION_FIGURES, ActionFigure, RunPair
 from mutator.store import plan_file
@@ -71,7 +71,7 @@ def _build_drawing(frame: pd.DataFrame, traces: Traces | None, figure: ActionFig
     for rank, row in enumerate(examined, start=1):
         record = traces.record(row["experiment_id"])
         golden, faulty = traces.sampled(record.experiment_id)
-        step_s = max(manifest.step_s, 1.0 / RATE)
+        step_s = max(manifest.step_s, 1.0 / MOST_SAMPLES_PER_S)
         pair = RunPair.of(golden, faulty, record, manifest.time_channel, step_s, figure.hazard)
         steps = figure.find_steps(pair)
         if steps is not None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.message_text import counted
 from mutator.config.yaml_files import MOST_YAML_BYTES
-from mutator.outcomes.fault_free_runs import own_alerts
+from mutator.outcomes.fault_free_runs import fault_free_alerts_note
 from mutator.paper import observations, observations_by_seed, observations_page
 from mutator.paper.observations import ClaimVerdict
 from mutator.paper.published_numbers import has_published_numbers, load_published_numbers
@@ -135,4 +135,4 @@ def _describe_coverage(run: ReportedRun, fault_type_count: int, missing: list[st
     text = f"Based on {len(run.frame)} of {run.folder.planned_count} experiments, which cover "
     text += f"{fault_type_count - len(missing)} of the paper's {fault_type_count} fault types."
     text += f" Missing: {', '.join(missing)}." if missing else ""
-    return " ".join(filter(None, (text, own_alerts(run.fault_free()))))
+    return " ".join(filter(None, (text, fault_free_alerts_note(run.fault_free()))))

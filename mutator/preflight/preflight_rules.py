@@ -12,7 +12,7 @@ from mutator.errors import BadOutput
 from mutator.model import Status
 from mutator.mutants.probe import was_triggered
 from mutator.outcomes import golden_comparison
-from mutator.outcomes.hazards_and_metrics import load_judged
+from mutator.outcomes.hazards_and_metrics import load_judged_run
 from mutator.targets.manifest import TargetManifest
 
 
@@ -39,7 +39,7 @@ def read_check_run(manifest: TargetManifest, execution: Execution) -> CheckRun:
         last = f" ({log.splitlines()[-1]})" if log and execution.raised is None else ""
         return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
     try:
-        _, judged = load_judged(manifest, execution.out)
+        _, judged = load_judged_run(manifest, execution.out)
     except BadOutput as err:
         return CheckRun(problem=f"{Path(err.where or '').name}: {err.got}")
     return CheckRun(

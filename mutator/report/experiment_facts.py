@@ -51,7 +51,7 @@ class Seen:
         for number, (all_inputs, told) in enumerate(_looks(results, records, faults, fault_paths)):
             alerts |= told
             for row, inputs in enumerate(all_inputs, start=number * _PIECE):
-                untimed_path = fault_paths.untimed_path_of(inputs) if fault_paths and inputs else None
+                untimed_path = fault_paths.untimed_path_from(inputs) if fault_paths and inputs else None
                 if untimed_path is not None:
                     path_numbers[row] = code = codes.setdefault(id(untimed_path), len(codes))
                     if code == len(untimed_paths):
@@ -83,7 +83,7 @@ def _looks(
                 if record.hazards:
                     alerts[name] = record.alerts
                 if fault_paths and fault in faults:
-                    inputs = fault_paths.inputs_of(faults[fault], record)
+                    inputs = fault_paths.path_inputs(faults[fault], record)
             all_inputs.append(inputs)
         return all_inputs, alerts
 

@@ -32,7 +32,7 @@ class _PathsById(Mapping[str, FaultPath]):
     def __getitem__(self, name: str) -> FaultPath:
         last = self._last
         if last is None or last[0] != name:
-            self._last = last = name, self._fault_paths.path(self._planned[name], self._records[name])
+            self._last = last = name, self._fault_paths.fault_path(self._planned[name], self._records[name])
         path = last[1]
         if path is None:
             raise KeyError(name)

@@ -122,7 +122,7 @@ def _let_through(
     passed: Counter[str] = Counter()
     links: dict[str, set[str]] = {}
     for untimed_path, count in _untimed_paths(hazards, paths):
-        if link := untimed_path.entered:
+        if link := untimed_path.entry_link:
             passed[link.tail] += count
             links.setdefault(link.tail, set()).add(link_text(link.tail, link.tip))
     if not passed:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from mutator.errors import MutatorError
 from mutator.execution.run_traces import Traces
-from mutator.outcomes.series_sampling import keep_series
+from mutator.outcomes.series_sampling import write_sampled_series
 from mutator.results.table_columns import deviation_column_by_channel
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder
@@ -30,4 +30,4 @@ def sample_kept_traces(folder: RunFolder, workspace: "Workspace") -> None:
     for name in sorted(path.name for path in (folder.path / "traces").glob("*")):
         with suppress(MutatorError, KeyError):  # for example, the sources changed after the run
             if not series.is_readable(name, traces.record(name)) and traces.is_kept(name):
-                keep_series(folder.path, traces.manifest, *traces.of(name), traces.record(name))
+                write_sampled_series(folder.path, traces.manifest, *traces.of(name), traces.record(name))

@@ -11,7 +11,12 @@ from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
-from mutator.outcomes.verdict_rules import reaction_time, severity_of, since_activation, since_manifestation
+from mutator.outcomes.verdict_rules import (
+    fault_tolerant_time,
+    manifestation_to_hazard_time,
+    reaction_time,
+    severity_class_of,
+)
 from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
 from mutator.results.table_files import TableColumn
 from mutator.targets.contact_severity import Scale
@@ -132,7 +137,7 @@ SEVERITY_COLUMN = ResultColumn(
     "text",
     "",
     "class of the contact that ended the drive; empty without a contact",
-    lambda f: severity_of(f.record, f.severity_scale),
+    lambda f: severity_class_of(f.record, f.severity_scale),
 )
 TIME_TO_HAZARD_COLUMNS = (
     ResultColumn(
@@ -140,14 +145,14 @@ TIME_TO_HAZARD_COLUMNS = (
         "number",
         "s",
         "time from the activation to the first hazard",
-        lambda f: _rounded_time(since_activation(f.record)),
+        lambda f: _rounded_time(fault_tolerant_time(f.record)),
     ),
     ResultColumn(
         "manifest_to_hazard",
         "number",
         "s",
         "time from the manifestation to the first hazard; empty if the hazard came first",
-        lambda f: _rounded_time(since_manifestation(f.record)),
+        lambda f: _rounded_time(manifestation_to_hazard_time(f.record)),
     ),
 )
 PATH_COLUMNS = (

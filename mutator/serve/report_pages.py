@@ -13,7 +13,7 @@ from mutator.audit.table_audit import audit_tables
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
 from mutator.errors import Absent, MutatorError
-from mutator.outcomes.fault_free_runs import load_fault_free_runs, own_alerts
+from mutator.outcomes.fault_free_runs import fault_free_alerts_note, load_fault_free_runs
 from mutator.report import report_builder
 from mutator.report.panel import FOLDER
 from mutator.report.report_digests import made_from
@@ -104,7 +104,9 @@ class Shown:
     def _alerts(self, run: Path) -> str:
         folder = RunFolder.open(run)
         try:
-            return own_alerts(load_fault_free_runs(folder, self._workspace.manifest(folder.head.target)))
+            return fault_free_alerts_note(
+                load_fault_free_runs(folder, self._workspace.manifest(folder.head.target))
+            )
         except (MutatorError, KeyError):
             return ""
 

@@ -19,7 +19,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
-from mutator.outcomes.series_sampling import Sampler, keep_series
+from mutator.outcomes.series_sampling import SeriesSampler, write_sampled_series
 from mutator.report import report_builder
 from mutator.report.panels import figures_panel
 from mutator.results import table_building
@@ -101,12 +101,14 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     golden = {"time": t, **{name: np.sin(t + i) for i, name in enumerate(names)}}
     faulty = golden | {"gas": np.where(t < 2.0, golden["gas"], golden["gas"] + 0.3)}
     packed, kept = (record(experiment, 7, b"") for experiment in plan.experiments[1:3])
-    sampler, writer = Sampler(manifest, golden), SeriesWriter(out.path, "0001-main")
-    data = encode_series(sampler.series(faulty, packed), sampler.golden)
-    writer.append(packed.experiment_id, EncodedSeries(golden_key="A", golden=sampler.encoded, faulty=data))
+    sampler, writer = SeriesSampler(manifest, golden), SeriesWriter(out.path, "0001-main")
+    data = encode_series(sampler.faulty_series(faulty, packed), sampler.golden)
+    writer.append(
+        packed.experiment_id, EncodedSeries(golden_key="A", golden=sampler.encoded_golden, faulty=data)
+    )
     writer.close()
     pack_series(out.path, plan.digest, {packed.experiment_id: 0}, 1)
-    keep_series(out.path, manifest, golden, faulty, kept)
+    write_sampled_series(out.path, manifest, golden, faulty, kept)
     with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
         patch.setattr(figures_panel, "draw_figures", lambda frame: ())
         report_builder.write_report(out.path, None)

@@ -8,8 +8,8 @@ from mutator.execution.cluster.pieces import Kind, Piece, Result
 from mutator.execution.experiment_runner import without_outcome
 from mutator.execution.written_files import Sums
 from mutator.model import Status
-from mutator.outcomes.hazards_and_metrics import load_channels
-from mutator.outcomes.series_sampling import Sampler
+from mutator.outcomes.hazards_and_metrics import load_manifest_channels
+from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter
 from mutator.targets.manifest import TargetManifest
@@ -54,5 +54,5 @@ class Intake:
 
     def _golden_series(self, key: str) -> bytes:
         golden = next(one for one in self._folder.golden_runs if one.key == key)
-        trace = load_channels(self._manifest, self._folder.golden_folder(*golden))
-        return Sampler(self._manifest, trace).encoded
+        trace = load_manifest_channels(self._manifest, self._folder.golden_folder(*golden))
+        return SeriesSampler(self._manifest, trace).encoded_golden

@@ -13,13 +13,13 @@ from mutator.outcomes.trace_files import (
     frame_columns,
 )
 
-MOST_CSV = 64_000_000  # bytes; as numbers, text takes more memory
+MOST_CSV_BYTES = 64_000_000  # bytes; as numbers, text takes more memory
 
 
-def _read(request: TraceRequest) -> Arrays:
+def _read_csv(request: TraceRequest) -> Arrays:
     import pandas as pd
 
-    data = read_bounded(request.path, MOST_CSV)
+    data = read_bounded(request.path, MOST_CSV_BYTES)
     commas = data.count(b",", 0, data.find(b"\n") + 1 or None)
     if commas >= MOST_COLUMNS:
         raise BadTrace(f"{commas + 1} columns", f"at most {MOST_COLUMNS}")
@@ -27,4 +27,4 @@ def _read(request: TraceRequest) -> Arrays:
     return by_channel(columns, request, has_empty_cells=True)
 
 
-IMPORTER = Importer(about="a column for each channel", read=_read)
+IMPORTER = Importer(about="a column for each channel", read=_read_csv)

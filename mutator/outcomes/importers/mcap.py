@@ -6,11 +6,11 @@ from mutator.outcomes.mcap_reader import read_topics
 from mutator.outcomes.trace_files import Arrays, Importer, TraceRequest, own_times
 
 
-def _read(request: TraceRequest) -> Arrays:
+def _read_mcap(request: TraceRequest) -> Arrays:
     """Read the channels, which are named `/topic:field.of.field`."""
-    steps = request.time
+    steps = request.time_channel
     places = {channel.name: channel.in_trace.partition(":")[::2] for channel in request.channels}
-    may_miss = {channel.name for channel in request.also}
+    may_miss = {channel.name for channel in request.optional}
     fields: dict[str, dict[str, None]] = {steps: {}}
     for topic, field in places.values():
         fields.setdefault(topic, {})[field] = None
@@ -30,4 +30,4 @@ def _read(request: TraceRequest) -> Arrays:
     return values
 
 
-IMPORTER = Importer(about="JSON messages in topics (`pip install mcap` to write them)", read=_read)
+IMPORTER = Importer(about="JSON messages in topics (`pip install mcap` to write them)", read=_read_mcap)

@@ -9,7 +9,7 @@ from mutator.errors import BadTrace
 from mutator.outcomes import npz_reader
 from mutator.outcomes.trace_files import (
     MOST_COLUMNS,
-    MOST_TRACE,
+    MOST_TRACE_BYTES,
     Arrays,
     Importer,
     TraceRequest,
@@ -18,22 +18,22 @@ from mutator.outcomes.trace_files import (
 )
 
 
-def _columns(request: TraceRequest) -> Arrays:
-    data = read_bounded(request.path, MOST_TRACE)
-    members = npz_reader.members(data)
+def _read_columns(request: TraceRequest) -> Arrays:
+    data = read_bounded(request.path, MOST_TRACE_BYTES)
+    members = npz_reader.read_members(data)
     if members is not None:
-        return {name: members[name] for name in request.choose(members)}
-    if data.startswith(npz_reader.ARRAY):
+        return {name: members[name] for name in request.choose_names(members)}
+    if data.startswith(npz_reader.ARRAY_MAGIC):
         raise BadTrace("a single array", "an .npz file")
-    if data.count(npz_reader.ENTRY) > MOST_COLUMNS:
-        raise BadTrace(f"{data.count(npz_reader.ENTRY)} members", f"at most {MOST_COLUMNS}")
+    if data.count(npz_reader.ENTRY_MAGIC) > MOST_COLUMNS:
+        raise BadTrace(f"{data.count(npz_reader.ENTRY_MAGIC)} members", f"at most {MOST_COLUMNS}")
     with np.load(io.BytesIO(data), allow_pickle=False) as file:
         check_size(sum(member.file_size for member in file.zip.infolist()))
-        return {name: np.asarray(file[name]) for name in request.choose(file.files)}
+        return {name: np.asarray(file[name]) for name in request.choose_names(file.files)}
 
 
-def _read(request: TraceRequest) -> Arrays:
-    return by_channel(_columns(request), request)
+def _read_npz(request: TraceRequest) -> Arrays:
+    return by_channel(_read_columns(request), request)
 
 
-IMPORTER = Importer(about="an array for each channel (NumPy)", read=_read)
+IMPORTER = Importer(about="an array for each channel (NumPy)", read=_read_npz)

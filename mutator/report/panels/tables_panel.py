@@ -5,7 +5,7 @@ from dataclasses import replace
 from operator import itemgetter
 
 from mutator._common.table_rendering import TextTable
-from mutator.outcomes.fault_free_runs import fault_free_table, own_alerts
+from mutator.outcomes.fault_free_runs import fault_free_alerts_note, fault_free_table
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import count_table, counts_by_group, fault_types_of, hazard_names
@@ -66,7 +66,7 @@ def build_tables_panel(run: ReportedRun) -> Panel:
     page.
     """
     runs = run.fault_free()
-    note = own_alerts(runs)
+    note = fault_free_alerts_note(runs)
     own = () if run.compared else _statistics(run, None)
     counts, sheets = _counts(run), [_noted(sheet, note) for sheet in (*own, *_spreads(run))]
     parts = [notes(run.folder)]
@@ -98,7 +98,7 @@ def build_published_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of the run's statistics next to the published ones of its study; None if there are
     none.
     """
-    note = own_alerts(run.fault_free())
+    note = fault_free_alerts_note(run.fault_free())
     published = run.study.published(run) if run.study else None
     sheets = [_noted(sheet, note) for sheet in _statistics(run, published)]
     if not sheets:

@@ -18,7 +18,7 @@ from mutator.errors import MutatorError
 from mutator.execution.experiment_runner import Finished, Goldens, Runner
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
-from mutator.outcomes.golden_comparison import until
+from mutator.outcomes.golden_comparison import trace_until
 from mutator.targets.stop_code import stop_source
 from mutator.triggers import trace_formulas
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
@@ -214,7 +214,7 @@ def test_after_hazard_changes_the_ids_of_all_experiments(stopping: Fork, edit: E
 
 def test_a_trace_can_be_cut_at_a_time() -> None:
     trace = {"t": np.arange(4.0), "a": np.arange(4.0), "b": np.array([7.0, 8.0]), "b@": np.array([0.5, 2.5])}
-    cut = until(trace, 2.0, "t")
+    cut = trace_until(trace, 2.0, "t")
     assert {name: values.tolist() for name, values in cut.items()} == {
         "t": [0.0, 1.0, 2.0],
         "a": [0.0, 1.0, 2.0],

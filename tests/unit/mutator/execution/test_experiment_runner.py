@@ -180,7 +180,7 @@ def boom(
         text = '[project]\nname = "rvtraces"\nversion = "0.3"\n[project.entry-points."mutator.importers"]\n'
         (tmp_path / "pyproject.toml").write_text(f'{text}boom = "rvtraces:boom"\n')
         monkeypatch.delitem(sys.modules, "rvtraces", raising=False)
-        trace_files._importer.cache_clear()
+        trace_files._importer_for.cache_clear()
         install(tmp_path)
 
     return installed

@@ -5,8 +5,8 @@ import pytest
 
 from mutator._common.typed_json import from_json_types
 from mutator.model import Activation, Outcome, Record, Status
-from mutator.outcomes.channel_departures import departures
-from mutator.outcomes.golden_comparison import compare
+from mutator.outcomes.channel_departures import departures_from_golden
+from mutator.outcomes.golden_comparison import compare_traces
 from mutator.results.propagation_columns import PROPAGATION_COLUMNS, propagation_cells
 from mutator.targets.channels import Channel
 from mutator.targets.target_facts import ChannelFacts
@@ -24,7 +24,7 @@ def stepped(row: int, height: float = 1.0) -> np.ndarray:
 
 
 def left(golden: dict, faulty: dict, *channels: Channel, t_end: float | None = None) -> tuple:
-    return departures({"t": T, **golden}, {"t": T, **faulty}, channels, "t", t_end)
+    return departures_from_golden({"t": T, **golden}, {"t": T, **faulty}, channels, "t", t_end)
 
 
 def test_a_channel_leaves_golden_when_it_exceeds_its_tolerance() -> None:
@@ -61,10 +61,12 @@ def test_a_channel_that_was_not_recorded_is_left_out() -> None:
 
 def test_all_channels_leave_golden_where_the_shorter_run_ends() -> None:
     golden, faulty = {"t": T, "a": ZEROS}, {"t": T[:4], "a": ZEROS[:4]}
-    assert departures(golden, faulty, [channel("a")], "t", None) == (("a", T[4], 0.0),)
-    assert departures(golden, faulty, [channel("a")], "t", float(T[3])) == ()
+    assert departures_from_golden(golden, faulty, [channel("a")], "t", None) == (("a", T[4], 0.0),)
+    assert departures_from_golden(golden, faulty, [channel("a")], "t", float(T[3])) == ()
     rare = {"a": np.array([1.0]), "a@": np.array([0.1])}
-    assert departures(golden | rare, faulty | rare, [channel("a")], "t", None) == (("a", T[4], 0.0),)
+    assert departures_from_golden(golden | rare, faulty | rare, [channel("a")], "t", None) == (
+        ("a", T[4], 0.0),
+    )
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -76,7 +78,10 @@ def test_departures_agree_with_the_comparison(seed: int) -> None:
         name: np.where(random.random(6) < 0.7, golden[name], random.integers(-2, 3, 6)) for name in "abc"
     }
     faulty["t"] = T
-    found, compared = departures(golden, faulty, channels, "t", None), compare(golden, faulty, channels, "t")
+    found, compared = (
+        departures_from_golden(golden, faulty, channels, "t", None),
+        compare_traces(golden, faulty, channels, "t"),
+    )
     assert min((first for _, first, _ in found), default=None) == compared.t_first
     assert {name: largest for name, _, largest in found}.items() <= dict(compared.max_dev).items()
 

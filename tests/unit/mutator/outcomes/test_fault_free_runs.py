@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.outcomes.fault_free_runs import fault_free_table, load_fault_free_runs, own_alerts
+from mutator.outcomes.fault_free_runs import fault_free_alerts_note, fault_free_table, load_fault_free_runs
 from mutator.store.run_folder import RunFolder
 from mutator.targets.channels import Channel
 from mutator.targets.criteria import Hazard
@@ -53,7 +53,7 @@ def test_the_table_has_first_times_of_events_and_ranges_of_channels(tmp_path: Pa
         MANIFEST,
     )
     assert [(run.scenario, run.changes) for run in runs] == [("A", ("rain",)), ("B", ())]
-    assert runs[1].ranges == (("v", -1.0, 2.0),)
+    assert runs[1].channel_ranges == (("v", -1.0, 2.0),)
     table = fault_free_table(runs)
     assert list(table.heads) == ["fault-free run", "alerts", "hazards", "v"]
     assert list(table.rows[0]) == ["A+rain", "none", "none", "-1 to 2"]
@@ -66,8 +66,8 @@ def test_the_sentence_names_each_alert_once_with_its_scenarios(tmp_path: Path) -
     runs = load_fault_free_runs(
         folder(tmp_path, {("A", ""): fcw, ("A", "rain"): fcw, ("B", ""): fcw, ("C", ""): late}), MANIFEST
     )
-    assert own_alerts(runs).endswith("fault-free runs raise fcw in A, B; late in C.")
-    assert own_alerts(()) == ""
+    assert fault_free_alerts_note(runs).endswith("fault-free runs raise fcw in A, B; late in C.")
+    assert fault_free_alerts_note(()) == ""
 
 
 def test_a_missing_golden_run_is_an_error(tmp_path: Path) -> None:

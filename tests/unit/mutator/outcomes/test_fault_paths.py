@@ -117,7 +117,7 @@ def record(outcome: Outcome | None, **left: float) -> Record:
 def path(
     *modules: str, outcome: Outcome = Outcome.SDC, fault_paths: FaultPaths = WAYS, **left: float
 ) -> FaultPath:
-    found = fault_paths.path(experiment(*modules), record(outcome, **left))
+    found = fault_paths.fault_path(experiment(*modules), record(outcome, **left))
     assert found is not None
     return found
 
@@ -134,10 +134,10 @@ def test_an_estimator_that_did_not_change_stopped_the_fault() -> None:
     found = path("eyes", outcome=Outcome.MASKED)
     assert [*states(found).items()] == [
         ("eyes", ComponentState.INJECTED),
-        ("finder", ComponentState.HELD),
-        ("speed", ComponentState.HELD),
-        ("pedals", ComponentState.HELD),
-        ("car", ComponentState.HELD),
+        ("finder", ComponentState.UNCHANGED),
+        ("speed", ComponentState.UNCHANGED),
+        ("pedals", ComponentState.UNCHANGED),
+        ("car", ComponentState.UNCHANGED),
     ]
     assert (found.reached, found.stopped_at) == ("", ("finder",))
     assert link_states(found) == {
@@ -246,7 +246,7 @@ def test_a_component_with_a_single_input_is_reached_even_after_the_car() -> None
 def test_components_without_channels_are_unobserved() -> None:
     fault_paths = FaultPaths([channel for channel in CHANNELS if channel.name != "seen"], STRUCTURE)
     found = path("eyes", fault_paths=fault_paths, wanted=1.2, gas=1.2, place=1.3)
-    assert states(found)["finder"] is ComponentState.UNSEEN
+    assert states(found)["finder"] is ComponentState.UNRECORDED
     assert link_states(found)["picture"] is LinkState.UNKNOWN
     assert link_states(found)["lead"] is LinkState.THROUGH
     held = path("eyes", fault_paths=fault_paths, outcome=Outcome.MASKED)
@@ -260,12 +260,12 @@ def test_two_controllers_can_stop_one_fault() -> None:
 
 @pytest.mark.parametrize("outcome", [Outcome.NOT_ACTIVATED, None])
 def test_an_inactive_fault_or_a_failed_run_has_no_path(outcome: Outcome | None) -> None:
-    assert WAYS.path(experiment("eyes"), record(outcome)) is None
+    assert WAYS.fault_path(experiment("eyes"), record(outcome)) is None
 
 
 def test_a_fault_outside_all_components_has_no_path() -> None:
     """The start of the path is unknown."""
-    assert WAYS.path(experiment("other"), record(Outcome.SDC, gas=1.0)) is None
+    assert WAYS.fault_path(experiment("other"), record(Outcome.SDC, gas=1.0)) is None
 
 
 def test_without_a_structure_components_are_ordered_by_role() -> None:

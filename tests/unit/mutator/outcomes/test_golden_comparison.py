@@ -13,12 +13,12 @@ import pytest
 
 from mutator.errors import BadOutput, Shortage
 from mutator.outcomes.golden_comparison import (
-    alerts_of,
-    compare,
-    load_record,
+    alert_times,
+    compare_traces,
+    load_target_record,
     load_trace,
-    sharing_times,
     trace_digest,
+    with_golden_times,
 )
 from mutator.outcomes.importers import npz
 from mutator.store.run_folder import GoldenRun
@@ -44,26 +44,26 @@ def trace(**channels: list[float]) -> dict[str, np.ndarray]:
 
 def test_equal_traces_do_not_differ() -> None:
     same = trace(gas=[0.0, -0.0, np.nan, np.inf, -np.inf])
-    difference = compare(same, trace(gas=[-0.0, 0.0, np.nan, np.inf, -np.inf]), [GAS], "t")
+    difference = compare_traces(same, trace(gas=[-0.0, 0.0, np.nan, np.inf, -np.inf]), [GAS], "t")
     assert difference.t_first is None
     assert difference.max_dev == (("gas", 0.0),)
 
 
 def test_steps_after_the_end_of_the_drive_affect_only_max_dev() -> None:
     golden, faulty = trace(gas=[0, 0, 0, 0, 0]), trace(gas=[0, 2, 1, 9, 0])
-    found = compare(golden, faulty, [GAS], "t", t_end=0.2)
+    found = compare_traces(golden, faulty, [GAS], "t", t_end=0.2)
     assert (found.max_dev, found.dev) == ((("gas", 9.0),), (("gas", 2.0),))
-    assert compare(golden, faulty, [GAS], "t").dev == found.max_dev
+    assert compare_traces(golden, faulty, [GAS], "t").dev == found.max_dev
 
 
 def test_a_channel_is_compared_at_its_own_times() -> None:
     own, times = np.array([0.0, 0.2]), T + 0.01
     golden = {"t": T, "gas": np.array([1.0, 2.0]), "gas@": own}
     faulty = {**golden, "t": times}
-    assert compare(golden, faulty, [GAS], "t").t_first is None
-    assert compare(golden, {**faulty, "t": times[:3]}, [GAS], "t").t_first == T[3]
+    assert compare_traces(golden, faulty, [GAS], "t").t_first is None
+    assert compare_traces(golden, {**faulty, "t": times[:3]}, [GAS], "t").t_first == T[3]
     later = {**golden, "gas@": own + 0.05}
-    assert compare(golden, later, [GAS], "t").t_first == 0.0
+    assert compare_traces(golden, later, [GAS], "t").t_first == 0.0
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_a_value_at_another_time_is_a_difference(
     pedal = Channel(name="pedal", unit="-", role=Role.ACTUATOR, time="t_pedal")
     values = np.array([2.0, 9.0, 5.0])
     golden = {"t": np.arange(6.0), "pedal": values, "pedal@": np.array([0.0, 1.0, 2.0])}
-    found = compare(golden, golden | {"pedal@": np.array(later)}, [pedal], "t")
+    found = compare_traces(golden, golden | {"pedal@": np.array(later)}, [pedal], "t")
     assert found.t_first == first
     assert dict(found.max_dev) == {"pedal": largest}
 
@@ -89,28 +89,28 @@ def test_a_value_at_another_time_is_a_difference(
 def test_shared_times_do_not_change_a_comparison(times: np.ndarray) -> None:
     golden = trace(gas=[1, 2, 3, 4, 5])
     faulty = {"t": times.copy(), "gas": np.array([1, 2, 3.5, 4, np.nan])[: len(times)]}
-    shared = sharing_times(golden, faulty, "t")
+    shared = with_golden_times(golden, faulty, "t")
     assert (shared["t"] is golden["t"]) == (times is T)
-    assert compare(golden, shared, [GAS], "t") == compare(golden, faulty, [GAS], "t")
+    assert compare_traces(golden, shared, [GAS], "t") == compare_traces(golden, faulty, [GAS], "t")
 
 
 def test_the_first_and_the_largest_difference_are_found() -> None:
     golden = trace(gas=[0, 0, 0, 0, 0], brake=[1, 1, 1, 1, 1])
     faulty = trace(gas=[0, 0, 0, 0.5, -2], brake=[1, 1, 1.25, 1, 1])
-    difference = compare(golden, faulty, [GAS, BRAKE], "t")
+    difference = compare_traces(golden, faulty, [GAS, BRAKE], "t")
     assert difference.t_first == T[2]
     assert difference.max_dev == (("gas", 2.0), ("brake", 0.25))
 
 
 @pytest.mark.parametrize(("step", "first"), [(1e-12, T[3]), (0.5, T[3])])
 def test_without_a_tolerance_any_difference_is_a_manifestation(step: float, first: float) -> None:
-    difference = compare(trace(gas=[1, 1, 1, 1, 1]), trace(gas=[1, 1, 1, 1 + step, 1]), [GAS], "t")
+    difference = compare_traces(trace(gas=[1, 1, 1, 1, 1]), trace(gas=[1, 1, 1, 1 + step, 1]), [GAS], "t")
     assert difference.t_first == first
 
 
 def test_a_difference_within_its_tolerance_is_not_a_manifestation() -> None:
     channel = Channel(name="gas", unit="-", tolerance=0.1)
-    difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, 1.05, 1]), [channel], "t")
+    difference = compare_traces(trace(gas=[1, 1, 1]), trace(gas=[1, 1.05, 1]), [channel], "t")
     assert difference.t_first is None
     assert difference.max_dev[0][1] == pytest.approx(0.05)
 
@@ -118,21 +118,21 @@ def test_a_difference_within_its_tolerance_is_not_a_manifestation() -> None:
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_non_finite_value_is_an_infinite_difference(value: float) -> None:
     channel = Channel(name="gas", unit="-", tolerance=100.0)
-    difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, value, 1]), [channel], "t")
+    difference = compare_traces(trace(gas=[1, 1, 1]), trace(gas=[1, value, 1]), [channel], "t")
     assert difference.t_first == T[1]
     assert difference.max_dev == (("gas", np.inf),)
 
 
 @pytest.mark.parametrize(("golden", "faulty"), [(3, 5), (5, 3)])
 def test_runs_of_different_lengths_differ_where_one_ends(golden: int, faulty: int) -> None:
-    difference = compare(trace(gas=[0] * golden), trace(gas=[0] * faulty), [GAS], "t")
+    difference = compare_traces(trace(gas=[0] * golden), trace(gas=[0] * faulty), [GAS], "t")
     assert difference.t_first == T[3]
 
 
 def test_boolean_channels_are_compared() -> None:
     golden = {"t": T[:2], "gas": np.array([True, False])}
     faulty = {"t": T[:2], "gas": np.array([True, True])}
-    assert compare(golden, faulty, [GAS], "t").t_first == T[1]
+    assert compare_traces(golden, faulty, [GAS], "t").t_first == T[1]
 
 
 def test_the_key_of_a_golden_run_names_its_scenario_and_changes() -> None:
@@ -181,7 +181,7 @@ def test_an_unusual_file_is_a_bad_output(tmp_path: Path) -> None:
     path.unlink()
     os.mkfifo(path)
     os.mkfifo(tmp_path / "record.json")
-    for load in (load_trace, load_record):
+    for load in (load_trace, load_target_record):
         with pytest.raises(BadOutput, match="No such device"):
             load(MANIFEST, tmp_path)
 
@@ -193,10 +193,10 @@ def test_a_record_is_read_with_its_alerts(tmp_path: Path) -> None:
         "alert_events": [{"name": "fcw", "t": 1.0}, {"name": "chime", "t": 1.5}, {"name": "fcw", "t": 2.0}],
     }
     (tmp_path / "record.json").write_text(json.dumps(said))
-    record = load_record(MANIFEST, tmp_path)
+    record = load_target_record(MANIFEST, tmp_path)
     assert record == said
-    assert alerts_of(record, ["fcw"]) == [("fcw", 1.0), ("fcw", 2.0)]
-    assert alerts_of(record | {"alert_events": []}, ["fcw"]) == [("fcw", 1.0)]
+    assert alert_times(record, ["fcw"]) == [("fcw", 1.0), ("fcw", 2.0)]
+    assert alert_times(record | {"alert_events": []}, ["fcw"]) == [("fcw", 1.0)]
 
 
 @pytest.mark.parametrize(
@@ -212,7 +212,7 @@ def test_a_record_is_read_with_its_alerts(tmp_path: Path) -> None:
 def test_an_incomplete_record_is_a_bad_output(tmp_path: Path, text: str) -> None:
     (tmp_path / "record.json").write_text(text)
     with pytest.raises(BadOutput):
-        load_record(MANIFEST, tmp_path)
+        load_target_record(MANIFEST, tmp_path)
 
 
 def test_a_lack_of_file_handles_is_not_blamed_on_the_run(
@@ -229,6 +229,6 @@ def test_a_lack_of_file_handles_is_not_blamed_on_the_run(
 def test_a_pipe_is_a_bad_output(tmp_path: Path) -> None:
     for name in (MANIFEST.trace_file, MANIFEST.record_file):
         os.mkfifo(tmp_path / name)
-    for read in (load_trace, load_record, trace_digest):
+    for read in (load_trace, load_target_record, trace_digest):
         with pytest.raises(BadOutput):
             read(MANIFEST, tmp_path)

@@ -11,7 +11,7 @@ import pytest
 
 from mutator.errors import BadOutput, MutatorError
 from mutator.outcomes.golden_comparison import Trace
-from mutator.outcomes.hazards_and_metrics import Judged, judge_run, load_judged
+from mutator.outcomes.hazards_and_metrics import RunJudgement, judge_run, load_judged_run
 from mutator.targets.manifest import TargetManifest
 
 from .cart import GAP, SPEED, T, write_manifest
@@ -24,7 +24,7 @@ def write(tmp_path: Path) -> Write:
     return partial(write_manifest, tmp_path)
 
 
-def judged(manifest: TargetManifest, golden_run: Trace | None = None, **channels: Any) -> Judged:
+def judged(manifest: TargetManifest, golden_run: Trace | None = None, **channels: Any) -> RunJudgement:
     trace = {"time": T, "gap": GAP, "speed": SPEED, "force": SPEED} | channels
     return judge_run(manifest, trace, {"hazards": {}}, golden_run)
 
@@ -182,7 +182,7 @@ def test_a_run_without_a_channel_that_a_metric_reads_of_the_golden_run_is_refuse
     manifest = write("hazards: {}\nmetrics: {it: {max: golden.gap, unit: m, worse: lower, about: x}}\n")
     np.savez(tmp_path / "trace.npz", time=T, force=SPEED)
     with pytest.raises(BadOutput, match="no channel 'gap'"):
-        load_judged(manifest, tmp_path)
+        load_judged_run(manifest, tmp_path)
 
 
 def test_other_steps_are_compared_with_the_newest_golden_value(write: Write) -> None:

@@ -61,7 +61,7 @@ def read(path: Path, *records: bytes, **other: str) -> dict[str, list[float]]:
     path.write_bytes(complete(*records, **other))
     channel = Channel(name="gap", unit="m", source="/cart:gap")
     try:
-        found = mcap.IMPORTER.read(TraceRequest(path=path, time="/cart", channels=[channel]))
+        found = mcap.IMPORTER.read(TraceRequest(path=path, time_channel="/cart", channels=[channel]))
     except (ValueError, MemoryError, EOFError) as error:
         raise MutatorError(str(error)) from None
     return {name: values.tolist() for name, values in found.items()}
@@ -122,4 +122,4 @@ def test_other_encodings_are_refused(tmp_path: Path) -> None:
 def test_only_complete_files_are_read(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").write_bytes(complete(message(0.0))[:-1])
     with pytest.raises(ValueError, match="no end"):
-        mcap.IMPORTER.read(TraceRequest(path=tmp_path / "a.mcap", time="/cart", channels=[]))
+        mcap.IMPORTER.read(TraceRequest(path=tmp_path / "a.mcap", time_channel="/cart", channels=[]))

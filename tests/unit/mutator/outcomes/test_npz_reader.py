@@ -24,7 +24,7 @@ def written(save=np.savez, **arrays: np.ndarray) -> bytes:
 
 
 def test_the_fast_reader_returns_the_same_arrays_as_numpy() -> None:
-    found = npz_reader.members(written(**ARRAYS))
+    found = npz_reader.read_members(written(**ARRAYS))
     assert found is not None
     assert list(found) == list(ARRAYS)
     for name, array in ARRAYS.items():
@@ -44,7 +44,7 @@ def test_the_fast_reader_returns_the_same_arrays_as_numpy() -> None:
     ],
 )
 def test_unusual_files_are_left_to_numpy(data: bytes) -> None:
-    assert npz_reader.members(data) is None
+    assert npz_reader.read_members(data) is None
 
 
 def headed(header: bytes) -> bytes:
@@ -64,7 +64,7 @@ def headed(header: bytes) -> bytes:
 def test_any_header_is_read_as_numpy_reads_it(shape: str) -> None:
     """A mutant can write an invalid header with a valid checksum."""
     data = headed(b"{'descr': '<f8', 'fortran_order': False, 'shape': " + shape.encode() + b"}")
-    found = npz_reader.members(data)
+    found = npz_reader.read_members(data)
     if shape == "(3,)":
         assert found is not None
     if found is not None:
@@ -74,9 +74,9 @@ def test_any_header_is_read_as_numpy_reads_it(shape: str) -> None:
 def test_a_flipped_bit_never_changes_the_arrays() -> None:
     data = written(t=np.arange(3.0), x=np.arange(3, dtype=np.int32))
     for place in range(len(data)):
-        found = npz_reader.members(data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :])
+        found = npz_reader.read_members(data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :])
         if found is not None and list(found) == ["t", "x"]:
             assert np.array_equal(found["t"], np.arange(3.0))
             assert np.array_equal(found["x"], np.arange(3))
     for end in range(len(data)):
-        assert npz_reader.members(data[:end]) is None
+        assert npz_reader.read_members(data[:end]) is None

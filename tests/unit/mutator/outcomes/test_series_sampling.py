@@ -10,9 +10,9 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Record
-from mutator.outcomes.channel_departures import departures
-from mutator.outcomes.golden_comparison import Trace, compare
-from mutator.outcomes.series_sampling import Sampler, keep_series
+from mutator.outcomes.channel_departures import departures_from_golden
+from mutator.outcomes.golden_comparison import Trace, compare_traces
+from mutator.outcomes.series_sampling import SeriesSampler, write_sampled_series
 from mutator.store.series_folder import SeriesFolder, write_kept_series
 from mutator.store.series_format import Series, decode_series, encode_series
 from mutator.targets.channels import Role
@@ -38,15 +38,15 @@ def trace(time: np.ndarray = T, **channels: np.ndarray) -> Trace:
     return {"time": time, **{name: np.zeros(len(time)) for name in names}, **channels}
 
 
-def stored(sampler: Sampler, faulty: Trace, record: Record) -> tuple[Series, Series]:
-    golden = decode_series(sampler.encoded)
-    return golden, decode_series(encode_series(sampler.series(faulty, record), sampler.golden), golden)
+def stored(sampler: SeriesSampler, faulty: Trace, record: Record) -> tuple[Series, Series]:
+    golden = decode_series(sampler.encoded_golden)
+    return golden, decode_series(encode_series(sampler.faulty_series(faulty, record), sampler.golden), golden)
 
 
 def test_a_channel_has_twenty_values_per_second_and_its_last_value(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    one = Sampler(manifest, trace(speed=np.sin(T)))
+    one = SeriesSampler(manifest, trace(speed=np.sin(T)))
     golden, faulty = stored(one, trace(speed=np.cos(T)), record())
     assert golden.t.tolist() == [*T[::5], 4.99]
     assert faulty.t.tolist() == golden.t.tolist()
@@ -59,7 +59,7 @@ def test_internal_channels_have_ten_values_per_second(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
     inside = [replace(c, role=Role.INTERNAL) if c.name == "speed" else c for c in manifest.channels]
-    one = Sampler(replace(manifest, channels=tuple(inside)), trace(speed=np.sin(T)))
+    one = SeriesSampler(replace(manifest, channels=tuple(inside)), trace(speed=np.sin(T)))
     speed = np.sin(T)
     speed[5] = 3.0
     golden, faulty = stored(one, trace(speed=speed), record())
@@ -73,7 +73,7 @@ def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: C
     run, are stored as points."""
     gas = np.zeros(500)
     gas[[202, 303, 304, 404]] = 0.1, -7.0, 2.0, 9.0
-    one = Sampler(manifest, trace())
+    one = SeriesSampler(manifest, trace())
     points = stored(one, trace(gas=gas), record(t_end=3.5))[1].points
     assert points.t.tolist() == [2.02, 3.03, 4.04]
     assert points.faulty.tolist() == rounded([0.1, -7.0, 9.0])
@@ -86,7 +86,7 @@ def test_infinite_huge_and_missing_values_survive_rounding(
 ) -> None:
     speed = np.zeros(500)
     speed[:25:5] = np.inf, -np.inf, np.nan, 3.4e38, 1e300
-    faulty = stored(Sampler(manifest, trace()), trace(speed=speed), record())[1]
+    faulty = stored(SeriesSampler(manifest, trace()), trace(speed=speed), record())[1]
     first = faulty.channel_values[SPEED][:5]
     assert first[[0, 1, 4]].tolist() == [np.inf, -np.inf, np.inf] and np.isnan(first[2])
     assert first[3] == pytest.approx(3.4e38)
@@ -94,7 +94,7 @@ def test_infinite_huge_and_missing_values_survive_rounding(
 
 def test_all_channels_are_stored_at_a_hazard(manifest: TargetManifest, record: Callable[..., Record]) -> None:
     speed, gap = np.where(T < 2.0, T, 2 * T), 9.0 - T
-    one = Sampler(manifest, trace(speed=T, gap=gap))
+    one = SeriesSampler(manifest, trace(speed=T, gap=gap))
     hazards = (("H1", 2.52), ("H3", 3.0), ("H2", 7.0))  # there is already a sample at 3.00 s
     points = stored(one, trace(speed=speed, gap=gap), record(hazards=hazards))[1].points
     there = points.t == 2.52
@@ -108,7 +108,7 @@ def test_a_run_that_ends_early_keeps_its_last_step(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
     """The last step can be an impact."""
-    one = Sampler(manifest, trace(speed=T))
+    one = SeriesSampler(manifest, trace(speed=T))
     faulty = stored(one, trace(T[:303], speed=T[:303] ** 2), record())[1]
     assert faulty.t[-1] == 3.0
     assert faulty.facts["end"] == 4.99
@@ -116,7 +116,7 @@ def test_a_run_that_ends_early_keeps_its_last_step(
 
 
 def test_a_run_without_a_step_has_no_values(manifest: TargetManifest, record: Callable[..., Record]) -> None:
-    faulty = stored(Sampler(manifest, trace()), trace(np.zeros(0)), record())[1]
+    faulty = stored(SeriesSampler(manifest, trace()), trace(np.zeros(0)), record())[1]
     assert (len(faulty.t), len(faulty.points.t)) == (0, 0)
 
 
@@ -124,7 +124,7 @@ def test_a_run_that_lasts_longer_has_more_times(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
     time = np.arange(700) / 100
-    faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
+    faulty = stored(SeriesSampler(manifest, trace()), trace(time, speed=time), record())[1]
     assert faulty.t[-1] == 6.99
     assert np.diff(faulty.t).max() < 0.06
     assert faulty.channel_values[SPEED].tolist() == rounded(faulty.t)
@@ -132,7 +132,7 @@ def test_a_run_that_lasts_longer_has_more_times(
 
 def test_both_runs_share_one_time_axis(manifest: TargetManifest, record: Callable[..., Record]) -> None:
     time = np.arange(0.0, 5.0, 0.03)
-    faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
+    faulty = stored(SeriesSampler(manifest, trace()), trace(time, speed=time), record())[1]
     place = np.searchsorted(time, faulty.t + 1e-9, side="right") - 1
     assert faulty.channel_values[SPEED].tolist() == rounded(time[place])
 
@@ -141,7 +141,7 @@ def test_a_channel_with_its_own_times_keeps_its_newest_value(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
     own = {"gap": np.array([1.0, 2.0]), "gap@": np.array([1.0, 3.0])}
-    golden = stored(Sampler(manifest, {**trace(), **own}), {**trace(), **own}, record())[0]
+    golden = stored(SeriesSampler(manifest, {**trace(), **own}), {**trace(), **own}, record())[0]
     gap = dict(zip(golden.times_of(3).tolist(), golden.channel_values[3], strict=True))
     assert np.isnan(gap[0.95])
     assert (gap[1.0], gap[2.95], gap[3.0]) == (1.0, 1.0, 2.0)
@@ -149,8 +149,8 @@ def test_a_channel_with_its_own_times_keeps_its_newest_value(
 
 def recorded(manifest: TargetManifest, golden: Trace, faulty: Trace, one: Record) -> Record:
     """The record with the deviations of two traces."""
-    difference = compare(golden, faulty, manifest.compared, "time")
-    left = departures(golden, faulty, manifest.channels, "time", one.t_end)
+    difference = compare_traces(golden, faulty, manifest.compared, "time")
+    left = departures_from_golden(golden, faulty, manifest.channels, "time", one.t_end)
     return replace(one, max_dev=difference.max_dev, left=left)
 
 
@@ -177,7 +177,7 @@ def test_the_curves_of_every_run_match_its_record(
     tmp_path: Path, manifest: TargetManifest, record: Callable[..., Record], name: str
 ) -> None:
     one = recorded(manifest, *PAIRS[name], record())
-    keep_series(tmp_path, manifest, *PAIRS[name], one)
+    write_sampled_series(tmp_path, manifest, *PAIRS[name], one)
     assert SeriesFolder(tmp_path).load_series(one.experiment_id, one) is not None
 
 
@@ -188,7 +188,7 @@ def test_curves_that_deviate_otherwise_than_the_record_says_are_refused(
     """A forger can write the record's digest into any series."""
     pair = trace(gas=T), trace(gas=T**2)
     one = recorded(manifest, *pair, record())
-    golden, faulty = stored(Sampler(manifest, pair[0]), pair[1], one)
+    golden, faulty = stored(SeriesSampler(manifest, pair[0]), pair[1], one)
     channels = golden.facts["channels"]
     curves = {
         "golden": replace(golden, facts=faulty.facts),
@@ -215,10 +215,10 @@ def test_a_series_is_read_back_from_its_file(
     tmp_path: Path, manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
     one = recorded(manifest, trace(), trace(speed=T), record(alerts=(("brake_hard", 2.5),)))
-    keep_series(tmp_path, manifest, trace(), trace(speed=T), one)
+    write_sampled_series(tmp_path, manifest, trace(), trace(speed=T), one)
     path = SeriesFolder(tmp_path).kept_path(one.experiment_id)
     before = path.read_bytes()
-    keep_series(tmp_path, manifest, trace(), trace(speed=T), one)
+    write_sampled_series(tmp_path, manifest, trace(), trace(speed=T), one)
     assert path.read_bytes() == before
     found = SeriesFolder(tmp_path).load_series(one.experiment_id, one)
     assert found is not None

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mutator.outcomes.hazards_and_metrics import Judged, judge_run
+from mutator.outcomes.hazards_and_metrics import RunJudgement, judge_run
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -17,7 +17,7 @@ def manifest() -> TargetManifest:
     return Workspace.find(root=Path(__file__).parents[4]).manifest("openpilot")
 
 
-def driven(manifest: TargetManifest, gaps: list[float], offsets: list[float]) -> Judged:
+def driven(manifest: TargetManifest, gaps: list[float], offsets: list[float]) -> RunJudgement:
     """Judge a drive at 10 m/s behind a vehicle at 8 m/s, in steps of one second."""
     trace = {channel.name: np.zeros(len(gaps)) for channel in manifest.judged}
     trace |= {"t": np.arange(len(gaps), dtype=float), "d_rel": np.array(gaps), "hwt": np.array(gaps) / 10}

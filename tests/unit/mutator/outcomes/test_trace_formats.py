@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.outcomes.golden_comparison import load_record, load_trace
-from mutator.outcomes.hazards_and_metrics import load_judged
+from mutator.outcomes.golden_comparison import load_target_record, load_trace
+from mutator.outcomes.hazards_and_metrics import load_judged_run
 from mutator.targets.manifest_files import load_manifest
 
 from .cart import GAP, HEAD, SPEED, T, write_manifest
@@ -44,12 +44,12 @@ def test_every_trace_format_gives_the_same_result(tmp_path: Path, kind: str) -> 
         frame = pd.DataFrame({"time": T, "gap": GAP, "force": SPEED})
         frame = frame.join(pd.DataFrame({"t_seen": t_seen, "seen": seen}))
         frame.to_csv(path, index=False) if kind == "csv" else frame.to_parquet(path)
-    _, found = load_judged(manifest, tmp_path)
+    _, found = load_judged_run(manifest, tmp_path)
     assert found.hazards == (("HIT", 3.0), ("SEEN", 4.0))
     trace = load_trace(manifest, tmp_path, manifest.channels)
     assert trace["gap"].tolist() == GAP.tolist()
     assert trace["seen@"].tolist() == t_seen.tolist()
-    assert load_record(manifest, tmp_path) == {"hazards": {}, "alerts": []}
+    assert load_target_record(manifest, tmp_path) == {"hazards": {}, "alerts": []}
 
 
 def test_a_channel_can_be_faster_than_the_steps(tmp_path: Path) -> None:
@@ -61,7 +61,7 @@ def test_a_channel_can_be_faster_than_the_steps(tmp_path: Path) -> None:
     rows = ["time,gap,force,t_heat,heat", "0,3,1,0,1", ",,,0.5,2", "1,2,1,1,3", ",,,1.5,9", "2,1,1,2,9"]
     (tmp_path / "trace.csv").write_text("\n".join(rows) + "\n")
     manifest = load_manifest(tmp_path / "cart.yaml")
-    assert load_judged(manifest, tmp_path)[1].hazards == (("HOT", 2.0),)
+    assert load_judged_run(manifest, tmp_path)[1].hazards == (("HOT", 2.0),)
     assert load_trace(manifest, tmp_path, manifest.channels)["gap"].tolist() == [3.0, 2.0, 1.0]
 
 

@@ -5,7 +5,7 @@ from itertools import product
 import pytest
 
 from mutator.model import Activation, Outcome
-from mutator.outcomes.verdict_rules import first_events, judge, reaction_time
+from mutator.outcomes.verdict_rules import first_events_after, outcome_of, reaction_time
 
 ACTIVE = Activation(first=2.0, last=4.0, count=3)
 
@@ -25,7 +25,7 @@ TRUTH = {
 @pytest.mark.parametrize("case", list(product((False, True), repeat=3)), ids=str)
 def test_the_outcome_follows_the_truth_table(case: tuple[bool, bool, bool]) -> None:
     activated, manifested, hazard = case
-    outcome = judge(
+    outcome = outcome_of(
         activation=ACTIVE if activated else None,
         t_manifest=2.5 if manifested else None,
         hazards=(("H1", 3.0),) if hazard else (),
@@ -37,16 +37,16 @@ def test_the_outcome_follows_the_truth_table(case: tuple[bool, bool, bool]) -> N
     ("time", "counts"), [(0.0, False), (1.99, False), (2.0, True), (2.01, True), (9.0, True)]
 )
 def test_events_before_the_activation_are_ignored(time: float, counts: bool) -> None:
-    assert first_events([("H1", time)], ACTIVE) == ((("H1", time),) if counts else ())
+    assert first_events_after([("H1", time)], ACTIVE) == ((("H1", time),) if counts else ())
 
 
 def test_without_an_activated_fault_there_are_no_events() -> None:
-    assert first_events([("H1", 3.0), ("fcw", 0.0)], None) == ()
+    assert first_events_after([("H1", 3.0), ("fcw", 0.0)], None) == ()
 
 
 def test_the_first_event_of_each_name_is_kept() -> None:
     events = [("fcw", 1.0), ("b", 5.0), ("fcw", 4.0), ("fcw", 3.0), ("a", 5.0)]
-    assert first_events(events, ACTIVE) == (("fcw", 3.0), ("a", 5.0), ("b", 5.0))
+    assert first_events_after(events, ACTIVE) == (("fcw", 3.0), ("a", 5.0), ("b", 5.0))
 
 
 HAZARDS = (("H3", 5.0), ("H1", 7.0))

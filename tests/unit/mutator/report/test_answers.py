@@ -161,7 +161,9 @@ def untimed_path(by: str = "", stopped_at: tuple[str, ...] = ()) -> UntimedPath:
     """Return the path of a fault that reached its first actuator through the link `by`, or was stopped at
     these components."""
     entered = PathLink(name=by, tail=by, tip="pedals", state=LinkState.THROUGH) if by else None
-    return UntimedPath(states={}, late={}, links=(), reached="", stopped_at=stopped_at, entered=entered)
+    return UntimedPath(
+        state_by_component={}, late_ranks={}, links=(), reached="", stopped_at=stopped_at, entry_link=entered
+    )
 
 
 def test_the_component_that_let_most_faults_through_is_named() -> None:

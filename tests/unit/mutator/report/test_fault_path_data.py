@@ -34,8 +34,8 @@ def path(*states: ComponentState, stopped_at: tuple[str, ...] = ()) -> FaultPath
     )
     through = {
         ComponentState.REACHED: LinkState.THROUGH,
-        ComponentState.HELD: LinkState.STOPPED,
-        ComponentState.UNSEEN: LinkState.UNKNOWN,
+        ComponentState.UNCHANGED: LinkState.STOPPED,
+        ComponentState.UNRECORDED: LinkState.UNKNOWN,
     }
     links = tuple(
         PathLink(name=f"{tail}-{tip}", tail=tail, tip=tip, state=through[state])
@@ -47,7 +47,7 @@ def path(*states: ComponentState, stopped_at: tuple[str, ...] = ()) -> FaultPath
 def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Record]) -> None:
     far, held = (
         path(*[ComponentState.REACHED] * 3),
-        path(ComponentState.REACHED, ComponentState.HELD, ComponentState.HELD),
+        path(ComponentState.REACHED, ComponentState.UNCHANGED, ComponentState.UNCHANGED),
     )
     records = {
         "a": record("a", left=(("seen", 1.23456, 0.123456), ("gap", 2.0, inf))),
@@ -66,10 +66,12 @@ def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Recor
 def test_the_page_filters_by_the_links_that_a_fault_got_through() -> None:
     far, held = (
         path(*[ComponentState.REACHED] * 3),
-        path(ComponentState.REACHED, ComponentState.HELD, ComponentState.HELD),
+        path(ComponentState.REACHED, ComponentState.UNCHANGED, ComponentState.UNCHANGED),
     )
     untimed_paths = [
-        UntimedPath(states={}, late={}, links=one.links, reached="", stopped_at=(), entered=None)
+        UntimedPath(
+            state_by_component={}, late_ranks={}, links=one.links, reached="", stopped_at=(), entry_link=None
+        )
         for one in (held, far)
     ]
     found = RunPaths(
@@ -87,10 +89,15 @@ def test_faults_are_counted_by_link_and_component() -> None:
     counts = PathCounts()
     counts.add(path(ComponentState.INJECTED, ComponentState.REACHED, ComponentState.REACHED))
     counts.add(
-        path(ComponentState.INJECTED, ComponentState.HELD, ComponentState.HELD, stopped_at=("pedals",))
+        path(
+            ComponentState.INJECTED,
+            ComponentState.UNCHANGED,
+            ComponentState.UNCHANGED,
+            stopped_at=("pedals",),
+        )
     )
-    counts.add(path(ComponentState.INJECTED, ComponentState.UNSEEN, ComponentState.REACHED))
-    counts.add(path(ComponentState.INJECTED, ComponentState.REACHED, ComponentState.HELD))
+    counts.add(path(ComponentState.INJECTED, ComponentState.UNRECORDED, ComponentState.REACHED))
+    counts.add(path(ComponentState.INJECTED, ComponentState.REACHED, ComponentState.UNCHANGED))
     assert counts.active == 4
     assert counts.through == {"eyes-pedals": 2, "pedals-car": 2}
     assert counts.came == {"eyes-pedals": 3, "pedals-car": 4}

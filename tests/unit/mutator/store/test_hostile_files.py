@@ -109,7 +109,7 @@ def test_a_trace_that_unpacks_to_too_much_is_refused(tmp_path: Path, size: int, 
 
     def read() -> None:
         path = tmp_path / "trace.npz"
-        request = TraceRequest(path=path, time="t", channels=(), everything=True)
+        request = TraceRequest(path=path, time_channel="t", channels=(), everything=True)
         try:
             npz.IMPORTER.read(request)
         except (ValueError, MemoryError) as error:  # as `load_trace`
