@@ -106,7 +106,7 @@ def _print_version(is_requested: bool) -> None:
 
 
 @app.callback()
-def store_place(
+def store_workspace_options(
     ctx: typer.Context,
     root: Root = None,
     library: Library = None,
@@ -253,7 +253,7 @@ def _warnings_in_one_line() -> Iterator[None]:
         def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
             if issubclass(category, MutatorWarning):
                 progress_events.report_warning(str(message))
-                Terminal().note(f"warning: {message}")
+                Terminal().print_note(f"warning: {message}")
             else:
                 show_other_warning(message, category, *place, **more)
 

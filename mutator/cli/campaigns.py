@@ -257,7 +257,7 @@ def run(
 
 def _take_stills(terminal: Terminal, run: "Run", notify: "Notify", workers: int) -> None:
     if problem := run.take_stills(notify, workers=workers):
-        terminal.note(f"no stills of {problem}")
+        terminal.print_note(f"no stills of {problem}")
 
 
 def _write_report(out: Path, run: "Run", notify: "Notify") -> "WrittenReport | None":

@@ -15,7 +15,7 @@ from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 if TYPE_CHECKING:
     from mutator.comparison.run_comparison import Comparison, GateFinding
 
-MOST_LISTED = 20  # experiments listed in the terminal; the written comparison lists all of them
+MOST_LISTED_FINDINGS = 20  # experiments listed in the terminal; the written comparison lists all of them
 GATES_HELP = (
     "new-hazard, other-hazard, higher-severity, earlier-hazard, lost-alert, worse, new-crash, harness-error, "
     "unmatched, severity:CLASS (S0 to S3: RUN_B has a contact of that class or worse, RUN_A a milder one or "
@@ -148,9 +148,9 @@ def _fail_on_findings(
     gates: "list[mutator.Gate]",
     failing: "tuple[GateFinding, ...]",
 ) -> None:
-    for finding in failing[:MOST_LISTED]:
+    for finding in failing[:MOST_LISTED_FINDINGS]:
         terminal.print_error(f"{finding.gate.value}: {finding.description} [{finding.experiment_id}]")
-    if unlisted := failing[MOST_LISTED:]:
+    if unlisted := failing[MOST_LISTED_FINDINGS:]:
         terminal.print_error(f"and {len(unlisted)} more")
     if failing:
         raise typer.Exit(EXIT_CHECK_FAILED)

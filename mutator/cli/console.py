@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
 
-NO_BREAK = "\u00a0"  # printed as a space at which text is not folded
+NO_BREAK_SPACE = "\u00a0"  # printed as a space at which text is not folded
 _CONTROL_PATTERN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")  # not tabs and new lines
 PIPE_LINE_WIDTH = 100  # line width outside a terminal, unless COLUMNS is set
 
@@ -73,7 +73,7 @@ class Terminal:
         progress_events.report_link(kind, path)
         self.say(text or f"{kind}: {short_path(path)}")
 
-    def note(self, text: str) -> None:
+    def print_note(self, text: str) -> None:
         """Print a remark to standard error, so that a pipe gets only the result."""
         with ignoring_output_errors():
             _print_text(self.err, text, "dim")
@@ -193,9 +193,9 @@ def show_error(error: MutatorError) -> None:
     place = short_path(error.where) + (f":{error.line}" if error.line is not None else "")
     terminal.print_error(f"{place}: {error.got}" if place else error.got)
     if error.expected:
-        terminal.note(f"  expected: {error.expected}")
+        terminal.print_note(f"  expected: {error.expected}")
     if error.remedy:
-        terminal.note(f"  to do: {error.remedy}")
+        terminal.print_note(f"  to do: {error.remedy}")
 
 
 def error_text(error: MutatorError) -> str:
@@ -267,7 +267,7 @@ def _print_text(console: "Console", text: str, style: str | None, *, whole: bool
     text = _escape_controls(text)
     if not whole:
         width = console.width if console.is_terminal else _pipe_line_width()
-        text = wrap_text(text, width).replace(NO_BREAK, " ")
+        text = wrap_text(text, width).replace(NO_BREAK_SPACE, " ")
     console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
 
 

@@ -9,7 +9,7 @@ from mutator._common.message_text import counted
 from mutator.api.experiment_results import experiment_facts
 from mutator.api.stored_experiments import StoredExperiment, find_newest_run, open_stored_run
 from mutator.api.worst import worst_results
-from mutator.cli.console import NO_BREAK, STYLE_BY_ENDING, Terminal, short_path
+from mutator.cli.console import NO_BREAK_SPACE, STYLE_BY_ENDING, Terminal, short_path
 from mutator.errors import MutatorError
 from mutator.mutants.readable_patches import readable_patch
 
@@ -137,7 +137,7 @@ def _unit_by_name(manifest: "TargetManifest") -> dict[str, str]:
 
 def _describe_values(values: Iterable[tuple[str, float]], units: Mapping[str, str]) -> str:
     texts = (f"{name} {value:.4g} {units.get(name, '')}".rstrip() for name, value in values)
-    return ", ".join(text.replace(" ", NO_BREAK) for text in texts)
+    return ", ".join(text.replace(" ", NO_BREAK_SPACE) for text in texts)
 
 
 def _missing_alert_note(record: "Record", manifest: "TargetManifest", reaction_s: float | None) -> str:

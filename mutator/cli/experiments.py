@@ -151,7 +151,7 @@ def _rerun_and_plot(terminal: Terminal, experiment: "RunExperiment", *, anew: bo
     with terminal.show_spinner("rerunning" if anew else "no trace was kept: rerunning"):
         trial = experiment.rerun(keep=True)
     if trial.same_as_record is False:
-        terminal.note(DIFFERS_NOTE)
+        terminal.print_note(DIFFERS_NOTE)
     return experiment.plot_file if trial.has_trace else None
 
 
@@ -165,7 +165,7 @@ def _rerun_and_film(
     with terminal.show_spinner("rerunning and filming"):
         is_same = experiment.film(shots)
     if not is_same:
-        terminal.note(DIFFERS_NOTE)
+        terminal.print_note(DIFFERS_NOTE)
     return [shot.out for shot in shots]
 
 

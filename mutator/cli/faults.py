@@ -109,7 +109,7 @@ def try_spec(
     faults = selected_target.faults(choice)
     fault, _ = middle_of_each_variant(faults)[0]
     if len(faults) > 1:
-        terminal.note(f"{fault.label}, one of {len(faults)} faults (choose with --variant or --value)")
+        terminal.print_note(f"{fault.label}, one of {len(faults)} faults (choose with --variant or --value)")
     when = selected_target.trigger(trigger, armed_after)
     with terminal.show_spinner(f"running {scenario}, fault-free and faulty"):
         trial = mutator.try_fault(
@@ -196,7 +196,7 @@ def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole
         text, note = (patch, "") if whole else readable_patch(patch)
         terminal.print_diff(text)
         if note:
-            terminal.note(note)
+            terminal.print_note(note)
 
 
 OPERATOR_NAMES = ", ".join(OPERATORS.shipped_names())
@@ -284,7 +284,7 @@ def generate(
         mutants = mutator.MutantSet.of_campaign(campaign, choices=choices, workspace=workspace)
     elif choice:
         mutants = mutator.MutantSet.of_operators(choice, triggers or (), target=manifest, workspace=workspace)
-        terminal.note(mutants.note)
+        terminal.print_note(mutants.note)
     else:
         mutants = mutator.MutantSet.of_specs(
             specs or (),

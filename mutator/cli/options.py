@@ -148,9 +148,9 @@ class WorkspaceOptions:
         sandbox = bool(self.sandbox)
         return mutator.Workspace.find(self.root, self.library, self.templates, self.target, sandbox=sandbox)
 
-    def override(self, other: "WorkspaceOptions") -> "WorkspaceOptions":
+    def with_defaults(self, defaults: "WorkspaceOptions") -> "WorkspaceOptions":
         values = {f.name: getattr(self, f.name) for f in fields(self)}
-        return replace(other, **{k: v for k, v in values.items() if v is not None})
+        return replace(defaults, **{k: v for k, v in values.items() if v is not None})
 
 
 def with_workspace_options(verb: Callable[..., None]) -> Callable[..., None]:
@@ -179,7 +179,7 @@ def with_workspace_options(verb: Callable[..., None]) -> Callable[..., None]:
             values[name] = options_class(
                 **{field.name: values.pop(field.name) for field in fields(options_class)}
             )
-        workspace_options = values.pop("workspace_options").override(ctx.obj or WorkspaceOptions())
+        workspace_options = values.pop("workspace_options").with_defaults(ctx.obj or WorkspaceOptions())
         verb(workspace_options=workspace_options, **values)
 
     run_verb.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]

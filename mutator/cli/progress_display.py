@@ -15,7 +15,11 @@ if TYPE_CHECKING:
 @contextmanager
 def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
     """Show progress; yield the function that the campaign calls, from any thread."""
-    with _live_bar(terminal) if terminal.err.is_terminal else nullcontext(Lines(terminal.note)) as show:
+    with (
+        _live_progress_bar(terminal)
+        if terminal.err.is_terminal
+        else nullcontext(Lines(terminal.print_note)) as show
+    ):
 
         def notify(progress: "Progress") -> None:
             progress_events.report_phase(title(progress), progress.done, progress.total, progress.outcomes)
@@ -25,7 +29,7 @@ def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], Non
 
 
 @contextmanager
-def _live_bar(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
+def _live_progress_bar(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
 

@@ -69,7 +69,7 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
     terminal.say(f"{counted(len(groups), 'group')}: {describe_counts(review, groups)}")
     unlisted = review.entries.keys() - {group.id for group in groups}
     if unlisted:
-        terminal.note(f"blocks of the review file for groups that are not listed: {len(unlisted)}")
+        terminal.print_note(f"blocks of the review file for groups that are not listed: {len(unlisted)}")
 
 
 def _shorten_injection(injection: str) -> str:

@@ -146,7 +146,7 @@ def _write_pictures(
         terminal.say(short_path(Path(path)) + (f": {value}" if value else ""))
     for group in groups:
         if group.id not in written:
-            terminal.note(f"{group.id} has no pictures: it is not an image effect in a single place")
+            terminal.print_note(f"{group.id} has no pictures: it is not an image effect in a single place")
     return written
 
 

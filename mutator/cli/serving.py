@@ -54,7 +54,7 @@ def serve(
 
     def ready(address: str) -> None:
         terminal.say(address, whole=True)
-        terminal.note("Ctrl-C stops the server")
+        terminal.print_note("Ctrl-C stops the server")
         if browser:
             webbrowser.open(address)
 
@@ -67,4 +67,4 @@ def serve(
             workspace=workspace_options.workspace(),
         )
     except KeyboardInterrupt:
-        terminal.note("stopped")
+        terminal.print_note("stopped")

@@ -78,7 +78,7 @@ class ClaimRule(StrictModel):
         return f"{name} {value:g}"
 
 
-class _Groups(StrictModel):
+class _ClaimGroups(StrictModel):
     column: str
     values: list[str] = Field(min_length=1)
 
@@ -96,7 +96,7 @@ class Claim(StrictModel):
     part: str | None = None
     start: str | None = None
     end: str | None = None
-    each: _Groups | None = None
+    each: _ClaimGroups | None = None
     claim_rule: ClaimRule | None = Field(None, alias="holds")
     see: str = ""
     paper: list[list[int]] = Field(default_factory=list, max_length=2)

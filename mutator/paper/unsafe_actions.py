@@ -10,12 +10,12 @@ from mutator.outcomes.golden_comparison import Trace
 
 StepFlags = np.ndarray[tuple[int], np.dtype[np.bool_]]  # one flag per step
 
-MIN_APPLIED = 0.01  # share of full gas or brake; less is ignored
+MIN_APPLIED_SHARE = 0.01  # share of full gas or brake; less is ignored
 MIN_WRONG_S = 0.5  # minimum duration of wrong gas or brake
 MIN_BRAKE_S = 0.1  # braking for less than this is ignored
-MOST_SHORT_SHARE = 0.5  # up to this share of the golden run's braking time, braking is too short
-MOST_RELEASE_S = 1.0  # maximum time from the alert to the last gas or brake
-MIN_MISSED_S = 0.1  # minimum duration of gas and of braking that only the golden run applies
+MOST_TOO_SHORT_SHARE = 0.5  # up to this share of the golden run's braking time, braking is too short
+MOST_ALERT_TO_RELEASE_S = 1.0  # maximum time from the alert to the last gas or brake
+MIN_MISSED_USE_S = 0.1  # minimum duration of gas and of braking that only the golden run applies
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,13 +60,15 @@ class RunPair:
     def steps_applied(self, channel: str) -> tuple[StepFlags, StepFlags]:
         """Return the steps of the search in which the golden and the faulty run apply `channel`."""
         within = (self.times_s >= self.start_s) & (self.times_s <= self.end_s)
-        return within & (self.golden[channel] > MIN_APPLIED), within & (self.faulty[channel] > MIN_APPLIED)
+        return within & (self.golden[channel] > MIN_APPLIED_SHARE), within & (
+            self.faulty[channel] > MIN_APPLIED_SHARE
+        )
 
     def duration_s(self, steps: StepFlags) -> float:
         return float(steps.sum() * self.step_s)
 
 
-FindSteps = Callable[[RunPair], StepFlags | None]  # the steps that show the action; None if there are none
+StepFinder = Callable[[RunPair], StepFlags | None]  # the steps that show the action; None if there are none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +80,7 @@ class ActionFigure:
     query: str  # finds candidate runs by the columns of results.csv
     order_column: str  # candidates are examined in the order of this column, largest first
     what_it_shows: str  # describes what `find_steps` finds
-    find_steps: FindSteps
+    find_steps: StepFinder
     action_channels: tuple[str, ...]  # channels of the action, whose panels are shaded
     panels: tuple[tuple[str, str], ...]  # (channel, meaning), from the top
     hazard: str | None  # the search ends at this hazard; None: at the end of the run
@@ -90,12 +92,12 @@ def find_brake_too_short(pair: RunPair) -> StepFlags | None:
     None unless the faulty run brakes, too, but at most half as long.
     """
     golden, faulty = pair.steps_applied("brake")
-    if not MIN_BRAKE_S <= pair.duration_s(faulty) <= MOST_SHORT_SHARE * pair.duration_s(golden):
+    if not MIN_BRAKE_S <= pair.duration_s(faulty) <= MOST_TOO_SHORT_SHARE * pair.duration_s(golden):
         return None
     return golden & ~faulty
 
 
-def build_wrong_time_finder(channel: str) -> FindSteps:
+def build_wrong_time_finder(channel: str) -> StepFinder:
     """Return a function that finds the steps in which only the faulty run applies `channel`.
 
     The function returns None if these steps last less than MIN_WRONG_S.
@@ -118,9 +120,13 @@ def find_both_unavailable(pair: RunPair) -> StepFlags | None:
     last_use_s = pair.times_s[is_used].max(initial=pair.start_s)
     after_last_use: StepFlags = pair.times_s > last_use_s
     missed_s = [
-        pair.duration_s(after_last_use & (pair.golden[name] > MIN_APPLIED)) for name in ("gas", "brake")
+        pair.duration_s(after_last_use & (pair.golden[name] > MIN_APPLIED_SHARE)) for name in ("gas", "brake")
     ]
-    if pair.alert_s is None or last_use_s > pair.alert_s + MOST_RELEASE_S or min(missed_s) < MIN_MISSED_S:
+    if (
+        pair.alert_s is None
+        or last_use_s > pair.alert_s + MOST_ALERT_TO_RELEASE_S
+        or min(missed_s) < MIN_MISSED_USE_S
+    ):
         return None
     return after_last_use
 
@@ -135,7 +141,7 @@ ACTION_FIGURES = (
         query=f"{_WRONG_DATA_QUERY} and t_h1 > t_activation",
         order_column="max_dev_brake",
         what_it_shows=f"between activation and H1 the faulty run brakes, but for at most "
-        f"{MOST_SHORT_SHARE:.0%} of the fault-free run's braking time "
+        f"{MOST_TOO_SHORT_SHARE:.0%} of the fault-free run's braking time "
         "(grey: the fault-free run brakes, the faulty one does not)",
         find_steps=find_brake_too_short,
         action_channels=("brake",),
@@ -172,8 +178,9 @@ ACTION_FIGURES = (
         query='module == "radar" and fault_type == "jamming" and status == "ok" and t_alert >= t_activation '
         "and max_dev_gas > 0",
         order_column="max_dev_brake",
-        what_it_shows=f"at most {MOST_RELEASE_S:.0f} s after the first alert, the faulty run stops applying "
-        f"gas and brake (grey), while the fault-free run still applies each for {MIN_MISSED_S} s or more",
+        what_it_shows=f"at most {MOST_ALERT_TO_RELEASE_S:.0f} s after the first alert, the faulty run stops "
+        f"applying gas and brake (grey), while the fault-free run still applies each for "
+        f"{MIN_MISSED_USE_S} s or more",
         find_steps=find_both_unavailable,
         action_channels=("gas", "brake"),
         panels=(_GAS, _BRAKE, _SPEED),

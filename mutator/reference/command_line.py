@@ -15,8 +15,8 @@ from mutator.execution import pytest_plugin
 from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.workspace import Workspace
 
-_PLACE_OPTIONS = {field.name for field in fields(WorkspaceOptions)}
-_PLACE_OPTIONS_NOTE = (
+_WORKSPACE_OPTIONS = {field.name for field in fields(WorkspaceOptions)}
+_WORKSPACE_OPTIONS_NOTE = (
     "These options say where the library, templates and target are. Write them before or after the "
     "subcommand.\n"
 )
@@ -42,8 +42,8 @@ def render_command_line_page(workspace: Workspace) -> str:
         "campaigns,\nspecs, scenarios, targets, run folders in `runs/`, and experiments of the run that "
         "`--run` names or of the newest\nrun. `mutator --show-completion` prints its script.\n",
         "## Library, templates and target\n",
-        _PLACE_OPTIONS_NOTE,
-        *_options_table(command, [p for p in command.params if p.name in _PLACE_OPTIONS]),
+        _WORKSPACE_OPTIONS_NOTE,
+        *_options_table(command, [p for p in command.params if p.name in _WORKSPACE_OPTIONS]),
     ]
     for _, names in SUBCOMMAND_GROUPS:
         for name in names:
@@ -60,7 +60,7 @@ def _subcommand_section(group: Any, name: str) -> Iterator[str]:
         usage = " ".join(command.get_usage(ctx).removeprefix("Usage: ").split())
     yield f"```text\n{usage}\n```\n"
     yield f"{_unwrap_paragraphs(command.help)}\n"
-    params = [param for param in command.params if param.name not in (*_PLACE_OPTIONS, "help")]
+    params = [param for param in command.params if param.name not in (*_WORKSPACE_OPTIONS, "help")]
     yield from _options_table(command, params)
     if command.epilog:
         title, _, lines = command.epilog.replace("\b", "").strip().partition("\n")

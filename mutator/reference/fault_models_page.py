@@ -9,7 +9,7 @@ from mutator.faults.fault_models import TARGET_UNIT, Example, FaultModel, ParamS
 from mutator.reference.yaml_key_tables import generated_page_head, model_sections
 from mutator.workspace import Workspace
 
-INTRODUCTION = """\
+_INTRO = """\
 A fault model defines what a fault does to a statement. It consists of two files in `templates/`: the template
 `<name>.py.j2`, and `<name>.yaml` with its parameters and examples
 ([add one](../how-to/add-a-fault-model.md)). There are three kinds:
@@ -45,7 +45,7 @@ _SENTENCE_BY_KIND = {
 
 def render_fault_models_page(workspace: Workspace) -> str:
     models = list(workspace.fault_models())
-    parts = [generated_page_head("Fault models"), INTRODUCTION]
+    parts = [generated_page_head("Fault models"), _INTRO]
     rows = [(f"[{model.name}](#{model.name})", _first_sentence(model.about)) for model in models]
     parts += [TextTable(heads=("model", "what it does"), rows=rows).as_markdown(escape=False), ""]
     for model in models:

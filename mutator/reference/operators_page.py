@@ -15,7 +15,7 @@ controller, imitating typical mistakes of programmers.
 [Doors](doors.md#operator) how to add one. Each change is an ordinary fault, active while its trigger holds;
 under the trigger `always`, from the start.
 """
-_AFTER_REPLACEMENTS = """\
+_LEFT_OUT_NOTE = """\
 Operators do not change strings and containers in arithmetic, the comparisons in a chain such as `a < b < c`,
 expressions with a `yield`, or code outside functions. They do not leave out the assignment that gives a local
 name its first value.
@@ -55,7 +55,7 @@ def render_operators_page(workspace: Workspace) -> str:
     tables = [table.as_markdown(escape=False) for table in (replacements, fields)]
     return (
         "\n".join(
-            [generated_page_head("Mutation operators"), _INTRO, tables[0], "", _AFTER_REPLACEMENTS, tables[1]]
+            [generated_page_head("Mutation operators"), _INTRO, tables[0], "", _LEFT_OUT_NOTE, tables[1]]
         )
         + "\n"
     )

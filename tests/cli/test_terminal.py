@@ -139,7 +139,7 @@ def test_output_to_a_pipe_is_folded_at_100_columns_by_default(
         monkeypatch.setenv("COLUMNS", columns)
     terminal = Terminal()
     terminal.say(LONG)
-    terminal.note(LONG)
+    terminal.print_note(LONG)
     terminal.print_error(LONG)
     out, err = capsys.readouterr()
     for line in (out + err).splitlines():

@@ -8,8 +8,8 @@ import pytest
 
 from mutator.model import Record
 from mutator.paper.unsafe_actions import (
-    FindSteps,
     RunPair,
+    StepFinder,
     build_wrong_time_finder,
     find_both_unavailable,
     find_brake_too_short,
@@ -32,7 +32,7 @@ def pair(golden: dict[str, np.ndarray], faulty: dict[str, np.ndarray]) -> RunPai
     )
 
 
-def stretch(look: FindSteps, given: RunPair) -> tuple[float, float] | None:
+def stretch(look: StepFinder, given: RunPair) -> tuple[float, float] | None:
     """Return the times of the first and last step that show the action."""
     steps = look(given)
     return None if steps is None else (round(T[steps][0], 1), round(T[steps][-1], 1))
