@@ -46,7 +46,7 @@ def operators(manifest: TargetManifest, models: FaultModels, count: int) -> tupl
     start = process_time()
     found = select_mutations(manifest, models, OPERATORS.names(), PLACES)
     took = process_time() - start
-    faults = [mutation.fault("as_described") for mutation in sample_mutations(found, count, 1)]
+    faults = [mutation.to_fault("as_described") for mutation in sample_mutations(found, count, 1)]
     trigger = always_trigger()
     build(manifest, models, faults[0], trigger)  # parses the file that observes
     start = process_time()

@@ -245,9 +245,18 @@ class Reach:
 
     def is_assigned(self, site: Site) -> bool:
         functions = self.file.functions_by_name.get(site.function, ())
-        known = [s for f in functions for s in f.statements if s.reason is None and site.name in s.assigns]
+        known = [
+            s
+            for f in functions
+            for s in f.statements
+            if s.unanchorable_reason is None and site.name in s.assigned_names
+        ]
         for nth, statement in enumerate(known, 1):
-            if statement.first < _spot(site.node)[0] + 1 <= max(statement.last, statement.first + 1):
+            if (
+                statement.first_line
+                < _spot(site.node)[0] + 1
+                <= max(statement.end_line, statement.first_line + 1)
+            ):
                 anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name=site.name, nth=nth)
                 location = FaultLocation(path=self.file.path, function=site.function, anchor=anchor)
                 try:

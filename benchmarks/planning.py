@@ -70,9 +70,9 @@ def masked(experiment: Experiment) -> Record:
 def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
     looked_at = preflight_checks._PreflightChecks(workspace, folder)
     goldens = {}
-    for one in looked_at.keys:
+    for one in looked_at.golden_runs:
         key = one.key
-        out = looked_at.kept / "golden" / key
+        out = looked_at.pending_folder / "golden" / key
         out.mkdir(parents=True)
         for name in looked_at.manifest.outputs:
             (out / name).write_bytes(bytes(500_000))
@@ -80,7 +80,7 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
     said = {"schema": CHECKS_SCHEMA, "digest": looked_at.digest, "results": [], "goldens": goldens}
     looked_at._store_in_run_folder(json_bytes(said | {"run_cpu_s": 1.0}))
     preflight_cache.store_checks(
-        preflight_cache.entry_path(looked_at.digest), folder.path, FILE, looked_at.kept
+        preflight_cache.entry_path(looked_at.digest), folder.path, FILE, looked_at.pending_folder
     )
 
 

@@ -50,15 +50,15 @@ def draw_operator_faults(
     )
     if not candidates.mutations:
         raise MutatorError(
-            f"no mutant in {', '.join(choice.places)} ({candidates.told})",
+            f"no mutant in {', '.join(choice.places)} ({candidates.summary})",
             argument="in",
             remedy="choose other places or operators, or include lines that are not executed",
         )
     sample = sample_mutations(candidates, choice.sample, choice.seed)
     note = (
-        candidates.told
+        candidates.summary
         if len(sample) == len(candidates.mutations)
-        else f"{counted(len(sample), 'draw')} of {candidates.told}"
+        else f"{counted(len(sample), 'draw')} of {candidates.summary}"
     )
     reading = selected_target.workspace.readings().default
-    return tuple(mutation.fault(reading) for mutation in sample), note
+    return tuple(mutation.to_fault(reading) for mutation in sample), note

@@ -48,15 +48,15 @@ class OperatorFaults:
         drawn = sample_mutations(found, selection.sample, seed)
         if not drawn:
             raise MutatorError(
-                f"no mutant in {', '.join(selection.places)} ({found.told})",
+                f"no mutant in {', '.join(selection.places)} ({found.summary})",
                 expected="places with lines that a scenario of the campaign executes",
                 remedy="name other places, operators or scenarios",
             )
         draws = f"{counted(len(drawn), 'draw')} of " if len(drawn) < len(found.mutations) else ""
-        self.told[f"{', '.join(selection.places)}: {draws}{found.told}"] = None
+        self.told[f"{', '.join(selection.places)}: {draws}{found.summary}"] = None
         return [
             OperatorFault(
-                fault=one.fault(reading),
+                fault=one.to_fault(reading),
                 when=selection.when,
                 scenarios=frozenset(name for name in executed if self._runs(one, executed[name])),
             )
@@ -77,4 +77,6 @@ class OperatorFaults:
 
     def _runs(self, mutation: Mutation, lines: Mapping[str, Collection[int]]) -> bool:
         path = mutation.location.path
-        return mutation.line + 1 in facts_of(self._manifest.tree, path).executed(lines.get(path, ()))
+        return mutation.line + 1 in facts_of(self._manifest.tree, path).extend_to_statements(
+            lines.get(path, ())
+        )

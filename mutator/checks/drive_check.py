@@ -48,7 +48,7 @@ def drive_findings(workspace: Workspace, target: str, scenarios: Sequence[str] =
 
     The findings cover differences between equal runs (and likely causes), obstacles to forking, statements of
     fault specs that never run, triggers that never hold, and harmless canaries. Raises MutatorError for an
-    unknown scenario or a mistake in the library; `check_library` reports all such mistakes.
+    unknown scenario or a mistake in the library; `library_problems` reports all such mistakes.
     """
     with ScratchFolder("mutator-drive-") as scratch:
         return _DriveCheck(workspace, target, scenarios, scratch).findings()
@@ -77,11 +77,11 @@ class _DriveCheck:
         self.scenarios = list(dict.fromkeys(scenarios)) or list(used) or list(workspace.scenarios)
         for name in self.scenarios:
             workspace.scenario(name)
-        self.campaigns = [one for one in target_campaigns if set(one.scenarios) & set(self.scenarios)]
-        self.reach = ReachTracker(workspace, self.manifest, self.campaigns)
+        self.campaigns = [c for c in target_campaigns if set(c.scenarios) & set(self.scenarios)]
+        self.reach_tracker = ReachTracker(workspace, self.manifest, self.campaigns)
         settings = [_scenario_changes(workspace, campaign) for campaign in self.campaigns] or [()]
-        self.setting = () if () in settings else settings[0]
-        self.settings = list(dict.fromkeys(settings))
+        self.usual_changes = () if () in settings else settings[0]
+        self.changes_of_campaigns = list(dict.fromkeys(settings))
         limits = self.campaigns[0].limits if self.campaigns else Limits()
         self.seed = self.campaigns[0].seed if self.campaigns else 0
         self._scratch = scratch
@@ -106,25 +106,27 @@ class _DriveCheck:
                 self._forking_finding(goldens, is_deterministic=findings[0].level is CheckState.OK)
             )
             for name, golden in goldens.items():
-                self._record_reach(name, self.setting, golden.watched)
+                self._record_reach(name, self.usual_changes, golden.watched)
             canaries = pool.map(self._canary_finding, self._canary_experiments())
             self._run_with_further_changes()
-            return [*findings, *self.reach.findings(), *canaries]
+            return [*findings, *self.reach_tracker.findings(), *canaries]
 
     # Runs
 
     def _first_jobs(self, scenario: str) -> Iterator[Job]:
-        yield self._pristine_job("first", scenario, self.setting)
-        yield self._counting_job(scenario, self.setting)
+        yield self._pristine_job("first", scenario, self.usual_changes)
+        yield self._counting_job(scenario, self.usual_changes)
 
     def _golden_runs(self, scenario: str, runs: Mapping[str, Execution]) -> _GoldenRuns:
         first, watched = runs[f"first-{scenario}"], runs[f"counting-{scenario}"]
         first_run, watched_run = self._check_run(first), self._check_run(watched)
-        if first_run.problem or (first_run.digest == watched_run.digest and not watched_run.problem):
+        if first_run.problem or (
+            first_run.output_digest == watched_run.output_digest and not watched_run.problem
+        ):
             return _GoldenRuns(first, watched, watched)
-        again = replace(self._pristine_job("again", scenario, self.setting), hash_seed=_OTHER_HASH_SEED)
+        again = replace(self._pristine_job("again", scenario, self.usual_changes), hash_seed=_OTHER_HASH_SEED)
         if watched_run.problem:  # watching might be the cause
-            counting = self._counting_job(scenario, self.setting)
+            counting = self._counting_job(scenario, self.usual_changes)
             watched = self._run(replace(counting, name=f"unwatched-{scenario}", watch=False))
         return _GoldenRuns(first, watched, self._run(again))
 
@@ -133,7 +135,7 @@ class _DriveCheck:
         return Job(name=f"{kind}-{scenario}", scenario=file, seed=self.seed, changes=changes)
 
     def _counting_job(self, scenario: str, changes: tuple[str, ...]) -> Job:
-        mutant = self.reach.counting
+        mutant = self.reach_tracker.counting_mutant
         return replace(
             self._pristine_job("counting", scenario, changes),
             files=mutant.files,
@@ -162,11 +164,11 @@ class _DriveCheck:
         if not problem and not (problem := null_mutant_problem(first, watched)):
             success = f"the same bytes twice, in {golden.first.wall_s:.1f} s each"
             return Finding(name=name, level=CheckState.OK, found=success)
-        if first.problem or again.problem or watched.problem or first.digest == again.digest:
+        if first.problem or again.problem or watched.problem or first.output_digest == again.output_digest:
             remedy = "fix the target, the scenario or the manifest: no campaign can start"
             return Finding(name=name, level=CheckState.FAIL, found=problem, remedy=remedy)
-        same = self._check_run(self._run(self._pristine_job("same", scenario, self.setting)))
-        return self._nondeterminism_finding(name, golden, by_hash=same.digest == first.digest)
+        same = self._check_run(self._run(self._pristine_job("same", scenario, self.usual_changes)))
+        return self._nondeterminism_finding(name, golden, by_hash=same.output_digest == first.output_digest)
 
     def _nondeterminism_finding(self, name: str, golden: _GoldenRuns, *, by_hash: bool) -> Finding:
         where = describe_first_difference(self.manifest, golden.first.out, golden.again.out)
@@ -185,7 +187,7 @@ class _DriveCheck:
 
     def _notes_with_target_lines(self, golden: _GoldenRuns) -> dict[str, Any]:
         """Return the notes of the watched run, with the target's own line numbers."""
-        files = self.reach.counting.files
+        files = self.reach_tracker.counting_mutant.files
         noted = [
             note
             | {
@@ -221,8 +223,7 @@ class _DriveCheck:
     def _forking_finding(self, goldens: Mapping[str, _GoldenRuns], *, is_deterministic: bool) -> Finding:
         """Report whether a golden run can be forked between its steps.
 
-        This is tried only if the run is fast and deterministic (`well`); otherwise, only its threads are
-        checked.
+        This is tried only if the run is fast and deterministic; otherwise, only its threads are checked.
         """
         scenario, golden = next(iter(goldens.items()))
         is_tried = is_deterministic and golden.first.wall_s <= _MOST_REPEATED_RUN_S
@@ -259,7 +260,7 @@ class _DriveCheck:
         engine = ForkEngine(self.manifest, work, self.engine.limits, null=null)
         try:
             return engine.refusal(
-                replace(self._pristine_job("fork", scenario, self.setting), golden=golden.first.out)
+                replace(self._pristine_job("fork", scenario, self.usual_changes), golden=golden.first.out)
             )
         finally:
             engine.close()
@@ -267,25 +268,31 @@ class _DriveCheck:
     # Statements and triggers
 
     def _record_reach(self, scenario: str, changes: tuple[str, ...], execution: Execution) -> None:
-        self.reach.take(scenario, changes, execution.probe, execution.watched.get("seen", ()))
+        self.reach_tracker.record_run(scenario, changes, execution.probe, execution.watched.get("seen", ()))
 
     def _run_with_further_changes(self) -> None:
         """Run with the changes that faults and campaigns make, until every statement and trigger is reached
         or no changes are left.
         """
         fault_changes = list(
-            dict.fromkeys(statement.changes for statement in self.reach.unexecuted if statement.changes)
+            dict.fromkeys(
+                statement.changes
+                for statement in self.reach_tracker.unexecuted_statements
+                if statement.changes
+            )
         )
         for changes in fault_changes:
             for scenario in self.scenarios:
-                if any(statement.changes == changes for statement in self.reach.unexecuted):
-                    self._run_counting_mutant(scenario, (*changes, *self.setting))
-        for setting in self.settings:
-            remaining = [statement.changes for statement in self.reach.unexecuted] + [()] * bool(
-                self.reach.untriggered
-            )
+                if any(
+                    statement.changes == changes for statement in self.reach_tracker.unexecuted_statements
+                ):
+                    self._run_counting_mutant(scenario, (*changes, *self.usual_changes))
+        for setting in self.changes_of_campaigns:
+            remaining = [statement.changes for statement in self.reach_tracker.unexecuted_statements] + [
+                ()
+            ] * bool(self.reach_tracker.unreached_triggers)
             for changes in dict.fromkeys(remaining):
-                if setting != self.setting:
+                if setting != self.usual_changes:
                     self._run_counting_mutant(self.scenarios[0], (*changes, *setting))
 
     def _run_counting_mutant(self, scenario: str, changes: tuple[str, ...]) -> None:
@@ -297,7 +304,7 @@ class _DriveCheck:
     def _canary_experiments(self) -> list[tuple[str, Experiment, str]]:
         """Campaign, canary and hazard. Canaries that differ only in their setting are tried once."""
         canaries: dict[object, tuple[str, Experiment, str]] = {}
-        for campaign in sorted(self.campaigns, key=lambda one: len(_scenario_changes(self.workspace, one))):
+        for campaign in sorted(self.campaigns, key=lambda c: len(_scenario_changes(self.workspace, c))):
             reading = _reading_of(self.workspace, campaign)
             if campaign.canary not in canaries and campaign.canary.scenario in self.scenarios:
                 experiment = Expansion(

@@ -45,30 +45,33 @@ def library_problems(workspace: Workspace, target: str) -> list[MutatorError]:
     """
     collector = _ProblemCollector()
     collector.problems += unfilled_mark_errors(workspace.library)
-    manifest = collector.tried(lambda: workspace.manifest(target))
+    manifest = collector.result_of(lambda: workspace.manifest(target))
     if manifest:
-        collector.tried(lambda: check_requirements(manifest))
-        collector.tried(lambda: workspace.scale_of(manifest))
-    models = collector.tried(workspace.fault_models)
-    hazards = collector.tried(workspace.hazards)
-    tables = [collector.tried(partial(workspace.context_table, name)) for name in workspace.context_tables]
-    readings = collector.tried(workspace.readings)
+        collector.result_of(lambda: check_requirements(manifest))
+        collector.result_of(lambda: workspace.scale_of(manifest))
+    models = collector.result_of(workspace.fault_models)
+    hazards = collector.result_of(workspace.hazards)
+    tables = [
+        collector.result_of(partial(workspace.context_table, name)) for name in workspace.context_tables
+    ]
+    readings = collector.result_of(workspace.readings)
     spec_files = workspace.spec_files() if readings else ()
-    specs = [collector.tried(partial(workspace.spec, path)) for path in spec_files]
+    specs = [collector.result_of(partial(workspace.spec, path)) for path in spec_files]
     if models:
         collector.problems += example_problems(models)
     if manifest and hazards:
         collector.problems += _unknown_hazard_problems(
             manifest, tuple(hazards.hazards), [t for t in tables if t]
         )
-    if manifest and models and collector.tried(lambda: build(manifest, models, None, always_trigger())):
+    if manifest and models and collector.result_of(lambda: build(manifest, models, None, always_trigger())):
         for spec in specs:
             collector.problems += spec_problems(spec, models, manifest) if spec else ()
     if readings:
         collector.problems += campaign_problems(workspace, readings, manifest)
+
     if not collector.problems:
-        specs_in_order = collector.tried(workspace.specs)
-        analysis = collector.tried(workspace.analysis)
+        specs_in_order = collector.result_of(workspace.specs)
+        analysis = collector.result_of(workspace.analysis)
         if analysis and specs_in_order and manifest:
             collector.problems += check_analysis(analysis, specs_in_order, manifest)
     return collector.problems
@@ -83,13 +86,13 @@ def campaign_problems(
     """
     collector, checked_studies = _ProblemCollector(), set[str]()
     for name in workspace.campaigns:
-        campaign = collector.tried(partial(load_campaign, workspace.campaign(name)))
+        campaign = collector.result_of(partial(load_campaign, workspace.campaign(name)))
         if campaign is None:
             continue
-        collector.tried(partial(check_readings, campaign, readings))
+        collector.result_of(partial(check_readings, campaign, readings))
         if manifest and manifest.name == campaign.target:
-            collector.tried(partial(_check_triggers, campaign, manifest))
-        study = collector.tried(partial(load_study, campaign))
+            collector.result_of(partial(_check_triggers, campaign, manifest))
+        study = collector.result_of(partial(load_study, campaign))
         if study and campaign.study and campaign.study not in checked_studies:
             checked_studies.add(campaign.study)
             problems = study_problems(campaign.study, study, workspace)
@@ -114,7 +117,7 @@ class _ProblemCollector:
     def __init__(self) -> None:
         self.problems: list[MutatorError] = []
 
-    def tried(self, make: Callable[[], Result]) -> Result | None:
+    def result_of(self, make: Callable[[], Result]) -> Result | None:
         """Return the result of `make`; None if that fails."""
         try:
             return make()

@@ -51,7 +51,7 @@ def set_order_places(manifest: TargetManifest) -> list[FindingPlace]:
     for path in sorted(manifest.tree.files, key=lambda path: (matches(path, manifest.forbid), path)):
         if path.endswith(".py"):
             for use in set_iteration_order.list_set_order_uses(manifest.tree.files[path]):
-                what = f"in {use.function}: uses the order of a set, {use.what}"
+                what = f"in {use.function}: uses the order of a set, {use.set_source}"
                 places.append(FindingPlace(file=path, line=use.line, what=what))
     return places
 

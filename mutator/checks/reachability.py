@@ -51,19 +51,19 @@ class ReachTracker:
         self._manifest = manifest
         statements = list(_spec_statements(workspace, manifest))
         self._statement_count = len(statements)
-        self.counting, self._location_by_id = _build_counting_mutant(
+        self.counting_mutant, self._location_by_id = _build_counting_mutant(
             workspace, manifest, [statement.location for statement in statements]
         )
-        self.unexecuted = statements
-        self.untriggered = list(_awaited_triggers(workspace, manifest, campaigns))
-        self._trigger_count = len(self.untriggered)
+        self.unexecuted_statements = statements
+        self.unreached_triggers = list(_awaited_triggers(workspace, manifest, campaigns))
+        self._trigger_count = len(self.unreached_triggers)
         self._scenarios_run: list[str] = []  # scenarios with their changes
         self._condition_by_trigger = {
             statement.trigger: armed_condition_of(workspace, manifest, statement.trigger)
-            for statement in self.untriggered
+            for statement in self.unreached_triggers
         }
 
-    def take(
+    def record_run(
         self,
         scenario: str,
         changes: Sequence[str],
@@ -71,44 +71,46 @@ class ReachTracker:
         observations: Iterable[Sequence[float]],
     ) -> None:
         """Remove the statements and triggers that a run of the counting mutant reached, according to its
-        probe's report and its observations (`seen`).
+        probe's report and its observations (`observations`).
 
         A statement is removed only if the run had the changes that its fault needs.
         """
         self._scenarios_run.append("+".join((scenario, *changes)))
         counts = (probe or {}).get("injections", {})
         executed = {self._location_by_id[name] for name, entry in counts.items() if entry["count"]}
-        self.unexecuted = [
+        self.unexecuted_statements = [
             statement
-            for statement in self.unexecuted
+            for statement in self.unexecuted_statements
             if statement.location not in executed or not set(statement.changes) <= set(changes)
         ]
         rows = np.array(list(observations), dtype=float)
-        self.untriggered = [
+        self.unreached_triggers = [
             statement
-            for statement in self.untriggered
+            for statement in self.unreached_triggers
             if not is_ever_active(self._condition_by_trigger[statement.trigger], rows)
         ]
 
     def findings(self) -> list[Finding]:
         return [
-            self._finding(
+            self._reach_finding(
                 "statement",
                 self._statement_count,
-                [statement.place for statement in self.unexecuted],
+                [statement.place for statement in self.unexecuted_statements],
                 "faults there are never active: anchor them elsewhere, or add a scenario that reaches these "
                 "statements",
             ),
-            self._finding(
+            self._reach_finding(
                 "trigger",
                 self._trigger_count,
-                [statement.place for statement in self.untriggered],
+                [statement.place for statement in self.unreached_triggers],
                 "faults with such a trigger are never active: add a scenario in which it holds, or remove "
                 "it from the campaigns",
             ),
         ]
 
-    def _finding(self, noun: str, count: int, unreached: Sequence[FindingPlace], remedy: str) -> Finding:
+    def _reach_finding(
+        self, noun: str, count: int, unreached: Sequence[FindingPlace], remedy: str
+    ) -> Finding:
         name, whole = f"{noun}s", counted(count, noun)
         if not unreached:
             message = f"{whole}, {'which is' if count == 1 else 'which are all'} reached" if count else "none"

@@ -32,7 +32,7 @@ _MOST_CHARACTERS = 60  # longest shown expression, in characters
 class SetOrderUse:
     line: int
     function: str
-    what: str
+    set_source: str
 
 
 def list_set_order_uses(source: bytes) -> list[SetOrderUse]:
@@ -43,7 +43,7 @@ def list_set_order_uses(source: bytes) -> list[SetOrderUse]:
         tree = ast.parse(source)
     except (SyntaxError, ValueError, RecursionError):
         return []
-    uses = {(use.line, use.what): use for use in _Scope(tree, "<module>", frozenset()).places()}
+    uses = {(use.line, use.set_source): use for use in _Scope(tree, "<module>", frozenset()).set_order_uses()}
     return sorted(uses.values(), key=lambda use: use.line)
 
 
@@ -55,21 +55,21 @@ class _Scope:
         self._node = node
         self._scope_nodes = list(_nodes_in_scope(node))
         self._order_free_arguments = self._arguments_of_order_free_calls()
-        self.sets = outer
+        self.set_names = outer
         for _ in range(2):  # twice, because a name can be assigned from another
-            self.sets |= frozenset(self._names_assigned_sets())
+            self.set_names |= frozenset(self._names_assigned_sets())
 
-    def places(self) -> Iterator[SetOrderUse]:
+    def set_order_uses(self) -> Iterator[SetOrderUse]:
         for node in self._scope_nodes:
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
                 prefix = "" if self.name == "<module>" else f"{self.name}."
-                yield from _Scope(node, prefix + node.name, self.sets).places()
+                yield from _Scope(node, prefix + node.name, self.set_names).set_order_uses()
             elif set_expression := next(
                 (expression for expression in self._expressions_in_order(node) if self._is_set(expression)),
                 None,
             ):
                 line = getattr(node, "lineno", set_expression.lineno)
-                yield SetOrderUse(line=line, function=self.name, what=_shortened_source(set_expression))
+                yield SetOrderUse(line=line, function=self.name, set_source=_shortened_source(set_expression))
 
     def _names_assigned_sets(self) -> Iterator[str]:
         """Names and attributes of `self` that are assigned a set. For a class, those of all methods."""
@@ -96,7 +96,7 @@ class _Scope:
             if isinstance(function, ast.Attribute):
                 return function.attr in _SET_METHODS and self._is_set(function.value)
             return isinstance(function, ast.Name) and function.id in _SET_CONSTRUCTORS
-        return isinstance(node, ast.Name | ast.Attribute) and ast.unparse(node) in self.sets
+        return isinstance(node, ast.Name | ast.Attribute) and ast.unparse(node) in self.set_names
 
     def _expressions_in_order(self, node: ast.AST) -> Iterator[ast.expr]:
         """Yield the expressions that a node iterates over in order."""

@@ -96,7 +96,7 @@ class Summary:
         """0: success; 3: harness errors, or experiments left to run; 130: interrupted."""
         if self.interrupted:
             return EXIT_INTERRUPTED
-        whole = self.done == self.planned and (self.proof is None or self.proof.whole)
+        whole = self.done == self.planned and (self.proof is None or self.proof.is_complete)
         return EXIT_OK if whole and not self.problem else EXIT_HARNESS_ERRORS
 
 
@@ -227,7 +227,7 @@ class Session:
             proven, not_forked = None, why
             with self._noting_full_disk():
                 equivalence_check.remove_proof(self.folder)
-        if done == self.folder.planned_count and (proven is None or proven.whole):
+        if done == self.folder.planned_count and (proven is None or proven.is_complete):
             with self._noting_full_disk():
                 self._close_segments(finished=True)
         outcomes = Counter[str]()

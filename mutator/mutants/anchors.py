@@ -71,7 +71,7 @@ class ParsedFile:
         """Return the expression at the location; MutatorError with candidates unless exactly one matches."""
         functions = functions_named(self, location.function)
         expressions = self.expressions_by_function.get(plain_function_name(location.function), ())
-        return choose_expression(expressions, location, self.full_path, functions[0].line)
+        return choose_expression(expressions, location, self.full_path, functions[0].def_line)
 
     def resolve_constant_or_default(self, location: FaultLocation) -> ConstantOrDefault:
         """Return the constant or default at the location; MutatorError with candidates if there is none."""
@@ -99,8 +99,10 @@ class ParsedFile:
         if location.anchor.kind not in VALUE_ANCHORS:
             return self.resolve_statement(location).names_in_function
         line = self.resolve_expression(location).start[0]
-        above = [function for function in functions_named(self, location.function) if function.line <= line]
-        return max(above, key=lambda function: function.line).names
+        above = [
+            function for function in functions_named(self, location.function) if function.def_line <= line
+        ]
+        return max(above, key=lambda function: function.def_line).used_names
 
     def resolve_statement(self, location: FaultLocation) -> ResolvedAnchor:
         """Return the statement at the location; MutatorError with candidates unless exactly one matches."""
@@ -166,18 +168,18 @@ def _resolve_statement(file: ParsedFile, location: FaultLocation) -> ResolvedAnc
         return _resolve_entry(file, location, functions)
     function, statement = _choose_statement(file, location, functions)
     _refuse_awkward(file, location.anchor, statement)
-    _check_position(file, statement.place)
-    if statement.opens is not None:
-        return _block_start(file, statement.opens, function.names)
-    first = statement.first
+    _check_position(file, statement.position)
+    if statement.block_first_line is not None:
+        return _block_start(file, statement.block_first_line, function.used_names)
+    first = statement.first_line
     return ResolvedAnchor(
         first_line=first,
-        end_line=statement.last,
+        end_line=statement.end_line,
         is_after=location.anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL),
-        is_alone=statement.alone,
-        indentable_count=1 if statement.spanning_string else statement.last - first,
+        is_alone=statement.is_alone,
+        indentable_count=1 if statement.has_multiline_string else statement.end_line - first,
         indent=_indentation_of(file.lines[first]),
-        names_in_function=function.names,
+        names_in_function=function.used_names,
     )
 
 
@@ -214,26 +216,26 @@ def _resolve_entry(
 ) -> ResolvedAnchor:
     nth = location.anchor.nth
     if (len(functions) > 1) if nth is None else (nth > len(functions)):
-        places = ", ".join(f"line {f.line + 1}" for f in functions)
+        places = ", ".join(f"line {f.def_line + 1}" for f in functions)
         raise MutatorError(
             f"{counted(len(functions), 'function')} named '{location.function}'"
             + (f", but `nth` is {nth}" if nth else ""),
             where=file.full_path,
-            line=functions[0].line + 1,
+            line=functions[0].def_line + 1,
             expected=f"one of those at {places}" if len(functions) > 1 else f"the one at {places}",
             remedy=f"give `nth`, {describe_valid_nth(len(functions))}",
         )
     function = functions[(nth or 1) - 1]
-    if function.entry is None:
+    if function.entry_lines is None:
         raise MutatorError(
             f"nothing can be inserted at the entry of function '{location.function}'",
             where=file.full_path,
-            line=function.line + 1,
+            line=function.def_line + 1,
             expected="a body below the `def` line, and nothing else on the docstring's lines",
             remedy="anchor somewhere else, or reformat the target",
         )
-    _check_position(file, function.place)
-    index, model_line = function.entry
+    _check_position(file, function.position)
+    index, model_line = function.entry_lines
     return ResolvedAnchor(
         first_line=index,
         end_line=index,
@@ -241,7 +243,7 @@ def _resolve_entry(
         is_alone=True,
         indentable_count=0,
         indent=_indentation_of(file.lines[model_line]),
-        names_in_function=function.names,
+        names_in_function=function.used_names,
     )
 
 
@@ -251,13 +253,15 @@ def _choose_statement(
     anchor = location.anchor
     verb = anchor.kind.partition("_")[2]
     name = normalized_text(anchor.name)
-    pairs = [(f, s) for f in functions for s in f.statements if name in s.names(verb)]
+    pairs = [(f, s) for f in functions for s in f.statements if name in s.names_for(verb)]
     # heads of blocks are numbered last, so that `nth` in older specs selects the same statements
     hits = sorted(
-        (pair for pair in pairs if pair[1].reason is None), key=lambda pair: pair[1].opens is not None
+        (pair for pair in pairs if pair[1].unanchorable_reason is None),
+        key=lambda pair: pair[1].block_first_line is not None,
     )
-    statements = sum(s.opens is None for _, s in hits)
+    statements = sum(s.block_first_line is None for _, s in hits)
     nth = anchor.nth
+
     if hits and (1 in (len(hits), statements) if nth is None else nth <= len(hits)):
         return hits[(nth or 1) - 1]
     raise _ambiguous_or_missing_error(file, location, functions, pairs, hits)
@@ -278,21 +282,25 @@ def _ambiguous_or_missing_error(
     verb = anchor.kind.partition("_")[2]
     what, place = _describe_anchor(verb, anchor.name), f"in {location.function}"
     if hits:
-        lines = ", ".join(str(s.first + 1) for _, s in hits)
+        lines = ", ".join(str(s.first_line + 1) for _, s in hits)
         nth_range = describe_valid_nth(len(hits))
         statement_count = counted(len(hits), "statement")
         got = f"{what} matches {statement_count} {place}: {'lines' if len(hits) > 1 else 'line'} {lines}"
         remedy = (
             f"give `nth`, {nth_range}" if anchor.nth is None else f"`nth` is {anchor.nth}: give {nth_range}"
         )
-        line, expected = hits[0][1].first, "exactly one"
+        line, expected = hits[0][1].first_line, "exactly one"
     elif pairs:
         statement = pairs[0][1]
-        got = f"{what} {place} is not a separate statement: {statement.reason}"
-        line, expected = statement.first, "a separate statement"
+        got = f"{what} {place} is not a separate statement: {statement.unanchorable_reason}"
+        line, expected = statement.first_line, "a separate statement"
         remedy = "anchor at another statement"
     else:
-        got, line, expected = f"no {what} {place}", functions[0].line, _describe_candidates(functions, verb)
+        got, line, expected = (
+            f"no {what} {place}",
+            functions[0].def_line,
+            _describe_candidates(functions, verb),
+        )
         remedy = "write the name exactly as in the source"
     return MutatorError(got, where=file.full_path, line=line + 1, expected=expected, remedy=remedy)
 
@@ -304,11 +312,11 @@ def _describe_anchor(verb: str, name: str) -> str:
 
 def _describe_candidates(functions: tuple[Function, ...], verb: str) -> str:
     candidates = [
-        f"'{name}' (line {s.first + 1})" if name else f"line {s.first + 1}"
+        f"'{name}' (line {s.first_line + 1})" if name else f"line {s.first_line + 1}"
         for f in functions
         for s in f.statements
-        if s.reason is None
-        for name in s.names(verb)
+        if s.unanchorable_reason is None
+        for name in s.names_for(verb)
     ]
     return (
         f"one of {', '.join(candidates)}"
@@ -320,21 +328,21 @@ def _describe_candidates(functions: tuple[Function, ...], verb: str) -> str:
 def _refuse_awkward(file: ParsedFile, anchor: Anchor, statement: Statement) -> None:
     after = anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL)
     reason = None
-    if statement.opens is not None and not after:
+    if statement.block_first_line is not None and not after:
         reason = "is the head of a block"
-    elif statement.one_line_suite:
+    elif statement.is_one_line_suite:
         reason = "is on the line of its `if`, `for` or `def`"
     elif after and statement.is_return:
         reason = "returns, so nothing after it runs"
-    elif after and not statement.last_in_line:
+    elif after and not statement.is_last_in_line:
         reason = "shares its line with statements after it"
-    elif not after and not statement.first_in_line:
+    elif not after and not statement.is_first_in_line:
         reason = "shares its line with statements before it"
     if reason:
         raise MutatorError(
             f"the anchored statement {reason}",
             where=file.full_path,
-            line=statement.first + 1,
+            line=statement.first_line + 1,
             expected="a statement that shares no line with others",
             remedy="anchor at another statement, or reformat the target",
         )

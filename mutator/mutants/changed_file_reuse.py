@@ -29,24 +29,24 @@ class ChangedFile:
 class ReusableChangedFile:
     """The parts of a change before, between and after its inserted lines."""
 
-    data: tuple[bytes, ...]
-    patch: tuple[str, ...]
+    data_parts: tuple[bytes, ...]
+    patch_parts: tuple[str, ...]
 
     @classmethod
-    def of(cls, change: ChangedFile) -> "ReusableChangedFile":
+    def from_changed_file(cls, change: ChangedFile) -> "ReusableChangedFile":
         """Remove the tagged lines from a change."""
         patch = change.patch.encode("utf-8", "surrogateescape")
         return cls(
-            data=tuple(_split_at_tagged_lines(change.data, b"")),
-            patch=tuple(_decode_patch(part) for part in _split_at_tagged_lines(patch, b"+")),
+            data_parts=tuple(_split_at_tagged_lines(change.data, b"")),
+            patch_parts=tuple(_decode_patch(part) for part in _split_at_tagged_lines(patch, b"+")),
         )
 
-    def filled(self, lines: Sequence[bytes]) -> ChangedFile:
+    def with_lines(self, lines: Sequence[bytes]) -> ChangedFile:
         """Insert these lines, given without their line ends."""
         data: list[bytes] = [b""] * (2 * len(lines) + 1)
         patch = [""] * len(data)
-        data[::2], data[1::2] = self.data, lines
-        patch[::2], patch[1::2] = self.patch, map(_decode_patch, lines)
+        data[::2], data[1::2] = self.data_parts, lines
+        patch[::2], patch[1::2] = self.patch_parts, map(_decode_patch, lines)
         return ChangedFile(data=b"".join(data), patch="".join(patch))
 
 
@@ -62,7 +62,13 @@ def _empty_cache(path: str, data: bytes, root: Path) -> dict[ReuseKey, ReusableC
 def reuse_key(file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> ReuseKey:
     """Return what edits must have in common to share a reusable change; `ids` are the ids in their lines."""
     return tuple(
-        (e.index, e.rank, e.reindent, e.unit, normalized(b"".join(e.lines).decode(file.encoding), ids))
+        (
+            e.line_index,
+            e.rank,
+            e.indented_count,
+            e.indent_unit,
+            normalized(b"".join(e.lines).decode(file.encoding), ids),
+        )
         for e in sort_edits(edits)
     )
 
@@ -78,7 +84,7 @@ def always_compiles(file: ParsedFile, change: ReusableChangedFile, key: ReuseKey
     """
     texts = (text.rstrip("\r\n") for *_, text in key)  # the file's last line can lack a line end
     lines = "\n".join(texts).encode(file.encoding).splitlines()
-    return compiles(change.filled(lines).data)
+    return compiles(change.with_lines(lines).data)
 
 
 def _split_at_tagged_lines(data: bytes, sign: bytes) -> list[bytes]:

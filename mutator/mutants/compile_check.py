@@ -28,7 +28,9 @@ def _all_parts_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
     functions: dict[range, list[Edit]] = defaultdict(list)
     outside: list[Edit] = []
     for edit in edits:
-        function = file.outermost_function_at(edit.index - 1 if edit.rank is EditRank.AFTER else edit.index)
+        function = file.outermost_function_at(
+            edit.line_index - 1 if edit.rank is EditRank.AFTER_PREVIOUS else edit.line_index
+        )
         if function is None or edit.rank is EditRank.AFTER_WHOLE:  # such lines are between functions
             outside.append(edit)
         else:
@@ -40,7 +42,7 @@ def _all_parts_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
 
 def _rest_compiles(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
     """Return whether the file compiles with `outside`, and `outside` has at most the probe's import."""
-    if len(outside) > 1 or any(edit.index != file.import_line for edit in outside):
+    if len(outside) > 1 or any(edit.line_index != file.import_line for edit in outside):
         return False
     if outside not in file.verified_edits:
         try:
@@ -53,6 +55,6 @@ def _rest_compiles(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
 
 def _function_compiles(file: ParsedFile, function: range, edits: Iterable[Edit]) -> bool:
     alone = replace(file, lines=file.lines[function.start : function.stop])
-    moved = [replace(edit, index=edit.index - function.start) for edit in edits]
+    moved = [replace(edit, line_index=edit.line_index - function.start) for edit in edits]
     data = join_pieces(apply_edits(alone, moved))
     return compile_standalone(data.splitlines(keepends=True), file.encoding) is not None

@@ -200,7 +200,7 @@ def choose_constant_or_default(
         f" in {location.function}" if location.function else ""
     )
     if match is None:
-        names = [one.name for one in alike if not one.unsettable_reason]
+        names = [value.name for value in alike if not value.unsettable_reason]
         raise MutatorError(
             f"no {what}",
             where=where,

@@ -31,7 +31,8 @@ def choose_expression(
 ) -> Expression:
     """Choose from a function's expressions the one that the location's anchor names.
 
-    The function begins at `line`, counted from 0. MutatorError with candidates unless exactly one matches.
+    The function begins at `function_line`, counted from 0. MutatorError with candidates unless exactly one
+    matches.
     """
     anchor, kind = location.anchor, location.anchor.kind
     name = normalized_text(anchor.name)
@@ -45,7 +46,7 @@ def choose_expression(
         filter(None, (f"`{kind.value}: {anchor.name}`".replace(": `", "`"), _describe_which(anchor)))
     )
     if matches:
-        lines = ", ".join(str(one.start[0] + 1) for one in matches)
+        lines = ", ".join(str(expression.start[0] + 1) for expression in matches)
         nth_range = describe_valid_nth(len(matches))
         raise MutatorError(
             f"{what} names {counted(len(matches), 'expression')} in {location.function}: "
@@ -81,8 +82,8 @@ def _describe_candidates(expressions: Sequence[Expression], kind: AnchorKind, na
         near = get_close_matches(name, [called for called, *_ in roles], n=_MOST_CANDIDATES, cutoff=0.0)
         roles = [role for role in roles if role[0] in near][:_MOST_CANDIDATES]
     descriptions = [
-        f"`{called}`" + (f" with `which: {place}`" if place else "") + f" (line {one.start[0] + 1})"
-        for called, place, one in roles
+        f"`{called}`" + (f" with `which: {place}`" if place else "") + f" (line {expression.start[0] + 1})"
+        for called, place, expression in roles
     ]
     return (
         f"one of {', '.join(descriptions)}"

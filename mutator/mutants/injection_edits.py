@@ -262,14 +262,15 @@ def _bound_names(code: str) -> Iterator[str]:
 
 
 def _check_scopes(file: ParsedFile, site: ResolvedAnchor, edit: Edit) -> None:
-    inserted = range(edit.index + 1, edit.index + 1 + len(edit.lines))
+    inserted = range(edit.line_index + 1, edit.line_index + 1 + len(edit.lines))
     try:
         moved = next(moved_names(file.data, join_pieces(apply_edits(file, [edit])), inserted), None)
     except SyntaxError:
         return  # the mutant does not compile, which building reports
     if moved:
         raise MutatorError(
-            f"the lines would make '{moved.name}' {moved.after} in {moved.scope}, where it is {moved.before}",
+            f"the lines would make '{moved.name}' {moved.scope_after} in {moved.holder}, where it is "
+            f"{moved.scope_before}",
             where=file.full_path,
             line=site.first_line + 1,
             expected="a variable that the function sets itself, or declares `global` or `nonlocal`",

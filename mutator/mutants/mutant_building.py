@@ -134,6 +134,7 @@ def _build_probe(
     ids: tuple[str, ...],
     sets: bool,
 ) -> Probe:
+
     probe_stem = probe_path(manifest.package).removesuffix("py")
     if clashes := [
         path for path in manifest.tree.files if path.startswith((probe_stem, f"{probe_stem[:-1]}/"))
@@ -201,13 +202,13 @@ class _ReusingSplicer(_Splicer):
         if key in cache:
             cached = cache[key]
             if isinstance(cached, ChangedFile):  # only on reuse: most changes of values are used once
-                cached = cache[key] = ReusableChangedFile.of(cached)
-            return cached.filled(inserted_lines(edits))
+                cached = cache[key] = ReusableChangedFile.from_changed_file(cached)
+            return cached.with_lines(inserted_lines(edits))
         if certainly_compiles(file, edits, key):
             cache[key] = change = self.splice(file, edits)
             return change
         change = super().checked_change(file, edits, ids)
-        reusable = ReusableChangedFile.of(change)
+        reusable = ReusableChangedFile.from_changed_file(change)
         if always_compiles(file, reusable, key):
             cache[key] = reusable
         return change

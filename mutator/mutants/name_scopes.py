@@ -17,9 +17,9 @@ class MovedName:
     """A name whose meaning has changed in a function or class."""
 
     name: str
-    scope: str
-    before: str
-    after: str
+    holder: str
+    scope_before: str
+    scope_after: str
 
 
 def names_by_function(data: bytes) -> NamesByFunction:
@@ -30,7 +30,7 @@ def names_by_function(data: bytes) -> NamesByFunction:
 def _names_in_tables(
     table: SymbolTable, private_prefix: str
 ) -> Iterator[tuple[tuple[int, str], frozenset[str]]]:
-    """Like `function_names`; `private` is the compiler's prefix for private names (`__x`) in a class."""
+    """Like `names_by_function`; `private_prefix` is the compiler's for private names (`__x`) in a class."""
     if table.get_type() == "class":
         name = table.get_name().lstrip("_")
         private_prefix = f"_{name}__" if name else ""
@@ -80,7 +80,9 @@ def _moved_between(before: SymbolTable, after: SymbolTable, inserted: Container[
     for symbol in before.get_symbols():
         name, home = symbol.get_name(), _scope_kind(symbol)
         if homes.get(name, "unknown") != home:
-            yield MovedName(name=name, scope=before.get_name(), before=home, after=homes.get(name, "unknown"))
+            yield MovedName(
+                name=name, holder=before.get_name(), scope_before=home, scope_after=homes.get(name, "unknown")
+            )
     unchanged = [child for child in after.get_children() if child.get_lineno() not in inserted]
     for child_before, child_after in zip(before.get_children(), unchanged, strict=False):
         yield from _moved_between(child_before, child_after, inserted)

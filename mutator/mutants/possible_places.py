@@ -60,23 +60,25 @@ class _PlaceLister:
     def places_in_function(self, name: str) -> Iterator[ListedPlace]:
         functions = self.file.functions_by_name[name]
         for i, function in enumerate(functions):
-            if function.entry is not None:
+            if function.entry_lines is not None:
                 yield from self.statement_places(
                     name, AnchorKind.ENTRY, "", i + 1 if len(functions) > 1 else None
                 )
         for verb, kinds in _ANCHOR_KINDS_BY_VERB.items():
-            anchorable = (s for f in functions for s in f.statements if not s.reason)
-            statements = sorted(anchorable, key=lambda s: s.opens is not None)  # in the order of `nth`
+            anchorable = (s for f in functions for s in f.statements if not s.unanchorable_reason)
+            statements = sorted(
+                anchorable, key=lambda s: s.block_first_line is not None
+            )  # in the order of `nth`
             totals, numbers = (Counter[str]() for _ in range(2))
-            totals.update(one for s in statements for one in s.names(verb))
+            totals.update(n for s in statements for n in s.names_for(verb))
             for statement in statements:
-                names = statement.names(verb)
+                names = statement.names_for(verb)
                 numbers.update(names)
-                usable_names = [one for one in names if is_writable_in_spec(one)]
-                for one in usable_names[-1:] if verb == "return" else usable_names:
+                usable_names = [bound_name for bound_name in names if is_writable_in_spec(bound_name)]
+                for bound_name in usable_names[-1:] if verb == "return" else usable_names:
                     for kind in kinds:
                         yield from self.statement_places(
-                            name, kind, one, numbers[one] if totals[one] > 1 else None
+                            name, kind, bound_name, numbers[bound_name] if totals[bound_name] > 1 else None
                         )
         yield from self.expression_places(name)
 
@@ -116,13 +118,13 @@ class _PlaceLister:
         expressions = self.file.expressions_by_function.get(function, ())
         totals = Counter(role for expression in expressions for role in dict.fromkeys(expression.roles))
         numbers = Counter[Any]()
-        for one in expressions:
-            kind, name, which = role = one.roles[0]
-            numbers.update(dict.fromkeys(one.roles, 1))
+        for expression in expressions:
+            kind, name, which = role = expression.roles[0]
+            numbers.update(dict.fromkeys(expression.roles, 1))
             nth = numbers[role] if totals[role] > 1 else None
             location = self.location_at(function, Anchor(kind=kind, name=name, which=which, nth=nth))
-            models = tuple(model.name for model in self.models if can_change(model, one))
-            yield ListedPlace(line=one.start[0] + 1, location=location, models=models)
+            models = tuple(model.name for model in self.models if can_change(model, expression))
+            yield ListedPlace(line=expression.start[0] + 1, location=location, models=models)
 
     def constant_and_default_places(self, function: str | None) -> Iterator[ListedPlace]:
         models = tuple(model.name for model in self.models if can_change(model, None))

@@ -49,7 +49,7 @@ class ProbeSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class Probe:
-    """A probe's source: its own parts, and those that it shares with the other probes of a target.
+    """A probe's source: parts with its own settings, and parts of code that all probes of a target share.
 
     In its file, they alternate.
     """
@@ -64,13 +64,15 @@ class Probe:
 
     @property
     def settings_and_code(self) -> tuple[str, str]:
-        """Its own part, and the shared one. Run one after the other, they do the same as the whole.
+        """The settings and the shared code. Run one after the other, they do the same as the whole.
 
         Blank lines keep the line numbers unchanged.
         """
         pairs = list(zip(self.settings_parts, self.code_parts, strict=True))
         padded_settings = (settings + "\n" * code.count("\n") for settings, code in pairs)
-        return "".join(padded_settings), "".join("\n" * one.count("\n") + other for one, other in pairs)
+        return "".join(padded_settings), "".join(
+            "\n" * settings.count("\n") + code for settings, code in pairs
+        )
 
     @property
     def armed_condition(self) -> tuple[float, str]:
@@ -93,6 +95,7 @@ def is_probe_path(path: str) -> bool:
 
 def injection_id(index: int, injection: Injection) -> str:
     """Return the id of an injection in tags and reports, from its content and position in the fault."""
+
     return content_id([index, injection])[:8]
 
 

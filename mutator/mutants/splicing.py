@@ -29,7 +29,7 @@ from mutator.mutants.injected_lines import (
 class EditRank(IntEnum):
     """The order of edits at one line index."""
 
-    AFTER = 0  # lines inserted after the previous line
+    AFTER_PREVIOUS = 0  # lines inserted after the previous line
     AFTER_WHOLE = 1  # lines inserted after a whole statement that ends on the previous line
     BEFORE = 2  # lines inserted before the line itself
     GUARD = 3  # a guard around the line
@@ -38,16 +38,16 @@ class EditRank(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edit:
-    """Lines to insert before line `index`; the `reindent` lines that follow are indented by `unit`.
+    """Lines to insert before line `line_index`; the `indented_count` lines that follow get `indent_unit`.
 
-    An edit of rank INSTEAD replaces line `index`.
+    An edit of rank INSTEAD replaces line `line_index`.
     """
 
-    index: int
+    line_index: int
     rank: EditRank
     lines: tuple[bytes, ...]
-    reindent: int = 0
-    unit: bytes = b""
+    indented_count: int = 0
+    indent_unit: bytes = b""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,8 +76,10 @@ class PatchPiece:
 def insertion_edit(file: ParsedFile, site: ResolvedAnchor, code: Sequence[str], tag: str) -> Edit:
     """Return the edit that inserts `code` (4 spaces per indentation level) at `site`, each line tagged."""
     lines = _tagged_lines(file, site, code, tag)
-    index, rank = (site.end_line, EditRank.AFTER) if site.is_after else (site.first_line, EditRank.BEFORE)
-    return Edit(index=index, rank=rank, lines=lines)
+    index, rank = (
+        (site.end_line, EditRank.AFTER_PREVIOUS) if site.is_after else (site.first_line, EditRank.BEFORE)
+    )
+    return Edit(line_index=index, rank=rank, lines=lines)
 
 
 def guard_edit(file: ParsedFile, site: ResolvedAnchor, code: Sequence[str], tag: str) -> Edit:
@@ -92,17 +94,17 @@ def guard_edit(file: ParsedFile, site: ResolvedAnchor, code: Sequence[str], tag:
         )
     lines = _tagged_lines(file, site, code, tag, site.indentable_count)
     return Edit(
-        index=site.first_line,
+        line_index=site.first_line,
         rank=EditRank.GUARD,
         lines=lines,
-        reindent=site.indentable_count,
-        unit=_indent_unit_of(file, site.indent),
+        indented_count=site.indentable_count,
+        indent_unit=_indent_unit_of(file, site.indent),
     )
 
 
 def setting_edit(file: ParsedFile, value: ConstantOrDefault, code: str, tag: str) -> Edit:
     line = value.indent + _encode(file, tagged_line(code, tag), value.first_line) + file.newline
-    return Edit(index=value.insertion_line, rank=EditRank.AFTER_WHOLE, lines=(line,))
+    return Edit(line_index=value.insertion_line, rank=EditRank.AFTER_WHOLE, lines=(line,))
 
 
 def value_edit(
@@ -129,8 +131,8 @@ def as_line_edits(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[E
     """Convert edits of values to edits that replace whole lines of the target; other edits are unchanged."""
     edits = list(edits)
     values = sorted((e for e in edits if isinstance(e, ValueEdit)), key=lambda e: e.start)
-    for one, following in pairwise(values):
-        if following.start < one.end:
+    for earlier, following in pairwise(values):
+        if following.start < earlier.end:
             raise MutatorError(
                 "two injections into one expression",
                 where=file.full_path,
@@ -153,7 +155,7 @@ def _replacement_edit(file: ParsedFile, index: int, texts: Sequence[tuple[int, b
     for column, text, _ in reversed(texts):
         line = line[:column] + text + line[column:]
     tag = replacement_tag(dict.fromkeys(tag for *_, tag in texts), original)
-    return Edit(index=index, rank=EditRank.INSTEAD, lines=(line + tag + whole[len(original) :],))
+    return Edit(line_index=index, rank=EditRank.INSTEAD, lines=(line + tag + whole[len(original) :],))
 
 
 def probe_import_edit(file: ParsedFile, package: str | None) -> Edit:
@@ -166,7 +168,7 @@ def probe_import_edit(file: ParsedFile, package: str | None) -> Edit:
             remedy="save the file without a byte order mark",
         )
     line = probe_import_line(package).encode(file.encoding)
-    return Edit(index=file.import_line, rank=EditRank.BEFORE, lines=(line + file.newline,))
+    return Edit(line_index=file.import_line, rank=EditRank.BEFORE, lines=(line + file.newline,))
 
 
 def _indent_unit_of(file: ParsedFile, indent: bytes) -> bytes:
@@ -204,7 +206,7 @@ def sort_edits(edits: Iterable[Edit]) -> list[Edit]:
 
     Exception: lines inserted after a class follow those inserted after its last function.
     """
-    return sorted(edits, key=lambda e: (e.index, e.rank, -_indentation_depth(e)))
+    return sorted(edits, key=lambda e: (e.line_index, e.rank, -_indentation_depth(e)))
 
 
 def _indentation_depth(edit: Edit) -> int:
@@ -212,31 +214,31 @@ def _indentation_depth(edit: Edit) -> int:
 
 
 def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[PatchPiece, ...]:
-    """Return the edited file as pieces, for `joined`; MutatorError if two guards wrap one statement."""
+    """Return the edited file as pieces, for `join_pieces`; MutatorError if two guards wrap one statement."""
     pieces: list[PatchPiece] = []
     next_line = 0
     for edit in sort_edits(edits):
-        if edit.index < next_line:
+        if edit.line_index < next_line:
             raise MutatorError(
                 "two guards around one statement, or an injection inside a guarded one",
                 where=file.full_path,
-                line=edit.index + 1,
+                line=edit.line_index + 1,
                 expected="one guard per statement, and no other injection in it",
                 remedy="remove one of the injections",
             )
-        _append_unchanged(pieces, file.lines[next_line : edit.index])
-        next_line = edit.index
+        _append_unchanged(pieces, file.lines[next_line : edit.line_index])
+        next_line = edit.line_index
         added = list(edit.lines)
-        if next_line and edit.index == len(file.lines):
+        if next_line and edit.line_index == len(file.lines):
             added = _move_last_newline(pieces, added, file.newline)
         if edit.rank is EditRank.INSTEAD:
-            pieces.append(PatchPiece(sign="-", lines=file.lines[edit.index : edit.index + 1]))
+            pieces.append(PatchPiece(sign="-", lines=file.lines[edit.line_index : edit.line_index + 1]))
             next_line += 1
-        if edit.reindent:
-            next_line += edit.reindent
-            wrapped = file.lines[edit.index : next_line]
+        if edit.indented_count:
+            next_line += edit.indented_count
+            wrapped = file.lines[edit.line_index : next_line]
             pieces.append(PatchPiece(sign="-", lines=wrapped))
-            added += _indent_lines(wrapped, edit.unit)
+            added += _indent_lines(wrapped, edit.indent_unit)
         pieces.append(PatchPiece(sign="+", lines=tuple(added)))
     _append_unchanged(pieces, file.lines[next_line:])
     return tuple(pieces)
@@ -281,22 +283,22 @@ def unsplice(data: bytes) -> bytes:
     """Return the original bytes of a mutated file."""
     lines = data.splitlines(keepends=True)
     result: list[bytes] = []
-    indented_count = 0  # lines still indented by a guard
-    guard_indentation = indent_unit = b""
+    remaining = 0  # lines still indented by a guard
+    guard_indentation = guard_unit = b""
     for line in lines:
         tag = tag_of(line)
         if tag and tag.replaced_line is not None:
             result.append(tag.replaced_line + line[len(line.rstrip(b"\r\n")) :])
         elif tag:
-            indented_count = tag.guarded_line_count
-            guard_indentation, indent_unit = _indentation_of(line), b""
-        elif indented_count and not indent_unit:
-            indent_unit = _indentation_of(line)[len(guard_indentation) :]
-            result.append(guard_indentation + line[len(guard_indentation) + len(indent_unit) :])
-            indented_count -= 1
-        elif indented_count:
-            result.append(line[len(indent_unit) :] if line.strip() else line)
-            indented_count -= 1
+            remaining = tag.guarded_line_count
+            guard_indentation, guard_unit = _indentation_of(line), b""
+        elif remaining and not guard_unit:
+            guard_unit = _indentation_of(line)[len(guard_indentation) :]
+            result.append(guard_indentation + line[len(guard_indentation) + len(guard_unit) :])
+            remaining -= 1
+        elif remaining:
+            result.append(line[len(guard_unit) :] if line.strip() else line)
+            remaining -= 1
         else:
             result.append(line)
     if result and tag_of(lines[-1]) and not lines[-1].endswith((b"\n", b"\r")):

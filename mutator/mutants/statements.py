@@ -21,48 +21,49 @@ from mutator.mutants.node_positions import (
 class Statement:
     """A small statement, or another construct that binds a name or calls a function.
 
-    Lines are counted from 0, `last` is exclusive. Names are dotted, as written. A statement that returns also
-    has the empty name in `returns`, which matches any return. Only small statements have a `place`.
+    Lines are counted from 0, `end_line` is exclusive. Names are dotted, as written. A statement that returns
+    also has the empty name in `returned_names`, which matches any return. Only small statements have a
+    `position`.
     """
 
-    first: int
-    last: int
-    place: NodePosition | None = None
-    assigns: tuple[str, ...] = ()
-    calls: tuple[str, ...] = ()
-    returns: tuple[str, ...] = ()
-    first_in_line: bool = True
-    last_in_line: bool = True
-    one_line_suite: bool = False
-    spanning_string: bool = False
-    reason: str | None = None  # why nothing can be anchored at this construct
-    opens: int | None = None  # for a binding in the head of a block: the block's first line
+    first_line: int
+    end_line: int
+    position: NodePosition | None = None
+    assigned_names: tuple[str, ...] = ()
+    called_names: tuple[str, ...] = ()
+    returned_names: tuple[str, ...] = ()
+    is_first_in_line: bool = True
+    is_last_in_line: bool = True
+    is_one_line_suite: bool = False
+    has_multiline_string: bool = False
+    unanchorable_reason: str | None = None  # why nothing can be anchored at this construct
+    block_first_line: int | None = None  # for a binding in the head of a block: the block's first line
 
-    def names(self, verb: str) -> tuple[str, ...]:
-        return {"assign": self.assigns, "call": self.calls, "return": self.returns}[verb]
+    def names_for(self, verb: str) -> tuple[str, ...]:
+        return {"assign": self.assigned_names, "call": self.called_names, "return": self.returned_names}[verb]
 
     @property
-    def alone(self) -> bool:
-        return self.first_in_line and self.last_in_line and not self.one_line_suite
+    def is_alone(self) -> bool:
+        return self.is_first_in_line and self.is_last_in_line and not self.is_one_line_suite
 
     @property
     def is_return(self) -> bool:
-        return bool(self.returns)
+        return bool(self.returned_names)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Function:
     """A function. Its statements do not include those of nested functions and classes.
 
-    `entry` has the index of the line before which to insert, and of the line whose indentation to use; None
-    if nothing can be inserted.
+    `entry_lines` has the index of the line before which to insert, and of the line whose indentation to use;
+    None if nothing can be inserted.
     """
 
-    line: int
-    place: NodePosition
+    def_line: int
+    position: NodePosition
     statements: tuple[Statement, ...]
-    names: frozenset[str]
-    entry: tuple[int, int] | None
+    used_names: frozenset[str]
+    entry_lines: tuple[int, int] | None
 
 
 def collect_functions(
@@ -94,37 +95,37 @@ class _FunctionCollector(cst.CSTVisitor):
     def __init__(self, positions: Positions, names: NamesByFunction) -> None:
         super().__init__()
         self.positions = positions
-        self.names = names
+        self.names_by_function = names
         self.functions: dict[str, list[Function]] = {}
-        self.scope: list[str] = []
-        self.open: list[list[Statement] | None] = []  # None for a class
-        self.heads: set[int] = set()  # ids of targets in heads of blocks
+        self.scope_names: list[str] = []
+        self.open_scopes: list[list[Statement] | None] = []  # None for a class
+        self.head_target_ids: set[int] = set()  # ids of targets in heads of blocks
 
     def visit_ClassDef(self, node: cst.ClassDef) -> None:  # noqa: N802
-        self.scope.append(normalize_identifier(node.name.value))
-        self.open.append(None)
+        self.scope_names.append(normalize_identifier(node.name.value))
+        self.open_scopes.append(None)
 
     def leave_ClassDef(self, original_node: cst.ClassDef) -> None:  # noqa: N802
-        self.scope.pop()
-        self.open.pop()
+        self.scope_names.pop()
+        self.open_scopes.pop()
 
     def visit_FunctionDef(self, node: cst.FunctionDef) -> None:  # noqa: N802
-        self.scope.append(normalize_identifier(node.name.value))
-        self.open.append([])
+        self.scope_names.append(normalize_identifier(node.name.value))
+        self.open_scopes.append([])
 
     def leave_FunctionDef(self, original_node: cst.FunctionDef) -> None:  # noqa: N802
-        statements = self.open.pop()
+        statements = self.open_scopes.pop()
         assert statements is not None
         line = self.positions[original_node].start.line
         function = Function(
-            line=line - 1,
-            place=function_position(original_node, self.positions),
-            statements=tuple(sorted(statements, key=lambda s: s.first)),
-            names=self.names.get((line, self.scope[-1]), frozenset()),
-            entry=_entry_lines(original_node, self.positions),
+            def_line=line - 1,
+            position=function_position(original_node, self.positions),
+            statements=tuple(sorted(statements, key=lambda s: s.first_line)),
+            used_names=self.names_by_function.get((line, self.scope_names[-1]), frozenset()),
+            entry_lines=_entry_lines(original_node, self.positions),
         )
-        self.functions.setdefault(".".join(self.scope), []).append(function)
-        self.scope.pop()
+        self.functions.setdefault(".".join(self.scope_names), []).append(function)
+        self.scope_names.pop()
 
     def visit_SimpleStatementLine(self, node: cst.SimpleStatementLine) -> None:  # noqa: N802
         self._add_small_statements(node, one_line_suite=False)
@@ -145,7 +146,7 @@ class _FunctionCollector(cst.CSTVisitor):
             self._add_head_binding(node.name.name, node.body, "it is bound by `as`")
 
     def visit_AsName(self, node: cst.AsName) -> None:  # noqa: N802
-        if id(node.name) not in self.heads:
+        if id(node.name) not in self.head_target_ids:
             self._add_unanchorable(node, _target_names(node.name), "it is bound by `as`")
 
     def visit_NamedExpr(self, node: cst.NamedExpr) -> None:  # noqa: N802
@@ -154,7 +155,7 @@ class _FunctionCollector(cst.CSTVisitor):
     def _add_small_statements(
         self, node: cst.SimpleStatementLine | cst.SimpleStatementSuite, one_line_suite: bool
     ) -> None:
-        statements = self.open[-1] if self.open else None
+        statements = self.open_scopes[-1] if self.open_scopes else None
         if statements is None:
             return
         span = self.positions[node]
@@ -170,23 +171,23 @@ class _FunctionCollector(cst.CSTVisitor):
                 continue
             statements.append(
                 Statement(
-                    first=span.start.line - 1,
-                    last=last,
-                    place=statement_position(small, self.positions),
-                    assigns=assigns,
-                    calls=calls,
-                    returns=returns,
-                    first_in_line=i == 0,
-                    last_in_line=i == len(node.body) - 1,
-                    one_line_suite=one_line_suite,
-                    spanning_string=_has_multiline_string(small, self.positions),
+                    first_line=span.start.line - 1,
+                    end_line=last,
+                    position=statement_position(small, self.positions),
+                    assigned_names=assigns,
+                    called_names=calls,
+                    returned_names=returns,
+                    is_first_in_line=i == 0,
+                    is_last_in_line=i == len(node.body) - 1,
+                    is_one_line_suite=one_line_suite,
+                    has_multiline_string=_has_multiline_string(small, self.positions),
                 )
             )
 
     def _add_head_binding(self, target: cst.CSTNode, body: cst.BaseSuite, reason: str) -> None:
         """Add what the head of a block binds. Snippets go into the block, if the block has its own lines."""
-        self.heads.add(id(target))
-        statements, names = self.open[-1] if self.open else None, _target_names(target)
+        self.head_target_ids.add(id(target))
+        statements, names = self.open_scopes[-1] if self.open_scopes else None, _target_names(target)
         if statements is None or not names:
             return
         if not isinstance(body, cst.IndentedBlock):
@@ -196,22 +197,29 @@ class _FunctionCollector(cst.CSTVisitor):
         decorators = first.decorators if isinstance(first, cst.FunctionDef | cst.ClassDef) else ()
         opens = min(self.positions[node].start.line for node in (first, *decorators)) - 1
         line = self.positions[target].start.line - 1
-        statements.append(Statement(first=line, last=opens, assigns=tuple(_stable_names(names)), opens=opens))
+        statements.append(
+            Statement(
+                first_line=line,
+                end_line=opens,
+                assigned_names=tuple(_stable_names(names)),
+                block_first_line=opens,
+            )
+        )
 
     def _add_unanchorable(
         self, node: cst.CSTNode, names: list[str], reason: str, calls: bool = False
     ) -> None:
-        statements = self.open[-1] if self.open else None
+        statements = self.open_scopes[-1] if self.open_scopes else None
         if statements is not None and names and all(names):
             span = self.positions[node]
             bound_names = tuple(names)
             statements.append(
                 Statement(
-                    first=span.start.line - 1,
-                    last=span.end.line,
-                    assigns=() if calls else bound_names,
-                    calls=bound_names if calls else (),
-                    reason=reason,
+                    first_line=span.start.line - 1,
+                    end_line=span.end.line,
+                    assigned_names=() if calls else bound_names,
+                    called_names=bound_names if calls else (),
+                    unanchorable_reason=reason,
                 )
             )
 

@@ -93,7 +93,7 @@ class CountingContext(_Context):
 
     work = 0
 
-    def add(self, work: int) -> None:
+    def add_work(self, work: int) -> None:
         """Count work; SecurityError if it is too much."""
         self.work += work
         if self.work > MOST_WORK_STEPS:
@@ -127,7 +127,7 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
         self.filter_names = frozenset(self.filters)
         self.filters |= {_TURN_COUNTER: _count_turns, _READ_COUNTER: _counting_filter(lambda value: value)}
         self.globals = dict(functions)
-        self.compiled = lru_cache(maxsize=256)(self._compile_template)
+        self.compiled_template = lru_cache(maxsize=256)(self._compile_template)
 
     def _compile_template(self, text: str) -> Template:
         """Return the template; TemplateSyntaxError with the line of a construct that is not allowed."""
@@ -187,14 +187,14 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
     def call_binop(self, context: Any, operator: str, left: Any, right: Any) -> Any:
         """Calculate with numbers, and add texts or lists."""
         if operator == "+" and isinstance(left, str | list) and type(left) is type(right):
-            context.add(len(left) + len(right))
+            context.add_work(len(left) + len(right))
         elif not (_is_number(left) and _is_number(right)):
             kinds = f"{type(left).__name__} {operator} {type(right).__name__}"
             raise SecurityError(f"{kinds} is not allowed")
         return super().call_binop(context, operator, left, right)
 
     def call(__self, __context: Any, __function: Any, *args: Any, **kwargs: Any) -> Any:  # noqa: N805 (Jinja2's)
-        __context.add(_count_characters(getattr(__function, "__self__", None)))
+        __context.add_work(_count_characters(getattr(__function, "__self__", None)))
         return super().call(__context, __function, *args, **kwargs)
 
     @staticmethod
@@ -235,7 +235,7 @@ def _counting_filter(function: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(function)
     def counted(context: CountingContext, value: Any, *args: Any) -> Any:
         times = len(value) if isinstance(value, list | tuple) else 1
-        context.add(_count_characters(value) + times * sum(map(_count_characters, args)))
+        context.add_work(_count_characters(value) + times * sum(map(_count_characters, args)))
         return function(value, *args)
 
     return counted
@@ -245,7 +245,7 @@ def _counting_filter(function: Callable[..., Any]) -> Callable[..., Any]:
 def _count_turns(context: CountingContext, value: Any, size: int) -> Any:
     if not isinstance(value, list | tuple):
         raise SecurityError(f"a loop over a {type(value).__name__}")
-    context.add(len(value) * size)
+    context.add_work(len(value) * size)
     return value
 
 

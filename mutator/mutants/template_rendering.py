@@ -226,7 +226,7 @@ def _checked_param(param: ParamSchema, params: Mapping[str, Value]) -> Value:
 def render_template(template: str, names: Mapping[str, object], where: Path, first_line: int = 1) -> str:
     """Render a template, or its part from `first_line` on; MutatorError with the line, if known."""
     try:
-        return _ENVIRONMENT.compiled(template).render(names)
+        return _ENVIRONMENT.compiled_template(template).render(names)
     except TemplateSyntaxError as error:
         raise _template_error(str(error.message), where, error.lineno, first_line) from None
     except TemplateError as error:
@@ -263,7 +263,7 @@ def _template_line_of(error: BaseException) -> int | None:
 
 @lru_cache(maxsize=1024)
 def _is_valid_snippet(text: str, kind: SnippetKind) -> bool:
-    """Return whether normalized source, and so all source that it covers, passes `_check_lines`."""
+    """Return whether normalized source, and so all source that it covers, passes `_check_snippet`."""
     try:
         _check_snippet(text, kind, Path())
     except MutatorError:

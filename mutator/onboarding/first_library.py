@@ -49,6 +49,7 @@ def write_first_library(survey: SourceSurvey, folder: Path) -> None:
         path = folder / form.format(name=variables["name"], entry=variables["entry"])
         path.parent.mkdir(parents=True, exist_ok=True)
         text = templates.get_template(f"{template}.j2").render(variables)
+
         path.write_text(re.sub(r"\n{4,}", "\n\n\n", text), encoding="utf-8")
     if not variables["candidates"]:
         warnings.warn(_describe_no_controller(survey), MutatorWarning, stacklevel=3)
@@ -56,12 +57,13 @@ def write_first_library(survey: SourceSurvey, folder: Path) -> None:
 
 def _describe_no_controller(survey: SourceSurvey) -> str:
     problems = [
-        f"{place} cannot be read: {problem}" for place, problem in survey.unread[:MOST_LISTED_CANDIDATES]
+        f"{place} cannot be read: {problem}" for place, problem in survey.unreadable[:MOST_LISTED_CANDIDATES]
     ]
     if survey.modules:
         problems.insert(0, f"no function in {counted(len(survey.modules), 'file')} looks like a step")
     reasons = "; ".join(problems) or "no Python files apart from tests, docs and scripts"
-    return f"{survey.installed or survey.root}: no controller found: {reasons}; fill in the files by hand"
+    source = survey.installed_package or survey.root
+    return f"{source}: no controller found: {reasons}; fill in the files by hand"
 
 
 def _yaml_scalar(text: str) -> str:
@@ -71,7 +73,9 @@ def _yaml_scalar(text: str) -> str:
 
 def _template_variables(survey: SourceSurvey, folder: Path) -> dict[str, Any]:
     candidates = list_step_candidates(survey)[:MOST_LISTED_CANDIDATES]
-    title = survey.installed or (survey.packages[0] if len(survey.packages) == 1 else survey.root.name)
+    title = survey.installed_package or (
+        survey.packages[0] if len(survey.packages) == 1 else survey.root.name
+    )
     name = re.sub(r"\W+", "_", title.removesuffix(".py")).strip("_").lower()
     name = name if name[:1].isalpha() else f"controller_{name}".strip("_")
     package_names = {package.removesuffix(".py") for package in survey.packages}
@@ -83,15 +87,17 @@ def _template_variables(survey: SourceSurvey, folder: Path) -> dict[str, Any]:
         "entry": next(
             name for name in ("drive", "drive_loop", "drive_closed_loop") if name not in package_names
         ),
-        "installed": survey.installed,
-        "requires": survey.requires,
+        "installed": survey.installed_package,
+        "requires": survey.requirement,
         "root": os.path.relpath(survey.root, manifest_folder),
-        "root_shown": survey.installed or survey.root.name,
-        "where": f"the installed package {survey.installed}" if survey.installed else f"`{survey.root.name}`",
+        "root_shown": survey.installed_package or survey.root.name,
+        "where": f"the installed package {survey.installed_package}"
+        if survey.installed_package
+        else f"`{survey.root.name}`",
         "package": only_package if not only_package.endswith(".py") else "",
         "packages": survey.packages,
         "count": counted(len(survey.modules), "Python file"),
-        "unread": survey.unread[:MOST_LISTED_CANDIDATES],
+        "unread": survey.unreadable[:MOST_LISTED_CANDIDATES],
         "mark": TODO_MARK,
         "candidates": candidates,
         **_step_variables(candidates[0] if candidates else None),
@@ -109,19 +115,19 @@ def _step_variables(best: StepCandidate | None) -> dict[str, Any]:
             "builds": (),
             "build_arguments": "",
         }
-    called = "self.controller" if best.owner else best.function
-    if best.owner and best.function != "__call__":
+    called = "self.controller" if best.class_name else best.function
+    if best.class_name and best.function != "__call__":
         called += f".{best.function}"
     first, *rest = best.values or (None,)
     places = ", ".join(f"{value.name} (line {value.line})" for value in rest[:MOST_LISTED_CANDIDATES])
     return {
         "module": best.module,
-        "imported": best.owner or best.function,
-        "run": "Drive" if best.owner != "Drive" else "Loop",
+        "imported": best.class_name or best.function,
+        "run": "Drive" if best.class_name != "Drive" else "Loop",
         "thing": best.name,
-        "builder": best.owner or "",
-        "builds": best.builds,
-        "build_arguments": ", ".join(f"{argument}=..." for argument in best.builds),
+        "builder": best.class_name or "",
+        "builds": best.constructor_arguments,
+        "build_arguments": ", ".join(f"{argument}=..." for argument in best.constructor_arguments),
         "call": f"{called}({_call_arguments(best)})",
         "path": best.path,
         "function": best.name,
@@ -134,6 +140,6 @@ def _step_variables(best: StepCandidate | None) -> dict[str, Any]:
 
 def _call_arguments(best: StepCandidate) -> str:
     """Return call arguments: the state first, then the time step, and `...` for all others."""
-    first, *others = best.needs or ("",)
+    first, *others = best.required_arguments or ("",)
     texts = [f"{name}={'self.step_s' if name in _TIME_STEP_NAMES else '...'}" for name in others]
     return ", ".join(["state", *texts]) if first else ""

@@ -42,9 +42,9 @@ class SourceSurvey:
     root: Path  # the folder for `sys.path`
     packages: tuple[str, ...]  # import packages and flat modules (`drive.py`)
     modules: tuple[SourceModule, ...]  # the files that were read
-    unread: tuple[tuple[str, str], ...] = ()  # `path:line` and reason of each file that cannot be read
-    installed: str | None = None
-    requires: str | None = None  # requirement for the installed distribution
+    unreadable: tuple[tuple[str, str], ...] = ()  # `path:line` and reason of each file that cannot be read
+    installed_package: str | None = None
+    requirement: str | None = None  # requirement for the installed distribution
 
 
 def survey_source(target: str) -> SourceSurvey:
@@ -76,7 +76,7 @@ def _survey_installed(name: str) -> SourceSurvey:
             remedy="install it in mutator's environment, or correct the name",
         )
     survey = _survey_packages(package_path.parent, (package_path.name,), any_links=True)
-    return replace(survey, installed=name, requires=_distribution_requirement(name))
+    return replace(survey, installed_package=name, requirement=_distribution_requirement(name))
 
 
 def _distribution_requirement(name: str) -> str | None:
@@ -150,4 +150,4 @@ def _survey_packages(root: Path, packages: tuple[str, ...], *, any_links: bool =
             except (SyntaxError, ValueError, RecursionError, MemoryError, OSError) as err:
                 line = getattr(err, "lineno", None) or 1
                 unread.append((f"{relative}:{line}", getattr(err, "msg", None) or str(err)))
-    return SourceSurvey(root=root, packages=packages, modules=tuple(modules), unread=tuple(unread))
+    return SourceSurvey(root=root, packages=packages, modules=tuple(modules), unreadable=tuple(unread))

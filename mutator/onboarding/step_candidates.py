@@ -45,17 +45,17 @@ class StepCandidate:
     module: str
     path: str
     line: int
-    owner: str | None  # the class of a method
+    class_name: str | None  # the class of a method
     function: str
-    needs: tuple[str, ...]  # required arguments
-    builds: tuple[str, ...]  # required arguments of the class's constructor
+    required_arguments: tuple[str, ...]  # required arguments
+    constructor_arguments: tuple[str, ...]  # required arguments of the class's constructor
     score: int
     values: tuple[ValueCandidate, ...]
 
     @property
     def name(self) -> str:
         """The name in a fault spec: `PID.update`."""
-        return f"{self.owner}.{self.function}" if self.owner else self.function
+        return f"{self.class_name}.{self.function}" if self.class_name else self.function
 
 
 def list_step_candidates(survey: SourceSurvey) -> tuple[StepCandidate, ...]:
@@ -100,6 +100,7 @@ def _build_candidate(
     module: SourceModule, owner: ast.ClassDef | None, function: Function, looped: Counter[str]
 ) -> StepCandidate:
     values = tuple(_value_candidates(function))
+
     hints = _name_score(function.name) + 2 * min(looped[function.name], 3)
     score = min(len(values), _MOST_VALUE_POINTS) + (hints or _NO_HINT_POINTS)
     if owner is not None:
@@ -114,10 +115,10 @@ def _build_candidate(
         module=module.name,
         path=module.path,
         line=function.lineno,
-        owner=owner.name if owner else None,
+        class_name=owner.name if owner else None,
         function=function.name,
-        needs=_required_arguments(function, is_method=owner is not None),
-        builds=_required_arguments(init, is_method=True) if init else (),
+        required_arguments=_required_arguments(function, is_method=owner is not None),
+        constructor_arguments=_required_arguments(init, is_method=True) if init else (),
         score=score,
         values=values,
     )
@@ -133,6 +134,7 @@ def _name_score(name: str) -> int:
 
 def _class_score(name: str) -> int:
     lower = name.lower()
+
     return 5 * bool(_CONTROLLER_PATTERN.search(lower)) - 6 * bool(_WORLD_PATTERN.search(lower))
 
 

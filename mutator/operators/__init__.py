@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rule:
+class MutationRule:
     """A change of an expression: a fault model with parameters."""
 
     model: str
     params: tuple[tuple[str, Value], ...] = ()
 
 
-def rule(model: str, **params: Value) -> Rule:
-    return Rule(model=model, params=tuple(sorted(params.items())))
+def mutation_rule(model: str, **params: Value) -> MutationRule:
+    return MutationRule(model=model, params=tuple(sorted(params.items())))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,5 +42,5 @@ class Operator:
     about: str
     replacements: tuple[tuple[str, str], ...]
     examples: Mapping[str, Sequence[str]]
-    rules: "Callable[[Expression, StatementFacts], Iterable[Rule]] | None" = None
+    rules: "Callable[[Expression, StatementFacts], Iterable[MutationRule]] | None" = None
     omits: "Callable[[Statement, StatementFacts], bool] | None" = None

@@ -12,7 +12,7 @@ from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.expressions import Expression, template_parts
 from mutator.mutants.statements import Statement
 from mutator.mutants.template_rendering import render_changed_value
-from mutator.operators import Operator, Rule
+from mutator.operators import MutationRule, Operator
 from mutator.operators.mutations import Mutation
 from mutator.operators.operator_lookup import find_operator
 from mutator.operators.statement_facts import StatementFacts
@@ -31,14 +31,14 @@ def mutations_of(
     mutations = list(_expression_mutations(file, facts, function, models, operator_by_name))
     if any(operator.omits for operator in operator_by_name.values()):
         mutations += _omission_mutations(file, facts, function, operator_by_name)
-    return sorted(mutations, key=lambda one: (one.line, OPERATORS.sort_key(one.operator)))
+    return sorted(mutations, key=lambda mutation: (mutation.line, OPERATORS.sort_key(mutation.operator)))
 
 
 def _expression_mutations(
     file: ParsedFile, facts: StatementFacts, function: str, models: FaultModels, operators: _OperatorByName
 ) -> Iterator[Mutation]:
     expressions = file.expressions_by_function.get(function, ())
-    totals = Counter(one.text for one in expressions)
+    totals = Counter(e.text for e in expressions)
     numbers: Counter[str] = Counter()
     for expression in expressions:
         text = expression.text
@@ -57,9 +57,9 @@ def _expression_mutations(
                 location=location,
                 model=rule.model,
                 params=rule.params,
-                place=expression,
-                was=text,
-                now=render_changed_value(
+                mutated_part=expression,
+                source_before=text,
+                source_after=render_changed_value(
                     model, dict(rule.params), _PLACEHOLDER_ID, expression.one_line_source, parts
                 ),
             )
@@ -67,35 +67,37 @@ def _expression_mutations(
 
 def _rules_for(
     operators: _OperatorByName, expression: Expression, facts: StatementFacts
-) -> Iterator[tuple[str, Rule]]:
+) -> Iterator[tuple[str, MutationRule]]:
     for name, operator in operators.items():
         if operator.rules:
             with OPERATORS.blaming_package(name):
                 for rule in operator.rules(expression, facts):
-                    if not isinstance(rule, Rule):
-                        raise TypeError(f"{rule!r} is no Rule")
+                    if not isinstance(rule, MutationRule):
+                        raise TypeError(f"{rule!r} is no MutationRule")
                     yield name, rule
 
 
 def _omission_mutations(
     file: ParsedFile, facts: StatementFacts, function: str, operators: _OperatorByName
 ) -> Iterator[Mutation]:
-    every = ((f.line + 1, one) for f in file.functions_by_name.get(function, ()) for one in f.statements)
-    anchorable = [(line, one) for line, one in every if one.reason is None and one.opens is None]
+    every = ((f.def_line + 1, s) for f in file.functions_by_name.get(function, ()) for s in f.statements)
+    anchorable = [
+        (line, s) for line, s in every if s.unanchorable_reason is None and s.block_first_line is None
+    ]
     numbers: Counter[tuple[str, str]] = Counter()
     for line, statement in anchorable:
         numbered_anchor = None
         for verb in ("assign", "call"):
-            for name in statement.names(verb):
+            for name in statement.names_for(verb):
                 numbers[verb, name] += 1
                 numbered_anchor = numbered_anchor or (verb, name, numbers[verb, name])
         if numbered_anchor is None or not _can_be_omitted(statement, facts, line):
             continue
-        omitting = [name for name, one in operators.items() if _does_omit(name, one, statement, facts)]
+        omitting = [name for name, o in operators.items() if _does_omit(name, o, statement, facts)]
         if not omitting:
             continue
         verb, name, number = numbered_anchor
-        is_ambiguous = sum(name in one.names(verb) for _, one in anchorable) > 1
+        is_ambiguous = sum(name in s.names_for(verb) for _, s in anchorable) > 1
         kind = AnchorKind.BEFORE_ASSIGN if verb == "assign" else AnchorKind.BEFORE_CALL
         anchor = Anchor(kind=kind, name=name, nth=number if is_ambiguous else None)
         location = FaultLocation(path=file.path, function=function, anchor=anchor)
@@ -109,9 +111,9 @@ def _omission_mutations(
                 location=location,
                 model="omission",
                 params=(),
-                place=statement,
-                was=facts.texts.get(statement.first + 1, name),
-                now=LEFT_OUT_TEXT,
+                mutated_part=statement,
+                source_before=facts.source_by_line.get(statement.first_line + 1, name),
+                source_after=LEFT_OUT_TEXT,
             )
 
 
@@ -124,7 +126,9 @@ def _can_be_omitted(statement: Statement, facts: StatementFacts, def_line: int) 
     """Return whether a statement can be omitted. The first binding of a local name cannot, because later
     uses of the name would fail.
     """
-    if not statement.alone:
+    if not statement.is_alone:
         return False
-    names = [name for name in statement.assigns if name.isidentifier()]
-    return all(facts.bound.get((def_line, name), 0) < statement.first + 1 for name in names)
+    names = [name for name in statement.assigned_names if name.isidentifier()]
+    return all(
+        facts.first_binding_line_by_name.get((def_line, name), 0) < statement.first_line + 1 for name in names
+    )

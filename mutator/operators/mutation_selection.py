@@ -27,19 +27,19 @@ class SelectedMutations:
     """The selected mutations, and the numbers of those left out, by reason."""
 
     mutations: tuple[Mutation, ...] = ()
-    unexecuted: int = 0  # no golden run executes the line
-    equal: int = 0  # same code as the original
-    twins: int = 0  # same code as an earlier mutation
-    invalid: int = 0  # does not compile
+    unexecuted_count: int = 0  # no golden run executes the line
+    equal_count: int = 0  # same code as the original
+    duplicate_count: int = 0  # same code as an earlier mutation
+    invalid_count: int = 0  # does not compile
 
     @property
-    def told(self) -> str:
+    def summary(self) -> str:
         """A summary of the numbers for the user."""
         left_out = {
-            "in lines that no golden run executes": self.unexecuted,
-            "with the code of the original": self.equal,
-            "with the code of another": self.twins,
-            "that do not compile": self.invalid,
+            "in lines that no golden run executes": self.unexecuted_count,
+            "with the code of the original": self.equal_count,
+            "with the code of another": self.duplicate_count,
+            "that do not compile": self.invalid_count,
         }
         parts = [f"{number} {what}" for what, number in left_out.items() if number]
         rest = f"; left out: {', '.join(parts)}" if parts else ""
@@ -82,27 +82,27 @@ def _select_in_file(
     mutations = [
         mutation for name in functions for mutation in mutations_of(file, facts, name, models, operators)
     ]
-    lines = None if executed is None else facts.executed(executed.get(path, ()))
+    lines = None if executed is None else facts.extend_to_statements(executed.get(path, ()))
     executed_mutations = (
         mutations if lines is None else [mutation for mutation in mutations if mutation.line + 1 in lines]
     )
     distinct_mutations = drop_equal_code(file, executed_mutations)
     return SelectedMutations(
         mutations=distinct_mutations.mutations,
-        unexecuted=len(mutations) - len(executed_mutations),
-        equal=distinct_mutations.equal,
-        twins=distinct_mutations.twins,
-        invalid=distinct_mutations.invalid,
+        unexecuted_count=len(mutations) - len(executed_mutations),
+        equal_count=distinct_mutations.equal_count,
+        duplicate_count=distinct_mutations.duplicate_count,
+        invalid_count=distinct_mutations.invalid_count,
     )
 
 
 def _merge(first: SelectedMutations, second: SelectedMutations) -> SelectedMutations:
     return SelectedMutations(
         mutations=first.mutations + second.mutations,
-        unexecuted=first.unexecuted + second.unexecuted,
-        equal=first.equal + second.equal,
-        twins=first.twins + second.twins,
-        invalid=first.invalid + second.invalid,
+        unexecuted_count=first.unexecuted_count + second.unexecuted_count,
+        equal_count=first.equal_count + second.equal_count,
+        duplicate_count=first.duplicate_count + second.duplicate_count,
+        invalid_count=first.invalid_count + second.invalid_count,
     )
 
 

@@ -21,33 +21,37 @@ class Mutation:
     location: FaultLocation
     model: str
     params: tuple[tuple[str, Value], ...]
-    place: Expression | Statement
-    was: str
-    now: str
+    mutated_part: Expression | Statement
+    source_before: str
+    source_after: str
 
     @property
     def line(self) -> int:
         """The line on which the place begins, counted from 0."""
-        return self.place.start[0] if isinstance(self.place, Expression) else self.place.first
+        return (
+            self.mutated_part.start[0]
+            if isinstance(self.mutated_part, Expression)
+            else self.mutated_part.first_line
+        )
 
     @property
-    def text(self) -> str:
+    def description(self) -> str:
         """The change, abbreviated: `a + b -> a - b`."""
-        was, now = " ".join(self.was.split()), " ".join(self.now.split())
+        was, now = " ".join(self.source_before.split()), " ".join(self.source_after.split())
         if max(len(was), len(now)) <= _MOST_CHARACTERS:
             return f"{was} -> {now}"
         before = max(0, _common_prefix_length(was, now) - _CONTEXT_CHARACTERS)
         after = max(0, _common_prefix_length(was[before:][::-1], now[before:][::-1]) - _CONTEXT_CHARACTERS)
         return " -> ".join(_abbreviate(text, before, after) for text in (was, now))
 
-    def fault(self, reading: str) -> Fault:
+    def to_fault(self, reading: str) -> Fault:
         injection = Injection(location=self.location, model=self.model, params=self.params)
         return Fault(
             spec=f"{OPERATORS}/{self.operator}/{self.location.path}::{self.location.function}",
             module=OPERATORS,
             fault_type=self.operator,
             reading=reading,
-            value=self.text,
+            value=self.description,
             unit="-",
             aim="",
             injections=(injection,),
@@ -64,6 +68,7 @@ def _common_prefix_length(first: str, second: str) -> int:
 def _abbreviate(text: str, before: int, after: int) -> str:
     part = text[before : len(text) - after]
     half = _MOST_CHARACTERS // 2
+
     if len(part) > _MOST_CHARACTERS + 4:
         part = f"{part[:half]} .. {part[-half:]}"
     return f"{'.. ' if before else ''}{part}{' ..' if after else ''}"

@@ -17,22 +17,22 @@ _LOCAL_NAME_FIELDS: dict[type[ast.AST], str] = {ast.comprehension: "target", ast
 class StatementFacts:
     """Facts about the statements of a file's functions. Line numbers start at 1.
 
-    * `augmented`: the operator of an augmented assignment, by the extent of its right-hand side
-    * `texts`: the source of simple statements, by first line
-    * `bound`: the line that first binds a name in a function. The key has the function's `def` line, because
-      a property and its setter share a name
-    * `own`: the lines of each statement without those of nested statements
+    * `augmenting_operator_by_extent`: of augmented assignments, by the extent of the right-hand side
+    * `source_by_line`: the source of simple statements, by first line
+    * `first_binding_line_by_name`: in a function. The key has the function's `def` line, because a property and
+      its setter share a name
+    * `statement_lines`: the lines of each statement without those of nested statements
     """
 
-    augmented: dict[NodeExtent, ast.operator] = field(default_factory=dict)
-    texts: dict[int, str] = field(default_factory=dict)
-    bound: dict[tuple[int, str], int] = field(default_factory=dict)
-    own: list[range] = field(default_factory=list)
+    augmenting_operator_by_extent: dict[NodeExtent, ast.operator] = field(default_factory=dict)
+    source_by_line: dict[int, str] = field(default_factory=dict)
+    first_binding_line_by_name: dict[tuple[int, str], int] = field(default_factory=dict)
+    statement_lines: list[range] = field(default_factory=list)
 
-    def executed(self, lines: Collection[int]) -> frozenset[int]:
+    def extend_to_statements(self, lines: Collection[int]) -> frozenset[int]:
         """Extend the lines to whole statements."""
         executed_statements = [
-            statement for statement in self.own if any(line in lines for line in statement)
+            statement for statement in self.statement_lines if any(line in lines for line in statement)
         ]
         return frozenset(lines).union(*executed_statements)
 
@@ -57,7 +57,9 @@ def _collect_block(body: list[ast.stmt], def_line: int | None, facts: StatementF
             _collect_statement(statement, def_line, facts)
         if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef):
             for argument in _all_arguments(statement.args):
-                facts.bound.setdefault((statement.lineno, argument.arg), statement.lineno)
+                facts.first_binding_line_by_name.setdefault(
+                    (statement.lineno, argument.arg), statement.lineno
+                )
             _collect_block(statement.body, statement.lineno, facts)
         elif isinstance(statement, ast.ClassDef):
             _collect_block(statement.body, None, facts)
@@ -74,17 +76,19 @@ def _all_arguments(arguments: ast.arguments) -> Iterator[ast.arg]:
 def _collect_statement(statement: ast.stmt, def_line: int, facts: StatementFacts) -> None:
     inner = [block[0].lineno for block in blocks_of(statement) if block]
     last = statement.end_lineno or statement.lineno
-    facts.own.append(range(statement.lineno, max(statement.lineno, min([last, *(n - 1 for n in inner)])) + 1))
+    facts.statement_lines.append(
+        range(statement.lineno, max(statement.lineno, min([last, *(n - 1 for n in inner)])) + 1)
+    )
     if not inner:
-        facts.texts.setdefault(statement.lineno, ast.unparse(statement))
+        facts.source_by_line.setdefault(statement.lineno, ast.unparse(statement))
     if isinstance(statement, ast.AugAssign):
-        facts.augmented[extent_of(statement.value)] = statement.op
+        facts.augmenting_operator_by_extent[extent_of(statement.value)] = statement.op
     if isinstance(statement, ast.Global | ast.Nonlocal):
         for name in statement.names:
-            facts.bound[def_line, name] = 0
+            facts.first_binding_line_by_name[def_line, name] = 0
     for node in _nodes_in_scope(statement):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            facts.bound.setdefault((def_line, node.id), statement.lineno)
+            facts.first_binding_line_by_name.setdefault((def_line, node.id), statement.lineno)
 
 
 def _nodes_in_scope(statement: ast.stmt) -> Iterator[ast.AST]:

@@ -25,10 +25,8 @@ def experiments_to_try(
     for spec in workspace.specs():
         if canary_fault.spec.startswith(f"{spec.name}/") and canary_fault.reading in spec.readings.names:
             faults = expand(spec, canary.seed, canary_fault.reading, models=models, manifest=manifest)
-            others |= {
-                one.id: one for one in faults if one.spec == canary_fault.spec and one.id != canary_fault.id
-            }
-    for fault in sorted(others.values(), key=lambda one: one.size, reverse=True):
+            others |= {f.id: f for f in faults if f.spec == canary_fault.spec and f.id != canary_fault.id}
+    for fault in sorted(others.values(), key=lambda fault: fault.size, reverse=True):
         yield replace(canary, fault=fault)
 
 

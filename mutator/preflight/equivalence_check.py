@@ -46,7 +46,7 @@ class EquivalenceResult:
     errors: tuple[tuple[str, str], ...] = ()
 
     @property
-    def whole(self) -> bool:
+    def is_complete(self) -> bool:
         return self.same == self.sampled
 
     def __str__(self) -> str:

@@ -18,7 +18,7 @@ def entry_path(key: str) -> Path:
 
 
 def store_checks(entry: Path, run: Path, file: str, observation_folder: Path) -> None:
-    """Store a run folder's golden runs, check results (`file`) and observations at `place`, if the cache is
+    """Store a run folder's golden runs, check results (`file`) and observations in `entry`, if the cache is
     writable.
     """
 

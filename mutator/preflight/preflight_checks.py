@@ -52,7 +52,7 @@ def run_checks(
     """
     checks = _PreflightChecks(workspace, folder)
     notify = notify or (lambda progress: None)
-    earlier_results = checks.known(workers, notify)
+    earlier_results = checks.find_earlier_results(workers, notify)
     if earlier_results is not None:
         return earlier_results
     with raising_disk_full(folder.path):
@@ -66,7 +66,9 @@ def run_checks(
             remedy="fix target, templates or canary (`mutator check --drive` shows details); the campaign "
             "starts only if all pass",
         )
-    preflight_cache.store_checks(preflight_cache.entry_path(checks.digest), folder.path, FILE, checks.kept)
+    preflight_cache.store_checks(
+        preflight_cache.entry_path(checks.digest), folder.path, FILE, checks.pending_folder
+    )
     return results
 
 
@@ -98,13 +100,15 @@ class _PreflightChecks:
         head = folder.head
         self.workspace = workspace
         self.folder = folder
-        self.kept = _pending_folder(folder)
+        self.pending_folder = _pending_folder(folder)
         self.manifest: TargetManifest = workspace.manifest(head.target)
         self.models = workspace.fault_models()
-        self.keys = folder.golden_runs
+        self.golden_runs = folder.golden_runs
         now = RunInputs.of(workspace, self.manifest, folder.scenarios).digests()
-        self.variants = {fault.spec: fault for fault in plan_file.load_faults(folder.path).values()}
-        places = sorted((name, [i.location for i in f.injections]) for name, f in self.variants.items())
+        self.fault_by_variant = {fault.spec: fault for fault in plan_file.load_faults(folder.path).values()}
+        places = sorted(
+            (name, [i.location for i in f.injections]) for name, f in self.fault_by_variant.items()
+        )
         content = [
             now,
             run_environment.surroundings(),
@@ -116,13 +120,13 @@ class _PreflightChecks:
         ]
         self.digest = digest([*content, places])
 
-    def known(self, workers: int, notify: OnProgress) -> tuple[CheckResult, ...] | None:
+    def find_earlier_results(self, workers: int, notify: OnProgress) -> tuple[CheckResult, ...] | None:
         """Earlier results, copied from another folder if necessary; None unless all checks passed and the
         golden runs are unchanged.
         """
         if (results := self._passed_results(self._stored_checks(), self.folder.path)) is not None:
             return results
-        copy = self.kept
+        copy = self.pending_folder
         try:
             with raising_disk_full(copy):
                 cached_folders.copy_from_cache(preflight_cache.entry_path(self.digest), copy)
@@ -134,7 +138,7 @@ class _PreflightChecks:
             return None  # missing or damaged
         if results is not None:
             if (
-                self._check_runner(self.folder.scratch_folder / "again").drive_goldens(workers, notify)
+                self._check_runner(self.folder.scratch_folder / "again").run_goldens(workers, notify)
                 != stored["goldens"]
             ):
                 return None  # forged, or no longer true
@@ -145,7 +149,7 @@ class _PreflightChecks:
     def _passed_results(self, stored: dict[str, Any] | None, folder: Path) -> tuple[CheckResult, ...] | None:
         if stored is None or stored["digest"] != self.digest:
             return None
-        keys = [golden_run.key for golden_run in self.keys]
+        keys = [golden_run.key for golden_run in self.golden_runs]
         if any(
             output_digest_of(self.manifest, path_below(folder / "golden", key)) != stored["goldens"][key]
             for key in keys
@@ -159,11 +163,11 @@ class _PreflightChecks:
         if not anchors.passed:  # the runs would take minutes
             yield anchors
             return
-        runs, canary_verdict = self._check_runner(self.kept).drive(workers, notify)
+        runs, canary_verdict = self._check_runner(self.pending_folder).run_all(workers, notify)
         results = [anchors, *self._judge_goldens(runs), _check_result("canary", *canary_verdict)]
-        goldens = {golden_run.key: runs[GOLDEN, golden_run].digest for golden_run in self.keys}
+        goldens = {golden_run.key: runs[GOLDEN, golden_run].output_digest for golden_run in self.golden_runs}
         self._check_same_as_before(goldens)
-        cpu = [runs[GOLDEN, key].cpu_s for key in self.keys]
+        cpu = [runs[GOLDEN, key].cpu_s for key in self.golden_runs]
         checks = {
             "schema": SCHEMA,
             "digest": self.digest,
@@ -177,11 +181,14 @@ class _PreflightChecks:
 
     def _check_runner(self, pending_folder: Path) -> CheckRunner:
         return CheckRunner(
-            workspace=self.workspace, folder=self.folder, manifest=self.manifest, kept=pending_folder
+            workspace=self.workspace,
+            folder=self.folder,
+            manifest=self.manifest,
+            pending_folder=pending_folder,
         )
 
     def _store_in_run_folder(self, checks: bytes) -> None:
-        run, golden = self.folder.path, self.kept / "golden"
+        run, golden = self.folder.path, self.pending_folder / "golden"
         golden.mkdir(parents=True, exist_ok=True)
         files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}
         new = {
@@ -217,12 +224,12 @@ class _PreflightChecks:
 
     def _loaded_packages(self, runs: CheckRunByName) -> list[str]:
         """Return the packages that the golden runs loaded, without the target and the standard library."""
-        loaded = {module for key in self.keys for module in runs[GOLDEN, key].modules}
+        loaded = {module for key in self.golden_runs for module in runs[GOLDEN, key].modules}
         target_modules = {path.split("/")[0].removesuffix(".py") for path in self.manifest.tree.files}
         return list(run_environment.packages_of(loaded - target_modules))
 
     def _judge_goldens(self, runs: CheckRunByName) -> Iterator[CheckResult]:
-        for key in self.keys:
+        for key in self.golden_runs:
             first, again, null = (runs[name, key] for name in (GOLDEN, GOLDEN_AGAIN, NULL_MUTANT))
             detail = golden_problem(first, again)
             yield _check_result(f"golden {key.key}", detail, "the same bytes twice")
@@ -234,7 +241,7 @@ class _PreflightChecks:
     def _judge_equal_scenarios(self, runs: CheckRunByName) -> Iterator[CheckResult]:
         """Check that scenarios which a change makes equal, according to the manifest, give the same bytes."""
         equal_runs: dict[GoldenRun, dict[str, CheckRun]] = {}
-        for golden_run in self.keys:
+        for golden_run in self.golden_runs:
             if golden_run.scenario in same_in(self.manifest, golden_run.changes):
                 equal_runs.setdefault(golden_run._replace(scenario=""), {})[golden_run.scenario] = runs[
                     GOLDEN, golden_run
@@ -248,7 +255,7 @@ class _PreflightChecks:
         passes this check.
         """
         problems: dict[str, list[str]] = {}
-        for fault in self.variants.values():
+        for fault in self.fault_by_variant.values():
             try:
                 build(self.manifest, self.models, fault, always_trigger())
             except InvalidMutant:
@@ -256,7 +263,7 @@ class _PreflightChecks:
             except MutatorError as err:
                 problems.setdefault(str(err), []).append(fault.spec)
         text = "; ".join(f"{', '.join(specs)}: {problem}" for problem, specs in problems.items())
-        return _check_result("anchors", text, f"{len(self.variants)} variants found their statements")
+        return _check_result("anchors", text, f"{len(self.fault_by_variant)} variants found their statements")
 
 
 def _check_result(name: str, problem: str, success: str) -> CheckResult:

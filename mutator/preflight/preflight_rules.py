@@ -23,11 +23,11 @@ class CheckRun:
     """
 
     problem: str
-    digest: str = ""
-    trace: str = ""
+    output_digest: str = ""
+    trace_digest: str = ""
     hazards: tuple[tuple[str, float], ...] = ()
     alerts: tuple[tuple[str, float], ...] = ()
-    triggered: bool = False
+    has_triggered: bool = False
     cpu_s: float = 0.0
     modules: tuple[str, ...] = ()
 
@@ -44,11 +44,11 @@ def read_check_run(manifest: TargetManifest, execution: Execution) -> CheckRun:
         return CheckRun(problem=f"{Path(err.where or '').name}: {err.got}")
     return CheckRun(
         problem="",
-        digest=output_digest_of(manifest, execution.out),
-        trace=golden_comparison.trace_digest(manifest, execution.out),
+        output_digest=output_digest_of(manifest, execution.out),
+        trace_digest=golden_comparison.trace_digest(manifest, execution.out),
         alerts=judged.alerts,
         hazards=judged.hazards,
-        triggered=was_triggered(execution.probe),
+        has_triggered=was_triggered(execution.probe),
         cpu_s=execution.cpu_s,
         modules=execution.modules,
     )
@@ -66,7 +66,7 @@ def golden_problem(first: CheckRun, again: CheckRun) -> str:
     """Return the problem of a pair of golden runs; empty if there is none."""
     if first.problem or again.problem:
         return first.problem or again.problem
-    if first.digest != again.digest:
+    if first.output_digest != again.output_digest:
         return "two runs that differ in nothing but PYTHONHASHSEED gave different bytes"
     if first.hazards:
         name, time = first.hazards[0]
@@ -77,9 +77,9 @@ def golden_problem(first: CheckRun, again: CheckRun) -> str:
 def null_mutant_problem(first: CheckRun, null: CheckRun) -> str:
     if null.problem:
         return null.problem
-    if null.digest != first.digest:
+    if null.output_digest != first.output_digest:
         return "the probe alone changes what the target does"
-    return "" if null.triggered else "its trigger never fired: the observation statement is not executed"
+    return "" if null.has_triggered else "its trigger never fired: the observation statement is not executed"
 
 
 def equal_scenarios_problem(goldens: Mapping[str, CheckRun]) -> str:
@@ -90,6 +90,6 @@ def equal_scenarios_problem(goldens: Mapping[str, CheckRun]) -> str:
     for name, run in others:
         if run.problem or reference.problem:
             return run.problem or reference.problem
-        if (run.trace, run.alerts) != (reference.trace, reference.alerts):
+        if (run.trace_digest, run.alerts) != (reference.trace_digest, reference.alerts):
             return f"{name} differs from {first}, although the manifest says that they are equal (same_in)"
     return ""

@@ -32,14 +32,14 @@ CheckRunByName = dict[tuple[str, Any], CheckRun]  # kind of run, and `GoldenRun`
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckRunner:
-    """Executes the runs that the checks judge. Golden runs and their observations stay in `kept`."""
+    """Executes the runs that the checks judge; golden runs and observations stay in `pending_folder`."""
 
     workspace: Workspace
     folder: RunFolder
     manifest: TargetManifest
-    kept: Path
+    pending_folder: Path
 
-    def drive(self, workers: int, notify: OnProgress) -> tuple[CheckRunByName, tuple[str, str]]:
+    def run_all(self, workers: int, notify: OnProgress) -> tuple[CheckRunByName, tuple[str, str]]:
         """Do all runs of all checks, `workers` at a time. Return them with the result of `canary.judge`."""
         with self._engine_and_pool(workers) as (engine, pool):
             judged = pool.submit(self._judge_canary, engine)
@@ -55,7 +55,7 @@ class CheckRunner:
             canary_verdict = judged.result()
             return {name: future.result() for name, future in futures.items()}, canary_verdict
 
-    def drive_goldens(self, workers: int, notify: OnProgress) -> dict[str, str]:
+    def run_goldens(self, workers: int, notify: OnProgress) -> dict[str, str]:
         """Do each golden run once; return the digests by key."""
         jobs = {name: job for name, job in self._jobs_by_name().items() if name[0] == GOLDEN}
         with self._engine_and_pool(workers) as (engine, pool):
@@ -63,12 +63,12 @@ class CheckRunner:
                 name[1].key: pool.submit(self._run_job, engine, name, job) for name, job in jobs.items()
             }
             _report_progress("golden", [*futures.values()], notify)
-            return {key: future.result().digest for key, future in futures.items()}
+            return {key: future.result().output_digest for key, future in futures.items()}
 
     @contextmanager
     def _engine_and_pool(self, workers: int) -> Iterator[tuple[ReferenceEngine, ThreadPoolExecutor]]:
         work = self.folder.scratch_folder / "checks"
-        for scratch in (work, self.kept):
+        for scratch in (work, self.pending_folder):
             remove_folder(scratch)
         work.mkdir(parents=True)
         pool = ThreadPoolExecutor(max(1, workers))
@@ -105,7 +105,9 @@ class CheckRunner:
             )
             jobs[GOLDEN, key] = Job(name=f"a-{name}", **common)
             jobs[GOLDEN_AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
-        return dict(sorted(jobs.items(), key=lambda entry: entry[0][0] != NULL_MUTANT))  # null mutants last
+        return dict(
+            sorted(jobs.items(), key=lambda entry: entry[0][0] != NULL_MUTANT)
+        )  # null mutants first, as their stage
 
     def _run_job(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
         scratch = path_below(engine.work, job.name)
@@ -116,10 +118,10 @@ class CheckRunner:
                 shared_cache.prune_target(self.manifest.cache_name)
             if name[0] == NULL_MUTANT:
                 unreached_triggers.save_observations(
-                    self.kept, name[1].key, execution.watched.get("seen", ())
+                    self.pending_folder, name[1].key, execution.watched.get("seen", ())
                 )
             if name[0] == GOLDEN and not run.problem:
-                golden_folder = path_below(self.kept / "golden", name[1].key)
+                golden_folder = path_below(self.pending_folder / "golden", name[1].key)
                 golden_folder.parent.mkdir(parents=True, exist_ok=True)
                 execution.out.rename(golden_folder)
             return run

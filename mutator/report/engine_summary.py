@@ -78,7 +78,7 @@ def _proof(folder: RunFolder, records: Mapping[str, Record]) -> tuple[str, str, 
             said += f" Forking pays off only with {WORTH_IT} or more experiments."
         return said, "none needed", False
     same = f"{found.same} of {found.sampled} same"
-    if not found.whole:
+    if not found.is_complete:
         said = f"The equivalence check is not finished: so far, {found}, byte for byte. The rest of the "
         said += "sample has not been rerun."
         return said, f"not finished: {same}", False

@@ -221,10 +221,10 @@ class _Catalogue:
         found = list(mutations_of(file, facts, at.function, self.models, [operator]))
         models = {*OPERATOR_MODELS, *(one.model for one in found)}
         return Material(
-            diff=[[one.was, one.now] for one in found],
+            diff=[[one.source_before, one.source_after] for one in found],
             functions=functions_of(tree, [at]),
             templates={one.name: one.template for one in self.models if one.name in models},
-            calls=self._called.of_expressions(at.path, at.function, [one.now for one in found]),
+            calls=self._called.of_expressions(at.path, at.function, [one.source_after for one in found]),
         )
 
     def _probe(self, runs: Mapping[str, int] | None) -> Group:

@@ -71,7 +71,7 @@ def test_two_workers_give_the_same_bytes(
     summary = on(two, toy, out)
     assert (summary.exit_code, summary.problem, summary.done) == (0, "", 12)
     assert (results(out), summary.seal) == undisturbed
-    assert summary.proof is not None and summary.proof.whole
+    assert summary.proof is not None and summary.proof.is_complete
     folder = RunFolder.open(out)
     assert len(folder.stretches[-1].machines) == 2
     assert two.children() == []

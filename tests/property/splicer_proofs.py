@@ -155,7 +155,9 @@ def _add_guard(
         return
     figures.anchors["guard"] += 1
     guards = groups.setdefault("guard", [])
-    if all(other.edit.index != edit.index for other in guards):  # several anchors name one statement
+    if all(
+        other.edit.line_index != edit.line_index for other in guards
+    ):  # several anchors name one statement
         guards.append(_Placed(placed.spot, edit, guard=True))
 
 

@@ -30,7 +30,13 @@ SHAPES = (
 
 def statements(file: ParsedFile) -> Iterator[FaultLocation]:
     for function, known in file.functions_by_name.items():
-        seen = Counter(name for one in known for s in one.statements if not s.reason for name in s.assigns)
+        seen = Counter(
+            name
+            for one in known
+            for s in one.statements
+            if not s.unanchorable_reason
+            for name in s.assigned_names
+        )
         for name, count in seen.items():
             for nth in range(1, count + 1):
                 anchor = Anchor(kind=AnchorKind.BEFORE_ASSIGN, name=name, nth=nth)

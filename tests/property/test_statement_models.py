@@ -38,9 +38,14 @@ class _Inactive(ast.NodeTransformer):
 def locations(file: ParsedFile) -> Iterator[FaultLocation]:
     for function, found in file.functions_by_name.items():
         seen: Counter[tuple[str, str]] = Counter()
-        for statement in (s for one in found for s in one.statements if s.reason is None and s.opens is None):
+        for statement in (
+            s
+            for one in found
+            for s in one.statements
+            if s.unanchorable_reason is None and s.block_first_line is None
+        ):
             for verb in ("assign", "call", "return"):
-                for name in dict.fromkeys(statement.names(verb)):
+                for name in dict.fromkeys(statement.names_for(verb)):
                     seen[verb, name] += 1
                     kind = AnchorKind(f"before_{verb}")
                     anchor = Anchor(kind=kind, name=name, nth=seen[verb, name])

@@ -182,7 +182,7 @@ def checked_mutations(names: Sequence[str], count: int) -> int:
         for first in range(0, len(own), TOGETHER):
             edits: list[Edit | ValueEdit] = []
             for number, mutation in enumerate(own[first : first + TOGETHER]):
-                injection = mutation.fault("as_is").injections[0]
+                injection = mutation.to_fault("as_is").injections[0]
                 edit = injection_edit(file, models(), injection, f"{number:08x}")
                 try:
                     apply_edits(file, as_line_edits(file, [*edits, edit]))

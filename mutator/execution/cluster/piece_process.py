@@ -133,8 +133,8 @@ class PieceRunner:
         )
         for _, execution in engine.run([job]):
             found = read_check_run(self._manifest, execution)
-            if found.problem or found.digest != known:
-                came = found.problem or f"has the digest {found.digest[:16]} here, not {known[:16]}"
+            if found.problem or found.output_digest != known:
+                came = found.problem or f"has the digest {found.output_digest[:16]} here, not {known[:16]}"
                 raise GoldenRunsDiffer(f"golden run {golden.key} {came}")
             execution.out.rename(place)
             if golden.seed is not None:  # the images of a hundred seeds would fill the disk

@@ -119,13 +119,17 @@ def _located(
 
 def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> dict[str, Any]:
     """Replace all anchored lines (at a function's entry, the line after the insertion)."""
-    first = min(span[0], *(edit.index for edit in edits), len(file.lines) - 1)
+    first = min(span[0], *(edit.line_index for edit in edits), len(file.lines) - 1)
     last = max(span[1], first + 1)
     lines, new, done = file.lines[first:last], list[bytes](), 0
     for edit in sort_edits(edits):
-        at = edit.index - first
-        gone = at + (1 if edit.rank is EditRank.INSTEAD else edit.reindent)
-        new += [*lines[done:at], *edit.lines, *(edit.unit + line for line in lines[at : at + edit.reindent])]
+        at = edit.line_index - first
+        gone = at + (1 if edit.rank is EditRank.INSTEAD else edit.indented_count)
+        new += [
+            *lines[done:at],
+            *edit.lines,
+            *(edit.indent_unit + line for line in lines[at : at + edit.indented_count]),
+        ]
         done = gone
     new += lines[done:]
     replacement = b"".join(new).rstrip(b"\r\n").decode(file.encoding)

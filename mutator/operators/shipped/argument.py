@@ -4,20 +4,20 @@ import ast
 from collections.abc import Iterator
 
 from mutator.mutants.expressions import Expression
-from mutator.operators import Operator, Rule, rule
+from mutator.operators import MutationRule, Operator, mutation_rule
 from mutator.operators.statement_facts import StatementFacts
 
 
-def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[MutationRule]:
     node = expression.node
     if not isinstance(node, ast.Call):
         return
     starred = (number for number, argument in enumerate(node.args) if isinstance(argument, ast.Starred))
     for first in range(1, next(starred, len(node.args))):
-        yield rule("operator_swap", first=first)
+        yield mutation_rule("operator_swap", first=first)
     for number, keyword in enumerate(node.keywords, len(node.args) + 1):
         if keyword.arg is not None:
-            yield rule("operator_drop", place=number)
+            yield mutation_rule("operator_drop", place=number)
 
 
 OPERATOR = Operator(

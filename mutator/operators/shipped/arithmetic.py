@@ -4,7 +4,7 @@ import ast
 from collections.abc import Iterator
 
 from mutator.mutants.expressions import Expression
-from mutator.operators import Operator, Rule, rule
+from mutator.operators import MutationRule, Operator, mutation_rule
 from mutator.operators.statement_facts import StatementFacts, extent_of
 
 _REPLACEMENTS_BY_OPERATOR: dict[type[ast.operator], tuple[str, ...]] = {
@@ -31,16 +31,16 @@ _OPERAND_PREFIX_BY_OPERATOR: dict[type[ast.operator], str] = {
 _NON_NUMBER_NODES = (ast.List, ast.ListComp, ast.Dict, ast.Set, ast.Tuple, ast.JoinedStr)
 
 
-def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[MutationRule]:
     node = expression.node
     if isinstance(node, ast.BinOp) and _can_be_number(node.left) and _can_be_number(node.right):
-        yield from (rule("operator_infix", to=to) for to in _REPLACEMENTS_BY_OPERATOR[type(node.op)])
+        yield from (mutation_rule("operator_infix", to=to) for to in _REPLACEMENTS_BY_OPERATOR[type(node.op)])
     match node:
         case ast.UnaryOp(op=ast.USub(), operand=operand) if not isinstance(operand, ast.Constant):
-            yield rule("operator_prefix", to="-")
-    augmented = facts.augmented.get(extent_of(node))
+            yield mutation_rule("operator_prefix", to="-")
+    augmented = facts.augmenting_operator_by_extent.get(extent_of(node))
     if augmented is not None and type(augmented) in _OPERAND_PREFIX_BY_OPERATOR and _can_be_number(node):
-        yield rule("operator_prefix", to=_OPERAND_PREFIX_BY_OPERATOR[type(augmented)])
+        yield mutation_rule("operator_prefix", to=_OPERAND_PREFIX_BY_OPERATOR[type(augmented)])
 
 
 def _can_be_number(node: ast.expr) -> bool:

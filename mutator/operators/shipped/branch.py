@@ -5,17 +5,17 @@ from collections.abc import Iterator
 
 from mutator.model import AnchorKind
 from mutator.mutants.expressions import Expression
-from mutator.operators import Operator, Rule, rule
+from mutator.operators import MutationRule, Operator, mutation_rule
 from mutator.operators.statement_facts import StatementFacts
 
 
-def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[MutationRule]:
     if not expression.matches_anchor(AnchorKind.CONDITION, "", None):
         return
-    yield rule("operator_prefix", to="not")
+    yield mutation_rule("operator_prefix", to="not")
     if not any(isinstance(inner, ast.NamedExpr) for inner in ast.walk(expression.node)):
-        yield rule("operator_constant", to=True)
-        yield rule("operator_constant", to=False)
+        yield mutation_rule("operator_constant", to=True)
+        yield mutation_rule("operator_constant", to=False)
 
 
 OPERATOR = Operator(

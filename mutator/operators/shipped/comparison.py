@@ -4,7 +4,7 @@ import ast
 from collections.abc import Iterator
 
 from mutator.mutants.expressions import Expression
-from mutator.operators import Operator, Rule, rule
+from mutator.operators import MutationRule, Operator, mutation_rule
 from mutator.operators.statement_facts import StatementFacts
 
 _REPLACEMENTS_BY_OPERATOR: dict[type[ast.cmpop], tuple[str, ...]] = {
@@ -21,14 +21,16 @@ _REPLACEMENTS_BY_OPERATOR: dict[type[ast.cmpop], tuple[str, ...]] = {
 }
 
 
-def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[MutationRule]:
     match expression.node:
         case ast.Compare(ops=[link]):
-            yield from (rule("operator_infix", to=to) for to in _REPLACEMENTS_BY_OPERATOR[type(link)])
+            yield from (
+                mutation_rule("operator_infix", to=to) for to in _REPLACEMENTS_BY_OPERATOR[type(link)]
+            )
         case ast.BoolOp(op=link):
-            yield rule("operator_infix", to="or" if isinstance(link, ast.And) else "and")
+            yield mutation_rule("operator_infix", to="or" if isinstance(link, ast.And) else "and")
         case ast.UnaryOp(op=ast.Not()):
-            yield rule("operator_prefix", to="not")
+            yield mutation_rule("operator_prefix", to="not")
 
 
 OPERATOR = Operator(

@@ -5,12 +5,12 @@ from collections.abc import Iterator
 
 from mutator.model import Value
 from mutator.mutants.expressions import Expression
-from mutator.operators import Operator, Rule, rule
+from mutator.operators import MutationRule, Operator, mutation_rule
 from mutator.operators.statement_facts import StatementFacts
 
 
-def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
-    yield from (rule("operator_constant", to=value) for value in _replacements(expression.node))
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[MutationRule]:
+    yield from (mutation_rule("operator_constant", to=value) for value in _replacements(expression.node))
 
 
 def _replacements(node: ast.expr) -> list[Value]:

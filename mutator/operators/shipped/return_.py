@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from mutator.model import AnchorKind
 from mutator.mutants.expressions import Expression
-from mutator.operators import Operator, Rule, rule
+from mutator.operators import MutationRule, Operator, mutation_rule
 from mutator.operators.statement_facts import StatementFacts
 
 _EMPTY_LITERAL_BY_NODES: tuple[tuple[tuple[type[ast.expr], ...], str], ...] = (
@@ -16,22 +16,22 @@ _EMPTY_LITERAL_BY_NODES: tuple[tuple[tuple[type[ast.expr], ...], str], ...] = (
 )
 
 
-def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[MutationRule]:
     node = expression.node
     if not expression.matches_anchor(AnchorKind.RETURN_VALUE, "", None) or _is_constant(node, type(None)):
         return
-    yield rule("operator_constant", to=None)
+    yield mutation_rule("operator_constant", to=None)
     for kinds, empty in _EMPTY_LITERAL_BY_NODES:
         if isinstance(node, kinds):
-            yield rule("operator_empty", to=empty)
+            yield mutation_rule("operator_empty", to=empty)
             return
     if _is_constant(node, str):
-        yield rule("operator_empty", to="''")
+        yield mutation_rule("operator_empty", to="''")
     elif isinstance(node, ast.Compare | ast.BoolOp) or _has_prefix(node, ast.Not):
-        yield rule("operator_prefix", to="not")
+        yield mutation_rule("operator_prefix", to="not")
     elif not (isinstance(node, ast.Constant | ast.Lambda) or _is_negative(node)):
-        yield rule("operator_constant", to=0)
-        yield rule("operator_prefix", to="-")
+        yield mutation_rule("operator_constant", to=0)
+        yield mutation_rule("operator_prefix", to="-")
 
 
 def _is_constant(node: ast.expr, *types: type) -> bool:

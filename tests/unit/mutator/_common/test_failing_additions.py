@@ -68,7 +68,7 @@ def failing(tmp_path: Path, install: Callable[[Path], None]) -> None:
     [
         ("boom", f"operator 'boom' of package rvdoors 0.3 {NO_LUCK}"),
         ("leaves", f"operator 'leaves' of package rvdoors 0.3 {NO_LUCK}"),
-        ("odd", "operator 'odd' of package rvdoors 0.3 fails: TypeError: 3 is no Rule"),
+        ("odd", "operator 'odd' of package rvdoors 0.3 fails: TypeError: 3 is no MutationRule"),
         ("all", f"operator 'boom' of package rvdoors 0.3 {NO_LUCK}"),
     ],
 )

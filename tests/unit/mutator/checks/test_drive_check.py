@@ -211,7 +211,7 @@ def test_an_anchor_reached_only_without_the_faults_change_is_reported(toy: Works
     [(0, "none"), (1, "1 trigger, which is reached"), (2, "2 triggers, which are all reached")],
 )
 def test_the_wording_fits_the_number_of_places_reached(toy: Workspace, count: int, told: str) -> None:
-    finding = ReachTracker(toy, toy.manifest("toycar"), [])._finding("trigger", count, [], "")
+    finding = ReachTracker(toy, toy.manifest("toycar"), [])._reach_finding("trigger", count, [], "")
     assert (finding.name, finding.found) == ("triggers", told)
 
 

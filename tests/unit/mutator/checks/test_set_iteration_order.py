@@ -51,4 +51,4 @@ def test_a_place_has_its_line_and_function() -> None:
         b"class A:\n    def f(self):\n        names = {'a', 'b'}\n        for n in names:\n            g(n)\n"
     )
     (place,) = list_set_order_uses(source)
-    assert (place.line, place.function, place.what) == (4, "A.f", "names")
+    assert (place.line, place.function, place.set_source) == (4, "A.f", "names")

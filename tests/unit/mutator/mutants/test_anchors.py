@@ -102,7 +102,7 @@ def test_an_item_whose_index_the_statement_changes_has_no_name(targets: str, nam
         f"def f(self):\n    for {targets} in g():\n        h()\n",
     ):
         (function,) = parsed(source).functions_by_name["f"]
-        assert [name for one in function.statements for name in one.assigns] == named
+        assert [name for one in function.statements for name in one.assigned_names] == named
 
 
 def test_the_head_of_a_block_is_the_last_candidate() -> None:

@@ -47,7 +47,7 @@ def change(
     edits = [make(file, site, [code], name), splicing.probe_import_edit(file, "pack")]
     pieces = splicing.apply_edits(file, edits)
     made = ChangedFile(data=splicing.join_pieces(pieces), patch=render_changed_file("m.py", pieces))
-    reusable = ReusableChangedFile.of(made)
+    reusable = ReusableChangedFile.from_changed_file(made)
     compiles = always_compiles(file, reusable, reuse_key(file, edits, [name]))
     return reusable, made, inserted_lines(edits), compiles
 
@@ -60,7 +60,7 @@ def test_a_reusable_change_equals_the_spliced_one(text: str, guard: bool) -> Non
     other, made, lines, _ = change(text, code.format("abcdefab", 1e-300), "abcdefab", guard)
     assert compiles
     assert reusable == other
-    assert reusable.filled(lines) == made
+    assert reusable.with_lines(lines) == made
 
 
 @pytest.mark.parametrize("text", TEXTS)
@@ -76,14 +76,14 @@ def test_a_change_of_a_value_and_inserted_lines_can_be_reused_together(text: str
         edits = splicing.as_line_edits(file, [observes, splicing.value_edit(file, value_at, value, name)])
         pieces = splicing.apply_edits(file, edits)
         made = ChangedFile(data=splicing.join_pieces(pieces), patch=render_changed_file("m.py", pieces))
-        reusable = ReusableChangedFile.of(made)
+        reusable = ReusableChangedFile.from_changed_file(made)
         assert splicing.unsplice(made.data) == file.data
         assert always_compiles(file, reusable, reuse_key(file, edits, [name]))
         return reusable, made, inserted_lines(edits)
 
     (reusable, *_), (other, made, lines) = changed("00000001", "3.25"), changed("abcdefab", "1e-300")
     assert reusable == other
-    assert reusable.filled(lines) == made
+    assert reusable.with_lines(lines) == made
 
 
 def test_a_change_that_compiles_only_with_some_values_is_not_reused() -> None:

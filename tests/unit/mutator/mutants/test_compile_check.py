@@ -50,6 +50,6 @@ def test_compiling_a_changed_function_shows_whether_the_file_compiles(
 ) -> None:
     edits = [
         probe_import_edit(file, None),
-        Edit(index=line, rank=EditRank.INSTEAD, lines=(text,)),
+        Edit(line_index=line, rank=EditRank.INSTEAD, lines=(text,)),
     ]
     assert certainly_compiles(file, edits, reuse_key(file, edits, ["0a"])) is known

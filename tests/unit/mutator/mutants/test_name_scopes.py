@@ -74,5 +74,7 @@ def test_an_inserted_binding_can_change_the_scope_of_a_name(
     place = next(i for i, line in enumerate(source.splitlines(), 1) if line.strip() == "#")
     made = source.replace("#", inserted)
     found = next(moved_names(source.replace("#", "pass").encode(), made.encode(), {place}), None)
-    expected = moved and MovedName(name=moved[0], scope=moved[1], before=moved[2], after=moved[3])
+    expected = moved and MovedName(
+        name=moved[0], holder=moved[1], scope_before=moved[2], scope_after=moved[3]
+    )
     assert found == expected

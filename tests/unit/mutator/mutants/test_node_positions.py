@@ -31,13 +31,13 @@ def parsed(source: str = SOURCE) -> ParsedFile:
 
 def test_both_parsers_agree_on_places() -> None:
     file = parsed()
-    told = [f.place for functions in file.functions_by_name.values() for f in functions]
+    told = [f.position for functions in file.functions_by_name.values() for f in functions]
     told += [
-        s.place
+        s.position
         for functions in file.functions_by_name.values()
         for f in functions
         for s in f.statements
-        if s.place
+        if s.position
     ]
     assert {place.with_byte_columns(file.lines, file.encoding) for place in told} == {
         place for place in file.ast_positions if place.node_class != "Expr" or place.start[0] != 3

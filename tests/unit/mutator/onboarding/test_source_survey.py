@@ -65,8 +65,8 @@ def test_an_unreadable_file_is_listed_with_its_position(tree: Tree) -> None:
     (folder / "binary.py").write_bytes(b"\0\xff")
     found = survey_source(str(folder))
     assert [module.path for module in found.modules] == ["good.py"]
-    assert [place for place, _ in found.unread] == ["bad.py:2", "binary.py:1"]
-    assert all(why for _, why in found.unread)
+    assert [place for place, _ in found.unreadable] == ["bad.py:2", "binary.py:1"]
+    assert all(why for _, why in found.unreadable)
 
 
 def test_the_survey_imports_nothing(tree: Tree) -> None:
@@ -104,7 +104,7 @@ def test_environments_and_hidden_folders_are_left_out(tree: Tree) -> None:
 def test_an_installed_package_is_found_without_importing_it() -> None:
     found = survey_source("installed:typer")
     assert found.packages == ("typer",)
-    assert found.requires and found.requires.startswith("typer>=")
+    assert found.requirement and found.requirement.startswith("typer>=")
     assert any(module.name == "typer.main" for module in found.modules)
 
 
@@ -129,4 +129,4 @@ def test_a_link_out_of_the_tree_is_not_read(tree: Tree, tmp_path: Path) -> None:
     (folder / "linked.py").symlink_to(tmp_path / "mine.py")
     found = survey_source(str(folder))
     assert [module.path for module in found.modules] == ["own.py"]
-    assert found.unread == (("linked.py:1", "a link that leads out of its folder"),)
+    assert found.unreadable == (("linked.py:1", "a link that leads out of its folder"),)

@@ -67,8 +67,8 @@ def test_the_controllers_step_ranks_first() -> None:
 
 def test_required_arguments_are_listed() -> None:
     first, *_ = candidates(car=CAR)
-    assert first.needs == ("speed", "wanted", "dt")
-    assert first.builds == ("gain", "limit")
+    assert first.required_arguments == ("speed", "wanted", "dt")
+    assert first.constructor_arguments == ("gain", "limit")
 
 
 def test_only_numbers_with_a_name_are_listed_as_values() -> None:

@@ -44,7 +44,7 @@ def test_each_operator_makes_the_changes_of_its_examples(name: str, make: Make) 
     examples = find_operator(name).examples
     assert any(examples.values())
     for body, expected in examples.items():
-        assert [one.text for one in make(body, name)] == list(expected), body
+        assert [one.description for one in make(body, name)] == list(expected), body
 
 
 def test_an_operator_of_another_package_is_used_like_the_others(
@@ -55,7 +55,7 @@ def test_an_operator_of_another_package_is_used_like_the_others(
     assert [one.operator for one in both] == ["return"] * 3
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = select_mutations(manifest, models, ["zero"], ["toycar/**"])
-    fault = found.mutations[0].fault("as_described")
+    fault = found.mutations[0].to_fault("as_described")
     assert fault.spec.startswith("operators/zero/") and str(fault.value).endswith(" -> 0")
     assert build(manifest, models, fault, always_trigger()).patch
 
@@ -65,9 +65,9 @@ def test_an_expression_with_a_yield_has_no_mutations(make: Make) -> None:
 
 
 def test_mutations_to_equal_code_are_dropped(make: Make) -> None:
-    assert [one.text for one in make("while True: a()", "branch")] == ["True -> not True"]
+    assert [one.description for one in make("while True: a()", "branch")] == ["True -> not True"]
     denied = make("return not a", "comparison", "return")
-    assert [(one.operator, one.now) for one in denied] == [
+    assert [(one.operator, one.source_after) for one in denied] == [
         ("comparison", "not (not a)"),
         ("return", "None"),
     ]
@@ -81,7 +81,7 @@ def test_first_assignments_are_never_omitted_in_functions_with_the_same_name(mak
         "omission",
         head="if 1:",
     )
-    assert [one.text for one in made] == ["self.a = c -> left out"]
+    assert [one.description for one in made] == ["self.a = c -> left out"]
 
 
 def test_mutants_of_a_file_with_a_byte_order_mark_compile(tmp_path: Path, clone: Workspace) -> None:
@@ -89,12 +89,12 @@ def test_mutants_of_a_file_with_a_byte_order_mark_compile(tmp_path: Path, clone:
     tree = read_tree(tmp_path, ["m.py"])
     file, models = parsed_file(tree, "m.py"), clone.fault_models()
     made = mutations_of(file, facts_of(tree, "m.py"), "f", models, ["arithmetic"])
-    assert made and not drop_equal_code(file, made).invalid
+    assert made and not drop_equal_code(file, made).invalid_count
 
 
 def test_a_long_change_is_shortened_to_the_part_that_differs(make: Make) -> None:
     [long] = make(f"{'a' * 80}(b, limit=a)", "argument")
-    assert long.text == ".. aaaaaaaaaaaaaaaaaa(b, limit=a) -> .. aaaaaaaaaaaaaaaaaa(b)"
+    assert long.description == ".. aaaaaaaaaaaaaaaaaa(b, limit=a) -> .. aaaaaaaaaaaaaaaaaa(b)"
 
 
 def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
@@ -108,8 +108,8 @@ def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
     assert set(whole.mutations) <= set(found("toycar/**").mutations)
     line = part.mutations[0].line + 1
     some = found("toycar/sensing.py", {"toycar/sensing.py": [line]})
-    assert {one.line + 1 for one in some.mutations} == {line} and some.unexecuted
-    assert f"{some.unexecuted} in lines that no golden run executes" in some.told
+    assert {one.line + 1 for one in some.mutations} == {line} and some.unexecuted_count
+    assert f"{some.unexecuted_count} in lines that no golden run executes" in some.summary
     for place, text in {
         "toycar/sensin.py": "no Python file",
         "toycar/sensing.py::G": "no function 'G'",
@@ -129,8 +129,8 @@ def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
         == sample_mutations(found, len(found.mutations) // 3, 4)
         != sample_mutations(found, len(drawn), 5)
     )
-    spec = Counter(one.fault("r").spec for one in found.mutations)
-    taken = Counter(one.fault("r").spec for one in drawn)
+    spec = Counter(one.to_fault("r").spec for one in found.mutations)
+    taken = Counter(one.to_fault("r").spec for one in drawn)
     assert len(drawn) == len(found.mutations) // 3
     assert all(abs(taken[name] - count / 3) < 1.4 for name, count in spec.items())
 
@@ -140,7 +140,7 @@ def test_every_mutant_of_the_toy_can_be_built(toycar: Workspace) -> None:
     found = select_mutations(
         manifest, models, OPERATORS.shipped_names(), ["toycar/sensing.py", "toycar/driver.py"]
     )
-    faults = [one.fault("as_described") for one in found.mutations]
+    faults = [one.to_fault("as_described") for one in found.mutations]
     assert len({fault.id for fault in faults}) == len(faults)
     for fault in faults:
         mutant = build(manifest, models, fault, always_trigger())
