@@ -37,7 +37,7 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
-_OTHER_HASH_SEED = 4242
+_OTHER_HASH_SEED = 4242  # any but 0, the seed of ordinary runs
 _MOST_REPEATED_RUN_S = 5.0  # slower golden runs are not repeated for the fast engines
 _MOST_PLACES = 20  # places listed in a finding
 

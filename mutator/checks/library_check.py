@@ -68,7 +68,7 @@ def library_problems(workspace: Workspace, target: str) -> list[MutatorError]:
             collector.problems += spec_problems(spec, models, manifest) if spec else ()
     if readings:
         collector.problems += campaign_problems(workspace, readings, manifest)
-
+    # the analysis compares specs with context tables, so it needs all of them to be valid
     if not collector.problems:
         specs_in_order = collector.result_of(workspace.specs)
         analysis = collector.result_of(workspace.analysis)

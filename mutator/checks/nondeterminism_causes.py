@@ -9,7 +9,7 @@ from mutator.engines.in_target.nondeterminism_watch import CLOCK, DRAW, HASH, PR
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
 
-_MOST_PLACES = 5
+_MOST_PLACES = 5  # the first causes hide the later ones, so a long list helps nobody
 _REMEDY_BY_KIND = {
     CLOCK: "count time in steps: `step * dt`",
     DRAW: "draw from `numpy.random.default_rng(seed)` with the run's seed",

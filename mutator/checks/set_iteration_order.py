@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 _SET_CONSTRUCTORS = ("set", "frozenset")
 _SET_METHODS = ("union", "intersection", "difference", "symmetric_difference", "copy")
+# `sum` is among them, because adding floats in another order rounds differently
 _ORDER_DEPENDENT_FUNCTIONS = (
     "list",
     "tuple",

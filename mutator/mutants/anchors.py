@@ -261,7 +261,7 @@ def _choose_statement(
     )
     statements = sum(s.block_first_line is None for _, s in hits)
     nth = anchor.nth
-
+    # one statement is no ambiguity, even if heads of blocks bind the same name
     if hits and (1 in (len(hits), statements) if nth is None else nth <= len(hits)):
         return hits[(nth or 1) - 1]
     raise _ambiguous_or_missing_error(file, location, functions, pairs, hits)

@@ -12,7 +12,7 @@ from mutator.mutants.expression_roles import blocks_of
 from mutator.mutants.name_scopes import globals_set_in_functions
 from mutator.targets.source_tree import SourceTree
 
-_STAR = "*"
+_STAR = "*"  # the name that `from module import *` imports, as `ast` gives it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

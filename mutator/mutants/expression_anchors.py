@@ -79,6 +79,7 @@ def _describe_candidates(expressions: Sequence[Expression], kind: AnchorKind, na
     ]
     roles = [role for role in roles if role[0] == name] or roles
     if len(roles) > _MOST_CANDIDATES:
+        # a cutoff of 0 only ranks: the error must list something, however different the names
         near = get_close_matches(name, [called for called, *_ in roles], n=_MOST_CANDIDATES, cutoff=0.0)
         roles = [role for role in roles if role[0] in near][:_MOST_CANDIDATES]
     descriptions = [

@@ -8,7 +8,10 @@ from mutator.model import AnchorKind
 AnchorRole = tuple[AnchorKind, str, str | None]  # an anchor's kind, name and `which`
 ExpressionInFunction = tuple[str, ast.expr, tuple[AnchorRole, ...]]
 
+# a star or a slice is no value, a generator expression can share its parentheses with a call, and
+# templates refuse `yield`
 _UNCHANGEABLE_NODES = ast.Starred | ast.Slice | ast.GeneratorExp | ast.Yield | ast.YieldFrom
+# lists of statements; handlers and cases are nodes with a body of their own
 _BLOCK_FIELDS = ("body", "orelse", "finalbody")
 
 

@@ -20,6 +20,7 @@ from mutator.mutants.node_positions import Positions
 # line and column, from 0; in `Expression`, columns count bytes, elsewhere characters
 _LineColumn = tuple[int, int]
 
+# no operator beside these binds a part of them, so they need no parentheses
 _UNSPLITTABLE_NODES = (
     ast.Name | ast.Attribute | ast.Call | ast.Subscript | ast.Constant | ast.List | ast.Dict | ast.Set
 )
@@ -87,6 +88,7 @@ def list_expressions(
             expressions.append(
                 _build_expression(lines, encoding, (function, node, roles), start, end, bare=bare)
             )
+    # an outer expression precedes those inside it, so that `nth` counts in reading order
     return _grouped_by_function(
         sorted(
             expressions, key=lambda expression: (expression.start, (-expression.end[0], -expression.end[1]))

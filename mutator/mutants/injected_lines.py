@@ -22,8 +22,10 @@ INJECTION_ID_PATTERN = (
 )
 
 _TAG_START = "# fi:"
+# most lines have no tag: searching for these bytes first is faster than matching the pattern
 _TAG_START_BYTES = _TAG_START.encode()
 _TAG_PATTERN = rf"{_TAG_START}([0-9a-z]+(?:\+[0-9a-z]+)*)(?: guard:(\d+)| was:([^\r\n]*))?"
+# only at the end of a line, because a string of the target can contain the text of a tag
 _TAG_AT_LINE_END_PATTERN = re.compile(rf"[ \t]*{_TAG_PATTERN}(?=\r?\n?\Z)".encode())
 _PROBE_NAME_PATTERN = re.compile(rf"\b{PROBE_NAME}\b".encode())
 _ACTIVE_CHECK_PATTERN = (  # checks of the instance or execution come first
@@ -31,6 +33,7 @@ _ACTIVE_CHECK_PATTERN = (  # checks of the instance or execution come first
     rf'(?:{PROBE_NAME}\.(?:call|every)\("[0-9a-z]+", \d+\) and )?'
     rf'{PROBE_NAME}\.active\("(?P<id>[0-9a-z]+)"\)'
 )
+# a drift that stays after its trigger has ended guards its lines with `or _fi.steps()`
 _GUARD_PATTERN = re.compile(
     rf"\s*if (?:not )?\(?{_ACTIVE_CHECK_PATTERN}\)?(?: or {PROBE_NAME}\.steps\(\))?:\Z".encode()
 )
@@ -39,6 +42,7 @@ _PROBE_CHECKS = [f"{PROBE_NAME}.{name}" for name in ("call", "every", "active")]
 _SET_VALUE_PATTERN = re.compile(rf'\s*{PROBE_NAME}\.(?:constant|default)\("[0-9a-z]+", '.encode())
 _TAGGED_ADDITION_PATTERN = re.compile(rf"^\+.*{_TAG_PATTERN}\r?$", re.MULTILINE)
 _FAULT_ADDITION_PATTERN = re.compile(rf"^\+.*{_TAG_START}(?!{IMPORT_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)
+# mutants whose probes differ only in these values can have the same shape, and share a review
 _PROBE_SETTING_PATTERN = re.compile(
     r"(?P<mutant>(?<![0-9A-Za-z])[0-9a-f]{16}(?![0-9A-Za-z]))"
     rf"|(?P<id>{INJECTION_ID_PATTERN})"

@@ -134,7 +134,7 @@ def _build_probe(
     ids: tuple[str, ...],
     sets: bool,
 ) -> Probe:
-
+    # also a package or an extension module of this name would be imported instead of the probe
     probe_stem = probe_path(manifest.package).removesuffix("py")
     if clashes := [
         path for path in manifest.tree.files if path.startswith((probe_stem, f"{probe_stem[:-1]}/"))

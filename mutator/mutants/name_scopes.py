@@ -98,4 +98,5 @@ def _symbol_table(data: bytes) -> SymbolTable:
     return symtable(data, "<source>", "exec")  # type: ignore[arg-type]  # bytes, as `compile`
 
 
+# a fault changes few files, but each of its mutants compares them again
 _cached_symbol_table = lru_cache(maxsize=16)(_symbol_table)

@@ -13,6 +13,7 @@ from libcst.metadata import CodePosition, CodeRange
 
 Positions = Mapping[cst.CSTNode, CodeRange]
 _LineColumn = tuple[int, int]
+# only these assign, call or return as a whole
 _ANCHORABLE_STATEMENTS = ast.Assign | ast.AugAssign | ast.AnnAssign | ast.Expr | ast.Return
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from mutator.mutants.splicing import PatchPiece
 
-_CONTEXT_LINES = 3
+_CONTEXT_LINES = 3  # as many as `diff -u` and git write, so that `patch` finds each place as usual
 _NO_NEWLINE_NOTE = "\\ No newline at end of file\n"
 
 

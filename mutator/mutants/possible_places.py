@@ -14,6 +14,7 @@ from mutator.mutants.expressions import NO_TEMPLATE_PARTS, Expression, template_
 from mutator.mutants.statement_texts import one_line_texts
 
 _OPERATOR_MODEL_PREFIX = "operator_"  # models of mutation operators, which find their own places
+# nothing after a `return` runs, so it has no anchor behind it
 _ANCHOR_KINDS_BY_VERB = {
     "assign": (AnchorKind.BEFORE_ASSIGN, AnchorKind.AFTER_ASSIGN),
     "call": (AnchorKind.BEFORE_CALL, AnchorKind.AFTER_CALL),

@@ -95,7 +95,7 @@ def is_probe_path(path: str) -> bool:
 
 def injection_id(index: int, injection: Injection) -> str:
     """Return the id of an injection in tags and reports, from its content and position in the fault."""
-
+    # short, because it is in every injected line, and a fault has few injections
     return content_id([index, injection])[:8]
 
 

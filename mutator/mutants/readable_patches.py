@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 
-_NEW_PATH_PATTERN = re.compile(r"^\+\+\+ b/(.+?)\t?$", re.MULTILINE)
+_NEW_PATH_PATTERN = re.compile(r"^\+\+\+ b/(.+?)\t?$", re.MULTILINE)  # a tab ends a path that has a space
 
 
 def readable_patch(patch: str) -> tuple[str, str]:

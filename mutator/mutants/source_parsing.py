@@ -15,7 +15,8 @@ from mutator.mutants.injected_lines import find_instrumented_line
 from mutator.mutants.node_positions import Positions, line_after_statements
 
 MOST_NODES = 50_000  # of a file's syntax tree; LibCST takes about 0.1 ms and 4 kB for each
-MOST_CHAIN_LINKS = 500
+MOST_CHAIN_LINKS = 500  # LibCST recurses once for each link, and thousands would end the process
+# `splitlines` ends a line at a lone CR, but `patch` does not
 _LONE_CR_PATTERN = re.compile(rb"\r(?!\n)")
 
 

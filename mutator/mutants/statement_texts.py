@@ -9,10 +9,12 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import Needs
 from mutator.mutants.anchors import ParsedFile, ResolvedAnchor
 
+# statements without a block: only these can be repeated or moved as one line
 _SMALL_STATEMENTS = (
     ast.Assign | ast.AugAssign | ast.AnnAssign | ast.Expr | ast.Return | ast.Delete | ast.Raise | ast.Assert
 )
 _SMALL_STATEMENTS |= ast.Pass | ast.Break | ast.Continue
+# repeated or swapped, these would leave code that never runs
 _BLOCK_ENDING_STATEMENTS = ast.Return | ast.Raise | ast.Break | ast.Continue
 _BLOCK_FIELDS = ("body", "orelse", "finalbody")
 

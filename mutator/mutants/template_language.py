@@ -51,6 +51,7 @@ _ALLOWED_NODES = (
     nodes.Tuple,
     nodes.List,
 )
+# none returns more text than it gets; `join`, `replace` and `format` could multiply it
 _ALLOWED_METHODS = (
     "endswith",
     "partition",

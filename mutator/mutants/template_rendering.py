@@ -106,6 +106,7 @@ _ENVIRONMENT = TemplateEnvironment(
     finalize=python_literal,
 )
 _PARSER_ERRORS = (SyntaxError, ValueError, RecursionError, MemoryError)  # what Python's parser raises
+# what a template's own arithmetic, indices and methods can raise
 _RENDERING_ERRORS = (
     TypeError,
     ValueError,

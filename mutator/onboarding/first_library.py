@@ -18,6 +18,7 @@ from mutator.onboarding.step_candidates import StepCandidate, list_step_candidat
 from mutator.onboarding.todo_marks import TODO_MARK
 
 MOST_LISTED_CANDIDATES = 5  # maximum number of candidates for the step, and of values of each
+# parameters that get the step length instead of `...`
 _TIME_STEP_NAMES = ("dt", "delta_t", "time_step", "timestep")
 _PATH_BY_TEMPLATE = {
     "README.md": "README.md",
@@ -49,7 +50,7 @@ def write_first_library(survey: SourceSurvey, folder: Path) -> None:
         path = folder / form.format(name=variables["name"], entry=variables["entry"])
         path.parent.mkdir(parents=True, exist_ok=True)
         text = templates.get_template(f"{template}.j2").render(variables)
-
+        # parts that a template leaves out leave their blank lines behind
         path.write_text(re.sub(r"\n{4,}", "\n\n\n", text), encoding="utf-8")
     if not variables["candidates"]:
         warnings.warn(_describe_no_controller(survey), MutatorWarning, stacklevel=3)

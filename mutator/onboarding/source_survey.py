@@ -15,7 +15,7 @@ from mutator.errors import MutatorError, Outside
 from mutator.targets.roots import INSTALLED, installed_at
 from mutator.targets.source_tree import MOST_SOURCE
 
-_MOST_FILES = 5000
+_MOST_FILES = 5000  # a controller has hundreds; more are a home folder or an environment, passed by mistake
 _SKIPPED_FOLDERS_AND_MODULES = {
     *("test", "tests", "testing", "doc", "docs", "example", "examples", "benchmark", "benchmarks", "scripts"),
     *("build", "dist", "node_modules", "site-packages", "venv", "env", "__pycache__"),

@@ -100,7 +100,7 @@ def _build_candidate(
     module: SourceModule, owner: ast.ClassDef | None, function: Function, looped: Counter[str]
 ) -> StepCandidate:
     values = tuple(_value_candidates(function))
-
+    # three calls in loops say as much as thirty, which only a helper has
     hints = _name_score(function.name) + 2 * min(looped[function.name], 3)
     score = min(len(values), _MOST_VALUE_POINTS) + (hints or _NO_HINT_POINTS)
     if owner is not None:
@@ -134,7 +134,7 @@ def _name_score(name: str) -> int:
 
 def _class_score(name: str) -> int:
     lower = name.lower()
-
+    # a `ControllerEnv` is a world, so a word of the world counts more
     return 5 * bool(_CONTROLLER_PATTERN.search(lower)) - 6 * bool(_WORLD_PATTERN.search(lower))
 
 

@@ -21,6 +21,7 @@ from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 from mutator.targets.manifest import TargetManifest
 
+# part of each entry's key: a new schema ignores the old entries instead of misreading them
 _SCHEMA = "lines/1"
 ExecutedLines = dict[str, frozenset[int]]  # lines (from 1) by file
 

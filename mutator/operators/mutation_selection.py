@@ -19,7 +19,7 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
 
 LinesByFile = Mapping[str, Collection[int]]  # by file, from 1
-_WILDCARDS = "*?["
+_WILDCARDS = "*?["  # of `fnmatch`; a path without one must be a file of the target
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -68,7 +68,7 @@ def _common_prefix_length(first: str, second: str) -> int:
 def _abbreviate(text: str, before: int, after: int) -> str:
     part = text[before : len(text) - after]
     half = _MOST_CHARACTERS // 2
-
+    # the ` .. ` in the middle takes four characters
     if len(part) > _MOST_CHARACTERS + 4:
         part = f"{part[:half]} .. {part[-half:]}"
     return f"{'.. ' if before else ''}{part}{' ..' if after else ''}"

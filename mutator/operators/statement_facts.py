@@ -10,6 +10,7 @@ from mutator.targets.source_tree import SourceTree
 
 NodeExtent = tuple[int, int, int | None, int | None]
 
+# these bind names of their own scope, which are no locals of the function
 _LOCAL_NAME_FIELDS: dict[type[ast.AST], str] = {ast.comprehension: "target", ast.Lambda: "body"}
 
 
@@ -19,8 +20,8 @@ class StatementFacts:
 
     * `augmenting_operator_by_extent`: of augmented assignments, by the extent of the right-hand side
     * `source_by_line`: the source of simple statements, by first line
-    * `first_binding_line_by_name`: in a function. The key has the function's `def` line, because a property and
-      its setter share a name
+    * `first_binding_line_by_name`: in a function. The key has its `def` line, because a property and its
+      setter share a name
     * `statement_lines`: the lines of each statement without those of nested statements
     """
 

@@ -24,7 +24,7 @@ from mutator.workspace import Workspace
 
 GOLDEN, GOLDEN_AGAIN, NULL_MUTANT = "golden", "golden again", "null mutant"
 _CANARY = "canary"
-_OTHER_HASH_SEED = 4242
+_OTHER_HASH_SEED = 4242  # any but 0, with which golden runs are made: the order of sets of strings differs
 
 OnProgress = Callable[[Progress], None]
 CheckRunByName = dict[tuple[str, Any], CheckRun]  # kind of run, and `GoldenRun`
@@ -105,9 +105,8 @@ class CheckRunner:
             )
             jobs[GOLDEN, key] = Job(name=f"a-{name}", **common)
             jobs[GOLDEN_AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
-        return dict(
-            sorted(jobs.items(), key=lambda entry: entry[0][0] != NULL_MUTANT)
-        )  # null mutants first, as their stage
+        # null mutants first: their stage is reported before that of the golden runs
+        return dict(sorted(jobs.items(), key=lambda entry: entry[0][0] != NULL_MUTANT))
 
     def _run_job(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
         scratch = path_below(engine.work, job.name)

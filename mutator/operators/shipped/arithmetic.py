@@ -22,12 +22,14 @@ _REPLACEMENTS_BY_OPERATOR: dict[type[ast.operator], tuple[str, ...]] = {
     ast.LShift: (">>",),
     ast.RShift: ("<<",),
 }
+# the operator of `a += b` is no part of an expression, so `b` changes instead
 _OPERAND_PREFIX_BY_OPERATOR: dict[type[ast.operator], str] = {
     ast.Add: "-",
     ast.Sub: "-",
     ast.Mult: "1 /",
     ast.Div: "1 /",
 }
+# another operator on these nearly always raises TypeError, which tests nothing but the crash
 _NON_NUMBER_NODES = (ast.List, ast.ListComp, ast.Dict, ast.Set, ast.Tuple, ast.JoinedStr)
 
 

@@ -7,6 +7,7 @@ from mutator.mutants.expressions import Expression
 from mutator.operators import MutationRule, Operator, mutation_rule
 from mutator.operators.statement_facts import StatementFacts
 
+# objects that are compared with `==` often have no order, so that `<` would only crash
 _REPLACEMENTS_BY_OPERATOR: dict[type[ast.cmpop], tuple[str, ...]] = {
     ast.Lt: ("<=", ">", ">=", "==", "!="),
     ast.LtE: ("<", ">", ">=", "==", "!="),
