@@ -26,10 +26,10 @@ from statistics import mean, median
 from types import SimpleNamespace
 from typing import Any
 
-from mutator.campaigns.chunks import Pending, pending
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
-from mutator.campaigns.run_provenance import add_stretch
+from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
+from mutator.campaigns.run_provenance import append_stretch
 from mutator.execution.cluster import cluster_distributor, crew, worker_tasks
 from mutator.execution.cluster import result_intake as intakes
 from mutator.execution.cluster.bundle import Bundle
@@ -98,12 +98,12 @@ def cpu_s(command: list[str], env: dict[str, str]) -> float:
 
 
 @contextmanager
-def planned(name: str = "paper") -> Iterator[tuple[Workspace, RunFolder, tuple[Pending, ...]]]:
+def planned(name: str = "paper") -> Iterator[tuple[Workspace, RunFolder, tuple[PendingChunk, ...]]]:
     """Yield a frozen plan, by default that of the paper's 11,280 experiments."""
     workspace = Workspace.find(ROOT)
     with tempfile.TemporaryDirectory() as place:
-        folder = freeze(make_plan(workspace, name), Path(place) / "run", workspace)
-        yield workspace, folder, pending(folder, {})
+        folder = freeze_plan(build_plan(workspace, name), Path(place) / "run", workspace)
+        yield workspace, folder, pending_chunks_of(folder, {})
 
 
 # These functions replace those of a real worker and take no time. Dask sends them to the workers.
@@ -155,7 +155,7 @@ def intake() -> None:
     for fake in (facts, deliver, attend, leave, work):
         setattr(worker_tasks, fake.__name__, fake)
     with planned() as (workspace, folder, left):
-        folder = add_stretch(folder, Stretch(python="", packages={}, platform=""))
+        folder = append_stretch(folder, Stretch(python="", packages={}, platform=""))
         session: Any = SimpleNamespace(
             workspace=workspace,
             folder=folder,
@@ -210,7 +210,7 @@ def ends(seed: int) -> None:
 
 
 def simulated(
-    folder: RunFolder, left: Sequence[Pending], draw: random.Random
+    folder: RunFolder, left: Sequence[PendingChunk], draw: random.Random
 ) -> tuple[list[float], float, int]:
     """Return when each worker finished, their total working time and the number of pieces."""
     now = [0.0]

@@ -20,7 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.campaigns.plan import Plan, make_plan  # noqa: E402
+from mutator.campaigns.plan import Plan, build_plan  # noqa: E402
 from mutator.engines.engine_jobs import Engine, Job  # noqa: E402
 from mutator.engines.fork_engine import ForkEngine  # noqa: E402
 from mutator.engines.reference_engine import ReferenceEngine  # noqa: E402
@@ -130,7 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args(arguments)
     workspace = Workspace.find(root=ROOT, library=options.library)
-    plan = make_plan(workspace, options.campaign, Choices(limit=options.experiments))
+    plan = build_plan(workspace, options.campaign, Choices(limit=options.experiments))
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(plan, workspace, Path(folder))
         found: dict[str, Measured] = {}

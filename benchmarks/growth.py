@@ -19,8 +19,8 @@ from time import process_time
 
 from mutator._common.hashing import digest
 from mutator.audit.seal import seals_of
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import Plan, make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import Plan, build_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.results import table_building
@@ -52,7 +52,7 @@ def plan_of(workspace: Workspace, size: int) -> Plan:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "paper.yaml"
         path.write_text(text.replace("[S1, S2, S3, S4, S5]", f"[{', '.join(scenarios)}]"))
-        plan = make_plan(workspace, path)
+        plan = build_plan(workspace, path)
     count = min(size, len(plan.experiments))
     chunks = tuple(min(CHUNK, count - first) for first in range(0, count, CHUNK))
     return replace(plan, experiments=plan.experiments[:count], chunks=chunks)
@@ -99,7 +99,7 @@ def planning(size: int, out: Path) -> dict[str, float]:
     began = process_time()
     plan = plan_of(workspace, size)
     planned = process_time()
-    freeze(plan, out, workspace)
+    freeze_plan(plan, out, workspace)
     frozen = process_time()
     return {"plan_s": planned - began, "freeze_s": frozen - planned, "memory_mb": most_mb()}
 
@@ -124,10 +124,10 @@ def working(size: int, out: Path) -> dict[str, float]:
 def written_run(size: int, out: Path, patch: bytes = b"") -> RunFolder:
     """Write a run folder with that many synthetic records and, if given a patch, as many copies of it."""
     workspace = Workspace.find(root=ROOT)
-    plan = make_plan(workspace, "paper")
+    plan = build_plan(workspace, "paper")
     more = (replace(e, seed=e.seed + k) for k in range(size) for e in plan.experiments)
     experiments = tuple(next(more) for _ in range(size))
-    folder = freeze(replace(plan, experiments=experiments, chunks=(size,)), out, workspace)
+    folder = freeze_plan(replace(plan, experiments=experiments, chunks=(size,)), out, workspace)
     lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
     patches = PatchWriter(out, "0001-main")
     for number, experiment in enumerate(experiments):

@@ -24,9 +24,9 @@ from growth import record
 from mutator._common.hashing import canonical_json, digest
 from mutator.audit.seal import seals_of
 from mutator.campaigns import run_environment
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import Planning
-from mutator.campaigns.run_provenance import add_stretch
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import SeedBySeedPlan
+from mutator.campaigns.run_provenance import append_stretch
 from mutator.execution.single_run import run_golden
 from mutator.model import Experiment, Record
 from mutator.mutants.mutant_building import build
@@ -72,13 +72,15 @@ def make(size: int, out: Path) -> str:
     equivalence_check.mark_as_needed(out)
     write_proof(folder, ids, records, patches)
     write_series(workspace, folder, ids, first)
-    add_stretch(
+    append_stretch(
         folder,
         Stretch(
-            python=run_environment.python(),
+            python=run_environment.python_version(),
             packages={
                 name: version
-                for name, version in run_environment.versions(run_environment.required()).items()
+                for name, version in run_environment.package_versions(
+                    run_environment.required_packages()
+                ).items()
                 if version
             },
             platform="made up",
@@ -106,7 +108,7 @@ def campaign(folder: Path, size: int) -> Path:
 
 def planned(workspace: Workspace, size: int, out: Path) -> RunFolder:
     with TemporaryDirectory() as place:
-        return freeze(Planning(workspace, campaign(Path(place), size)), out, workspace)
+        return freeze_plan(SeedBySeedPlan(workspace, campaign(Path(place), size)), out, workspace)
 
 
 def _experiments(folder: RunFolder) -> Iterator[Experiment]:

@@ -18,7 +18,7 @@ from statistics import median
 from time import process_time
 
 from mutator._common.doors import OPERATORS
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.plan import build_plan
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment
 from mutator.mutants.anchors import parse_file
@@ -62,7 +62,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="file for the figures")
     options = parser.parse_args()
     workspace = Workspace.find(root=ROOT)
-    plan = make_plan(workspace, "paper")
+    plan = build_plan(workspace, "paper")
     manifest, models = workspace.manifest(plan.campaign.target), workspace.fault_models()
 
     def reused(experiment: Experiment) -> None:

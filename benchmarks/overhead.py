@@ -25,7 +25,7 @@ from time import process_time
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.campaigns.plan import make_plan  # noqa: E402
+from mutator.campaigns.plan import build_plan  # noqa: E402
 from mutator.engines.engine_jobs import Job  # noqa: E402
 from mutator.engines.fork_engine import ForkEngine  # noqa: E402
 from mutator.engines.reference_engine import ReferenceEngine  # noqa: E402
@@ -56,7 +56,7 @@ class Cost:
 
 def late(workspace: Workspace, count: int) -> list[Experiment]:
     """Return faults of the campaign that leave the scenario unchanged and first act in the last steps."""
-    plan = make_plan(workspace, "paper", Choices(limit=8 * count))
+    plan = build_plan(workspace, "paper", Choices(limit=8 * count))
     known = {e.fault.id: e for e in plan.experiments if e.scenario == SCENARIO and not e.fault.changes}
     made = []
     for number, experiment in enumerate(islice(cycle(known.values()), count)):
@@ -73,7 +73,7 @@ class Bench:
         self.manifest, self.models = workspace.manifest("openpilot"), workspace.fault_models()
         self.work = folder / "work"
         self.work.mkdir()
-        limits = make_plan(workspace, "paper", Choices(limit=1)).campaign.limits
+        limits = build_plan(workspace, "paper", Choices(limit=1)).campaign.limits
         self.common = (self.manifest, self.work, limits)
 
     def golden(self) -> float:

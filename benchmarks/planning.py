@@ -15,8 +15,8 @@ from time import process_time
 from typing import Any
 
 from mutator._common.files import json_bytes
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.engines.engine_jobs import Execution, Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.campaign_running import run_campaign
@@ -106,10 +106,10 @@ def main() -> None:
         os.environ["XDG_CACHE_HOME"] = place
         out = Path(place) / "run"
         began = process_time()
-        plan = make_plan(workspace, "paper")
+        plan = build_plan(workspace, "paper")
         table.count = len(plan.experiments)
         table.add("plan", process_time() - began)
-        folder = table.timed("freeze", lambda: freeze(plan, out, workspace))
+        folder = table.timed("freeze", lambda: freeze_plan(plan, out, workspace))
         make_up_checks(workspace, folder)
         new = out.with_name("new")
         table.add("new, first run", until_the_first_run(workspace, new))

@@ -21,8 +21,8 @@ import numpy as np
 from growth import record
 from markupsafe import Markup
 
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.mutants.readable_patches import readable_patch
@@ -84,10 +84,10 @@ STEPS = {  # a reader's first actions
 
 def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
     """Write a run folder with results of synthetic records and return its experiments."""
-    plan = make_plan(workspace, "paper")
+    plan = build_plan(workspace, "paper")
     known = plan.experiments
     experiments = [replace(known[i % len(known)], seed=1 + i // len(known)) for i in range(size)]
-    freeze(replace(plan, experiments=tuple(experiments), chunks=(size,)), out, workspace)
+    freeze_plan(replace(plan, experiments=tuple(experiments), chunks=(size,)), out, workspace)
     lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
     draw = np.random.default_rng(1)
     names = [metric.name for metric in workspace.manifest("openpilot").measures]

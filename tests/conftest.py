@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import Plan, make_plan
-from mutator.campaigns.run_provenance import add_stretch
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import Plan, build_plan
+from mutator.campaigns.run_provenance import append_stretch
 from mutator.model import (
     Activation,
     Anchor,
@@ -304,8 +304,8 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
     ) -> Path:
         """`became` returns the fields of an experiment's record, or None if the experiment has no record.
         `changed` alters the campaign's plan."""
-        plan = changed(make_plan(workspace, campaign, Choices(**choices)))
-        freeze(plan, out, workspace)
+        plan = changed(build_plan(workspace, campaign, Choices(**choices)))
+        freeze_plan(plan, out, workspace)
         compared = workspace.manifest(plan.campaign.target).compared
         unchanged = {"max_dev": tuple((channel.name, 0.0) for channel in compared)}
         lines = LineWriter(out / "records" / "0001-a.jsonl", {"schema": SCHEMA, "plan": plan.digest})
@@ -394,7 +394,9 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
             for name, data in new.items():
                 (out / name).parent.mkdir(parents=True, exist_ok=True)
                 (out / name).write_bytes(data)
-        add_stretch(folder, Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform="Linux"))
+        append_stretch(
+            folder, Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform="Linux")
+        )
         file_digests.close_segments(out, finished=True)
         return out
 

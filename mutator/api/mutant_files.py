@@ -12,7 +12,7 @@ from mutator._common.message_text import counted
 from mutator.api.mutants import BuiltMutant, build_selected
 from mutator.api.operator_mutants import OperatorChoice, draw_operator_faults
 from mutator.api.selection import FaultChoice, SelectedTarget, WorkspaceLike, context_tables, open_workspace
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
 from mutator.mutants.mutant_building import write_tree
@@ -74,7 +74,7 @@ def pairs_of_specs(
 def pairs_of_campaign(
     workspace: Workspace, campaign: str, choices: Choices
 ) -> tuple[SelectedTarget, list[FaultWithTrigger]]:
-    plan = make_plan(workspace, campaign, choices)
+    plan = build_plan(workspace, campaign, choices)
     return SelectedTarget.of(workspace, plan.campaign.target), [
         (e.fault, e.trigger) for e in plan.experiments
     ]

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.campaigns.freezing import freeze_and_tell
-from mutator.campaigns.plan import Plan, Planning, load_plan, make_plan
+from mutator.campaigns.freezing import freeze_plan_with_tally
+from mutator.campaigns.plan import Plan, SeedBySeedPlan, build_plan, load_plan
 from mutator.engines.forkable import not_forked
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
@@ -25,13 +25,13 @@ def plan(
     """
     opened_workspace = open_workspace(workspace)
     if out is None:
-        return make_plan(opened_workspace, campaign, choices)
-    planning = Planning(opened_workspace, campaign, choices)
-    folder, tally = freeze_and_tell(planning, Path(out), opened_workspace)
+        return build_plan(opened_workspace, campaign, choices)
+    planning = SeedBySeedPlan(opened_workspace, campaign, choices)
+    folder, tally = freeze_plan_with_tally(planning, Path(out), opened_workspace)
     return load_plan(folder, tally)  # reading it back adds the cost measured in this folder, if any
 
 
 def reasons_not_to_fork(plan: Plan, workspace: Workspace) -> dict[str, str]:
     """Return the variants of a plan that only the reference engine can run, with the reasons."""
-    faults = plan.tally.variants.values()
+    faults = plan.tally.fault_by_variant.values()
     return not_forked(workspace.manifest(plan.campaign.target), workspace.fault_models(), faults)

@@ -8,8 +8,8 @@ from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.campaigns.filters import compile_filter
-from mutator.campaigns.git_clone import user_name
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.git_clone import find_user_name
+from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.review import approval_gate, mutant_groups
 from mutator.review.decisions import Change, Kind, Review, State, record
@@ -133,7 +133,7 @@ def load_review(
         raise MutatorError("given together with specs", argument="campaign", expected="one or the other")
     opened_workspace = open_workspace(workspace)
     if campaign:
-        plan = make_plan(opened_workspace, campaign, Choices(seed=seed, reading=reading))
+        plan = build_plan(opened_workspace, campaign, Choices(seed=seed, reading=reading))
         manifest = opened_workspace.manifest(plan.campaign.target)
         groups = mutant_groups.of_plan(opened_workspace, plan)
     else:
@@ -175,7 +175,7 @@ def group_facts(review: Review, group: Group) -> dict[str, object]:
 
 def reviewer_name(workspace: WorkspaceLike = None) -> str | None:
     """Return `user.name` of the user's own git configuration; None if it is not set."""
-    return user_name(open_workspace(workspace).library)
+    return find_user_name(open_workspace(workspace).library)
 
 
 def write_pictures(

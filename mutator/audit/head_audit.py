@@ -9,7 +9,7 @@ from typing import Any
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator.audit.record_audit import StoredRecord
-from mutator.campaigns.freezing import target_facts
+from mutator.campaigns.freezing import collect_target_facts
 from mutator.campaigns.shared_runs import run_key
 from mutator.errors import MutatorError
 from mutator.model import Outcome
@@ -29,7 +29,7 @@ _REMEDY = "verify with the library of the run"
 def target_fact_problems(folder: RunFolder, workspace: Workspace, manifest: TargetManifest) -> Problems:
     """Yield what run.json says about the target and its hazards, but the library does not."""
     keys = {run_key(manifest, experiment) for experiment in plan_file.iterate_experiments(folder.path)}
-    expected_head = replace(folder.head, runs=len(keys), **vars(target_facts(workspace, manifest)))
+    expected_head = replace(folder.head, runs=len(keys), **vars(collect_target_facts(workspace, manifest)))
     for key, stored, value in folder.head.differences(expected_head):
         yield MutatorError(
             f"{key} {shortened(stored)}",

@@ -21,7 +21,7 @@ from mutator.audit.record_audit import load_stored_records, mutant_problems, pro
 from mutator.audit.seal import golden_digests
 from mutator.audit.series_audit import audit_series
 from mutator.audit.table_audit import audit_tables
-from mutator.campaigns.freezing import CSV, plan_csv
+from mutator.campaigns.freezing import PLAN_CSV, plan_csv_bytes
 from mutator.campaigns.plan import load_plan
 from mutator.campaigns.plan_parts import plan_digest
 from mutator.campaigns.run_inputs import RunInputs
@@ -156,7 +156,7 @@ def _plan_problems(folder: RunFolder) -> Problems:
         plan=plan_digest([e.id for e in plan.experiments], plan.chunks, plan.canary.id, campaign),
         experiments=len(plan.experiments),
         campaign=campaign.name,
-        campaign_digest=digest(campaign.source),
+        campaign_digest=digest(campaign.file_bytes),
         study=campaign.study,
         target=campaign.target,
         chunks=recomputed_chunks(folder),
@@ -167,9 +167,9 @@ def _plan_problems(folder: RunFolder) -> Problems:
     for key, stored, value in head.differences(expected_head):
         expected = f"{shortened(value)}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
         yield MutatorError(f"{key} {shortened(stored)}", where=run / HEAD, expected=expected)
-    if FileDigest.of_file(run / CSV) != FileDigest.of_bytes(plan_csv(plan)):
+    if FileDigest.of_file(run / PLAN_CSV) != FileDigest.of_bytes(plan_csv_bytes(plan)):
         yield MutatorError(
-            "differs from the plan", where=run / CSV, expected=f"the rows of {plan_file.EXPERIMENTS}"
+            "differs from the plan", where=run / PLAN_CSV, expected=f"the rows of {plan_file.EXPERIMENTS}"
         )
 
 
@@ -199,7 +199,7 @@ def _source_problems(folder: RunFolder, workspace: Workspace | None) -> Problems
         )
         return
     manifest = workspace.manifest(head.target)
-    current_digests = RunInputs.of(workspace, manifest, folder.scenarios).digests()
+    current_digests = RunInputs.from_workspace(workspace, manifest, folder.scenarios).digest_by_source()
     for name, recorded in head.sources.items():
         if current_digests.get(name) != recorded:
             yield MutatorError(

@@ -25,7 +25,7 @@ from mutator._common.folder_locks import owning_run_folder
 from mutator._common.message_text import counted
 from mutator.audit.record_audit import load_stored_records
 from mutator.audit.series_repair import repair_series
-from mutator.campaigns.freezing import CSV, plan_csv
+from mutator.campaigns.freezing import PLAN_CSV, plan_csv_bytes
 from mutator.campaigns.plan import load_plan
 from mutator.errors import MutatorError, Outside, TooLarge
 from mutator.model import Status
@@ -95,8 +95,8 @@ def _file_changes(folder: RunFolder, ledger: DigestLedger) -> Iterator[_FileChan
             or file_digest.has_same_bytes(FileDigest.of_file_below(run, name))
         ):
             continue
-        if name == CSV and file_digest.has_same_bytes(
-            FileDigest.of_bytes(data := plan_csv(load_plan(folder)))
+        if name == PLAN_CSV and file_digest.has_same_bytes(
+            FileDigest.of_bytes(data := plan_csv_bytes(load_plan(folder)))
         ):
             yield name, data, f"{name} rebuilt from the plan"
         else:
@@ -255,7 +255,7 @@ def _apply_changes(run: Path, changes: list[_FileChange], ledger: DigestLedger) 
         for name, data, _ in changes
         if not name.startswith("timings/")
     }
-    finished = ledger.finished and {*new_digests} <= {CSV}
+    finished = ledger.finished and {*new_digests} <= {PLAN_CSV}
     with file_digests.rewriting_files(run, new_digests, finished=finished):
         for name, data, _ in changes:
             if data is None:

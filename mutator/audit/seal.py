@@ -20,7 +20,7 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator._common.hashing import canonical_json, digest
-from mutator.campaigns.freezing import CSV
+from mutator.campaigns.freezing import PLAN_CSV
 from mutator.store import file_digests, plan_file
 from mutator.store.approvals import review_digest
 from mutator.store.check_results import FILE as CHECKS
@@ -39,7 +39,7 @@ UNSEALED_KEYS = {
     CHECKS: ("digest", "run_cpu_s"),  # the key of a cache, which depends on the machine; a cost
 }
 KEYS_OUTSIDE_RESULTS_DIGEST = ("schema", "provenance", *UNSEALED_KEYS[HEAD])  # of run.json
-_SEALED_FILES = (CAMPAIGN, CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
+_SEALED_FILES = (CAMPAIGN, PLAN_CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
 _EXCEPTION_TEXT_KEYS, _EMPTY_EXCEPTION_TEXTS = ("detail", "error.message"), (b'"detail":""', b'"error":null')
 _UNSEALED_FILES_NOTE = (
     "times, engines and hosts of the experiments; series, kept traces, plots, stills, films"

@@ -13,10 +13,10 @@ from mutator._common.confined_files import is_inside, path_below
 from mutator._common.hashing import digest
 from mutator._common.message_text import describe_choices
 from mutator.campaigns.campaign_files import Campaign
-from mutator.campaigns.campaign_triggers import listed_triggers
+from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.campaigns.operator_faults import OperatorFault, OperatorFaults
 from mutator.campaigns.operator_selection import When
-from mutator.campaigns.sampling import spread
+from mutator.campaigns.sampling import evenly_spread_indices
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
@@ -27,10 +27,10 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger, draw_time, trigger_at_time
 from mutator.workspace import Workspace
 
-_Numbered = tuple[int, Fault]  # a fault and its position among its variant's values
+_NumberedFault = tuple[int, Fault]  # a fault and its position among its variant's values
 
 
-class Expansion:
+class CampaignExpansion:
     """Everything from which a campaign's experiments are created, for one seed and one reading."""
 
     def __init__(
@@ -41,41 +41,41 @@ class Expansion:
         self.manifest = manifest
         self.seed = seed
         self.reading = reading
-        armed_after_s = campaign.armed_after(reading)
+        armed_after_s = campaign.armed_after_s_in(reading)
         self.armed_after_s = manifest.armed_after_s if armed_after_s is None else armed_after_s
-        self._digests: dict[str, str] = {}
-        self._specs: list[tuple[FaultSpec, ...]] = []
-        self._models = workspace.fault_models()
-        self._operators = OperatorFaults(manifest, self._models, campaign.limits)
+        self._scenario_digests: dict[str, str] = {}
+        self._library_specs: list[tuple[FaultSpec, ...]] = []
+        self._fault_models = workspace.fault_models()
+        self._operator_faults = OperatorFaults(manifest, self._fault_models, campaign.limits)
 
-    def with_seed(self, seed: int) -> "Expansion":
+    def with_seed(self, seed: int) -> "CampaignExpansion":
         """Return the same expansion with another seed, without reading files again."""
         other = copy(self)
         other.seed = seed
         return other
 
     @property
-    def told(self) -> tuple[str, ...]:
-        return tuple(self._operators.told)
+    def operator_notes(self) -> tuple[str, ...]:
+        return tuple(self._operator_faults.notes)
 
-    def experiments(self) -> tuple[Experiment, ...]:
+    def build_experiments(self) -> tuple[Experiment, ...]:
         """Return all experiments. Those that share a golden run are adjacent."""
-        self._check_setting()
-        faults = self._selected()
-        mutants = self._mutants()
-        triggers = self._triggers()
-        made = [
+        self._check_changes()
+        faults = self._selected_faults()
+        mutants = self._selected_mutants()
+        triggers = self._campaign_triggers()
+        ordered = [
             (order, experiment)
             for order, scenario in enumerate(self.campaign.scenarios)
             for experiment in (
-                *self._of_scenario(scenario, faults, triggers),
-                *self._of_operators(scenario, mutants, triggers),
+                *self._experiments_of_faults(scenario, faults, triggers),
+                *self._experiments_of_mutants(scenario, mutants, triggers),
             )
         ]
-        made.sort(key=lambda item: (item[0], item[1].changes))
-        return tuple(experiment for _, experiment in made)
+        ordered.sort(key=lambda item: (item[0], item[1].changes))
+        return tuple(experiment for _, experiment in ordered)
 
-    def canary(self) -> Experiment:
+    def build_canary(self) -> Experiment:
         canary = self.campaign.canary
         if canary.hazard not in self.manifest.hazards:
             raise self.campaign.error(
@@ -84,17 +84,17 @@ class Expansion:
                 expected=f"one of {', '.join(self.manifest.hazards)}",
                 remedy="name a hazard of the target's manifest",
             )
-        known = (*self._library(), *chain.from_iterable(self._files().values()))
-        faults = [fault for _, fault in known if fault.spec == canary.spec]
+        candidates = (*self._library_faults(), *chain.from_iterable(self._faults_of_files().values()))
+        faults = [fault for _, fault in candidates if fault.spec == canary.spec]
         if not faults:
-            raise self._unmatched(("canary", "spec"), canary.spec)
-        worst = max(faults, key=lambda fault: fault.size)
+            raise self._unmatched_error(("canary", "spec"), canary.spec)
+        largest = max(faults, key=lambda fault: fault.size)
         trigger = trigger_at_time(canary.at_s, name="canary")
-        return self._experiment(worst, canary.scenario, Method.RANDOM, trigger)
+        return self._build_experiment(largest, canary.scenario, Method.RANDOM, trigger)
 
-    def _check_setting(self) -> None:
-        keys = self.campaign.setting_keys(self.reading)
-        for i, change in enumerate(self.campaign.setting_in(self.reading)):
+    def _check_changes(self) -> None:
+        keys = self.campaign.keys_of_changes(self.reading)
+        for i, change in enumerate(self.campaign.changes_in(self.reading)):
             if change not in self.manifest.changes:
                 raise self.campaign.error(
                     (*keys, i),
@@ -103,16 +103,20 @@ class Expansion:
                     remedy="name a change of the target's manifest",
                 )
 
-    def _library(self) -> list[_Numbered]:
-        if not self._specs:
-            self._specs.append(self.workspace.specs())
-        return self._expanded(self._specs[0])
+    def _library_faults(self) -> list[_NumberedFault]:
+        if not self._library_specs:
+            self._library_specs.append(self.workspace.specs())
+        return self._expand_specs(self._library_specs[0])
 
-    def _files(self) -> dict[int, list[_Numbered]]:
-        files = {i: one.file for i, one in enumerate(self.campaign.faults) if one.file is not None}
-        return {i: self._expanded([self._spec_of_file(("faults", i, "spec"), files[i])]) for i in files}
+    def _faults_of_files(self) -> dict[int, list[_NumberedFault]]:
+        files = {
+            i: selection.spec_file
+            for i, selection in enumerate(self.campaign.fault_selections)
+            if selection.spec_file is not None
+        }
+        return {i: self._expand_specs([self._load_spec_file(("faults", i, "spec"), files[i])]) for i in files}
 
-    def _spec_of_file(self, keys: KeyPath, file: Path) -> FaultSpec:
+    def _load_spec_file(self, keys: KeyPath, file: Path) -> FaultSpec:
         if not file.is_file():
             raise self.campaign.error(
                 keys,
@@ -120,8 +124,8 @@ class Expansion:
                 expected="the path of a spec file, relative to the campaign's folder",
                 remedy="correct the path",
             )
-        places = (self.campaign.path.parent, self.workspace.library)
-        if not any(is_inside(place, file) for place in places):
+        allowed_folders = (self.campaign.path.parent, self.workspace.library)
+        if not any(is_inside(place, file) for place in allowed_folders):
             raise self.campaign.error(
                 keys,
                 f"'{file}' is neither below the campaign's folder nor in the library",
@@ -129,8 +133,8 @@ class Expansion:
                 remedy="copy it there",
             )
         spec = self.workspace.spec(file)
-        known = path_below(self.workspace.library / "faults", f"{spec.name}.yaml")
-        if known.exists() and not known.samefile(file):
+        library_file = path_below(self.workspace.library / "faults", f"{spec.name}.yaml")
+        if library_file.exists() and not library_file.samefile(file):
             raise self.campaign.error(
                 keys,
                 f"{file.name} has the name of a spec in the library, {spec.name}",
@@ -139,96 +143,104 @@ class Expansion:
             )
         return spec
 
-    def _expanded(self, specs: Iterable[FaultSpec]) -> list[_Numbered]:
-        numbered: list[_Numbered] = []
+    def _expand_specs(self, specs: Iterable[FaultSpec]) -> list[_NumberedFault]:
+        numbered: list[_NumberedFault] = []
         for spec in specs:
-            seen: dict[str, int] = {}
-            for fault in expand(spec, self.seed, self.reading, models=self._models, manifest=self.manifest):
-                number = seen.get(fault.spec, 0)
-                seen[fault.spec] = number + 1
+            count_by_variant: dict[str, int] = {}
+            for fault in expand(
+                spec, self.seed, self.reading, models=self._fault_models, manifest=self.manifest
+            ):
+                number = count_by_variant.get(fault.spec, 0)
+                count_by_variant[fault.spec] = number + 1
                 numbered.append((number, fault))
         return numbered
 
-    def _selected(self) -> list[_Numbered]:
-        library, files = self._library(), self._files()
-        selected: dict[str, _Numbered] = {}
-        for i, selection in enumerate(self.campaign.faults):
-            if selection.operators is not None:
+    def _selected_faults(self) -> list[_NumberedFault]:
+        library, files = self._library_faults(), self._faults_of_files()
+        selected: dict[str, _NumberedFault] = {}
+        for i, selection in enumerate(self.campaign.fault_selections):
+            if selection.operator_selection is not None:
                 continue
-            variants: dict[str, list[_Numbered]] = {}
+            variants: dict[str, list[_NumberedFault]] = {}
             for numbered in files.get(i, library):
-                if i in files or fnmatchcase(numbered[1].spec, selection.spec):
+                if i in files or fnmatchcase(numbered[1].spec, selection.spec_pattern):
                     variants.setdefault(numbered[1].spec, []).append(numbered)
             if not variants:
-                raise self._unmatched(("faults", i, "spec"), selection.spec, library)
+                raise self._unmatched_error(("faults", i, "spec"), selection.spec_pattern, library)
             for faults in variants.values():
-                wanted = spread(len(faults), selection.values or len(faults))
-                selected |= {faults[k][1].id: faults[k] for k in wanted if faults[k][1].id not in selected}
+                indices = evenly_spread_indices(len(faults), selection.values_per_variant or len(faults))
+                selected |= {faults[k][1].id: faults[k] for k in indices if faults[k][1].id not in selected}
         return list(selected.values())
 
-    def _mutants(self) -> list[OperatorFault]:
+    def _selected_mutants(self) -> list[OperatorFault]:
         """Return the mutants of operators, without duplicates.
 
         A mutant in several selections is active whenever one of them requires it.
         """
-        found: dict[str, OperatorFault] = {}
-        for i, selection in enumerate(self.campaign.faults):
-            if selection.operators is not None:
-                with self._placed(("faults", i, "in")):
-                    mutants = self._operators.of(selection.operators, self._drives(), self.seed, self.reading)
-                for one in mutants:
-                    known = found.get(one.fault.id, one)
-                    found[one.fault.id] = replace(one, when=tuple(dict.fromkeys((*known.when, *one.when))))
-        return list(found.values())
+        mutant_by_id: dict[str, OperatorFault] = {}
+        for i, selection in enumerate(self.campaign.fault_selections):
+            if selection.operator_selection is not None:
+                with self._errors_at(("faults", i, "in")):
+                    mutants = self._operator_faults.faults_of_selection(
+                        selection.operator_selection, self._golden_drives(), self.seed, self.reading
+                    )
+                for mutant in mutants:
+                    earlier = mutant_by_id.get(mutant.fault.id, mutant)
+                    mutant_by_id[mutant.fault.id] = replace(
+                        mutant, when=tuple(dict.fromkeys((*earlier.when, *mutant.when)))
+                    )
+        return list(mutant_by_id.values())
 
-    def _drives(self) -> dict[str, GoldenRunInputs]:
+    def _golden_drives(self) -> dict[str, GoldenRunInputs]:
         return {
             name: GoldenRunInputs(
                 scenario=self._scenario_file(name),
-                changes=self.campaign.setting_in(self.reading),
+                changes=self.campaign.changes_in(self.reading),
                 seed=self.seed,
             )
             for name in self.campaign.scenarios
         }
 
-    def _unmatched(self, keys: KeyPath, pattern: str, library: Sequence[_Numbered] = ()) -> MutatorError:
-        whole = f"{pattern}/*"
-        fits = any(fnmatchcase(fault.spec, whole) for _, fault in library)
+    def _unmatched_error(
+        self, keys: KeyPath, pattern: str, library: Sequence[_NumberedFault] = ()
+    ) -> MutatorError:
+        with_variants = f"{pattern}/*"
+        is_prefix = any(fnmatchcase(fault.spec, with_variants) for _, fault in library)
         return self.campaign.error(
             keys,
             f"no fault in the library matches '{pattern}'",
             expected="<module>/<fault_type>/<variant>, with * for any text",
-            remedy=f"write '{whole}' for all its variants" if fits else "see `mutator list`",
+            remedy=f"write '{with_variants}' for all its variants" if is_prefix else "see `mutator list`",
         )
 
-    def _triggers(self) -> tuple[Trigger, ...]:
+    def _campaign_triggers(self) -> tuple[Trigger, ...]:
         """Return the triggers of the context table or list. Each random time is paired with one of them."""
-        if self.campaign.table is None:
-            return listed_triggers(
-                self.campaign.listed,
-                self.campaign.yaml,
+        if self.campaign.context_table is None:
+            return build_listed_triggers(
+                self.campaign.listed_triggers,
+                self.campaign.yaml_source,
                 self.manifest,
                 armed_after_s=self.armed_after_s,
                 hold_s=self.campaign.hold_s,
             )
-        with self._placed(("triggers", "table")):
+        with self._errors_at(("triggers", "table")):
             variables = self.manifest.observation.variables
-            table = self.workspace.context_table(self.campaign.table, variables)
-        with self._placed(("triggers", "rows")):
+            table = self.workspace.context_table(self.campaign.context_table, variables)
+        with self._errors_at(("triggers", "rows")):
             return table.triggers(
-                hold_s=self.campaign.hold_s, armed_after_s=self.armed_after_s, rows=self.campaign.rows
+                hold_s=self.campaign.hold_s, armed_after_s=self.armed_after_s, rows=self.campaign.context_ids
             )
 
-    def _of_scenario(
-        self, scenario: str, faults: list[_Numbered], triggers: tuple[Trigger, ...]
+    def _experiments_of_faults(
+        self, scenario: str, faults: list[_NumberedFault], triggers: tuple[Trigger, ...]
     ) -> Iterator[Experiment]:
         for number, fault in faults:
             for method in self.campaign.methods:
                 for row in triggers:
-                    trigger = self._trigger(method, scenario, fault, number, row)
-                    yield self._experiment(fault, scenario, method, trigger)
+                    trigger = self._trigger_of_method(method, scenario, fault, number, row)
+                    yield self._build_experiment(fault, scenario, method, trigger)
 
-    def _of_operators(
+    def _experiments_of_mutants(
         self, scenario: str, mutants: list[OperatorFault], triggers: tuple[Trigger, ...]
     ) -> Iterator[Experiment]:
         """Yield the experiments of each mutant in the scenarios that execute its changed line.
@@ -236,23 +248,25 @@ class Expansion:
         Permanent mutants are always active; transient ones follow the campaign's triggers.
         """
         permanent = always_trigger(armed_after_s=self.armed_after_s)
-        for one in mutants:
-            if scenario not in one.scenarios:
+        for mutant in mutants:
+            if scenario not in mutant.scenarios:
                 continue
-            if When.PERMANENT in one.when:
-                yield self._experiment(one.fault, scenario, Method.GUIDED, permanent)
-            if When.TRANSIENT in one.when:
-                number = int(one.fault.id, 16)
-                for made in self._of_scenario(scenario, [(number, one.fault)], triggers):
-                    if made.trigger.condition != permanent.condition:
-                        yield made
+            if When.PERMANENT in mutant.when:
+                yield self._build_experiment(mutant.fault, scenario, Method.GUIDED, permanent)
+            if When.TRANSIENT in mutant.when:
+                number = int(mutant.fault.id, 16)
+                for experiment in self._experiments_of_faults(scenario, [(number, mutant.fault)], triggers):
+                    if experiment.trigger.condition != permanent.condition:
+                        yield experiment
 
-    def _trigger(self, method: Method, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
+    def _trigger_of_method(
+        self, method: Method, scenario: str, fault: Fault, number: int, paired_trigger: Trigger
+    ) -> Trigger:
         if method is Method.RANDOM:
-            return self._random(scenario, fault, number, row)
-        return row
+            return self._random_trigger(scenario, fault, number, paired_trigger)
+        return paired_trigger
 
-    def _random(self, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
+    def _random_trigger(self, scenario: str, fault: Fault, number: int, paired_trigger: Trigger) -> Trigger:
         """Return the random partner of a row's trigger.
 
         The drawn time depends on the reading only through the earliest possible time.
@@ -260,14 +274,14 @@ class Expansion:
         assert self.campaign.random_until_s is not None  # the schema requires it for random times
         time = draw_time(
             self.seed,
-            f"{scenario}/{fault.spec}/{number}/{row.name}",
+            f"{scenario}/{fault.spec}/{number}/{paired_trigger.name}",
             first_s=self.armed_after_s,
             last_s=self.campaign.random_until_s,
             step_s=self.manifest.step_s,
         )
-        return trigger_at_time(time, name=f"random/{row.name}", hold_s=self.campaign.hold_s)
+        return trigger_at_time(time, name=f"random/{paired_trigger.name}", hold_s=self.campaign.hold_s)
 
-    def _experiment(self, fault: Fault, scenario: str, method: Method, trigger: Trigger) -> Experiment:
+    def _build_experiment(self, fault: Fault, scenario: str, method: Method, trigger: Trigger) -> Experiment:
         return Experiment(
             fault=fault,
             scenario=scenario,
@@ -275,28 +289,28 @@ class Expansion:
             method=method,
             trigger=trigger,
             seed=self.seed,
-            setting=self.campaign.setting_in(self.reading),
+            setting=self.campaign.changes_in(self.reading),
             after_hazard=self.campaign.after_hazard,
         )
 
     def _scenario_digest(self, scenario: str) -> str:
-        if scenario not in self._digests:
-            self._digests[scenario] = digest(read_bounded(self._scenario_file(scenario)))
-        return self._digests[scenario]
+        if scenario not in self._scenario_digests:
+            self._scenario_digests[scenario] = digest(read_bounded(self._scenario_file(scenario)))
+        return self._scenario_digests[scenario]
 
     def _scenario_file(self, scenario: str) -> Path:
-        known = self.workspace.scenarios
-        if scenario not in known:  # a file outside the library could change, or differ on another machine
+        scenarios = self.workspace.scenarios
+        if scenario not in scenarios:  # a file outside the library could change, or differ on another machine
             raise self.campaign.error(
                 self._scenario_keys(scenario),
                 f"no scenario '{scenario}' in the library",
-                expected=describe_choices(known),
+                expected=describe_choices(scenarios),
                 remedy="correct the name, or add the file to the library's scenarios/",
             )
         return self.workspace.scenario(scenario)
 
     @contextmanager
-    def _placed(self, keys: KeyPath) -> Iterator[None]:
+    def _errors_at(self, keys: KeyPath) -> Iterator[None]:
         """Point errors without a line number to `keys` in the campaign file; leave others unchanged."""
         try:
             yield

@@ -11,9 +11,9 @@ from mutator.campaigns.campaign_model import CampaignModel, Canary, SelectionMod
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
     ListedTrigger,
-    with_list,
+    with_list_below_triggers,
 )
-from mutator.campaigns.installed_studies import Study, find_study
+from mutator.campaigns.installed_studies import CheckableStudy, load_installed_study
 from mutator.campaigns.operator_selection import OperatorSelection, When
 from mutator.config.yaml_files import load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
@@ -22,18 +22,18 @@ from mutator.faults.library_readings import FILE, Readings
 from mutator.model import AfterHazard, Limits, Method
 
 SCHEMA = "campaign/1"
-_SUFFIXES = (".yaml", ".yml")
-_Told = TypeVar("_Told")
+_SPEC_SUFFIXES = (".yaml", ".yml")
+_Value = TypeVar("_Told")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Selection:
+class FaultSelection:
     """A selection of faults: a glob over `<module>/<fault_type>/<variant>`, a spec `file`, or `operators`."""
 
-    spec: str
-    file: Path | None = None
-    values: int | None = None  # number of values from each variant, spread evenly; None: all
-    operators: OperatorSelection | None = None
+    spec_pattern: str
+    spec_file: Path | None = None
+    values_per_variant: int | None = None  # number of values from each variant, spread evenly; None: all
+    operator_selection: OperatorSelection | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,54 +41,56 @@ class Campaign:
     """A checked campaign file. Times are simulated seconds."""
 
     name: str
-    about: str
+    purpose: str
     study: str | None  # the published work with which reports compare the run
     path: Path
-    source: bytes
+    file_bytes: bytes
     target: str
     scenarios: tuple[str, ...]
-    setting: Mapping[str, tuple[str, ...]]
-    faults: tuple[Selection, ...]
+    changes_by_reading: Mapping[str, tuple[str, ...]]
+    fault_selections: tuple[FaultSelection, ...]
     reading: str | None  # None: the library's default
     methods: tuple[Method, ...]
-    table: str | None
-    rows: tuple[str, ...] | None
-    listed: tuple[ListedTrigger, ...]
-    armed_after_s: Mapping[str, float]
+    context_table: str | None
+    context_ids: tuple[str, ...] | None
+    listed_triggers: tuple[ListedTrigger, ...]
+    armed_after_s_by_reading: Mapping[str, float]
     random_until_s: float | None
     hold_s: float | None  # how long faults stay active; None: while the context holds, or to the end
-    sample: int | None  # number of experiments, balanced over the variants
-    proportional: bool  # whether to sample pairs, in proportion to the size of each fault type and scenario
+    sample_size: int | None  # number of experiments, balanced over the variants
+    is_proportional: (
+        bool  # whether to sample pairs, in proportion to the size of each fault type and scenario
+    )
     seeds: range  # the campaign is repeated with each seed
     canary: Canary
     limits: Limits
-    chunk: int
+    chunk_size: int
     after_hazard: AfterHazard
-    yaml: YamlSource
+    yaml_source: YamlSource
 
     @property
     def seed(self) -> int:
         """The seed, or the first of several."""
         return self.seeds[0]
 
-    def armed_after(self, reading: str) -> float | None:
+    def armed_after_s_in(self, reading: str) -> float | None:
         """Return the time at which triggers are armed; None if the campaign does not set it."""
-        return _in(self.armed_after_s, reading) if self.armed_after_s else None
+        return _value_in(self.armed_after_s_by_reading, reading) if self.armed_after_s_by_reading else None
 
-    def setting_in(self, reading: str) -> tuple[str, ...]:
-        return _in(self.setting, reading)
+    def changes_in(self, reading: str) -> tuple[str, ...]:
+        return _value_in(self.changes_by_reading, reading)
 
-    def setting_keys(self, reading: str) -> KeyPath:
+    def keys_of_changes(self, reading: str) -> KeyPath:
         """Return where the campaign file has the value of `setting_in`."""
-        return ("setting", reading) if reading in self.setting else ("setting",)
+        return ("setting", reading) if reading in self.changes_by_reading else ("setting",)
 
     def error(self, keys: KeyPath, got: str, *, expected: str, remedy: str) -> MutatorError:
         """Return an error at `keys` of the campaign file; the caller raises it."""
-        return self.yaml.error(keys, got, expected=expected, remedy=remedy)
+        return self.yaml_source.error(keys, got, expected=expected, remedy=remedy)
 
 
-def _in(told: Mapping[str, _Told], reading: str) -> _Told:
-    return told[reading] if reading in told else told[EVERY_READING]
+def _value_in(value_by_reading: Mapping[str, _Value], reading: str) -> _Value:
+    return value_by_reading[reading] if reading in value_by_reading else value_by_reading[EVERY_READING]
 
 
 def load_campaign(path: Path) -> Campaign:
@@ -96,121 +98,121 @@ def load_campaign(path: Path) -> Campaign:
 
     The study need not be installed, so that old runs can be read. `load_study` checks it.
     """
-    model, source = load_yaml_model(path, CampaignModel, SCHEMA, prepare=with_list)
-    _check_once(model, source)
+    model, source = load_yaml_model(path, CampaignModel, SCHEMA, prepare=with_list_below_triggers)
+    _check_no_duplicates(model, source)
     triggers = model.triggers
     for keys, name in {("target",): model.target, ("triggers", "table"): triggers.table or ""}.items():
         with source.locating_errors(keys):
             check_library_name(name, path)
     return Campaign(
         name=model.name,
-        about=model.about.strip(),
+        purpose=model.about.strip(),
         study=model.study,
         path=path,
-        source=read_bounded(path),
+        file_bytes=read_bounded(path),
         target=model.target,
         scenarios=tuple(model.scenarios),
-        setting={reading: tuple(names) for reading, names in model.setting.items()},
-        faults=tuple(
-            Selection(
-                spec=item.spec or "",
-                file=_spec_file(path, item.spec or ""),
-                values=item.values,
-                operators=_operators(item),
+        changes_by_reading={reading: tuple(names) for reading, names in model.setting.items()},
+        fault_selections=tuple(
+            FaultSelection(
+                spec_pattern=item.spec or "",
+                spec_file=_spec_file_path(path, item.spec or ""),
+                values_per_variant=item.values,
+                operator_selection=_operator_selection(item),
             )
             for item in model.faults
         ),
         reading=model.reading,
         methods=tuple(Method(name) for name in model.methods),
-        table=triggers.table,
-        rows=tuple(triggers.rows) if triggers.rows else None,
-        listed=tuple(triggers.listed or ()),
-        armed_after_s=triggers.armed_after_s,
+        context_table=triggers.table,
+        context_ids=tuple(triggers.rows) if triggers.rows else None,
+        listed_triggers=tuple(triggers.listed or ()),
+        armed_after_s_by_reading=triggers.armed_after_s,
         random_until_s=triggers.random_until_s,
         hold_s=triggers.hold_s,
-        sample=model.sample,
-        proportional=model.proportional,
-        seeds=_seeds(model),
+        sample_size=model.sample,
+        is_proportional=model.proportional,
+        seeds=_seed_range(model),
         canary=model.canary,
         limits=model.limits,
-        chunk=model.chunk,
+        chunk_size=model.chunk,
         after_hazard=model.after_hazard,
-        yaml=source,
+        yaml_source=source,
     )
 
 
-def _operators(item: SelectionModel) -> OperatorSelection | None:
+def _operator_selection(item: SelectionModel) -> OperatorSelection | None:
     if item.operators is None:
         return None
     return OperatorSelection(
         operators=tuple(dict.fromkeys(item.operators)),
         places=tuple(item.in_ or ()),
-        sample=item.sample,
-        when=tuple(dict.fromkeys(item.when or When)),
+        sample_size=item.sample,
+        activity=tuple(dict.fromkeys(item.when or When)),
     )
 
 
-def _seeds(model: CampaignModel) -> range:
+def _seed_range(model: CampaignModel) -> range:
     if model.seeds is not None:
         return range(model.seeds.from_, model.seeds.to + 1)
     assert model.seed is not None  # the model requires one of the two
     return range(model.seed, model.seed + 1)
 
 
-def _check_once(model: CampaignModel, source: YamlSource) -> None:
+def _check_no_duplicates(model: CampaignModel, source: YamlSource) -> None:
     settings: dict[KeyPath, Sequence[str]] = {
         ("setting",) if name == EVERY_READING else ("setting", name): names
         for name, names in model.setting.items()
     }
-    once: dict[KeyPath, Sequence[str]] = {("scenarios",): model.scenarios, ("methods",): model.methods}
-    for keys, values in (once | settings).items():
-        seen = set[str]()
+    lists: dict[KeyPath, Sequence[str]] = {("scenarios",): model.scenarios, ("methods",): model.methods}
+    for keys, values in (lists | settings).items():
+        earlier = set[str]()
         for i, value in enumerate(values):
-            if value in seen:
+            if value in earlier:
                 raise source.error((*keys, i), f"'{value}' is listed twice", remedy="remove one of the two")
-            seen.add(value)
+            earlier.add(value)
 
 
-def _spec_file(campaign: Path, spec: str) -> Path | None:
-    return campaign.parent / spec if spec.endswith(_SUFFIXES) else None
+def _spec_file_path(campaign: Path, spec: str) -> Path | None:
+    return campaign.parent / spec if spec.endswith(_SPEC_SUFFIXES) else None
 
 
-def load_study(campaign: Campaign) -> Study | None:
+def load_campaign_study(campaign: Campaign) -> CheckableStudy | None:
     if campaign.study is None:
         return None
     try:
-        return find_study(campaign.study)
+        return load_installed_study(campaign.study)
     except MutatorError as error:
-        raise campaign.yaml.error(
+        raise campaign.yaml_source.error(
             ("study",), error.got, expected=error.expected, remedy=error.remedy
         ) from error
 
 
 def check_readings(campaign: Campaign, readings: Readings) -> None:
     """Raise MutatorError for an undeclared reading, or if `armed_after_s` or `setting` omits a reading."""
-    known = ", ".join(readings.names)
+    readings_text = ", ".join(readings.names)
     remedy = f"correct the name, or declare the reading in the library's {FILE}"
     if campaign.reading is not None and campaign.reading not in readings.names:
         raise campaign.error(
-            ("reading",), f"reading '{campaign.reading}'", expected=f"one of {known}", remedy=remedy
+            ("reading",), f"reading '{campaign.reading}'", expected=f"one of {readings_text}", remedy=remedy
         )
     places: dict[KeyPath, tuple[str, Mapping[str, object]]] = {
-        ("triggers", "armed_after_s"): ("time", campaign.armed_after_s),
-        ("setting",): ("setting", campaign.setting),
+        ("triggers", "armed_after_s"): ("time", campaign.armed_after_s_by_reading),
+        ("setting",): ("setting", campaign.changes_by_reading),
     }
-    for keys, (what, told) in places.items():
-        if EVERY_READING in told or not told:
+    for keys, (noun, value_by_reading) in places.items():
+        if EVERY_READING in value_by_reading or not value_by_reading:
             continue
-        for name in told:
+        for name in value_by_reading:
             if name not in readings.names:
                 raise campaign.error(
-                    (*keys, name), f"reading '{name}'", expected=f"one of {known}", remedy=remedy
+                    (*keys, name), f"reading '{name}'", expected=f"one of {readings_text}", remedy=remedy
                 )
         for name in readings.names:
-            if name not in told:
+            if name not in value_by_reading:
                 raise campaign.error(
                     keys,
-                    f"no {what} for reading '{name}'",
-                    expected=f"one for each of {known}",
+                    f"no {noun} for reading '{name}'",
+                    expected=f"one for each of {readings_text}",
                     remedy=f"add `{name}: ...`, or write one for all of them",
                 )

@@ -11,24 +11,24 @@ from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
     Triggers,
-    by_reading,
-    or_by_reading,
+    schema_with_readings,
+    to_value_by_reading,
 )
 from mutator.campaigns.operator_selection import When
 from mutator.config.yaml_files import StrictModel, YamlRecord
 from mutator.model import AfterHazard, Limits, Method
 
 
-def _operator(name: str) -> str:
+def _check_operator(name: str) -> str:
     if not OPERATORS.has(name):
         *others, last = map(repr, OPERATORS.names())
         raise PydanticKnownError("enum", {"expected": f"{', '.join(others)} or {last}"})
     return name
 
 
-_Operator = Annotated[
+_OperatorName = Annotated[
     str,
-    AfterValidator(_operator),
+    AfterValidator(_check_operator),
     WithJsonSchema({"anyOf": [{"enum": OPERATORS.shipped_names()}, {"type": "string"}]}),
 ]
 
@@ -44,7 +44,7 @@ class SelectionModel(StrictModel, title="A selection"):
     values: int | None = Field(
         None, ge=1, description="How many values to take from each variant, spread evenly. Default: all."
     )
-    operators: list[_Operator] | None = Field(
+    operators: list[_OperatorName] | None = Field(
         None,
         min_length=1,
         description="Instead of `spec`: mutants of these [operators](operators.md), shipped or "
@@ -83,7 +83,7 @@ class SelectionModel(StrictModel, title="A selection"):
 
 
 MOST_SEEDS = 10_000
-_NAMES = {"type": "array", "items": {"type": "string"}}
+_NAMES_SCHEMA = {"type": "array", "items": {"type": "string"}}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,7 +129,9 @@ class CampaignModel(StrictModel, title="The file"):
     target: str = Field(description="The name of the target's manifest.")
     scenarios: list[str] = Field(min_length=1, description="The scenarios by name, each once.")
     setting: Annotated[
-        dict[str, list[str]], BeforeValidator(by_reading), WithJsonSchema(or_by_reading(_NAMES))
+        dict[str, list[str]],
+        BeforeValidator(to_value_by_reading),
+        WithJsonSchema(schema_with_readings(_NAMES_SCHEMA)),
     ] = Field(
         {EVERY_READING: []},
         description="Changes from the manifest that apply to every run, including fault-free runs. Give one "
@@ -189,7 +191,7 @@ class CampaignModel(StrictModel, title="The file"):
     def _check(self) -> "CampaignModel":
         if self.proportional and self.sample is None:
             raise ValueError("`sample`, the number of experiments, together with `proportional`")
-        if self.proportional and any(one.operators for one in self.faults):
+        if self.proportional and any(selection.operators for selection in self.faults):
             raise ValueError("no `proportional` with `operators`, which have their own `sample`")
         if (self.seed is None) == (self.seeds is None):
             raise ValueError(

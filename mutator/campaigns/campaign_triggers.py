@@ -15,17 +15,17 @@ from mutator.triggers.conditions import canonical_condition
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 
 EVERY_READING = "*"  # key of a value that applies to all readings
-_LIST: KeyPath = ("triggers", "list")
+_LIST_KEYS: KeyPath = ("triggers", "list")
 Seconds = Annotated[float, Field(ge=0.0, le=MOST, allow_inf_nan=False)]
-_SECONDS = {"type": "number", "minimum": 0.0, "maximum": MOST}
+_SECONDS_SCHEMA = {"type": "number", "minimum": 0.0, "maximum": MOST}
 
 
-def by_reading(given: object) -> object:
+def to_value_by_reading(value: object) -> object:
     """Return values by reading; a single value applies to all."""
-    return given if isinstance(given, dict) else {EVERY_READING: given}
+    return value if isinstance(value, dict) else {EVERY_READING: value}
 
 
-def or_by_reading(schema: dict[str, Any]) -> dict[str, Any]:
+def schema_with_readings(schema: dict[str, Any]) -> dict[str, Any]:
     """Return the JSON schema of a value that is given once or for each reading."""
     return {"anyOf": [schema, {"type": "object", "additionalProperties": schema}]}
 
@@ -63,15 +63,17 @@ class ListedTrigger:
             raise ValueError("one of `always`, `at_s` and `when`")
 
 
-_Mapping = YamlRecord[ListedTrigger]
-_Word = Literal["always"] | _Mapping
+_TriggerMapping = YamlRecord[ListedTrigger]
+_TriggerOrAlways = Literal["always"] | _TriggerMapping
 
 
-def _in_words(given: object) -> object:
-    return {"always": True} if given == "always" else given
+def _always_as_mapping(trigger: object) -> object:
+    return {"always": True} if trigger == "always" else trigger
 
 
-_Listed = Annotated[_Mapping, BeforeValidator(_in_words, json_schema_input_type=_Word)]
+_ListedTriggerField = Annotated[
+    _TriggerMapping, BeforeValidator(_always_as_mapping, json_schema_input_type=_TriggerOrAlways)
+]
 
 
 class TriggersModel(StrictModel, title="Triggers"):
@@ -85,11 +87,13 @@ class TriggersModel(StrictModel, title="Triggers"):
     rows: list[str] | None = Field(
         None, min_length=1, description="The contexts of the table to use. Default: all."
     )
-    listed: list[_Listed] | None = Field(
+    listed: list[_ListedTriggerField] | None = Field(
         None, alias="list", min_length=1, description="Instead of `table`: the triggers, each once."
     )
     armed_after_s: Annotated[
-        dict[str, Seconds], BeforeValidator(by_reading), WithJsonSchema(or_by_reading(_SECONDS))
+        dict[str, Seconds],
+        BeforeValidator(to_value_by_reading),
+        WithJsonSchema(schema_with_readings(_SECONDS_SCHEMA)),
     ] = Field(
         default_factory=dict,
         min_length=1,
@@ -125,27 +129,30 @@ class TriggersModel(StrictModel, title="Triggers"):
         return self
 
 
-def _as_it_is(given: object) -> object:
-    return given
+def _unchanged(value: object) -> object:
+    return value
 
 
 # `with_list` has already converted the list, so that errors have its lines
 Triggers = Annotated[
-    TriggersModel, BeforeValidator(_as_it_is, json_schema_input_type=TriggersModel | list[_Word])
+    TriggersModel, BeforeValidator(_unchanged, json_schema_input_type=TriggersModel | list[_TriggerOrAlways])
 ]
 
 
-def with_list(source: YamlSource) -> YamlSource:
+def with_list_below_triggers(source: YamlSource) -> YamlSource:
     """Convert a campaign whose key `triggers` has a list into one with that list under `list`."""
-    given = source.data.get("triggers")
-    if not isinstance(given, list):
+    triggers = source.data.get("triggers")
+    if not isinstance(triggers, list):
         return source
-    lines = {_LIST + keys[1:] if keys[:1] == _LIST[:1] else keys: line for keys, line in source.lines.items()}
-    lines["triggers",] = lines[_LIST]
-    return replace(source, data={**source.data, "triggers": {"list": given}}, lines=lines)
+    lines = {
+        _LIST_KEYS + keys[1:] if keys[:1] == _LIST_KEYS[:1] else keys: line
+        for keys, line in source.lines.items()
+    }
+    lines["triggers",] = lines[_LIST_KEYS]
+    return replace(source, data={**source.data, "triggers": {"list": triggers}}, lines=lines)
 
 
-def listed_triggers(
+def build_listed_triggers(
     listed: Sequence[ListedTrigger],
     source: YamlSource,
     manifest: TargetManifest,
@@ -157,18 +164,20 @@ def listed_triggers(
 
     MutatorError with the line for a condition on unobserved values, and for a duplicate trigger.
     """
-    found: dict[str, Trigger] = {}
-    for i, one in enumerate(listed):
-        with source.locating_errors((*_LIST, i, "when")):
-            trigger = _made(one, manifest.observation.variables, armed_after_s, one.hold_s or hold_s)
-        if trigger.name in found:
+    trigger_by_name: dict[str, Trigger] = {}
+    for i, item in enumerate(listed):
+        with source.locating_errors((*_LIST_KEYS, i, "when")):
+            trigger = _build_trigger(
+                item, manifest.observation.variables, armed_after_s, item.hold_s or hold_s
+            )
+        if trigger.name in trigger_by_name:
             got = f"'{trigger.name}' is listed twice"
-            raise source.error((*_LIST, i), got, expected="each trigger once", remedy="remove one")
-        found[trigger.name] = trigger
-    return tuple(found.values())
+            raise source.error((*_LIST_KEYS, i), got, expected="each trigger once", remedy="remove one")
+        trigger_by_name[trigger.name] = trigger
+    return tuple(trigger_by_name.values())
 
 
-def _made(
+def _build_trigger(
     listed: ListedTrigger, variables: Collection[str], armed_after_s: float, hold_s: float | None
 ) -> Trigger:
     if listed.at_s is not None:

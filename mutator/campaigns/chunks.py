@@ -10,7 +10,7 @@ from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 
 
-def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
+def chunk_lengths(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
     """Return the lengths of a plan's chunks: at most `size` experiments each; no chunk spans two groups.
 
     The experiments of a group share a golden run, so an engine can share work within a chunk.
@@ -24,35 +24,35 @@ def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
     return tuple(lengths)
 
 
-def cut_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]:
+def chunk_lengths_of_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]:
     """Return the number of experiments in each chunk of at most `size` runs. No chunk splits a shared run."""
     lengths = iter([len(same) for same in runs])
-    counts = cut([(same[0].scenario, same[0].changes) for same in runs], size)
+    counts = chunk_lengths([(same[0].scenario, same[0].changes) for same in runs], size)
     return tuple(sum(islice(lengths, count)) for count in counts)
 
 
 @dataclass(frozen=True, slots=True)
-class Pending:
+class PendingChunk:
     """The unfinished part of a chunk."""
 
-    chunk: int
+    chunk_index: int
     places: tuple[int, ...]  # positions in the chunk
 
 
-def pending(folder: RunFolder, records: Mapping[str, Record]) -> tuple[Pending, ...]:
+def pending_chunks_of(folder: RunFolder, records: Mapping[str, Record]) -> tuple[PendingChunk, ...]:
     """Return the chunks of the folder's shard that still have experiments to run.
 
     Experiments to run are those without a record, and harness errors, which are retried.
     """
-    done = {one.experiment_id for one in endings_of(records) if one.is_final}
-    names = plan_file.ids(folder.path) if done else None
+    finished_ids = {record.experiment_id for record in endings_of(records) if record.is_final}
+    names = plan_file.ids(folder.path) if finished_ids else None
     shard = folder.shard
-    left: list[Pending] = []
+    pending_chunks: list[PendingChunk] = []
     for index, (_, _, count) in enumerate(folder.head.chunks):
         if names is None:
-            places = tuple(range(count))
+            positions = tuple(range(count))
         else:
-            places = tuple(i for i in range(count) if next(names) not in done)
-        if places and (shard is None or shard.has_chunk(index)):
-            left.append(Pending(index, places))
-    return tuple(left)
+            positions = tuple(i for i in range(count) if next(names) not in finished_ids)
+        if positions and (shard is None or shard.has_chunk(index)):
+            pending_chunks.append(PendingChunk(index, positions))
+    return tuple(pending_chunks)

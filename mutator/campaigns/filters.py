@@ -12,76 +12,76 @@ from fnmatch import fnmatchcase
 from mutator._common.message_text import operator_hint
 from mutator.errors import MutatorError
 
-Row = Mapping[str, object]
-Predicate = Callable[[Row], bool]
-Getter = Callable[[Row], object]
+FilterRow = Mapping[str, object]
+RowPredicate = Callable[[FilterRow], bool]
+CellGetter = Callable[[FilterRow], object]
 
-_ORDER: dict[type[ast.cmpop], Callable[[object, object], bool]] = {
+_ORDER_OPERATORS: dict[type[ast.cmpop], Callable[[object, object], bool]] = {
     ast.Lt: operator.lt,  # type: ignore[dict-item]
     ast.LtE: operator.le,  # type: ignore[dict-item]
     ast.Gt: operator.gt,  # type: ignore[dict-item]
     ast.GtE: operator.ge,  # type: ignore[dict-item]
 }
-_LONGEST = 2000
-_ALLOWED = (
+_MOST_CHARACTERS = 2000
+_ALLOWED_SYNTAX = (
     'columns, numbers, "strings", ==, !=, <, <=, >, >=, in, not in, and, or, not, match(column, "glob*")'
 )
 
 
-def compile_filter(text: str, columns: Collection[str]) -> Predicate:
+def compile_filter(text: str, columns: Collection[str]) -> RowPredicate:
     """Compile a filter into a predicate over rows.
 
     An empty cell equals only `None`, and is neither less nor greater than any value. MutatorError shows the
     text, the mistake and the known columns.
     """
-    if len(text) > _LONGEST:
-        raise _error(text[:60] + "...", f"{len(text)} characters", f"at most {_LONGEST}")
+    if len(text) > _MOST_CHARACTERS:
+        raise _filter_error(text[:60] + "...", f"{len(text)} characters", f"at most {_MOST_CHARACTERS}")
     try:
         tree = ast.parse(text.strip(), mode="eval")
-        return _Compiler(text, columns).predicate(tree.body)
+        return _FilterCompiler(text, columns).node_predicate(tree.body)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as err:
         got = f"not an expression ({getattr(err, 'msg', err)})"
-        raise _error(text, got, _ALLOWED, operator_hint(text)) from None
+        raise _filter_error(text, got, _ALLOWED_SYNTAX, operator_hint(text)) from None
 
 
-def _error(text: str, got: str, expected: str, remedy: str = "") -> MutatorError:
+def _filter_error(text: str, got: str, expected: str, remedy: str = "") -> MutatorError:
     return MutatorError(f"{got} in the filter `{text}`", expected=expected, remedy=remedy or None)
 
 
-class _Compiler:
+class _FilterCompiler:
     def __init__(self, text: str, columns: Collection[str]) -> None:
         self.text = text
         self.columns = columns
 
-    def predicate(self, node: ast.expr) -> Predicate:
+    def node_predicate(self, node: ast.expr) -> RowPredicate:
         if isinstance(node, ast.BoolOp):
-            parts = [self.predicate(v) for v in node.values]
+            parts = [self.node_predicate(v) for v in node.values]
             if isinstance(node.op, ast.And):
                 return lambda row: all(part(row) for part in parts)
             return lambda row: any(part(row) for part in parts)
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-            inner = self.predicate(node.operand)
+            inner = self.node_predicate(node.operand)
             return lambda row: not inner(row)
         if isinstance(node, ast.Compare):
-            return self.comparison(node)
+            return self.comparison_predicate(node)
         if isinstance(node, ast.Call):
-            return self.match(node)
+            return self.match_predicate(node)
         if isinstance(node, ast.Name):
-            get = self.operand(node)
+            get = self.cell_getter(node)
             return lambda row: bool(get(row))
-        raise self.refuse(node)
+        raise self.refusal(node)
 
-    def comparison(self, node: ast.Compare) -> Predicate:
-        operands = [self.operand(side) for side in (node.left, *node.comparators)]
-        links = [self.link(op) for op in node.ops]
+    def comparison_predicate(self, node: ast.Compare) -> RowPredicate:
+        operands = [self.cell_getter(side) for side in (node.left, *node.comparators)]
+        links = [self.comparator(op) for op in node.ops]
 
-        def holds(row: Row) -> bool:
+        def holds(row: FilterRow) -> bool:
             values = [get(row) for get in operands]
             return all(link(values[i], values[i + 1]) for i, link in enumerate(links))
 
         return holds
 
-    def link(self, op: ast.cmpop) -> Callable[[object, object], bool]:
+    def comparator(self, op: ast.cmpop) -> Callable[[object, object], bool]:
         if isinstance(op, ast.Eq):
             return operator.eq
         if isinstance(op, ast.NotEq):
@@ -90,60 +90,62 @@ class _Compiler:
             return lambda a, b: self.contains(b, a)
         if isinstance(op, ast.NotIn):
             return lambda a, b: not self.contains(b, a)
-        if type(op) in _ORDER:
-            return lambda a, b: self.ordered(type(op), a, b)
-        raise _error(self.text, "`is`", "== or !=")
+        if type(op) in _ORDER_OPERATORS:
+            return lambda a, b: self.is_ordered(type(op), a, b)
+        raise _filter_error(self.text, "`is`", "== or !=")
 
     def contains(self, group: object, value: object) -> bool:
         if not isinstance(group, tuple | str) or (isinstance(group, str) and not isinstance(value, str)):
-            raise _error(
+            raise _filter_error(
                 self.text, f"{group!r} on the right of `in`", "a tuple, or text if the left side is text"
             )
         return value in group
 
-    def ordered(self, op: type[ast.cmpop], a: object, b: object) -> bool:
+    def is_ordered(self, op: type[ast.cmpop], a: object, b: object) -> bool:
         if a is None or b is None:
             return False
         try:
-            return _ORDER[op](a, b)
+            return _ORDER_OPERATORS[op](a, b)
         except TypeError:
-            raise _error(
+            raise _filter_error(
                 self.text, f"{a!r} compared with {b!r}", "numbers with numbers, texts with texts"
             ) from None
 
-    def match(self, node: ast.Call) -> Predicate:
+    def match_predicate(self, node: ast.Call) -> RowPredicate:
         if not (isinstance(node.func, ast.Name) and node.func.id == "match" and len(node.args) == 2):
-            raise self.refuse(node)
+            raise self.refusal(node)
         pattern = node.args[1]
         if node.keywords or not (isinstance(pattern, ast.Constant) and isinstance(pattern.value, str)):
-            raise self.refuse(node)
-        get, glob = self.operand(node.args[0]), pattern.value
+            raise self.refusal(node)
+        get, glob = self.cell_getter(node.args[0]), pattern.value
 
-        def matches(row: Row) -> bool:
+        def matches(row: FilterRow) -> bool:
             value = get(row)
             return value is not None and fnmatchcase(str(value), glob)
 
         return matches
 
-    def operand(self, node: ast.expr) -> Getter:
+    def cell_getter(self, node: ast.expr) -> CellGetter:
         if isinstance(node, ast.Name):
             name = node.id
             if name not in self.columns:
-                raise _error(self.text, f"unknown column `{name}`", "one of " + ", ".join(self.columns))
+                raise _filter_error(
+                    self.text, f"unknown column `{name}`", "one of " + ", ".join(self.columns)
+                )
             return lambda row: row[name]
-        constant = self.constant(node)
+        constant = self.constant_value(node)
         return lambda row: constant
 
-    def constant(self, node: ast.expr) -> object:
+    def constant_value(self, node: ast.expr) -> object:
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float | str | bool | None):
             return node.value
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-            value = self.constant(node.operand)
+            value = self.constant_value(node.operand)
             if isinstance(value, int | float):
                 return -value
         if isinstance(node, ast.Tuple | ast.List | ast.Set):
-            return tuple(self.constant(item) for item in node.elts)
-        raise self.refuse(node)
+            return tuple(self.constant_value(item) for item in node.elts)
+        raise self.refusal(node)
 
-    def refuse(self, node: ast.expr) -> MutatorError:
-        return _error(self.text, f"`{ast.unparse(node)}`", _ALLOWED)
+    def refusal(self, node: ast.expr) -> MutatorError:
+        return _filter_error(self.text, f"`{ast.unparse(node)}`", _ALLOWED_SYNTAX)

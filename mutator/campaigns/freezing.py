@@ -17,8 +17,8 @@ from mutator._common.files import (
 from mutator._common.folder_locks import owning_run_folder
 from mutator._common.hashing import as_json_types, digest
 from mutator._common.version import VERSION
-from mutator.campaigns.plan import Plan, Planning
-from mutator.campaigns.plan_parts import Part, PlanDigest, Tally
+from mutator.campaigns.plan import Plan, SeedBySeedPlan
+from mutator.campaigns.plan_parts import PlanDigestBuilder, PlanPart, PlanTally
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.errors import MutatorError
@@ -33,33 +33,35 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.target_facts import TargetFacts, channel_facts, hazard_facts, metric_facts
 from mutator.workspace import Workspace
 
-CSV = "plan.csv"
-_OURS = (
+PLAN_CSV = "plan.csv"
+_FILES_OF_KILLED_FREEZE = (
     "owner.lock",
     "workers",
     "plan",
-    CSV,
+    PLAN_CSV,
     CAMPAIGN,
     file_digests.FILE,
 )  # files that a killed freeze can leave
 
 
-def freeze(plan: Plan | Planning, out: Path, workspace: Workspace) -> RunFolder:
+def freeze_plan(plan: Plan | SeedBySeedPlan, out: Path, workspace: Workspace) -> RunFolder:
     """Write the plan and plan.csv into the run folder `out`, which is created if missing.
 
     A folder with the same plan is left unchanged. MutatorError if the folder has another plan, changed
     sources or other content, or is in use.
     """
-    return freeze_and_tell(plan, out, workspace)[0]
+    return freeze_plan_with_tally(plan, out, workspace)[0]
 
 
-def freeze_and_tell(plan: Plan | Planning, out: Path, workspace: Workspace) -> tuple[RunFolder, Tally]:
+def freeze_plan_with_tally(
+    plan: Plan | SeedBySeedPlan, out: Path, workspace: Workspace
+) -> tuple[RunFolder, PlanTally]:
     """Like `freeze`, but also return the plan's totals."""
     is_new = not out.exists()
     make_run_folder(out)
     try:
         with owning_run_folder(out):
-            return freeze_owned(plan, out, workspace)
+            return freeze_plan_in_owned_folder(plan, out, workspace)
     except BaseException:
         if is_new and not RunFolder.exists(out):
             remove_folder(out)
@@ -72,10 +74,12 @@ def make_run_folder(out: Path) -> None:
         check_contents(out.resolve())
     if out.exists() and not RunFolder.exists(out):
         names = [path.name for path in out.iterdir()] if out.is_dir() else [out.name]
-        strangers = [name for name in names if name not in _OURS and not is_half_written(name)]
-        if strangers:
+        foreign_names = [
+            name for name in names if name not in _FILES_OF_KILLED_FREEZE and not is_half_written(name)
+        ]
+        if foreign_names:
             raise MutatorError(
-                f"this folder has no {HEAD} and is not empty ({', '.join(sorted(strangers)[:3])})",
+                f"this folder has no {HEAD} and is not empty ({', '.join(sorted(foreign_names)[:3])})",
                 where=out,
                 argument="out",
                 expected="a run folder, or a new or empty folder",
@@ -84,103 +88,117 @@ def make_run_folder(out: Path) -> None:
     make_folder(out)
 
 
-def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tuple[RunFolder, Tally]:
+def freeze_plan_in_owned_folder(
+    plan: Plan | SeedBySeedPlan, out: Path, workspace: Workspace
+) -> tuple[RunFolder, PlanTally]:
     """Like `freeze_and_tell`, for a caller that owns the folder."""
     if RunFolder.exists(out):
         folder = RunFolder.open(out)
-        tally, found = _counted(plan)
-        if folder.head.plan != found:
+        tally, plan_digest = _count_parts(plan)
+        if folder.head.plan != plan_digest:
             raise MutatorError(
                 "this folder holds another plan",
                 where=out,
-                expected=f"plan {found[:16]}",
+                expected=f"plan {plan_digest[:16]}",
                 remedy="use another folder, or the campaign and options with which this folder was planned",
             )
         check_version(folder)
-        check_sources(out, folder.head.sources, _sources(tally, plan, workspace))
+        check_sources(out, folder.head.sources, _source_digests(tally, plan, workspace))
         return folder, tally
-    tally, found, places, files = _written(plan, out)
-    head = _head(plan, tally, found, workspace, places).file_bytes()
+    tally, plan_digest, places, files = _write_plan_files(plan, out)
+    head = _build_head(plan, tally, plan_digest, workspace, places).file_bytes()
     file_digests.save_ledger(out, DigestLedger(files=files | {HEAD: FileDigest.of_bytes(head)}))
     write_atomic(out / HEAD, head)  # last, because this file makes the folder a run folder
     return RunFolder.open(out), tally
 
 
-def _counted(plan: Plan | Planning, each: Callable[[Part], None] = lambda part: None) -> tuple[Tally, str]:
-    tally, made = plan.empty_tally(), PlanDigest()
+def _count_parts(
+    plan: Plan | SeedBySeedPlan, on_part: Callable[[PlanPart], None] = lambda part: None
+) -> tuple[PlanTally, str]:
+    tally, digest_builder = plan.empty_tally(), PlanDigestBuilder()
     for part in plan.parts():
         tally.add(part)
-        made.add([experiment.id for experiment in part.experiments])
-        each(part)
-    known = plan.digest if isinstance(plan, Plan) else made.end(tally.chunks, plan.canary.id, plan.campaign)
-    return tally, known
+        digest_builder.add([experiment.id for experiment in part.experiments])
+        on_part(part)
+    plan_digest = (
+        plan.digest
+        if isinstance(plan, Plan)
+        else digest_builder.finish(tally.chunk_lengths, plan.canary.id, plan.campaign)
+    )
+    return tally, plan_digest
 
 
-def _written(
-    plan: Plan | Planning, out: Path
-) -> tuple[Tally, str, list[plan_file.Chunk], dict[str, FileDigest]]:
+def _write_plan_files(
+    plan: Plan | SeedBySeedPlan, out: Path
+) -> tuple[PlanTally, str, list[plan_file.Chunk], dict[str, FileDigest]]:
     """Write the plan's files part by part; return totals, digest, chunk positions and file digests."""
     plan_file.create_plan_folder(out)
-    write_atomic(out / CAMPAIGN, plan.campaign.source)
+    write_atomic(out / CAMPAIGN, plan.campaign.file_bytes)
     with ExitStack() as stack:
         rows, lines, faults = (
             DigestingFile(stack.enter_context(writing_atomic(path)))
-            for path in (out / CSV, out / plan_file.EXPERIMENTS, out / plan_file.FAULTS)
+            for path in (out / PLAN_CSV, out / plan_file.EXPERIMENTS, out / plan_file.FAULTS)
         )
         writer = plan_file.PlanWriter(lines, faults)
-        rows.write(csv_bytes([], head=True))
+        rows.write(plan_csv_lines([], with_head=True))
 
-        def write(part: Part) -> None:
-            rows.write(csv_bytes(part.experiments))
+        def write(part: PlanPart) -> None:
+            rows.write(plan_csv_lines(part.experiments))
             writer.append(part.experiments, part.chunks)
 
-        tally, found = _counted(plan, write)
+        tally, plan_digest = _count_parts(plan, write)
     files = {
-        CAMPAIGN: FileDigest.of_bytes(plan.campaign.source),
-        CSV: rows.digest,
+        CAMPAIGN: FileDigest.of_bytes(plan.campaign.file_bytes),
+        PLAN_CSV: rows.digest,
         plan_file.EXPERIMENTS: lines.digest,
         plan_file.FAULTS: faults.digest,
     }
-    return tally, found, writer.chunks, files
+    return tally, plan_digest, writer.chunks, files
 
 
-def _sources(tally: Tally, plan: Plan | Planning, workspace: Workspace) -> dict[str, str]:
-    scenarios = {one.scenario for one in tally.needed()}
-    return RunInputs.of(workspace, workspace.manifest(plan.campaign.target), scenarios).digests()
+def _source_digests(tally: PlanTally, plan: Plan | SeedBySeedPlan, workspace: Workspace) -> dict[str, str]:
+    scenarios = {golden.scenario for golden in tally.golden_runs()}
+    return RunInputs.from_workspace(
+        workspace, workspace.manifest(plan.campaign.target), scenarios
+    ).digest_by_source()
 
 
-def _head(
-    plan: Plan | Planning, tally: Tally, found: str, workspace: Workspace, chunks: list[plan_file.Chunk]
+def _build_head(
+    plan: Plan | SeedBySeedPlan,
+    tally: PlanTally,
+    plan_digest: str,
+    workspace: Workspace,
+    chunks: list[plan_file.Chunk],
 ) -> RunHead:
     manifest = workspace.manifest(plan.campaign.target)
     canary = plan_file.experiment_as_json(plan.canary) | {"fault": as_json_types(plan.canary.fault)}
     return RunHead(
         schema=SCHEMA,
-        plan=found,
+        plan=plan_digest,
         campaign=plan.campaign.name,
-        campaign_digest=digest(plan.campaign.source),
+        campaign_digest=digest(plan.campaign.file_bytes),
         study=plan.campaign.study,
         target=plan.campaign.target,
         seed=plan.seed,
         seeds=(plan.seeds[0], plan.seeds[-1]) if len(plan.seeds) > 1 else None,
         reading=plan.reading,
-        operators=plan.told,
+        operators=plan.operator_notes,
         choices=plan.choices,
-        experiments=tally.experiments,
-        runs=tally.runs,
+        experiments=tally.experiment_count,
+        runs=tally.run_count,
         limits=plan.campaign.limits,
-        **vars(target_facts(workspace, manifest)),
-        goldens=tuple(one.to_stored() for one in tally.needed()),
+        **vars(collect_target_facts(workspace, manifest)),
+        goldens=tuple(golden.to_stored() for golden in tally.golden_runs()),
         canary=canary,
         canary_hazard=plan.campaign.canary.hazard,
-        sources=_sources(tally, plan, workspace),
+        sources=_source_digests(tally, plan, workspace),
         provenance=Provenance(mutator=VERSION),
         stretches=(),
         chunks=tuple(chunks),
     )
 
 
-def target_facts(workspace: Workspace, manifest: TargetManifest) -> TargetFacts:
+def collect_target_facts(workspace: Workspace, manifest: TargetManifest) -> TargetFacts:
     structure = workspace.structure(manifest)
     return TargetFacts(
         hazards=manifest.hazards,
@@ -196,14 +214,14 @@ def target_facts(workspace: Workspace, manifest: TargetManifest) -> TargetFacts:
     )
 
 
-def csv_bytes(experiments: Iterable[Experiment], *, head: bool = False) -> bytes:
+def plan_csv_lines(experiments: Iterable[Experiment], *, with_head: bool = False) -> bytes:
     writer = csv.writer(text := io.StringIO(), lineterminator="\n")
-    if head:
+    if with_head:
         writer.writerow(PLAN_COLUMN_NAMES)
     cells = itemgetter(*PLAN_COLUMN_NAMES)
     writer.writerows(cells(plan_row(experiment)) for experiment in experiments)
     return text.getvalue().encode()
 
 
-def plan_csv(plan: Plan) -> bytes:
-    return csv_bytes(plan.experiments, head=True)
+def plan_csv_bytes(plan: Plan) -> bytes:
+    return plan_csv_lines(plan.experiments, with_head=True)

@@ -12,7 +12,7 @@ from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
 
-class Study(Protocol):
+class CheckableStudy(Protocol):
     """The part of a study that concerns campaigns."""
 
     def check(self, workspace: Workspace) -> Iterable[MutatorError]:
@@ -20,23 +20,23 @@ class Study(Protocol):
         ...
 
 
-def find_study(name: str) -> Study:
+def load_installed_study(name: str) -> CheckableStudy:
     """Load the study of that name; MutatorError if it is not installed, cannot be loaded or is no study."""
-    return cast(Study, STUDIES.load(name))
+    return cast(CheckableStudy, STUDIES.load(name))
 
 
-def study_problems(name: str, study: Study, workspace: Workspace) -> list[MutatorError]:
+def study_problems(name: str, study: CheckableStudy, workspace: Workspace) -> list[MutatorError]:
     """Return the problems of a study's data in a fault library. Exceptions from the check are included."""
     try:
         problems = list(study.check(workspace))
     except MutatorError as error:
         return [error]
     except Exception as err:  # third-party code
-        return [_bad_check(name, f"fails: {type(err).__name__}: {err}")]
-    if strangers := [problem for problem in problems if not isinstance(problem, MutatorError)]:
-        return [_bad_check(name, f"returned {strangers[0]!r}, which is not a MutatorError")]
+        return [_check_error(name, f"fails: {type(err).__name__}: {err}")]
+    if non_errors := [problem for problem in problems if not isinstance(problem, MutatorError)]:
+        return [_check_error(name, f"returned {non_errors[0]!r}, which is not a MutatorError")]
     return problems
 
 
-def _bad_check(name: str, what: str) -> MutatorError:
+def _check_error(name: str, what: str) -> MutatorError:
     return MutatorError(f"the check of study '{name}' {what}", remedy="correct the package that provides it")

@@ -29,12 +29,12 @@ class OperatorFaults:
 
     def __init__(self, manifest: TargetManifest, models: FaultModels, limits: Limits) -> None:
         self._manifest, self._models, self._limits = manifest, models, limits
-        self._found: dict[
+        self._mutations_by_selection: dict[
             tuple[OperatorSelection, frozenset[tuple[str, frozenset[int]]]], SelectedMutations
         ] = {}
-        self.told: dict[str, None] = {}  # lines that say what was found and left out, without duplicates
+        self.notes: dict[str, None] = {}  # lines that say what was found and left out, without duplicates
 
-    def of(
+    def faults_of_selection(
         self, selection: OperatorSelection, drives: Mapping[str, GoldenRunInputs], seed: int, reading: str
     ) -> list[OperatorFault]:
         executed = dict(
@@ -44,38 +44,38 @@ class OperatorFaults:
                 strict=True,
             )
         )
-        found = self._enumerated(selection, list(executed.values()))
-        drawn = sample_mutations(found, selection.sample, seed)
-        if not drawn:
+        mutations = self._find_mutations(selection, list(executed.values()))
+        draw = sample_mutations(mutations, selection.sample_size, seed)
+        if not draw:
             raise MutatorError(
-                f"no mutant in {', '.join(selection.places)} ({found.summary})",
+                f"no mutant in {', '.join(selection.places)} ({mutations.summary})",
                 expected="places with lines that a scenario of the campaign executes",
                 remedy="name other places, operators or scenarios",
             )
-        draws = f"{counted(len(drawn), 'draw')} of " if len(drawn) < len(found.mutations) else ""
-        self.told[f"{', '.join(selection.places)}: {draws}{found.summary}"] = None
+        draws = f"{counted(len(draw), 'draw')} of " if len(draw) < len(mutations.mutations) else ""
+        self.notes[f"{', '.join(selection.places)}: {draws}{mutations.summary}"] = None
         return [
             OperatorFault(
-                fault=one.to_fault(reading),
-                when=selection.when,
-                scenarios=frozenset(name for name in executed if self._runs(one, executed[name])),
+                fault=mutation.to_fault(reading),
+                when=selection.activity,
+                scenarios=frozenset(name for name in executed if self._is_executed(mutation, executed[name])),
             )
-            for one in drawn
+            for mutation in draw
         ]
 
-    def _enumerated(
+    def _find_mutations(
         self, selection: OperatorSelection, executed: Sequence[ExecutedLines]
     ) -> SelectedMutations:
         files = dict.fromkeys(path for lines in executed for path in lines)
         union = {path: frozenset().union(*(lines.get(path, ()) for lines in executed)) for path in files}
         key = (selection, frozenset(union.items()))
-        if key not in self._found:
-            self._found[key] = select_mutations(
+        if key not in self._mutations_by_selection:
+            self._mutations_by_selection[key] = select_mutations(
                 self._manifest, self._models, selection.operators, selection.places, union
             )
-        return self._found[key]
+        return self._mutations_by_selection[key]
 
-    def _runs(self, mutation: Mutation, lines: Mapping[str, Collection[int]]) -> bool:
+    def _is_executed(self, mutation: Mutation, lines: Mapping[str, Collection[int]]) -> bool:
         path = mutation.location.path
         return mutation.line + 1 in facts_of(self._manifest.tree, path).extend_to_statements(
             lines.get(path, ())

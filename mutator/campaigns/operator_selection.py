@@ -17,5 +17,5 @@ class OperatorSelection:
 
     operators: tuple[str, ...]
     places: tuple[str, ...]
-    sample: int | None  # number of mutants; None: all
-    when: tuple[When, ...]
+    sample_size: int | None  # number of mutants; None: all
+    activity: tuple[When, ...]

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 from mutator._common.argument_checks import check_type
 from mutator._common.message_text import counted, describe_seeds
 from mutator._common.table_rendering import TextTable
-from mutator.campaigns.campaign_expansion import Expansion
-from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
-from mutator.campaigns.chunks import cut_runs
+from mutator.campaigns.campaign_expansion import CampaignExpansion
+from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_campaign_study
+from mutator.campaigns.chunks import chunk_lengths_of_runs
 from mutator.campaigns.filters import compile_filter
-from mutator.campaigns.plan_parts import Group, Part, Tally, plan_digest
-from mutator.campaigns.plan_warnings import IdleValues
-from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs
-from mutator.campaigns.shared_runs import in_turn, runs
+from mutator.campaigns.plan_parts import FaultTypeAndMethod, PlanPart, PlanTally, plan_digest
+from mutator.campaigns.plan_warnings import IdleFaults
+from mutator.campaigns.sampling import draw_balanced, draw_balanced_pairs, draw_in_proportion
+from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
@@ -36,22 +36,22 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RUNS_PER_GOLDEN = 3  # two golden runs and the null mutant, for each scenario with its changes
-_DEFAULT_CPU_S = 1.4  # one run on the reference engine, including interpreter start
-_START_S = 3.0  # time that a campaign needs outside its runs
+_DEFAULT_RUN_CPU_S = 1.4  # one run on the reference engine, including interpreter start
+_TIME_OUTSIDE_RUNS_S = 3.0  # time that a campaign needs outside its runs
 _BYTES_PER_EXPERIMENT = 9_000  # series, patch, record and table rows of an experiment
 _BYTES_PER_GOLDEN = 1_200_000
-_IN_MEMORY = 50_000  # larger plans are not read as a whole
+_MOST_EXPERIMENTS_IN_MEMORY = 50_000  # larger plans are not read as a whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cost:
+class PlanCost:
     """The expected cost of a plan: CPU seconds, wall seconds on `workers`, bytes on disk."""
 
     cpu_s: float
     wall_s: float
     disk_bytes: int
     workers: int
-    measured: bool  # whether `cpu_s` is based on golden runs of the run folder
+    is_measured: bool  # whether `cpu_s` is based on golden runs of the run folder
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -68,7 +68,7 @@ class Plan:
     runs: int  #: the number of runs; a run that several scenarios share is counted once
     digest: str  #: the digest: equal on every machine for the same campaign, choices, library and scenarios
     run_cpu_s: float | None = None  #: the measured CPU time of one run in s; None: not measured
-    told: tuple[str, ...] = ()  #: how many mutants the operators produced, and what was left out
+    operator_notes: tuple[str, ...] = ()  #: how many mutants the operators produced, and what was left out
 
     def __repr__(self) -> str:
         count = counted(len(self.experiments), "experiment")
@@ -77,23 +77,23 @@ class Plan:
     @property
     def seeds(self) -> range:
         """All seeds of the plan."""
-        return _seeds(self.campaign, self.choices)
+        return _selected_seeds(self.campaign, self.choices)
 
     @cached_property
-    def tally(self) -> Tally:
+    def tally(self) -> PlanTally:
         """The plan's totals."""
-        found = self.empty_tally()
+        tally = self.empty_tally()
         for part in self.parts():
-            found.add(part)
-        return found
+            tally.add(part)
+        return tally
 
-    def empty_tally(self) -> Tally:
+    def empty_tally(self) -> PlanTally:
         """Return a tally without parts."""
-        return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
+        return PlanTally(canary=self.canary, several_seeds=len(self.seeds) > 1)
 
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[PlanPart]:
         """Yield the plan as one part."""
-        yield Part(experiments=self.experiments, chunks=self.chunks, runs=self.runs)
+        yield PlanPart(experiments=self.experiments, chunks=self.chunks, runs=self.runs)
 
     def _repr_html_(self) -> str:
         groups = sorted(self.groups().items())
@@ -110,9 +110,9 @@ class Plan:
 
         return pd.DataFrame(self.rows()).set_index("experiment_id")
 
-    def groups(self) -> Counter[Group]:
+    def groups(self) -> Counter[FaultTypeAndMethod]:
         """Return the number of experiments for each (module, fault type, method)."""
-        return self.tally.groups
+        return self.tally.count_by_type_and_method
 
     def rows(self) -> list[dict[str, object]]:
         """Return one dict per experiment: the result columns that are known before it runs."""
@@ -120,23 +120,23 @@ class Plan:
 
     def goldens(self) -> tuple[GoldenRun, ...]:
         """Return every golden run that the plan needs, including the canary's."""
-        return self.tally.needed()
+        return self.tally.golden_runs()
 
-    def cost(self, workers: int = 2) -> Cost:
+    def cost(self, workers: int = 2) -> PlanCost:
         """Return the expected time and disk space."""
         goldens = len(self.goldens())
         runs = self.runs + RUNS_PER_GOLDEN * goldens + 1
-        cpu_s = runs * (self.run_cpu_s or _DEFAULT_CPU_S)
-        return Cost(
+        cpu_s = runs * (self.run_cpu_s or _DEFAULT_RUN_CPU_S)
+        return PlanCost(
             cpu_s=cpu_s,
-            wall_s=cpu_s / max(workers, 1) + _START_S,
+            wall_s=cpu_s / max(workers, 1) + _TIME_OUTSIDE_RUNS_S,
             disk_bytes=len(self.experiments) * _BYTES_PER_EXPERIMENT + goldens * _BYTES_PER_GOLDEN,
             workers=workers,
-            measured=self.run_cpu_s is not None,
+            is_measured=self.run_cpu_s is not None,
         )
 
 
-class Planning:
+class SeedBySeedPlan:
     """A campaign with checked choices, expanded seed by seed.
 
     MutatorError for a choice that is invalid in this campaign.
@@ -146,18 +146,20 @@ class Planning:
         self.choices = Choices() if choices is None else choices
         check_type("choices", self.choices, Choices, "mutator.Choices")
         self.campaign = load_campaign(workspace.campaign(campaign))
-        self.seeds = _seeds(self.campaign, self.choices)
+        self.seeds = _selected_seeds(self.campaign, self.choices)
         readings = workspace.readings()
         check_readings(self.campaign, readings)
-        load_study(self.campaign)
+        load_campaign_study(self.campaign)
         self.reading = self.choices.reading or self.campaign.reading or readings.default
         if self.choices.reading is not None:
             readings.check(self.choices.reading)
         self._workspace, self._manifest = workspace, workspace.manifest(self.campaign.target)
         if self.campaign.after_hazard is AfterHazard.STOP:
             stop_source(self._manifest)  # raises before any run starts
-        self._expansion = Expansion(workspace, self.campaign, self._manifest, self.seeds[0], self.reading)
-        self.canary = self._expansion.canary()
+        self._expansion = CampaignExpansion(
+            workspace, self.campaign, self._manifest, self.seeds[0], self.reading
+        )
+        self.canary = self._expansion.build_canary()
 
     @property
     def seed(self) -> int:
@@ -166,24 +168,24 @@ class Planning:
     @property
     def told(self) -> tuple[str, ...]:
         """How many mutants the operators produced, and what was left out; known once the parts exist."""
-        return self._expansion.told
+        return self._expansion.operator_notes
 
-    def empty_tally(self) -> Tally:
-        return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
+    def empty_tally(self) -> PlanTally:
+        return PlanTally(canary=self.canary, several_seeds=len(self.seeds) > 1)
 
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[PlanPart]:
         """Yield the experiments of each seed that has any.
 
         MutatorError if no seed has an experiment, or if there are more shards than chunks; MutatorWarning for
         values that change nothing.
         """
-        idle, chunks = IdleValues(self._workspace.fault_models()), 0
+        idle, chunks = IdleFaults(self._workspace.fault_models()), 0
         limit = self.choices.limit
         for number, seed in enumerate(self.seeds):
             if limit == 0:
                 break
-            most = None if limit is None else -(-limit // (len(self.seeds) - number))
-            part = self._part(seed, most)
+            most_experiments = None if limit is None else -(-limit // (len(self.seeds) - number))
+            part = self._build_part(seed, most_experiments)
             limit = None if limit is None else limit - len(part.experiments)
             chunks += len(part.chunks)
             idle.add(part.experiments)
@@ -200,13 +202,18 @@ class Planning:
         self._check_shards(chunks)
         idle.warn()
 
-    def _part(self, seed: int, most: int | None) -> Part:
-        found = self._expansion.with_seed(seed).experiments()
-        once = in_turn(runs(self._manifest, _choose(found, self.campaign, self.choices, seed, most)))
-        return Part(
-            experiments=tuple(experiment for same in once for experiment in same),
-            chunks=cut_runs(once, self.campaign.chunk),
-            runs=len(once),
+    def _build_part(self, seed: int, most_experiments: int | None) -> PlanPart:
+        experiments = self._expansion.with_seed(seed).build_experiments()
+        runs_in_order = order_for_sharing(
+            group_by_run(
+                self._manifest,
+                _choose_experiments(experiments, self.campaign, self.choices, seed, most_experiments),
+            )
+        )
+        return PlanPart(
+            experiments=tuple(experiment for same in runs_in_order for experiment in same),
+            chunks=chunk_lengths_of_runs(runs_in_order, self.campaign.chunk_size),
+            runs=len(runs_in_order),
         )
 
     def _check_shards(self, chunks: int) -> None:
@@ -219,17 +226,17 @@ class Planning:
             )
 
 
-def _seeds(campaign: Campaign, choices: Choices) -> range:
+def _selected_seeds(campaign: Campaign, choices: Choices) -> range:
     return campaign.seeds if choices.seed is None else range(choices.seed, choices.seed + 1)
 
 
-def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> Plan:
+def build_plan(workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> Plan:
     """Expand a campaign (a library name or a file) into its plan, without writing or running anything.
 
     MutatorError for an invalid choice, and if no experiment is left; MutatorWarning for values that change
     nothing.
     """
-    planning = Planning(workspace, campaign, choices)
+    planning = SeedBySeedPlan(workspace, campaign, choices)
     parts = tuple(planning.parts())
     experiments = tuple(chain.from_iterable(part.experiments for part in parts))
     chunks = tuple(chain.from_iterable(part.chunks for part in parts))
@@ -244,42 +251,48 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
         canary=canary,
         digest=plan_digest([e.id for e in experiments], chunks, canary.id, loaded),
         runs=sum(part.runs for part in parts),
-        told=planning.told,
+        operator_notes=planning.told,
     )
 
 
-def _choose(
-    experiments: tuple[Experiment, ...], campaign: Campaign, choices: Choices, seed: int, most: int | None
+def _choose_experiments(
+    experiments: tuple[Experiment, ...],
+    campaign: Campaign,
+    choices: Choices,
+    seed: int,
+    most_experiments: int | None,
 ) -> tuple[Experiment, ...]:
-    if campaign.sample is not None:
-        experiments = _sample(experiments, campaign, campaign.sample, seed)
-    for text, wanted in ((choices.only, True), (choices.exclude, False)):
+    if campaign.sample_size is not None:
+        experiments = _sample_experiments(experiments, campaign, campaign.sample_size, seed)
+    for text, selects in ((choices.only, True), (choices.exclude, False)):
         if text is not None:
             accepts = compile_filter(text, PLAN_COLUMN_NAMES)
-            experiments = tuple(e for e in experiments if accepts(plan_row(e)) is wanted)
-    return experiments if most is None else pick_pairs(experiments, most, seed)
+            experiments = tuple(e for e in experiments if accepts(plan_row(e)) is selects)
+    return (
+        experiments if most_experiments is None else draw_balanced_pairs(experiments, most_experiments, seed)
+    )
 
 
-def _sample(
+def _sample_experiments(
     experiments: tuple[Experiment, ...], campaign: Campaign, count: int, seed: int
 ) -> tuple[Experiment, ...]:
-    if not campaign.proportional:
-        return pick(experiments, count, seed)
+    if not campaign.is_proportional:
+        return draw_balanced(experiments, count, seed)
     try:
-        return pick_in_proportion(experiments, count, seed)
+        return draw_in_proportion(experiments, count, seed)
     except ValueError as err:
         raise campaign.error(
             ("sample",), f"sample {count}", expected=str(err), remedy="correct the number"
         ) from None
 
 
-def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
+def load_plan(folder: RunFolder, tally: PlanTally | None = None) -> Plan:
     """Load the frozen plan of a run folder; `tally` has its totals, if known.
 
     The experiments of a very large plan are not kept in memory.
     """
     head = folder.head
-    large = head.experiments > _IN_MEMORY
+    large = head.experiments > _MOST_EXPERIMENTS_IN_MEMORY
     plan = Plan(
         campaign=load_campaign(folder.path / CAMPAIGN),
         choices=head.choices,
@@ -293,7 +306,7 @@ def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
         runs=head.runs,
         digest=head.plan,
         run_cpu_s=measured_cpu_s(folder),
-        told=head.operators,
+        operator_notes=head.operators,
     )
     if tally is not None:
         vars(plan)["tally"] = tally  # set the cached property; computing it would read every experiment

@@ -13,11 +13,11 @@ from mutator.store.run_folder import GoldenRun
 # The start of every plan digest. Publications cite digests, so this text must never change.
 _DIGEST_PREFIX = "run/1"
 
-Group = tuple[str, str, str]  # module, fault type, method
+FaultTypeAndMethod = tuple[str, str, str]  # module, fault type, method
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
+class PlanPart:
     """Experiments in run order, the lengths of their chunks, and the number of runs; experiments can share
     a run.
     """
@@ -28,52 +28,52 @@ class Part:
 
 
 @dataclass(slots=True, kw_only=True)
-class Tally:
+class PlanTally:
     """The totals of the plan parts added so far."""
 
     canary: Experiment
     several_seeds: bool  # each seed has its own golden runs
-    experiments: int = 0
-    runs: int = 0
-    chunks: list[int] = field(default_factory=list)
-    groups: Counter[Group] = field(default_factory=Counter)
+    experiment_count: int = 0
+    run_count: int = 0
+    chunk_lengths: list[int] = field(default_factory=list)
+    count_by_type_and_method: Counter[FaultTypeAndMethod] = field(default_factory=Counter)
     goldens: dict[GoldenRun, None] = field(default_factory=dict)
-    variants: dict[str, Fault] = field(default_factory=dict)  # one fault per variant
+    fault_by_variant: dict[str, Fault] = field(default_factory=dict)  # one fault per variant
 
-    def add(self, part: Part) -> None:
-        self.experiments += len(part.experiments)
-        self.runs += part.runs
-        self.chunks += part.chunks
-        for one in part.experiments:
-            fault = one.fault
-            self.groups[fault.module, fault.fault_type, one.method.value] += 1
-            self.goldens.setdefault(GoldenRun.for_experiment(one, several_seeds=self.several_seeds))
-            self.variants[fault.spec] = fault
+    def add(self, part: PlanPart) -> None:
+        self.experiment_count += len(part.experiments)
+        self.run_count += part.runs
+        self.chunk_lengths += part.chunks
+        for experiment in part.experiments:
+            fault = experiment.fault
+            self.count_by_type_and_method[fault.module, fault.fault_type, experiment.method.value] += 1
+            self.goldens.setdefault(GoldenRun.for_experiment(experiment, several_seeds=self.several_seeds))
+            self.fault_by_variant[fault.spec] = fault
 
-    def needed(self) -> tuple[GoldenRun, ...]:
-        own = GoldenRun.for_experiment(self.canary, several_seeds=self.several_seeds)
-        return tuple(dict.fromkeys((*self.goldens, own)))
+    def golden_runs(self) -> tuple[GoldenRun, ...]:
+        canary_golden = GoldenRun.for_experiment(self.canary, several_seeds=self.several_seeds)
+        return tuple(dict.fromkeys((*self.goldens, canary_golden)))
 
 
-class PlanDigest:
+class PlanDigestBuilder:
     """The digest of the ids and chunks of the experiments, the canary's id, and the campaign."""
 
     def __init__(self) -> None:
         self._hash = sha256(f"[{canonical_json(_DIGEST_PREFIX)},[".encode())
-        self._joint = ""
+        self._separator = ""
 
     def add(self, ids: Sequence[str]) -> None:
         if ids:
-            self._hash.update((self._joint + ",".join(f'"{name}"' for name in ids)).encode())
-            self._joint = ","
+            self._hash.update((self._separator + ",".join(f'"{name}"' for name in ids)).encode())
+            self._separator = ","
 
-    def end(self, chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
+    def finish(self, chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
         rest = [chunks, canary, as_json_types(campaign.canary), as_json_types(campaign.limits)]
         self._hash.update(f"],{canonical_json(rest)[1:]}".encode())
         return self._hash.hexdigest()
 
 
 def plan_digest(ids: Sequence[str], chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
-    made = PlanDigest()
-    made.add(ids)
-    return made.end(chunks, canary, campaign)
+    digest_builder = PlanDigestBuilder()
+    digest_builder.add(ids)
+    return digest_builder.finish(chunks, canary, campaign)

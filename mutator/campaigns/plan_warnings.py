@@ -8,34 +8,36 @@ from mutator.errors import MutatorWarning
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment, Fault
 
-_NAMED = 3  # how many faults a warning names
+_MOST_NAMED_FAULTS = 3  # how many faults a warning names
 
 
-class IdleValues:
+class IdleFaults:
     """Collects the faults whose value changes nothing, and counts their experiments."""
 
     def __init__(self, models: FaultModels) -> None:
         self._models = models
-        self._labels: list[str] = []
-        self._count = self._of = 0
+        self._idle_labels: list[str] = []
+        self._idle_count = self._experiment_count = 0
 
     def add(self, experiments: Sequence[Experiment]) -> None:
         faults = {experiment.fault.id: experiment.fault for experiment in experiments}
-        idle = {name: fault for name, fault in faults.items() if changes_nothing(fault, self._models)}
-        self._labels += [fault.label for fault in idle.values()]
-        self._count += sum(experiment.fault.id in idle for experiment in experiments) if idle else 0
-        self._of += len(experiments)
+        idle = {name: fault for name, fault in faults.items() if is_idle(fault, self._models)}
+        self._idle_labels += [fault.label for fault in idle.values()]
+        self._idle_count += sum(experiment.fault.id in idle for experiment in experiments) if idle else 0
+        self._experiment_count += len(experiments)
 
     def warn(self) -> None:
-        if labels := list(dict.fromkeys(self._labels)):
-            more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
+        if labels := list(dict.fromkeys(self._idle_labels)):
+            more = f" and {len(labels) - _MOST_NAMED_FAULTS} more" if len(labels) > _MOST_NAMED_FAULTS else ""
             warnings.warn(
-                f"the value changes nothing in {self._count} of {counted(self._of, 'experiment')}: "
-                f"{', '.join(labels[:_NAMED])}{more}",
+                f"the value changes nothing in {self._idle_count} of {counted(self._experiment_count, 'experiment')}: "
+                f"{', '.join(labels[:_MOST_NAMED_FAULTS])}{more}",
                 MutatorWarning,
                 stacklevel=2,
             )
 
 
-def changes_nothing(fault: Fault, models: FaultModels) -> bool:
-    return all(models.get(one.model).changes_nothing(dict(one.params)) for one in fault.injections)
+def is_idle(fault: Fault, models: FaultModels) -> bool:
+    return all(
+        models.get(injection.model).changes_nothing(dict(injection.params)) for injection in fault.injections
+    )

@@ -19,19 +19,26 @@ from mutator.engines.target_processes import environment
 from mutator.store.work_stretches import Blas
 from mutator.targets.process_environment import THREADS
 
-_BLAS = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threadpool_info()))"
+_BLAS_SCRIPT = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threadpool_info()))"
 
 
-def surroundings() -> list[Any]:
+def everything_outside_sources() -> list[Any]:
     """Return everything outside the target's sources that can affect its results."""
-    return [python(), platform.platform(), cpu(), blas(), threads(), versions()]
+    return [
+        python_version(),
+        platform.platform(),
+        processor_name(),
+        loaded_blas(),
+        thread_limits(),
+        package_versions(),
+    ]
 
 
-def python() -> str:
+def python_version() -> str:
     return f"{platform.python_implementation()} {platform.python_version()}"
 
 
-def cpu() -> str | None:
+def processor_name() -> str | None:
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -40,81 +47,83 @@ def cpu() -> str | None:
     return model[1] if model else platform.processor() or None
 
 
-def threads() -> dict[str, str]:
+def thread_limits() -> dict[str, str]:
     """Return the thread limits for numerical libraries in the target's environment."""
     return dict.fromkeys(THREADS, "1")
 
 
 @lru_cache(maxsize=1)
-def blas() -> tuple[Blas, ...]:
+def loaded_blas() -> tuple[Blas, ...]:
     """Return the BLAS that numpy loads in the target's environment; empty without numpy.
 
     `kernel` is the one that the library chose for this processor.
     """
     with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run(
-            [sys.executable, "-P", "-s", "-c", _BLAS],
+        process = subprocess.run(
+            [sys.executable, "-P", "-s", "-c", _BLAS_SCRIPT],
             cwd=folder,
             env=environment(0, Path(folder)),
             capture_output=True,
             check=False,
         )
-    loaded = json.loads(done.stdout) if done.returncode == 0 else []
+    loaded = json.loads(process.stdout) if process.returncode == 0 else []
     names = {"internal_api": "library", "version": "version", "architecture": "kernel"}
     names["num_threads"] = "threads"
-    return tuple(Blas(**{ours: one.get(theirs) for theirs, ours in names.items()}) for one in loaded)
+    return tuple(
+        Blas(**{field: library.get(numpy_name) for numpy_name, field in names.items()}) for library in loaded
+    )
 
 
 @lru_cache(maxsize=1)
-def _installed() -> dict[str, tuple[str, list[str]]]:
+def _installed_packages() -> dict[str, tuple[str, list[str]]]:
     """Return the version and requirements of each installed package.
 
     If a package is installed twice, return those of the copy that Python imports.
     """
-    found: dict[str, tuple[str, list[str]]] = {}
+    package_by_name: dict[str, tuple[str, list[str]]] = {}
     for distribution in metadata.distributions():
-        told = distribution.metadata
-        if name := told["Name"]:
-            requirements = told.get_all("Requires-Dist") or []
-            found.setdefault(canonicalize_name(name), (told["Version"], requirements))
-    return found
+        package_metadata = distribution.metadata
+        if name := package_metadata["Name"]:
+            requirements = package_metadata.get_all("Requires-Dist") or []
+            package_by_name.setdefault(canonicalize_name(name), (package_metadata["Version"], requirements))
+    return package_by_name
 
 
-def versions(names: Iterable[str] | None = None) -> dict[str, str | None]:
+def package_versions(names: Iterable[str] | None = None) -> dict[str, str | None]:
     """Return the version of each of these packages (default: all installed); None: not installed."""
-    installed = _installed()
-    wanted = installed if names is None else names
-    return {name: installed.get(name, (None,))[0] for name in sorted(wanted)}
+    installed = _installed_packages()
+    selected = installed if names is None else names
+    return {name: installed.get(name, (None,))[0] for name in sorted(selected)}
 
 
-def required() -> frozenset[str]:
+def required_packages() -> frozenset[str]:
     """Return the packages that mutator requires, directly or indirectly.
 
     If mutator is not installed, all installed packages are returned.
     """
-    installed = _installed()
-    seen: set[tuple[str, str]] = set()
-    waiting = [("mutator", "")]
-    while waiting:
-        name, extra = waiting.pop()
-        if (name, extra) not in seen and name in installed:
-            seen.add((name, extra))
+    installed = _installed_packages()
+    visited: set[tuple[str, str]] = set()
+    pending = [("mutator", "")]
+    while pending:
+        name, extra = pending.pop()
+        if (name, extra) not in visited and name in installed:
+            visited.add((name, extra))
             for requirement in map(Requirement, installed[name][1]):
                 if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
-                    needed = canonicalize_name(requirement.name)
-                    waiting += [(needed, wanted) for wanted in ("", *requirement.extras)]
-    return frozenset(name for name, _ in seen) - {"mutator"} or frozenset(installed)
+                    required_name = canonicalize_name(requirement.name)
+                    pending += [(required_name, extra_name) for extra_name in ("", *requirement.extras)]
+    return frozenset(name for name, _ in visited) - {"mutator"} or frozenset(installed)
 
 
-def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
+def packages_of_modules(modules: Iterable[str]) -> tuple[str, ...]:
     """Return the packages that provide these top-level modules. Modules without a package are omitted."""
-    providers = _providers()
+    providers = _packages_by_module()
     # the modules of an editable installation can be missing from `providers`; try the module's name
     names = (name for module in modules for name in providers.get(module, [module]))
-    return tuple(sorted({canonicalize_name(name) for name in names} & _installed().keys()))
+    return tuple(sorted({canonicalize_name(name) for name in names} & _installed_packages().keys()))
 
 
 @lru_cache(maxsize=1)
-def _providers() -> dict[str, list[str]]:
+def _packages_by_module() -> dict[str, list[str]]:
     """Return the packages of each top-level module; cached, because it reads every package's file list."""
     return dict(metadata.packages_distributions())

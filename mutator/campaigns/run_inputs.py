@@ -23,31 +23,33 @@ class RunInputs:
     """
 
     manifest: TargetManifest
-    models: FaultModels
-    scenarios: Mapping[str, Path]
+    fault_models: FaultModels
+    scenario_files: Mapping[str, Path]
 
     @classmethod
-    def of(cls, workspace: "Workspace", manifest: TargetManifest, scenarios: Iterable[str]) -> "RunInputs":
+    def from_workspace(
+        cls, workspace: "Workspace", manifest: TargetManifest, scenarios: Iterable[str]
+    ) -> "RunInputs":
         """Return the inputs in a workspace; MutatorError for a missing scenario or a mistake in a model."""
         files = {name: workspace.scenario(name) for name in sorted(scenarios)}
         return cls(manifest=manifest, models=workspace.fault_models(), scenarios=files)
 
     @classmethod
-    def unpacked(cls, data: bytes) -> "RunInputs":
+    def from_bytes(cls, data: bytes) -> "RunInputs":
         """Return what `packed` packed. The data must come from the process that started this one."""
         inputs = pickle.loads(data)
         assert isinstance(inputs, cls)
         return inputs
 
-    def packed(self) -> bytes:
+    def to_bytes(self) -> bytes:
         """Return the inputs for another process, which reads the target's tree itself."""
         return pickle.dumps(replace(self, manifest=replace(self.manifest)))
 
-    def digests(self) -> dict[str, str]:
+    def digest_by_source(self) -> dict[str, str]:
         """Return the digests, by name, of all files outside the plan that affect results."""
         return {
             "target": self.manifest.tree.digest,
             "manifest": digest(read_bounded(self.manifest.path)),
-            "templates": self.models.digest,
-            **{f"scenario {name}": digest(read_bounded(path)) for name, path in self.scenarios.items()},
+            "templates": self.fault_models.digest,
+            **{f"scenario {name}": digest(read_bounded(path)) for name, path in self.scenario_files.items()},
         }

@@ -11,7 +11,7 @@ from packaging.utils import canonicalize_name
 from mutator._common.doors import IMPORTERS
 from mutator._common.version import VERSION
 from mutator.campaigns import run_environment
-from mutator.campaigns.git_clone import clone_state
+from mutator.campaigns.git_clone import find_clone_state
 from mutator.errors import MutatorError
 from mutator.store import file_digests
 from mutator.store.check_results import loaded_packages
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mutator.workspace import Workspace
 
 _REMEDY = "undo the change, or use another run folder"
-_OWN = Path(__file__).parents[1]  # the harness
+_HARNESS_FOLDER = Path(__file__).parents[1]  # the harness
 
 
 def check_sources(run: Path, frozen: Mapping[str, str], now: Mapping[str, str]) -> None:
@@ -51,23 +51,25 @@ def check_version(folder: RunFolder) -> None:
         )
 
 
-def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...]:
+def accepted_version_differences(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...]:
     """List how Python and packages differ from the folder's last session; empty if nothing has run yet.
 
     MutatorError for any difference that is not accepted.
     """
     if not folder.stretches:
         return ()
-    found = version_differences(folder.stretches[-1], run_environment.python(), _packages(folder))
-    if found and not accept:
-        raise other_versions(folder.path, "this run used", found)
-    return found
+    version_differences = version_differences(
+        folder.stretches[-1], run_environment.python_version(), _versions_to_record(folder)
+    )
+    if version_differences and not accept:
+        raise version_error(folder.path, "this run used", version_differences)
+    return version_differences
 
 
-def other_versions(run: Path, what: str, found: Iterable[str]) -> MutatorError:
+def version_error(run: Path, beginning: str, version_differences: Iterable[str]) -> MutatorError:
     """Return an error about different versions, for the caller to raise. Its text begins with `what`."""
     return MutatorError(
-        f"{what} other versions: {'; '.join(found)}",
+        f"{beginning} other versions: {'; '.join(version_differences)}",
         where=run,
         argument="accept_versions",
         expected="the same Python and packages for a whole run",
@@ -75,10 +77,12 @@ def other_versions(run: Path, what: str, found: Iterable[str]) -> MutatorError:
     )
 
 
-def _packages(folder: RunFolder, more: Iterable[str] = ()) -> dict[str, str | None]:
+def _versions_to_record(folder: RunFolder, more: Iterable[str] = ()) -> dict[str, str | None]:
     """Return the versions of the harness's requirements, packages that golden runs loaded, and `more`."""
     before = (name for stretch in folder.stretches[-1:] for name in stretch.packages)
-    return run_environment.versions({*run_environment.required(), *loaded_packages(folder), *before, *more})
+    return run_environment.package_versions(
+        {*run_environment.required_packages(), *loaded_packages(folder), *before, *more}
+    )
 
 
 def begin_stretch(
@@ -91,38 +95,45 @@ def begin_stretch(
     `check_versions`.
     """
     manifest = workspace.manifest(folder.head.target)
-    places = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
-    places |= {"overlay": manifest.overlay} if manifest.overlay else {}
+    folder_by_name = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
+    folder_by_name |= {"overlay": manifest.overlay} if manifest.overlay else {}
     importer = IMPORTERS.package_of(Path(manifest.trace_file).suffix.removeprefix("."))
-    used = (*(wanted.name for wanted in manifest.requires), *packages, *([importer] if importer else []))
-    versions = _packages(folder, map(canonicalize_name, used))
-    states = {name: clone_state(place) for name, place in ({"mutator": _OWN} | places).items()}
-    return add_stretch(
+    used = (
+        *(requirement.name for requirement in manifest.requires),
+        *packages,
+        *([importer] if importer else []),
+    )
+    versions = _versions_to_record(folder, map(canonicalize_name, used))
+    states = {
+        name: find_clone_state(place)
+        for name, place in ({"mutator": _HARNESS_FOLDER} | folder_by_name).items()
+    }
+    return append_stretch(
         folder,
         Stretch(
-            accepted=check_versions(folder, accept=accept),
-            python=run_environment.python(),
+            accepted=accepted_version_differences(folder, accept=accept),
+            python=run_environment.python_version(),
             packages={name: version for name, version in versions.items() if version},
             platform=platform.platform(),
-            cpu=run_environment.cpu(),
-            blas=run_environment.blas(),
-            threads=run_environment.threads(),
+            cpu=run_environment.processor_name(),
+            blas=run_environment.loaded_blas(),
+            threads=run_environment.thread_limits(),
             git={name: state for name, state in states.items() if state} or None,
             records=records,
         ),
     )
 
 
-def add_stretch(folder: RunFolder, stretch: Stretch) -> RunFolder:
-    return _with_stretches(folder, (*folder.stretches, stretch))
+def append_stretch(folder: RunFolder, stretch: Stretch) -> RunFolder:
+    return _write_stretches(folder, (*folder.stretches, stretch))
 
 
-def add_machine(folder: RunFolder, machine: Machine) -> RunFolder:
+def append_machine(folder: RunFolder, machine: Machine) -> RunFolder:
     *before, last = folder.stretches
-    return _with_stretches(folder, (*before, replace(last, machines=(*last.machines, machine))))
+    return _write_stretches(folder, (*before, replace(last, machines=(*last.machines, machine))))
 
 
-def _with_stretches(folder: RunFolder, stretches: tuple[Stretch, ...]) -> RunFolder:
+def _write_stretches(folder: RunFolder, stretches: tuple[Stretch, ...]) -> RunFolder:
     """Write run.json with these stretches of work, and return the folder as it is then."""
     file_digests.rewrite_file(folder.path, HEAD, replace(folder.head, stretches=stretches).file_bytes())
     return RunFolder(folder.path)

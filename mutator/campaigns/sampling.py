@@ -11,51 +11,53 @@ from mutator.model import AfterHazard, Experiment
 _Cell = tuple[str, str, str, str]  # variant, method or methods, scenario, trigger
 
 
-def spread(count: int, wanted: int) -> list[int]:
+def evenly_spread_indices(count: int, size: int) -> list[int]:
     """Return `wanted` of the indices 0 ... count-1, evenly spread."""
-    if wanted >= count:
+    if size >= count:
         return list(range(count))
-    return [(2 * i + 1) * count // (2 * wanted) for i in range(wanted)]
+    return [(2 * i + 1) * count // (2 * size) for i in range(size)]
 
 
-def pick(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
+def draw_balanced(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
     """Draw `count` experiments, balanced over variants first, then over method, scenario and trigger.
 
     The experiments keep their order. A hash of seed and id selects values and breaks ties.
     """
-    return _pick(experiments, [[experiment] for experiment in experiments], count, seed)
+    return _draw_units(experiments, [[experiment] for experiment in experiments], count, seed)
 
 
-def pick_pairs(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
+def draw_balanced_pairs(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
     """Like `pick`, but take a guided experiment together with its random partner if both are present.
 
     If `count` does not fit whole pairs, the last pair is split.
     """
     pairs: dict[Hashable, list[Experiment]] = defaultdict(list)
     for experiment in experiments:
-        pairs[experiment.scenario, _pair(experiment)].append(experiment)
+        pairs[experiment.scenario, _pair_key(experiment)].append(experiment)
     together = [sorted(pair, key=lambda e: (e.method.value, e.id)) for pair in pairs.values()]
-    return _pick(experiments, together, count, seed)
+    return _draw_units(experiments, together, count, seed)
 
 
-def _pick(
+def _draw_units(
     experiments: Sequence[Experiment], units: Iterable[list[Experiment]], count: int, seed: int
 ) -> tuple[Experiment, ...]:
     """Like `pick`, but draw whole `units`. Only the last one is split if `count` requires it."""
     if count >= len(experiments):
         return tuple(experiments)
     cells: dict[str, dict[_Cell, deque[list[Experiment]]]] = defaultdict(dict)
-    for unit in sorted(units, key=lambda unit: digest([seed, _whole(unit[0]).id])):
+    for unit in sorted(units, key=lambda unit: digest([seed, _ignoring_after_hazard(unit[0]).id])):
         cell = _cell(unit)
         cells[cell[0]].setdefault(cell, deque()).append(unit)
-    taken: Counter[Hashable] = Counter()
+    count_by_property: Counter[Hashable] = Counter()
     chosen: set[str] = set()
     while len(chosen) < count:
-        variant = min(cells, key=lambda name: (taken[name], digest([seed, name])))
-        cell = min(cells[variant], key=lambda c: (*_load(taken, c), digest([seed, c])))
+        variant = min(cells, key=lambda name: (count_by_property[name], digest([seed, name])))
+        cell = min(
+            cells[variant], key=lambda c: (*_counts_of_properties(count_by_property, c), digest([seed, c]))
+        )
         unit = cells[variant][cell].popleft()
         chosen.update(experiment.id for experiment in unit[: count - len(chosen)])
-        taken.update(dict.fromkeys(_marks(cell), len(unit)))
+        count_by_property.update(dict.fromkeys(_balanced_properties(cell), len(unit)))
         if not cells[variant][cell]:
             del cells[variant][cell]
         if not cells[variant]:
@@ -63,7 +65,7 @@ def _pick(
     return tuple(e for e in experiments if e.id in chosen)
 
 
-def _whole(experiment: Experiment) -> Experiment:
+def _ignoring_after_hazard(experiment: Experiment) -> Experiment:
     """Remove `after_hazard`, so that campaigns with and without it draw the same sample."""
     goes_on = experiment.after_hazard is AfterHazard.GO_ON
     return experiment if goes_on else replace(experiment, after_hazard=AfterHazard.GO_ON)
@@ -75,7 +77,7 @@ def _cell(unit: Sequence[Experiment]) -> _Cell:
     return (first.fault.spec, methods, first.scenario, first.trigger.name)
 
 
-def _marks(cell: _Cell) -> Iterable[Hashable]:
+def _balanced_properties(cell: _Cell) -> Iterable[Hashable]:
     """Yield the properties whose counts are balanced, the most important first."""
     variant, method, scenario, trigger = cell
     yield variant
@@ -88,11 +90,11 @@ def _marks(cell: _Cell) -> Iterable[Hashable]:
     yield "trigger", trigger
 
 
-def _load(taken: Counter[Hashable], cell: _Cell) -> list[int]:
-    return [taken[mark] for mark in _marks(cell)]
+def _counts_of_properties(count_by_property: Counter[Hashable], cell: _Cell) -> list[int]:
+    return [count_by_property[mark] for mark in _balanced_properties(cell)]
 
 
-def pick_in_proportion(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
+def draw_in_proportion(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
     """Draw `count` experiments, guided and random ones in pairs, in their original order.
 
     Each fault type in each scenario is sampled systematically, in proportion to its number of experiments,
@@ -100,38 +102,40 @@ def pick_in_proportion(experiments: Sequence[Experiment], count: int, seed: int)
     """
     if count >= len(experiments):
         return tuple(experiments)
-    strata: dict[_Stratum, dict[_Pair, list[Experiment]]] = defaultdict(dict)
+    strata: dict[_Stratum, dict[_PairKey, list[Experiment]]] = defaultdict(dict)
     for experiment in experiments:
         fault = experiment.fault
         stratum = (fault.module, fault.fault_type, experiment.scenario)
-        strata[stratum].setdefault(_pair(experiment), []).append(experiment)
+        strata[stratum].setdefault(_pair_key(experiment), []).append(experiment)
     size = len({experiment.method for experiment in experiments})
     if count % size or count // size < len(strata):
         raise ValueError(f"a multiple of {size}, {size * len(strata)} or more")
     chosen: set[str] = set()
-    for stratum, number in _allot({key: len(pairs) for key, pairs in strata.items()}, count // size).items():
+    for stratum, number in _allot_seats(
+        {key: len(pairs) for key, pairs in strata.items()}, count // size
+    ).items():
         pairs = sorted(strata[stratum], key=lambda pair: (*pair[:2], digest([seed, pair])))
-        start = random.Random(digest([seed, stratum])).random()
+        offset = random.Random(digest([seed, stratum])).random()
         for i in range(number):
-            members = strata[stratum][pairs[int((i + start) * len(pairs) / number)]]
+            members = strata[stratum][pairs[int((i + offset) * len(pairs) / number)]]
             chosen.update(member.id for member in members)
     return tuple(e for e in experiments if e.id in chosen)
 
 
 _Stratum = tuple[str, str, str]  # module, fault type, scenario
-_Pair = tuple[str, str, str]  # variant, row of the context table, fault
+_PairKey = tuple[str, str, str]  # variant, row of the context table, fault
 
 
-def _pair(experiment: Experiment) -> _Pair:
+def _pair_key(experiment: Experiment) -> _PairKey:
     """Return what a guided experiment and its random partner have in common within a scenario."""
     row = experiment.trigger.name.removeprefix("random/")
     return (experiment.fault.spec, row, experiment.fault.id)
 
 
-def _allot(sizes: dict[_Stratum, int], total: int) -> dict[_Stratum, int]:
+def _allot_seats(sizes: dict[_Stratum, int], total: int) -> dict[_Stratum, int]:
     """Distribute `total` seats over strata: one each, then by the Sainte-Lague method (1910)."""
     seats = dict.fromkeys(sizes, 1)
     while sum(seats.values()) < total:
-        next_one = max(sizes, key=lambda key: (sizes[key] / (2 * seats[key] + 1), key))
-        seats[next_one] += 1
+        stratum = max(sizes, key=lambda key: (sizes[key] / (2 * seats[key] + 1), key))
+        seats[stratum] += 1
     return seats

@@ -13,28 +13,28 @@ def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
     Such experiments differ only in scenarios that a change makes identical. The manifest lists these
     scenarios in `same_in`, and the preflight checks that they are identical.
     """
-    scenarios = same_in(manifest, experiment.changes)
+    scenarios = equal_scenarios(manifest, experiment.changes)
     place: Hashable = scenarios if experiment.scenario in scenarios else experiment.scenario
     return (experiment.fault.id, experiment.trigger, experiment.seed, experiment.changes, place)
 
 
-def same_in(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]:
+def equal_scenarios(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]:
     return next((manifest.same_in[change] for change in changes if change in manifest.same_in), ())
 
 
-def in_turn(runs: Iterable[list[Experiment]]) -> list[list[Experiment]]:
+def order_for_sharing(runs: Iterable[list[Experiment]]) -> list[list[Experiment]]:
     """Order runs so that they share the most work: by golden run, trigger time and condition."""
 
-    def turn(run: list[Experiment]) -> tuple[str, tuple[str, ...], float, str]:
+    def sort_key(run: list[Experiment]) -> tuple[str, tuple[str, ...], float, str]:
         first = run[0]
         return (first.scenario, first.changes, time_of(first.trigger) or 0.0, first.trigger.condition)
 
-    return sorted(runs, key=turn)
+    return sorted(runs, key=sort_key)
 
 
-def runs(manifest: TargetManifest, experiments: Iterable[Experiment]) -> list[list[Experiment]]:
+def group_by_run(manifest: TargetManifest, experiments: Iterable[Experiment]) -> list[list[Experiment]]:
     """Return the experiments of each run, in the order of each run's first experiment."""
-    found: dict[Hashable, list[Experiment]] = {}
+    experiments_by_run: dict[Hashable, list[Experiment]] = {}
     for experiment in experiments:
-        found.setdefault(run_key(manifest, experiment), []).append(experiment)
-    return list(found.values())
+        experiments_by_run.setdefault(run_key(manifest, experiment), []).append(experiment)
+    return list(experiments_by_run.values())

@@ -14,7 +14,7 @@ from typing import Any
 from mutator._common.confined_files import path_below
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.files import ScratchFolder
-from mutator.campaigns.campaign_expansion import Expansion
+from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.checks import fast_engine_check, nondeterminism_causes
 from mutator.checks.findings import CheckState, Finding
@@ -307,9 +307,9 @@ class _DriveCheck:
         for campaign in sorted(self.campaigns, key=lambda c: len(_scenario_changes(self.workspace, c))):
             reading = _reading_of(self.workspace, campaign)
             if campaign.canary not in canaries and campaign.canary.scenario in self.scenarios:
-                experiment = Expansion(
+                experiment = CampaignExpansion(
                     self.workspace, campaign, self.manifest, campaign.seed, reading
-                ).canary()
+                ).build_canary()
                 canaries[campaign.canary] = (campaign.name, experiment, campaign.canary.hazard)
         return list(canaries.values())
 
@@ -342,7 +342,7 @@ def _reading_of(workspace: Workspace, campaign: Campaign) -> str:
 
 
 def _scenario_changes(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:
-    return campaign.setting_in(_reading_of(workspace, campaign))
+    return campaign.changes_in(_reading_of(workspace, campaign))
 
 
 def _target_line(data: bytes, line: int) -> int:

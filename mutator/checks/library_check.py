@@ -5,8 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
-from mutator.campaigns.campaign_triggers import listed_triggers
+from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_campaign_study
+from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.campaigns.installed_studies import study_problems
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
@@ -92,7 +92,7 @@ def campaign_problems(
         collector.result_of(partial(check_readings, campaign, readings))
         if manifest and manifest.name == campaign.target:
             collector.result_of(partial(_check_triggers, campaign, manifest))
-        study = collector.result_of(partial(load_study, campaign))
+        study = collector.result_of(partial(load_campaign_study, campaign))
         if study and campaign.study and campaign.study not in checked_studies:
             checked_studies.add(campaign.study)
             problems = study_problems(campaign.study, study, workspace)
@@ -101,14 +101,18 @@ def campaign_problems(
 
 
 def _check_triggers(campaign: Campaign, manifest: TargetManifest) -> None:
-    listed_triggers(campaign.listed, campaign.yaml, manifest, armed_after_s=0.0, hold_s=None)
+    build_listed_triggers(
+        campaign.listed_triggers, campaign.yaml_source, manifest, armed_after_s=0.0, hold_s=None
+    )
 
 
 def _located_problem(problem: MutatorError, campaign: Campaign) -> MutatorError:
     """Locate a study's problem at the campaign that uses the study, unless the problem names a file."""
     if problem.where:
         return problem
-    return campaign.yaml.error(("study",), problem.got, expected=problem.expected, remedy=problem.remedy)
+    return campaign.yaml_source.error(
+        ("study",), problem.got, expected=problem.expected, remedy=problem.remedy
+    )
 
 
 class _ProblemCollector:

@@ -13,7 +13,7 @@ import numpy as np
 
 from mutator._common.message_text import counted
 from mutator.campaigns.campaign_files import Campaign
-from mutator.campaigns.campaign_triggers import listed_triggers
+from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.checks.findings import CheckState, Finding, FindingPlace
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind
 from mutator.model import Fault, FaultLocation, Injection, Method, Trigger
@@ -176,13 +176,13 @@ def _awaited_triggers(
     """
     armed_after_s_by_row: dict[tuple[str, str], float] = {}
     for campaign in campaigns:
-        earliest = min(campaign.armed_after_s.values(), default=manifest.armed_after_s)
+        earliest = min(campaign.armed_after_s_by_reading.values(), default=manifest.armed_after_s)
         for row in _context_rows(workspace, campaign):
             armed_after_s_by_row[row] = min(armed_after_s_by_row.get(row, earliest), earliest)
         yield from _listed_triggers(campaign, manifest, earliest)
         if (until := campaign.random_until_s) is not None and Method.RANDOM in campaign.methods:
             what = f"{campaign.name}: random times until {until:g} s"
-            place = _yaml_place(campaign.path, campaign.yaml.line_of(("triggers", "random_until_s")), what)
+            place = _yaml_place(campaign.path, campaign.yaml_source.line_of(("triggers", "random_until_s")), what)
             yield AwaitedTrigger(trigger=trigger_at_time(until, name=campaign.name), place=place)
     for name in {table: None for table, _ in armed_after_s_by_row} if campaigns else workspace.context_tables:
         table = workspace.context_table(name)
@@ -195,23 +195,27 @@ def _awaited_triggers(
 
 
 def _context_rows(workspace: Workspace, campaign: Campaign) -> list[tuple[str, str]]:
-    if campaign.table is None:
+    if campaign.context_table is None:
         return []
-    rows = campaign.rows or [row.id for row in workspace.context_table(campaign.table).rows]
-    return [(campaign.table, row) for row in rows]
+    rows = campaign.context_ids or [row.id for row in workspace.context_table(campaign.context_table).rows]
+    return [(campaign.context_table, row) for row in rows]
 
 
 def _listed_triggers(
     campaign: Campaign, manifest: TargetManifest, armed_after_s: float
 ) -> Iterator[AwaitedTrigger]:
-    triggers = listed_triggers(
-        campaign.listed, campaign.yaml, manifest, armed_after_s=armed_after_s, hold_s=campaign.hold_s
+    triggers = build_listed_triggers(
+        campaign.listed_triggers,
+        campaign.yaml_source,
+        manifest,
+        armed_after_s=armed_after_s,
+        hold_s=campaign.hold_s,
     )
     for i, trigger in enumerate(triggers):
         what = f"{campaign.name}: {trigger.name}"
         yield AwaitedTrigger(
             trigger=trigger,
-            place=_yaml_place(campaign.path, campaign.yaml.line_of(("triggers", "list", i)), what),
+            place=_yaml_place(campaign.path, campaign.yaml_source.line_of(("triggers", "list", i)), what),
         )
 
 

@@ -37,7 +37,7 @@ from mutator.execution.progress_text import duration
 
 if TYPE_CHECKING:
     from mutator.api.runs import Run
-    from mutator.campaigns.plan import Cost
+    from mutator.campaigns.plan import PlanCost
     from mutator.execution.session import Notify, Summary
     from mutator.report.report_builder import WrittenReport
 
@@ -110,7 +110,7 @@ def _print_plan_as_json(
     terminal: Terminal,
     folder: Path,
     new_plan: "mutator.Plan",
-    cost: "Cost",
+    cost: "PlanCost",
     reason_by_variant: dict[str, str],
 ) -> None:
     kinds = [
@@ -129,7 +129,7 @@ def _print_plan_as_json(
 
 
 def _print_plan(
-    terminal: Terminal, new_plan: "mutator.Plan", cost: "Cost", reason_by_variant: dict[str, str]
+    terminal: Terminal, new_plan: "mutator.Plan", cost: "PlanCost", reason_by_variant: dict[str, str]
 ) -> None:
     groups = sorted(new_plan.groups().items())
     rows = [(f"{module}/{kind}", method, n) for (module, kind, method), n in groups]
@@ -139,7 +139,7 @@ def _print_plan(
         right=(2,),
         total=True,
     )
-    for text in new_plan.told:
+    for text in new_plan.operator_notes:
         terminal.say(text)
     if len(new_plan.seeds) > 1:
         terminal.say(
@@ -161,8 +161,8 @@ def _variants_by_reason(reason_by_variant: dict[str, str]) -> dict[str, list[str
     }
 
 
-def _describe_cost(cost: "Cost") -> str:
-    source = "measured in this folder" if cost.measured else "estimated with a default time per run"
+def _describe_cost(cost: "PlanCost") -> str:
+    source = "measured in this folder" if cost.is_measured else "estimated with a default time per run"
     time, disk = duration(cost.wall_s), cost.disk_bytes / 1e6
     who = counted(cost.workers, "worker")
     return f"{time} with {who} ({duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}"

@@ -11,7 +11,7 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
 from mutator._common.file_change_detection import UnchangedFiles
 from mutator._common.hashing import digest
-from mutator.campaigns.shared_runs import runs
+from mutator.campaigns.shared_runs import group_by_run
 from mutator.engines.engine_jobs import Engine, Execution, Job, RunMode
 from mutator.errors import BadAddition, BadOutput, InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
@@ -136,7 +136,7 @@ class Runner:
 
         A mutant that cannot be built is not run. Experiments that share a run get the same record.
         """
-        shared = {same[0].id: same for same in runs(self.manifest, experiments)}
+        shared = {same[0].id: same for same in group_by_run(self.manifest, experiments)}
         for finished in self._run([same[0] for same in shared.values()]):
             yield finished
             for other in shared[finished.experiment.id][1:]:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import load_campaign
-from mutator.campaigns.freezing import freeze_owned
-from mutator.campaigns.plan import Planning, load_plan, make_plan
+from mutator.campaigns.freezing import freeze_plan_in_owned_folder
+from mutator.campaigns.plan import SeedBySeedPlan, build_plan, load_plan
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.errors import MutatorError
@@ -29,11 +29,11 @@ def open_frozen(
         folder = _found(workspace, campaign, out, choices)
         approvals = approval_gate.approvals(workspace, load_plan(folder)) if reviewed else None
     else:
-        planning = Planning(workspace, campaign, choices)
+        planning = SeedBySeedPlan(workspace, campaign, choices)
         approvals = (
-            approval_gate.approvals(workspace, make_plan(workspace, campaign, choices)) if reviewed else None
+            approval_gate.approvals(workspace, build_plan(workspace, campaign, choices)) if reviewed else None
         )
-        folder, _ = freeze_owned(planning, out, workspace)
+        folder, _ = freeze_plan_in_owned_folder(planning, out, workspace)
     if approvals is not None:
         write_approvals(folder.path, approvals)
     return folder
@@ -44,7 +44,7 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
     head = folder.head
     check_version(folder)
     loaded = load_campaign(workspace.campaign(campaign))
-    if digest(loaded.source) != head.campaign_digest:
+    if digest(loaded.file_bytes) != head.campaign_digest:
         raise MutatorError(
             f"holds a run of campaign '{head.campaign}' whose text differs from {loaded.path}",
             where=out,
@@ -66,6 +66,8 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
                 argument=name,
                 remedy=f"leave out `{name}`, or use another folder",
             )
-    now = RunInputs.of(workspace, workspace.manifest(head.target), folder.scenarios).digests()
+    now = RunInputs.from_workspace(
+        workspace, workspace.manifest(head.target), folder.scenarios
+    ).digest_by_source()
     check_sources(out, head.sources, now)
     return folder

@@ -12,7 +12,7 @@ import pytest
 from mutator._common.files import raising_disk_full
 from mutator._common.folder_locks import register_worker
 from mutator._common.resource_shortages import find_shortage
-from mutator.campaigns.chunks import Pending
+from mutator.campaigns.chunks import PendingChunk
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage
 from mutator.execution.stopped_workers import on_stop
@@ -40,7 +40,7 @@ class CampaignItem(pytest.Item):
 class WorkItem(CampaignItem):
     """One chunk of the plan, or one experiment of the proof. A hazard is a result, not a failure."""
 
-    def __init__(self, *, work: Pending | SampledExperiment, worker: "LazyWorker", **keywords: Any) -> None:
+    def __init__(self, *, work: PendingChunk | SampledExperiment, worker: "LazyWorker", **keywords: Any) -> None:
         super().__init__(**keywords)
         self.work = work
         self.worker = worker
@@ -49,7 +49,7 @@ class WorkItem(CampaignItem):
         try:
             with raising_disk_full(self.config.rootpath):
                 worker, work = self.worker.get(), self.work
-                errors = worker.run(work) if isinstance(work, Pending) else worker.prove(work)
+                errors = worker.run(work) if isinstance(work, PendingChunk) else worker.prove(work)
         except Exception as err:
             known = err if isinstance(err, MutatorError) else find_shortage(err)
             problem = str(known) if known else _defect(err, self.name)
@@ -96,7 +96,7 @@ class LazyWorker:
 
 
 def collect(
-    session: pytest.Session, works: Sequence[Pending | SampledExperiment], worker: LazyWorker
+    session: pytest.Session, works: Sequence[PendingChunk | SampledExperiment], worker: LazyWorker
 ) -> bool:
     """Make the session's items: chunks, then experiments of the proof.
 
@@ -104,7 +104,9 @@ def collect(
     """
     session.items = []
     for work in works:
-        name = f"chunk-{work.chunk:05d}" if isinstance(work, Pending) else f"proof-{work.number:05d}"
+        name = (
+            f"chunk-{work.chunk_index:05d}" if isinstance(work, PendingChunk) else f"proof-{work.number:05d}"
+        )
         session.items.append(
             WorkItem.from_parent(session, name=name, nodeid=f"campaign::{name}", work=work, worker=worker)
         )
@@ -130,11 +132,11 @@ class WorkerSide:
         )
         self._config = config
         self._registration = register_worker(run)
-        self._work: list[Pending | SampledExperiment] = [
-            *(Pending(chunk, tuple(places)) for chunk, places in given["pending"]),
+        self._work: list[PendingChunk | SampledExperiment] = [
+            *(PendingChunk(chunk, tuple(places)) for chunk, places in given["pending"]),
             *(SampledExperiment(number, name) for number, name in given["proof"]),
         ]
-        self._worker = LazyWorker(partial(RunInputs.unpacked, given["inputs"]), assignment)
+        self._worker = LazyWorker(partial(RunInputs.from_bytes, given["inputs"]), assignment)
         on_stop(self._worker.note_stop)
 
     def pytest_collection(self, session: pytest.Session) -> bool:

@@ -22,10 +22,10 @@ from mutator._common.files import is_half_written, remove_anything_at
 from mutator._common.folder_locks import owning_run_folder, wait_for_workers
 from mutator._common.interrupts import interruptible
 from mutator.audit.seal import Seals, seals_of
-from mutator.campaigns.chunks import Pending, pending
+from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
 from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.run_inputs import RunInputs
-from mutator.campaigns.run_provenance import add_machine, begin_stretch, check_versions
+from mutator.campaigns.run_provenance import accepted_version_differences, append_machine, begin_stretch
 from mutator.engines.engine_choice import choose_engine, not_worth_forking
 from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import make_work
@@ -118,7 +118,7 @@ class Session:
         self.workers = workers
         self.accept_versions = accept_versions
         self.notify: Notify = notify or (lambda progress: None)
-        self.pending: tuple[Pending, ...] = ()
+        self.pending: tuple[PendingChunk, ...] = ()
         self.proof: tuple[equivalence_check.SampledExperiment, ...] = ()
         self.manifest = workspace.manifest(folder.head.target)
         # count the whole plan, so that all shards and an unsharded run agree on whether a proof is needed
@@ -150,13 +150,13 @@ class Session:
         self._known = None
         records = self.folder.records()
         self._done_before = sum(one.is_final for one in endings_of(records))
-        left = pending(self.folder, records)
+        left = pending_chunks_of(self.folder, records)
         if left and self.engine != REFERENCE:
             equivalence_check.mark_as_needed(self.folder.path)
         self.proof = equivalence_check.remaining_sample(self.folder)
         if left or self.proof or not checks_and_goldens_exist(self.folder):
             check_requirements(self.manifest)
-            check_versions(self.folder, accept=self.accept_versions)
+            accepted_version_differences(self.folder, accept=self.accept_versions)
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
             for remark in describe_unreached_triggers(self.workspace, self.folder):
                 warnings.warn(remark, MutatorWarning, stacklevel=2)
@@ -173,7 +173,7 @@ class Session:
         self._records = None if left else records
 
     def note_machine(self, machine: Machine) -> None:
-        self.folder = add_machine(self.folder, machine)
+        self.folder = append_machine(self.folder, machine)
         self._ledger = file_digests.load_ledger(self.folder.path)
 
     def worker_name(self, name: str) -> str:
@@ -186,18 +186,18 @@ class Session:
 
     @cached_property
     def inputs(self) -> RunInputs:
-        return RunInputs.of(self.workspace, self.manifest, self.folder.scenarios)
+        return RunInputs.from_workspace(self.workspace, self.manifest, self.folder.scenarios)
 
     def worker_input(self) -> dict[str, Any]:
         return {
             "parent": os.getpid(),
             "run": str(self.folder.path),
             "session": self.worker_name(""),
-            "inputs": self.inputs.packed(),
+            "inputs": self.inputs.to_bytes(),
             "engine": self.engine,
             "goldens": dict(self.golden_digests),
             "secret": self.secret,
-            "pending": [[item.chunk, list(item.places)] for item in self.pending],
+            "pending": [[item.chunk_index, list(item.places)] for item in self.pending],
             "proof": [[sample.number, sample.id] for sample in self.proof],
         }
 

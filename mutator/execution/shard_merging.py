@@ -13,7 +13,7 @@ from mutator._common.folder_locks import owning_run_folder
 from mutator._common.message_text import counted
 from mutator.audit.seal import UNSEALED_KEYS, without_keys
 from mutator.campaigns.freezing import make_run_folder
-from mutator.campaigns.run_provenance import other_versions
+from mutator.campaigns.run_provenance import version_error
 from mutator.errors import CheckFailed, MutatorError
 from mutator.preflight import equivalence_check
 from mutator.results import table_building
@@ -183,7 +183,7 @@ def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretc
             text for one, other in ends for text in version_differences(one, other.python, other.packages)
         ]
         if found and not accept:
-            raise other_versions(folder.path, f"unlike {first.path}, this shard used", found)
+            raise version_error(folder.path, f"unlike {first.path}, this shard used", found)
         assert folder.shard is not None
         for i, stretch in enumerate(folder.stretches):
             yield replace(

@@ -113,7 +113,7 @@ def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
 def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
     """Return the target of a run; MutatorError if its sources have changed since the run."""
     manifest = workspace.manifest(folder.head.target)
-    now = RunInputs.of(workspace, manifest, folder.scenarios).digests()
+    now = RunInputs.from_workspace(workspace, manifest, folder.scenarios).digest_by_source()
     check_sources(folder.path, folder.head.sources, now)
     return manifest
 

@@ -11,7 +11,7 @@ from typing import Any
 from mutator._common import shared_cache
 from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
-from mutator.campaigns.chunks import Pending
+from mutator.campaigns.chunks import PendingChunk
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
 from mutator.engines.engine_choice import make_engine
@@ -52,7 +52,7 @@ class Worker:
     def __init__(self, inputs: RunInputs, assignment: Assignment) -> None:
         self.was_stopped = False  # a signal handler sets it
         self.folder = RunFolder.open(assignment.run)
-        check_sources(self.folder.path, self.folder.head.sources, inputs.digests())
+        check_sources(self.folder.path, self.folder.head.sources, inputs.digest_by_source())
         with raising_disk_full(self.folder.scratch_folder):
             self.folder.scratch_folder.mkdir(exist_ok=True)
         self._inputs, self._manifest, self._assignment = inputs, inputs.manifest, assignment
@@ -66,10 +66,10 @@ class Worker:
         self._faults = plan_file.load_faults(self.folder.path)
         self._writer = RunWriter(self.folder, assignment.name)  # last: nothing is written if the rest fails
 
-    def run(self, pending: Pending) -> list[tuple[str, str]]:
+    def run(self, pending: PendingChunk) -> list[tuple[str, str]]:
         """Run the rest of a chunk; return (experiment id, detail) of each harness error."""
         experiments = plan_file.load_chunk(
-            self.folder.path, self.folder.head.chunks[pending.chunk], self._faults
+            self.folder.path, self.folder.head.chunks[pending.chunk_index], self._faults
         )
         self._make_room(experiments[0].seed)
         errors = []
@@ -133,10 +133,10 @@ class Worker:
         inputs = self._inputs
         return Runner(
             self._manifest,
-            inputs.models,
+            inputs.fault_models,
             engine,
             goldens,
-            inputs.scenarios.__getitem__,
+            inputs.scenario_files.__getitem__,
             with_series=with_series,
         )
 
@@ -144,7 +144,7 @@ class Worker:
         folder = self.folder
         setting = Setting(
             manifest=self._manifest,
-            models=self._inputs.models,
+            models=self._inputs.fault_models,
             work=folder.scratch_folder,
             limits=folder.limits,
             parent=self._assignment.parent,

@@ -15,7 +15,7 @@ from pathlib import Path
 from mutator._common.files import raising_disk_full, remove_folder
 from mutator._common.hashing import digest
 from mutator._common.message_text import counted
-from mutator.campaigns.sampling import pick
+from mutator.campaigns.sampling import draw_balanced
 from mutator.engines.engine_jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.model import Experiment, Record, Status
@@ -63,7 +63,7 @@ def mark_as_needed(run: Path) -> None:
 def choose_sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ...]:
     """Choose one experiment in a hundred, at least 20, with every fault type and every scenario."""
     count = max(_MIN_SAMPLE, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_ONE))
-    chosen = list(pick(experiments, count, seed))
+    chosen = list(draw_balanced(experiments, count, seed))
     covered = {mark for experiment in chosen for mark in _traits_to_cover(experiment)}
     for experiment in sorted(experiments, key=lambda e: digest([seed, e.id])):
         if not covered.issuperset(_traits_to_cover(experiment)):
@@ -88,7 +88,7 @@ def _cached_sample_ids(run: Path, plan: str, seeds: int) -> tuple[str, ...]:
     for seed, group in groupby(plan_file.iterate_experiments(run), key=lambda experiment: experiment.seed):
         experiments = tuple(group)
         sampled_experiments = (
-            pick(experiments, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_ONE), seed)
+            draw_balanced(experiments, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_ONE), seed)
             if ids
             else choose_sample(experiments, seed)
         )

@@ -13,7 +13,7 @@ from mutator._common.files import json_bytes, raising_disk_full, read_json, writ
 from mutator._common.hashing import digest
 from mutator.campaigns import run_environment
 from mutator.campaigns.run_inputs import RunInputs
-from mutator.campaigns.shared_runs import same_in
+from mutator.campaigns.shared_runs import equal_scenarios
 from mutator.errors import CheckFailed, DiskFull, InvalidMutant, MutatorError
 from mutator.mutants.mutant_building import build
 from mutator.preflight import preflight_cache, unreached_triggers
@@ -104,14 +104,14 @@ class _PreflightChecks:
         self.manifest: TargetManifest = workspace.manifest(head.target)
         self.models = workspace.fault_models()
         self.golden_runs = folder.golden_runs
-        now = RunInputs.of(workspace, self.manifest, folder.scenarios).digests()
+        now = RunInputs.from_workspace(workspace, self.manifest, folder.scenarios).digest_by_source()
         self.fault_by_variant = {fault.spec: fault for fault in plan_file.load_faults(folder.path).values()}
         places = sorted(
             (name, [i.location for i in f.injections]) for name, f in self.fault_by_variant.items()
         )
         content = [
             now,
-            run_environment.surroundings(),
+            run_environment.everything_outside_sources(),
             head.goldens,
             head.seed,
             folder.canary.id,
@@ -226,7 +226,7 @@ class _PreflightChecks:
         """Return the packages that the golden runs loaded, without the target and the standard library."""
         loaded = {module for key in self.golden_runs for module in runs[GOLDEN, key].modules}
         target_modules = {path.split("/")[0].removesuffix(".py") for path in self.manifest.tree.files}
-        return list(run_environment.packages_of(loaded - target_modules))
+        return list(run_environment.packages_of_modules(loaded - target_modules))
 
     def _judge_goldens(self, runs: CheckRunByName) -> Iterator[CheckResult]:
         for key in self.golden_runs:
@@ -242,7 +242,7 @@ class _PreflightChecks:
         """Check that scenarios which a change makes equal, according to the manifest, give the same bytes."""
         equal_runs: dict[GoldenRun, dict[str, CheckRun]] = {}
         for golden_run in self.golden_runs:
-            if golden_run.scenario in same_in(self.manifest, golden_run.changes):
+            if golden_run.scenario in equal_scenarios(self.manifest, golden_run.changes):
                 equal_runs.setdefault(golden_run._replace(scenario=""), {})[golden_run.scenario] = runs[
                     GOLDEN, golden_run
                 ]

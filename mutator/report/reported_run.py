@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, cast
 
-from mutator.campaigns.installed_studies import find_study
+from mutator.campaigns.installed_studies import load_installed_study
 from mutator.errors import MutatorError
 from mutator.figures.drawings import Drawing
 from mutator.model import Experiment, Fault, Record, Status
@@ -137,6 +137,6 @@ class PublishedWork:
 def _find_published_work(folder: RunFolder) -> PublishedWork | None:
     name = folder.head.study
     try:
-        return cast(PublishedWork, find_study(name)) if name else None
+        return cast(PublishedWork, load_installed_study(name)) if name else None
     except MutatorError:
         return None

@@ -78,5 +78,5 @@ def _campaign(workspace: Workspace, plan: Plan) -> str:
     """Return the campaign's name if the library's file of that name has the same text, else its file."""
     name = plan.campaign.name
     known = name in workspace.campaigns
-    same = known and read_bounded(workspace.campaign(name)) == plan.campaign.source
+    same = known and read_bounded(workspace.campaign(name)) == plan.campaign.file_bytes
     return name if same else shlex.quote(str(plan.campaign.path))

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator.campaigns.git_clone import Clone
+from mutator.campaigns.git_clone import GitClone
 from mutator.errors import MutatorError
 from mutator.review.mutant_groups import Group
 from mutator.workspace import Workspace
@@ -35,10 +35,12 @@ def _names(person: str) -> set[str]:
 
 def library_commit(workspace: Workspace) -> str | None:
     """Return the library's commit, with `-dirty` if more than its reviews changed since; None outside git."""
-    clone = Clone.of(workspace.library)
+    clone = GitClone.find(workspace.library)
     if clone is None:
         return None
-    return clone.commit + "-dirty" * (clone.differs(workspace.library, leave_out="reviews") is not False)
+    return clone.commit + "-dirty" * (
+        clone.differs_from_commit(workspace.library, leave_out="reviews") is not False
+    )
 
 
 def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
@@ -61,9 +63,9 @@ def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
 
 def _last_changes(group: Group) -> dict[Path, _Commit]:
     """Return the last commit that changed the group's sources, for each clone."""
-    clones: dict[Clone, list[Path]] = {}
+    clones: dict[GitClone, list[Path]] = {}
     for path in group.made_from:
-        clone = Clone.of(path.resolve().parent)
+        clone = GitClone.find(path.resolve().parent)
         if clone is None:
             raise _refusal(
                 f"cannot determine who last changed group {group.id}: its file is not in a git clone",
@@ -71,16 +73,16 @@ def _last_changes(group: Group) -> dict[Path, _Commit]:
                 "put the file under git",
             )
         clones.setdefault(clone, []).append(path)
-    return {clone.top: _last_change(group, clone, paths) for clone, paths in clones.items()}
+    return {clone.root: _last_change(group, clone, paths) for clone, paths in clones.items()}
 
 
-def _last_change(group: Group, clone: Clone, paths: Sequence[Path]) -> _Commit:
-    changed = clone.changed(paths)
-    commit = (clone.last_change(paths, _FORMAT) or "").strip("\n")
+def _last_change(group: Group, clone: GitClone, paths: Sequence[Path]) -> _Commit:
+    changed = clone.find_changed(paths)
+    commit = (clone.describe_last_change(paths, _FORMAT) or "").strip("\n")
     if changed is not None or not commit:
         raise _refusal(
             f"cannot determine who last changed group {group.id}: its latest change is not committed",
-            changed or clone.top,
+            changed or clone.root,
             "commit the change first",
         )
     sha, author, *others = filter(None, commit.split("\0"))

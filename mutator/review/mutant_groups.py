@@ -83,7 +83,7 @@ def of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
     manifest = workspace.manifest(plan.campaign.target)
     members = [(e.fault, e.trigger) for e in (*plan.experiments, plan.canary)]
     runs = Counter(patch_shapes.group_label(e.fault) for e in plan.experiments)
-    files = [one.file for one in plan.campaign.faults if one.file]
+    files = [one.spec_file for one in plan.campaign.fault_selections if one.spec_file]
     named = [
         workspace.spec(file) for file in files if file.is_file()
     ]  # in a run folder's copy of a campaign, links can be dangling

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from mutator.campaigns.git_clone import user_name
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.git_clone import find_user_name
+from mutator.campaigns.plan import build_plan
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import Absent, GroupsChanged, MutatorError, ReviewConflict
 from mutator.review import effect_pictures, group_results, mutant_groups
@@ -69,7 +69,7 @@ class Reviews:
 
     @property
     def reviewer(self) -> str:
-        return user_name(self.workspace.library) or ""
+        return find_user_name(self.workspace.library) or ""
 
     def selection(self, target: str, campaign: str | None, specs: Sequence[str]) -> Selection:
         if target not in self.workspace.targets:
@@ -181,7 +181,7 @@ class Reviews:
         workspace = self.workspace
         if chosen.campaign is None:
             return mutant_groups.of_library(workspace, workspace.manifest(chosen.target), specs=chosen.specs)
-        plan = make_plan(workspace, chosen.campaign, Choices())
+        plan = build_plan(workspace, chosen.campaign, Choices())
         if plan.campaign.target != chosen.target:
             raise Absent(f"campaign '{chosen.campaign}' belongs to target '{plan.campaign.target}'")
         return mutant_groups.of_plan(workspace, plan)

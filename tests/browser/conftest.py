@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from mutator._common.hashing import digest
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.series_sampling import SeriesSampler, write_sampled_series
@@ -84,8 +84,8 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     """
     folder = tmp_path_factory.mktemp("browser")
     workspace = copy_toycar(folder)
-    plan = make_plan(workspace, "toy")
-    out = freeze(plan, folder / "run", workspace)
+    plan = build_plan(workspace, "toy")
+    out = freeze_plan(plan, folder / "run", workspace)
     manifest, models = workspace.manifest("toycar"), workspace.fault_models()
     lines = LineWriter(out.path / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
     patches = PatchWriter(out.path, "0001-main")

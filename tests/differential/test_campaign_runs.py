@@ -64,7 +64,7 @@ def test_order_and_interruptions_change_no_byte(
     def two_chunks(self: Session, packages: Iterable[str]) -> None:
         prepare(self, packages)
         self.pending = tuple(draw.sample(self.pending, min(2, len(self.pending))))
-        taken.extend(item.chunk for item in self.pending)
+        taken.extend(item.chunk_index for item in self.pending)
 
     monkeypatch.setattr(Session, "prepare", two_chunks)
     ends = [(summary := run_campaign(toy, "small", tmp_path / "run")).exit_code]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.plan import build_plan
 from mutator.engines.engine_choice import make_engine
 from mutator.engines.engine_jobs import Job, Setting
 from mutator.engines.engine_kinds import ENGINES
@@ -24,7 +24,7 @@ CLONE = Path(__file__).parents[2]
 @pytest.mark.parametrize(("campaign", "limit"), [("quickstart", 26), ("paper", 8)])
 def test_the_engines_give_the_same_records(tmp_path: Path, campaign: str, limit: int) -> None:
     clone = Workspace.find(root=CLONE)
-    plan = make_plan(clone, campaign, Choices(limit=limit))
+    plan = build_plan(clone, campaign, Choices(limit=limit))
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     (tmp_path / "work").mkdir()
     limits = plan.campaign.limits

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import pytest
 
 from mutator.audit.seal import seals_of
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.engines import engine_choice
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution import shard_merging
@@ -163,7 +163,7 @@ def test_shards_of_other_plans_or_sources_are_refused(
         with pytest.raises(MutatorError, match=told) as caught:
             merge([copies["1/2"], two], tmp_path / "out")
         assert str(two) in str(caught.value)
-    third = freeze(make_plan(toy, "small", Choices(shard="2/3")), tmp_path / "third", toy).path
+    third = freeze_plan(build_plan(toy, "small", Choices(shard="2/3")), tmp_path / "third", toy).path
     with pytest.raises(MutatorError, match=f"{third}: shard 2/3; expected one of 2 shards"):
         merge([copies["1/2"], third], tmp_path / "out")
 
@@ -253,7 +253,7 @@ def fail(run: Path) -> Path:
 @pytest.mark.parametrize("shard", ["0/3", "4/3", "1", "a/b", "1/0", "-1/3", "1/7"])
 def test_impossible_shards_are_refused(toy: Workspace, shard: str) -> None:
     with pytest.raises(MutatorError, match=f"shard:? '?{shard}"):
-        make_plan(toy, "small", Choices(shard=shard))
+        build_plan(toy, "small", Choices(shard=shard))
 
 
 @pytest.mark.slow

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from mutator._common.hashing import canonical_json
-from mutator.campaigns.chunks import Pending, pending
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import load_plan, make_plan
+from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan, load_plan
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.execution.campaign_running import run_campaign
@@ -121,7 +121,7 @@ def test_one_experiment_of_a_shared_run_can_run_on_a_cluster(runs: tuple[Path, P
         library=runs[0].parent / "toy" / "fault_library", templates=runs[0].parent / "toy" / "templates"
     )
     bundle.lay_out(Bundle.of(toy, folder, "reference").data, tmp_path)
-    chunk = next(one for one in pending(folder, {}) if {"A", "C"} == set(_scenarios(folder, one)))
+    chunk = next(one for one in pending_chunks_of(folder, {}) if {"A", "C"} == set(_scenarios(folder, one)))
     left = replace(chunk, places=(_scenarios(folder, chunk).index("C"),))
     piece = Board(folder, [left], ()).take("w")
     assert piece is not None and piece.golden == "A+alone"
@@ -132,14 +132,14 @@ def test_one_experiment_of_a_shared_run_can_run_on_a_cluster(runs: tuple[Path, P
     assert record == canonical_json(record_as_json(folder.records()[name])).encode()
 
 
-def _scenarios(folder: RunFolder, chunk: Pending) -> list[str]:
-    lines = plan_file.read_chunk_lines(folder.path, folder.head.chunks[chunk.chunk])
+def _scenarios(folder: RunFolder, chunk: PendingChunk) -> list[str]:
+    lines = plan_file.read_chunk_lines(folder.path, folder.head.chunks[chunk.chunk_index])
     return [json.loads(line)["scenario"] for line in lines]
 
 
 def test_different_scenarios_declared_equal_are_refused(toy: Workspace, tmp_path: Path) -> None:
     two_scenarios(toy, SHARED)
     edit(toy.library / "scenarios" / "C.yaml", "speed: 20", "speed: 21")
-    folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
+    folder = freeze_plan(build_plan(toy, "small"), tmp_path / "run", toy)
     with pytest.raises(CheckFailed, match=r"same A\+C\+alone: C differs from A"):
         run_checks(toy, folder)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import mutator
-from mutator.campaigns.chunks import Pending
+from mutator.campaigns.chunks import PendingChunk
 from mutator.engines.engine_jobs import Execution, Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
@@ -210,7 +210,7 @@ def test_a_defect_in_a_worker_is_reported(
 ) -> None:
     run, seen = Worker.run, []
 
-    def broken(self: Worker, pending: Pending) -> list[tuple[str, str]]:
+    def broken(self: Worker, pending: PendingChunk) -> list[tuple[str, str]]:
         seen.append(pending)
         if len(seen) == 2:
             raise ZeroDivisionError("seven")

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.chunks import Pending
+from mutator.campaigns.chunks import PendingChunk
 from mutator.execution.pytest_session import Controller, configure
 from mutator.execution.written_files import WrittenFiles
 from mutator.workspace import Workspace
@@ -115,7 +115,7 @@ def test_collecting_50000_experiments_is_fast(toy: Workspace, tmp_path: Path) ->
     """Collecting 2,500 chunks opens neither plan nor target nor library."""
     begun: Any = SimpleNamespace(
         folder=SimpleNamespace(path=tmp_path / "nowhere"),
-        pending=tuple(Pending(chunk, tuple(range(20))) for chunk in range(2500)),
+        pending=tuple(PendingChunk(chunk, tuple(range(20))) for chunk in range(2500)),
         proof=(),
         engine="reference",
         golden_digests={},

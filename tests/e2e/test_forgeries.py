@@ -15,7 +15,7 @@ import pytest
 import mutator
 from mutator._common.hashing import canonical_json, digest
 from mutator.audit.seal import golden_digests, seals_of
-from mutator.campaigns.freezing import plan_csv
+from mutator.campaigns.freezing import plan_csv_bytes
 from mutator.campaigns.plan import load_plan
 from mutator.campaigns.plan_parts import plan_digest
 from mutator.cli.app import main
@@ -183,7 +183,7 @@ def replan(run: Path, changed: Callable[[list[Experiment]], list[Experiment]]) -
     before = head["plan"]
     head["plan"] = plan_digest([e.id for e in new], sizes, plan.canary.id, plan.campaign)
     path.write_text(json.dumps(head))
-    (run / "plan.csv").write_bytes(plan_csv(replace(plan, experiments=new)))
+    (run / "plan.csv").write_bytes(plan_csv_bytes(replace(plan, experiments=new)))
     for file in (file for kind in ("records", "proof", "timings") for file in (run / kind).iterdir()):
         file.write_text(file.read_text().replace(before, head["plan"]))
 

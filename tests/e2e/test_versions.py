@@ -260,7 +260,9 @@ def test_another_installed_python_resumes_only_if_accepted(toy: Workspace, tmp_p
         return subprocess.run(command, env=os.environ | places, capture_output=True, text=True, check=False)
 
     refused = run()
-    assert refused.returncode == 2 and f"{run_environment.python()}, here CPython 3." in refused.stderr
+    assert (
+        refused.returncode == 2 and f"{run_environment.python_version()}, here CPython 3." in refused.stderr
+    )
     accepted = run("--accept-versions")
     assert accepted.returncode == 0, accepted.stderr
     assert "12 of 12 experiments done, 10 now" in accepted.stderr + accepted.stdout

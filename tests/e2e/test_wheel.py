@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.plan import build_plan
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow
@@ -131,7 +131,7 @@ def test_the_first_commands_work_in_an_empty_folder(python: Path, elsewhere: Pat
     ran = call(mutator, "run", "quickstart", "--out", "runs/q", "-n", 2, here=elsewhere)
     assert "60 of 60 experiments done" in ran
     head = json.loads((elsewhere / "runs/q/run.json").read_text())
-    plan = make_plan(workspace, "quickstart")
+    plan = build_plan(workspace, "quickstart")
     assert head["plan"] == plan.digest
     assert head["sources"]["target"] == workspace.manifest("openpilot").tree.digest
     assert "60 experiments" in (elsewhere / "runs/q/report/REPORT.md").read_text()

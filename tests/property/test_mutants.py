@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
 from mutator.faults.spec_expansion import expand
@@ -121,7 +121,7 @@ def test_reused_changes_give_the_same_mutants_as_splicing(fault: Fault, trigger:
 @pytest.mark.slow
 @pytest.mark.parametrize("reading", READINGS)
 def test_mutants_of_the_papers_campaign_equal_spliced_ones(reading: str) -> None:
-    plan = make_plan(Workspace.find(root=ROOT), "paper", Choices(reading=reading))
+    plan = build_plan(Workspace.find(root=ROOT), "paper", Choices(reading=reading))
     pairs = {(e.fault.id, e.trigger): e for e in plan.experiments}
     assert len(pairs) > 6000
     for experiment in pairs.values():

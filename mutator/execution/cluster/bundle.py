@@ -151,6 +151,8 @@ def read_inputs(site: Site) -> RunInputs:
     check_column_names(manifest)
     return RunInputs(
         manifest=replace(manifest, sandbox=site.meta["sandbox"]),
-        models=load_fault_models(site.place / "templates"),
-        scenarios={golden.scenario: site.scenario(golden.scenario) for golden, _ in site.goldens.values()},
+        fault_models=load_fault_models(site.place / "templates"),
+        scenario_files={
+            golden.scenario: site.scenario(golden.scenario) for golden, _ in site.goldens.values()
+        },
     )

@@ -32,7 +32,7 @@ class DrivenGoldens:
             VERSION,
             [[path.relative_to(site.place).as_posix(), digest(read_bounded(path))] for path in files],
             site.meta["limits"],
-            run_environment.surroundings(),
+            run_environment.everything_outside_sources(),
             platform.node(),
         ]
 

@@ -23,7 +23,7 @@ from mutator._common.files import raising_disk_full
 from mutator._common.hashing import canonical_json
 from mutator._common.resource_shortages import find_shortage
 from mutator.campaigns.run_inputs import RunInputs
-from mutator.campaigns.shared_runs import runs
+from mutator.campaigns.shared_runs import group_by_run
 from mutator.engines import sandbox
 from mutator.engines.engine_choice import make_engine
 from mutator.engines.engine_jobs import FAST, Job, Setting
@@ -49,7 +49,7 @@ class PieceRunner:
 
     def __init__(self, site: Site, inputs: RunInputs, name: str, parent: int) -> None:
         self._site, self._name, self._parent = site, name, parent
-        self._manifest, self._models = inputs.manifest, inputs.models
+        self._manifest, self._models = inputs.manifest, inputs.fault_models
         check_requirements(inputs.manifest)
         if inputs.manifest.sandbox:
             sandbox.check()
@@ -69,7 +69,7 @@ class PieceRunner:
         began = time.monotonic()
         experiments = piece.experiments()
         # a shared run is compared with the golden run of its first experiment
-        for same in runs(self._manifest, experiments):
+        for same in group_by_run(self._manifest, experiments):
             if (key := self._golden_of(same[0]).key) not in self._alike:
                 self._have_golden(key)
         runner = self._runner(piece.kind)
@@ -199,7 +199,7 @@ def main() -> int:
     try:
         with raising_disk_full(site.place):
             with os.fdopen(int(sys.argv[2]), "rb") as file:
-                inputs = RunInputs.unpacked(file.read())
+                inputs = RunInputs.from_bytes(file.read())
             runner = PieceRunner(site, inputs, name, os.getppid())
     except Exception as err:
         _refuse(connection, err)

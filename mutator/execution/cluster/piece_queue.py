@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
-from mutator.campaigns.chunks import Pending
+from mutator.campaigns.chunks import PendingChunk
 from mutator.execution.cluster.pieces import Kind, Piece
 from mutator.execution.cluster.work_by_golden import Group, Run, faults_of, golden_of, groups_of
 from mutator.preflight.equivalence_check import SampledExperiment
@@ -55,7 +55,7 @@ class Board:
     def __init__(
         self,
         folder: RunFolder,
-        pending: Sequence[Pending],
+        pending: Sequence[PendingChunk],
         proof: Sequence[SampledExperiment],
         now: Callable[[], float] = time.monotonic,
     ) -> None:

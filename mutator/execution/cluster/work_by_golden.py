@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any
 
-from mutator.campaigns.chunks import Pending
+from mutator.campaigns.chunks import PendingChunk
 from mutator.execution.cluster.pieces import Piece
 from mutator.store import plan_file
 from mutator.store.plan_lines import id_on_line, parse_experiment, parse_fault, values_behind_id
@@ -32,11 +32,11 @@ class Group:
         return self.left + sum(len(piece.lines) for piece in self.again)
 
 
-def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> dict[str, Group]:
+def groups_of(folder: RunFolder, pending: Sequence[PendingChunk], faults: Faults) -> dict[str, Group]:
     """Return the pending work by golden run. All experiments of a chunk have the same golden run."""
-    chunks: dict[str, list[Pending]] = {}
+    chunks: dict[str, list[PendingChunk]] = {}
     for one in pending:
-        first = next(iter(plan_file.read_chunk_lines(folder.path, folder.head.chunks[one.chunk])))
+        first = next(iter(plan_file.read_chunk_lines(folder.path, folder.head.chunks[one.chunk_index])))
         chunks.setdefault(golden_of(folder, first, faults), []).append(one)
     return {
         golden: Group(golden, _runs_of(folder, ours), sum(len(one.places) for one in ours))
@@ -44,9 +44,9 @@ def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> 
     }
 
 
-def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
+def _runs_of(folder: RunFolder, pending: Sequence[PendingChunk]) -> Iterator[Run]:
     for one in pending:
-        lines = list(plan_file.read_chunk_lines(folder.path, folder.head.chunks[one.chunk]))
+        lines = list(plan_file.read_chunk_lines(folder.path, folder.head.chunks[one.chunk_index]))
         for _, same in groupby((lines[place] for place in one.places), key=_what_runs):
             yield {id_on_line(line): line for line in same}
 

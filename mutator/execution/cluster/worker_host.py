@@ -174,7 +174,7 @@ class Host:
 
     def _started(self) -> _Child:
         """Start a process that dies with this thread."""
-        self._inputs = self._inputs or bundle.read_inputs(Site(self.folder)).packed()
+        self._inputs = self._inputs or bundle.read_inputs(Site(self.folder)).to_bytes()
         ours, its = socket.socketpair()
         try:
             with tempfile.TemporaryFile(dir=self.folder) as file:  # nameless, so no run can change it

@@ -33,11 +33,11 @@ def facts(packages: Iterable[str]) -> dict[str, Any]:
     return {
         "mutator": VERSION,
         "host": socket.gethostname(),
-        "python": run_environment.python(),
+        "python": run_environment.python_version(),
         "platform": platform.platform(),
-        "cpu": run_environment.cpu(),
-        "blas": as_json_types(run_environment.blas()),
-        "packages": run_environment.versions(packages),
+        "cpu": run_environment.processor_name(),
+        "blas": as_json_types(run_environment.loaded_blas()),
+        "packages": run_environment.package_versions(packages),
     }
 
 

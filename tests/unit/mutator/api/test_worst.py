@@ -7,8 +7,8 @@ import pytest
 
 from mutator.api import worst as module
 from mutator.api.worst import worst_results
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.model import Outcome, Record
 from mutator.store.checksummed_lines import line_file_bytes
 from mutator.store.records import SCHEMA, record_as_json
@@ -18,8 +18,8 @@ from mutator.workspace import Workspace
 def test_filtered_results_are_sorted_by_severity(
     toycar: Workspace, tmp_path: Path, record: Callable[..., Record], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plan = make_plan(toycar, "toy")
-    run = freeze(plan, tmp_path / "run", toycar).path
+    plan = build_plan(toycar, "toy")
+    run = freeze_plan(plan, tmp_path / "run", toycar).path
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H3", 5.0),)}
     made = [record(e.id, **(hazard if i % 5 == 0 else {})) for i, e in enumerate(plan.experiments)]
     path = run / "records" / "0001-main.jsonl"

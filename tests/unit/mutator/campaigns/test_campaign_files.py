@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.campaign_files import check_readings, load_campaign, load_study
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.campaign_files import check_readings, load_campaign, load_campaign_study
+from mutator.campaigns.plan import build_plan
 from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
 from mutator.model import Method
@@ -38,11 +38,11 @@ def test_a_campaign_is_read(tmp_path: Path) -> None:
     campaign = load_campaign(path)
     assert (campaign.name, campaign.target, campaign.seed) == ("mine", "toycar", 3)
     assert campaign.methods == (Method.GUIDED, Method.RANDOM)
-    assert [selection.values for selection in campaign.faults] == [None, 2]
-    assert campaign.armed_after_s == {"as_described": 1.5, "as_coded": 0.0}
-    assert (campaign.sample, campaign.rows, campaign.reading) == (None, None, None)
+    assert [selection.values_per_variant for selection in campaign.fault_selections] == [None, 2]
+    assert campaign.armed_after_s_by_reading == {"as_described": 1.5, "as_coded": 0.0}
+    assert (campaign.sample_size, campaign.context_ids, campaign.reading) == (None, None, None)
     assert campaign.limits.wall_s > campaign.limits.cpu_s
-    assert campaign.source == TEXT.encode()
+    assert campaign.file_bytes == TEXT.encode()
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_a_single_arming_time_applies_to_every_reading(toycar: Workspace) -> Non
     path = in_library(toycar, "{as_described: 1.5, as_coded: 0.0}", "1.25")
     campaign = load_campaign(path)
     check_readings(campaign, toycar.readings())
-    assert [campaign.armed_after(name) for name in toycar.readings().names] == [1.25, 1.25]
+    assert [campaign.armed_after_s_in(name) for name in toycar.readings().names] == [1.25, 1.25]
 
 
 def test_a_setting_can_differ_by_reading(toycar: Workspace) -> None:
@@ -116,9 +116,9 @@ def test_a_setting_can_differ_by_reading(toycar: Workspace) -> None:
         path = in_library(toycar, "methods:", f"{text}methods:")
         campaign = load_campaign(path)
         check_readings(campaign, toycar.readings())
-        assert {name: campaign.setting_in(name) for name in expected} == expected
+        assert {name: campaign.changes_in(name) for name in expected} == expected
     for name in expected:
-        made = make_plan(toycar, path, Choices(reading=name)).experiments
+        made = build_plan(toycar, path, Choices(reading=name)).experiments
         assert {experiment.setting for experiment in made} == {expected[name]}
     twice = in_library(toycar, "methods:", "setting: {as_coded: [alone, alone]}\nmethods:")
     with pytest.raises(MutatorError, match=r"mine\.yaml:9: 'alone' is listed twice"):
@@ -149,7 +149,7 @@ def test_readings_must_be_those_of_the_library(
 ) -> None:
     path = in_library(toycar, old, new)
     with pytest.raises(MutatorError) as error:
-        make_plan(toycar, path)
+        build_plan(toycar, path)
     assert f"{path}:{line}: {told}" in str(error.value)
     assert any(told in str(problem) for problem in library_problems(toycar, "toycar"))
 
@@ -157,18 +157,18 @@ def test_readings_must_be_those_of_the_library(
 def test_a_plan_looks_up_only_the_changes_of_its_reading(toycar: Workspace) -> None:
     text = "setting: {as_described: [], as_coded: [upside_down]}\nmethods:"
     path = in_library(toycar, "methods:", text)
-    make_plan(toycar, path)
+    build_plan(toycar, path)
     with pytest.raises(MutatorError, match=r"mine\.yaml:9: change 'upside_down'"):
-        make_plan(toycar, path, Choices(reading="as_coded"))
+        build_plan(toycar, path, Choices(reading="as_coded"))
 
 
 def test_an_unknown_study_is_refused_with_its_line(toycar: Workspace, tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(TEXT)
-    assert make_plan(toycar, path).campaign.study is None
+    assert build_plan(toycar, path).campaign.study is None
     path.write_text(TEXT.replace("target: toycar", "target: toycar\nstudy: moon_landing"))
     said = "mine.yaml:5: no study 'moon_landing'; expected one of driving_agent_resilience"
     with pytest.raises(MutatorError, match=said):
-        make_plan(toycar, path)
+        build_plan(toycar, path)
     with pytest.raises(MutatorError, match=said):
-        load_study(load_campaign(path))
+        load_campaign_study(load_campaign(path))

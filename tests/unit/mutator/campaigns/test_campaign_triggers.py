@@ -6,7 +6,7 @@ import pytest
 
 from mutator.api.mutant_files import MutantSet
 from mutator.api.selection import find_trigger
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.plan import build_plan
 from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
 from mutator.model import Hold, Method
@@ -35,7 +35,7 @@ def listed(pole: Workspace, triggers: str, methods: str = "[guided]") -> Path:
 
 
 def test_each_listed_trigger_is_planned(pole: Workspace) -> None:
-    plan = make_plan(pole, "upright")
+    plan = build_plan(pole, "upright")
     assert len(plan.experiments) == 3 * 3 * 2
     found = {e.trigger.name: e.trigger for e in plan.experiments if e.method is Method.GUIDED}
     known = {n: (t.condition, t.hold, t.hold_s, t.armed_after_s) for n, t in found.items()}
@@ -55,14 +55,14 @@ def test_triggers_can_be_a_plain_list(pole: Workspace) -> None:
     path.write_text(path.read_text().replace("methods: [guided]\n", ""))
     manifest = pole.library / "targets" / "pole.yaml"
     manifest.write_text(manifest.read_text().replace("step_s: 0.02", "step_s: 0.02\narmed_after_s: 0.3"))
-    plan = make_plan(pole, "upright")
+    plan = build_plan(pole, "upright")
     assert {(e.method, e.trigger.armed_after_s) for e in plan.experiments} == {(Method.GUIDED, 0.3)}
     edit(
         pole,
         "triggers: [always, {when: angle > 0.1}]",
         "triggers: {list: [{always: true}, {when: angle > 0.1}]}",
     )
-    assert make_plan(pole, "upright").digest == plan.digest
+    assert build_plan(pole, "upright").digest == plan.digest
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_a_mistake_in_the_list_is_reported_at_its_line(
 ) -> None:
     path = listed(pole, triggers, methods)
     with pytest.raises(MutatorError, match=said) as caught:
-        make_plan(pole, "upright")
+        build_plan(pole, "upright")
     assert caught.value.where == str(path)
 
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.chunks import Pending, cut, pending
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.chunks import PendingChunk, chunk_lengths, pending_chunks_of
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.model import Record, Status
 from mutator.store.plan_file import load_chunk, load_faults
 from mutator.store.run_folder import RunFolder
@@ -25,17 +25,17 @@ from mutator.workspace import Workspace
     ],
 )
 def test_a_plan_is_divided_into_chunks(groups: str, size: int, lengths: tuple[int, ...]) -> None:
-    assert cut(groups, size) == lengths
+    assert chunk_lengths(groups, size) == lengths
 
 
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
-    return freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
+    return freeze_plan(build_plan(toycar, "toy"), tmp_path / "run", toycar)
 
 
 def test_all_experiments_are_pending_at_first(folder: RunFolder) -> None:
-    left = pending(folder, {})
-    assert [item.chunk for item in left] == list(range(8))
+    left = pending_chunks_of(folder, {})
+    assert [item.chunk_index for item in left] == list(range(8))
     assert sum(len(item.places) for item in left) == 24
 
 
@@ -47,9 +47,9 @@ def test_experiments_without_a_valid_record_are_pending(
     records = {e.id: record(e.id) for e in (*chunks[0], chunks[1][1], chunks[2][0])}
     wrong = record(chunks[2][0].id, status=Status.HARNESS_ERROR, outcome=None)
     records[wrong.experiment_id] = wrong
-    left = pending(folder, records)
-    assert left[0] == Pending(1, (0, 2))
-    assert left[1] == Pending(2, (0, 1, 2))
+    left = pending_chunks_of(folder, records)
+    assert left[0] == PendingChunk(1, (0, 2))
+    assert left[1] == PendingChunk(2, (0, 1, 2))
     assert len(left) == 7
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns import git_clone
-from mutator.campaigns.git_clone import Clone, clone_state, user_name
+from mutator.campaigns.git_clone import GitClone, find_clone_state, find_user_name
 from mutator.store.work_stretches import CloneState
 
 IDENTITY = ("-c", "user.name=x", "-c", "user.email=x@example.org", "-c", "commit.gpgsign=false")
@@ -48,21 +48,21 @@ def test_only_changes_in_the_folder_itself_make_a_commit_dirty(tmp_path: Path) -
     for folder in (library, other):
         folder.mkdir()
         (folder / "a.yaml").write_text("a")
-    assert clone_state(library) is None
+    assert find_clone_state(library) is None
     git(tmp_path, "init", "-q")
-    assert clone_state(library) is None  # no commit yet
+    assert find_clone_state(library) is None  # no commit yet
     git(tmp_path, "add", "library")
     git(tmp_path, "commit", "-qm", "one")
-    found = clone_state(library)
+    found = find_clone_state(library)
     assert found is not None and len(found.commit) == 40 and not found.changed
-    assert clone_state(other) is None  # inside the clone, but not in any commit
+    assert find_clone_state(other) is None  # inside the clone, but not in any commit
     (library / "b.yaml").write_text("new")
-    assert clone_state(library) == replace(found, changed=True)
+    assert find_clone_state(library) == replace(found, changed=True)
 
 
 def test_without_git_there_is_no_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert clone_state(Path(__file__).parent) is None
+    assert find_clone_state(Path(__file__).parent) is None
 
 
 CHANGES: dict[str, Callable[[Path], object]] = {
@@ -106,7 +106,7 @@ def test_changes_are_those_that_git_status_lists(
     (tmp_path / "config/git/ignore").write_text("*.mine\n")
     library = clone / "library"
     CHANGES[change](library)
-    state = clone_state(library)
+    state = find_clone_state(library)
     expected = bool(git(library, "status", "--porcelain", "--", "."))
     assert state == CloneState(commit=git(clone, "rev-parse", "HEAD").strip(), changed=expected)
 
@@ -128,12 +128,12 @@ def test_worktrees_shallow_clones_and_submodules_are_clones(tmp_path: Path, hash
     git(outer, "commit", "-qm", "inner")
     for top in (tmp_path / "tree", tmp_path / "shallow", outer / "inner"):
         library = top / "library"
-        state = clone_state(library)
+        state = find_clone_state(library)
         assert state == CloneState(commit=git(root, "rev-parse", "HEAD").strip(), changed=False)
-        found = Clone.of(library)
+        found = GitClone.find(library)
         assert found is not None and found.hash_name == hash_name
-        assert found.last_change([library / "b.yaml"], "--format=%H") == state.commit + "\n"
-    whole = clone_state(outer)
+        assert found.describe_last_change([library / "b.yaml"], "--format=%H") == state.commit + "\n"
+    whole = find_clone_state(outer)
     assert whole is not None and not whole.changed
 
 
@@ -143,7 +143,7 @@ def test_a_file_that_git_converts_counts_as_changed(clone: Path) -> None:
     (clone / "library/a.yaml").write_bytes(b"a\r\n")
     commit(clone)
     assert git(clone, "status", "--porcelain") == ""
-    state = clone_state(clone / "library")
+    state = find_clone_state(clone / "library")
     assert state is not None and state.changed
 
 
@@ -156,7 +156,7 @@ def test_ten_thousand_files_take_a_second(tmp_path: Path) -> None:
     git(tmp_path, "init", "-q")
     commit(tmp_path)
     began = time.process_time()
-    state = clone_state(tmp_path)
+    state = find_clone_state(tmp_path)
     assert state is not None and not state.changed
     assert time.process_time() - began < 3
 
@@ -165,7 +165,7 @@ def test_git_that_does_not_answer_is_not_waited_for(clone: Path, monkeypatch: py
     monkeypatch.setattr(git_clone, "_PATIENCE_S", 0.2)
     (clone / ".git/HEAD").unlink()
     os.mkfifo(clone / ".git/HEAD")
-    assert clone_state(clone) is None
+    assert find_clone_state(clone) is None
 
 
 def test_a_commit_with_more_files_than_memory_is_unknown(
@@ -183,7 +183,7 @@ def test_a_commit_with_more_files_than_memory_is_unknown(
         mode, kind, inner = "040000", "tree", made.stdout.strip()
     git(tmp_path, "update-ref", "HEAD", git(tmp_path, "commit-tree", inner, "-m", "bomb").strip())
     monkeypatch.setattr(git_clone, "_MOST_SAID", 1 << 20)
-    assert clone_state(tmp_path) is None
+    assert find_clone_state(tmp_path) is None
 
 
 def plant_fsmonitor(root: Path, run: str) -> None:
@@ -277,12 +277,12 @@ def test_a_clones_configuration_runs_no_program(
     script.chmod(0o755)
     plant(clone, str(script))
     library = clone / "library"
-    clone_state(library)
-    user_name(library)
-    found = Clone.of(library)
+    find_clone_state(library)
+    find_user_name(library)
+    found = GitClone.find(library)
     assert (found is None) == (plant is plant_bare)
     if found:
-        found.differs(library, leave_out="reviews")
-        found.changed([library / "a.yaml"])
-        found.last_change([library / "a.yaml"], "--format=%H%n%an")
+        found.differs_from_commit(library, leave_out="reviews")
+        found.find_changed([library / "a.yaml"])
+        found.describe_last_change([library / "a.yaml"], "--format=%H%n%an")
     assert not (tmp_path / "ran").exists(), (tmp_path / "ran").read_text()

@@ -8,9 +8,9 @@ import pytest
 
 from mutator._common import doors
 from mutator._common.doors import STUDIES
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.installed_studies import find_study
-from mutator.campaigns.plan import load_plan, make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.installed_studies import load_installed_study
+from mutator.campaigns.plan import build_plan, load_plan
 from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
 from mutator.report import report_builder
@@ -40,7 +40,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 def test_the_shipped_study_is_installed() -> None:
     assert "driving_agent_resilience" in STUDIES.names(), "install again: pip install -e . --no-deps"
-    assert list(find_study("driving_agent_resilience").check(Workspace.find(root=CLONE))) == []
+    assert list(load_installed_study("driving_agent_resilience").check(Workspace.find(root=CLONE))) == []
 
 
 def test_the_report_contains_a_study_from_another_package(installed: None, tmp_path: Path) -> None:
@@ -60,9 +60,9 @@ def test_the_report_contains_a_study_from_another_package(installed: None, tmp_p
 
 def test_an_unknown_or_broken_study_is_refused(installed: None) -> None:
     with pytest.raises(MutatorError, match="no study 'moon_landing'; expected one of broken, crash"):
-        find_study("moon_landing")
+        load_installed_study("moon_landing")
     with pytest.raises(MutatorError, match=r"'broken' of package .* cannot be loaded: .*MISSING"):
-        find_study("broken")
+        load_installed_study("broken")
 
 
 STRANGERS = {
@@ -133,7 +133,7 @@ def test_an_invalid_study_is_reported_at_its_line_in_the_campaign(
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
     with pytest.raises(MutatorError) as error:
-        make_plan(toycar, "small")
+        build_plan(toycar, "small")
     told = str(error.value)
     assert told.startswith(f"{path}:{line}: study '{study}' ")
     assert re.search(STRANGERS[study][1], told)
@@ -172,10 +172,10 @@ def test_a_run_can_be_opened_without_its_study(
     installed: None, toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asking(toycar, "crash_tests")
-    folder = freeze(make_plan(toycar, "small"), tmp_path / "planned", toycar)
+    folder = freeze_plan(build_plan(toycar, "small"), tmp_path / "planned", toycar)
     monkeypatch.setattr(doors, "_entry_points", lambda group: EntryPoints())
     assert load_plan(folder).campaign.study == "crash_tests"
     with pytest.raises(
         MutatorError, match="no study 'crash_tests'; expected no study, because none is installed"
     ):
-        make_plan(toycar, "small")
+        build_plan(toycar, "small")

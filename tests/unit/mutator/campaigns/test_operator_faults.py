@@ -9,8 +9,8 @@ import pytest
 
 from mutator.campaigns import operator_faults
 from mutator.campaigns.campaign_files import load_campaign
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import Plan, load_plan, make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import Plan, build_plan, load_plan
 from mutator.errors import MutatorError
 from mutator.model import Hold, Limits, Method
 from mutator.operators.executed_lines import ExecutedLines, GoldenRunInputs
@@ -54,47 +54,47 @@ def _edited(campaign: Path, old: str, new: str) -> Path:
 
 
 def test_each_mutant_is_planned_as_permanent_and_as_transient(toycar: Workspace, campaign: Path) -> None:
-    plan = make_plan(toycar, campaign)
+    plan = build_plan(toycar, campaign)
     assert len({one.fault.id for one in plan.experiments}) == 12 == len(plan.experiments) / 2
     found = Counter((one.method, one.trigger.hold) for one in plan.experiments)
     assert found == {(Method.GUIDED, Hold.TO_END): 12, (Method.RANDOM, Hold.FOR): 12}
     permanent = [one for one in plan.experiments if one.trigger.name == "always"]
     assert len(permanent) == 12
-    assert make_plan(toycar, campaign).digest == plan.digest
-    [told] = plan.told
+    assert build_plan(toycar, campaign).digest == plan.digest
+    [told] = plan.operator_notes
     assert told.startswith("toycar/driver.py::Driver.*: 12 draws of ")
     assert "in lines that no golden run executes" in told
 
 
 def test_the_frozen_plan_lists_left_out_mutants(toycar: Workspace, campaign: Path, tmp_path: Path) -> None:
-    plan = make_plan(toycar, campaign)
-    folder = freeze(plan, tmp_path / "run", toycar)
-    assert load_plan(folder).told == plan.told == folder.head.operators
-    other = freeze(make_plan(toycar, "small"), tmp_path / "other", toycar)
+    plan = build_plan(toycar, campaign)
+    folder = freeze_plan(plan, tmp_path / "run", toycar)
+    assert load_plan(folder).operator_notes == plan.operator_notes == folder.head.operators
+    other = freeze_plan(build_plan(toycar, "small"), tmp_path / "other", toycar)
     assert "operators" not in json.loads((other.path / "run.json").read_text())
 
 
 def test_the_key_when_selects_permanent_or_transient_mutants(toycar: Workspace, campaign: Path) -> None:
     _edited(campaign, "sample: 12}", "sample: 2, when: [permanent]}\n  - spec: sensor/silence/no_data")
-    kinds = Counter((one.fault.module, one.trigger.name) for one in make_plan(toycar, campaign).experiments)
+    kinds = Counter((one.fault.module, one.trigger.name) for one in build_plan(toycar, campaign).experiments)
     assert kinds == {("operators", "always"): 2, ("sensor", "random/always"): 1}
     _edited(campaign, "when: [permanent]", "when: [transient]")
     _edited(campaign, "list: [always]", "table: near_far")
     _edited(campaign, "[random]", "[guided]")
-    kinds = Counter((one.fault.module, one.trigger.name) for one in make_plan(toycar, campaign).experiments)
+    kinds = Counter((one.fault.module, one.trigger.name) for one in build_plan(toycar, campaign).experiments)
     assert kinds[("operators", "near")] == 2 == kinds[("operators", "far")]
 
 
 def test_selections_of_the_same_mutants_are_merged(toycar: Workspace, campaign: Path) -> None:
-    both = {one.id for one in make_plan(toycar, campaign).experiments}
+    both = {one.id for one in build_plan(toycar, campaign).experiments}
     entry = ENTRY.removesuffix("}")
     _edited(campaign, ENTRY, "\n".join(f"{entry}, when: [{name}]}}" for name in ("permanent", "transient")))
-    assert {one.id for one in make_plan(toycar, campaign).experiments} == both
+    assert {one.id for one in build_plan(toycar, campaign).experiments} == both
 
 
 def test_another_seed_draws_other_mutants(toycar: Workspace, campaign: Path) -> None:
     drawn = [
-        {one.fault.id for one in make_plan(toycar, campaign, Choices(seed=seed)).experiments}
+        {one.fault.id for one in build_plan(toycar, campaign, Choices(seed=seed)).experiments}
         for seed in (3, 4)
     ]
     assert drawn[0] != drawn[1] and len(drawn[0]) == len(drawn[1])
@@ -104,18 +104,18 @@ def test_review_groups_do_not_depend_on_the_draw(toycar: Workspace, campaign: Pa
     def groups(plan: Plan) -> dict[str, object]:
         return {one.what: one.bound for one in of_plan(toycar, plan) if ": operator" in one.what}
 
-    some = groups(make_plan(toycar, campaign))
+    some = groups(build_plan(toycar, campaign))
     assert set(some) == {
         f"toycar/driver.py Driver.drive: operator {name}" for name in ("arithmetic", "branch")
     }
     _edited(campaign, "sample: 12", "sample: 30")
-    assert groups(make_plan(toycar, campaign)) == some
+    assert groups(build_plan(toycar, campaign)) == some
 
 
 def test_a_campaign_can_name_an_operator_of_another_package(
     toycar: Workspace, campaign: Path, door_examples: Path
 ) -> None:
-    plan = make_plan(toycar, _edited(campaign, "[arithmetic, branch]", "[zero]"))
+    plan = build_plan(toycar, _edited(campaign, "[arithmetic, branch]", "[zero]"))
     assert {one.fault.fault_type for one in plan.experiments} == {"zero"}
     assert [one for one in of_plan(toycar, plan) if one.what.endswith(": operator zero")]
 
@@ -152,5 +152,5 @@ def test_a_place_without_mutants_is_refused_with_its_line(
 ) -> None:
     _edited(campaign, "toycar/driver.py::Driver.*", place)
     with pytest.raises(MutatorError, match=r"operators\.yaml:7: ") as caught:
-        make_plan(toycar, campaign)
+        build_plan(toycar, campaign)
     assert said in str(caught.value)

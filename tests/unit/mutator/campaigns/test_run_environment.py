@@ -9,7 +9,7 @@ from mutator.campaigns import run_environment
 
 
 def test_required_packages_include_indirect_requirements() -> None:
-    found = run_environment.required()
+    found = run_environment.required_packages()
     assert {"numpy", "jinja2", "markupsafe", "pydantic-core", "execnet", "pytest-xdist"} <= found
     assert not {"hypothesis", "mypy", "tox", "import-linter", "mutator"} & found
 
@@ -21,21 +21,21 @@ def test_requirements_that_do_not_apply_are_left_out(monkeypatch: pytest.MonkeyP
         **{name: ("1", []) for name in "bcdtw"},
     }
     monkeypatch.setattr(run_environment, "_installed", lambda: told)
-    assert run_environment.required() == {"a", "b", "c"}
+    assert run_environment.required_packages() == {"a", "b", "c"}
 
 
 def test_without_an_installed_mutator_every_package_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run_environment, "_installed", lambda: {"numpy": ("1", []), "stranger": ("2", [])})
-    assert run_environment.required() == {"numpy", "stranger"}
+    assert run_environment.required_packages() == {"numpy", "stranger"}
 
 
 def test_versions_come_from_package_metadata() -> None:
-    found = run_environment.versions(["numpy", "no-such-package"])
+    found = run_environment.package_versions(["numpy", "no-such-package"])
     assert found == {"numpy": metadata.version("numpy"), "no-such-package": None}
 
 
 def test_modules_are_reported_by_package() -> None:
-    assert run_environment.packages_of(["yaml", "_yaml", "cv2", "nosuch"]) == (
+    assert run_environment.packages_of_modules(["yaml", "_yaml", "cv2", "nosuch"]) == (
         "opencv-python-headless",
         "pyyaml",
     )
@@ -43,16 +43,16 @@ def test_modules_are_reported_by_package() -> None:
 
 def test_blas_uses_one_thread_in_any_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
-    run_environment.blas.cache_clear()
-    (library,) = run_environment.blas()
+    run_environment.loaded_blas.cache_clear()
+    (library,) = run_environment.loaded_blas()
     assert library.library and library.version and library.threads == 1
     assert (
-        set(run_environment.threads().values()) == {"1"}
-        and "OPENBLAS_NUM_THREADS" in run_environment.threads()
+        set(run_environment.thread_limits().values()) == {"1"}
+        and "OPENBLAS_NUM_THREADS" in run_environment.thread_limits()
     )
 
 
 def test_the_processor_model_is_read_from_cpuinfo() -> None:
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     models = {line.partition(":")[2].strip() for line in lines if line.startswith("model name")}
-    assert not models or run_environment.cpu() in models
+    assert not models or run_environment.processor_name() in models

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns import run_environment
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.git_clone import clone_state
-from mutator.campaigns.plan import make_plan
-from mutator.campaigns.run_provenance import begin_stretch, check_versions
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.git_clone import find_clone_state
+from mutator.campaigns.plan import build_plan
+from mutator.campaigns.run_provenance import accepted_version_differences, begin_stretch
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
 from mutator.execution.distribution import distributor, packages_of
 from mutator.store.check_results import SCHEMA
@@ -23,7 +23,7 @@ from mutator.workspace import Workspace
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
     """A planned run whose checks list `iniconfig` and `hypothesis` as packages that golden runs loaded."""
-    planned = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+    planned = freeze_plan(build_plan(toycar, "small"), tmp_path / "run", toycar)
     said = {"schema": SCHEMA, "packages": ["hypothesis", "iniconfig"]}
     (planned.path / "checks.json").write_text(json.dumps(said))
     return planned
@@ -31,7 +31,7 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 
 def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
     """Replace the versions of some packages; None means not installed."""
-    real = run_environment.versions
+    real = run_environment.package_versions
 
     def versions(names: Iterable[str] | None = None) -> dict[str, str | None]:
         found = real(names)
@@ -44,15 +44,19 @@ def test_a_session_records_everything_that_affects_results(folder: RunFolder, to
     folder = begin_stretch(folder, toycar, records="0001-*", accept=False)
     (stretch,) = RunFolder.open(folder.path).stretches
     assert stretch == folder.stretches[0]
-    assert stretch.python == run_environment.python() and stretch.cpu == run_environment.cpu()
-    assert stretch.packages == run_environment.versions({*run_environment.required(), "hypothesis"})
+    assert (
+        stretch.python == run_environment.python_version() and stretch.cpu == run_environment.processor_name()
+    )
+    assert stretch.packages == run_environment.package_versions(
+        {*run_environment.required_packages(), "hypothesis"}
+    )
     assert (stretch.records, stretch.git, stretch.accepted) == ("0001-*", _clone(), ())
     assert stretch.blas and stretch.threads and stretch.platform
 
 
 def _clone() -> dict[str, CloneState] | None:
     """Return the git state of the harness; the toy is outside any clone."""
-    state = clone_state(Path(run_environment.__file__).parents[1])
+    state = find_clone_state(Path(run_environment.__file__).parents[1])
     return {"mutator": state} if state else None
 
 
@@ -68,7 +72,7 @@ def test_a_later_session_only_appends_to_run_json(folder: RunFolder, toycar: Wor
 def test_a_package_that_reads_the_traces_or_distributes_the_work_is_recorded(
     folder: RunFolder, toycar: Workspace, door_examples: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for cached in (run_environment._installed, run_environment._providers):
+    for cached in (run_environment._installed_packages, run_environment._packages_by_module):
         monkeypatch.setattr(run_environment, cached.__name__, cached.__wrapped__)
     manifest = toycar.manifest("toycar")
     plain = begin_stretch(folder, toycar, records="0001-*", accept=False).stretches[-1]
@@ -81,25 +85,28 @@ def test_a_package_that_reads_the_traces_or_distributes_the_work_is_recorded(
         assert begun.stretches[-1].packages == {**plain.packages, "door-examples": "1.0"}
     use(monkeypatch, **{"door-examples": "1.1"})
     with pytest.raises(MutatorError, match=r"door-examples 1\.0, here 1\.1"):
-        check_versions(reading)
+        accepted_version_differences(reading)
 
 
 def test_before_the_first_run_any_version_is_accepted(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     use(monkeypatch, numpy="2.1.0")
-    assert check_versions(folder) == ()
+    assert accepted_version_differences(folder) == ()
 
 
 @pytest.mark.parametrize(
     ("other", "told"),
     [
-        ({"jinja2": "9.0"}, f"jinja2 {run_environment.versions(['jinja2'])['jinja2']}, here 9.0"),
+        ({"jinja2": "9.0"}, f"jinja2 {run_environment.package_versions(['jinja2'])['jinja2']}, here 9.0"),
         (
             {"hypothesis": "9.0"},
-            f"hypothesis {run_environment.versions(['hypothesis'])['hypothesis']}, here 9.0",
+            f"hypothesis {run_environment.package_versions(['hypothesis'])['hypothesis']}, here 9.0",
         ),
-        ({"iniconfig": None}, f"iniconfig {run_environment.versions(['iniconfig'])['iniconfig']}, here none"),
+        (
+            {"iniconfig": None},
+            f"iniconfig {run_environment.package_versions(['iniconfig'])['iniconfig']}, here none",
+        ),
     ],
     ids=["of the harness", "of the target", "gone"],
 )
@@ -113,12 +120,12 @@ def test_different_versions_are_refused_unless_accepted(
     folder = begin_stretch(folder, toycar, records="0001-*", accept=False)
     use(monkeypatch, **other)
     with pytest.raises(MutatorError) as caught:
-        check_versions(folder)
+        accepted_version_differences(folder)
     assert caught.value.exit_code == EXIT_WRONG_INPUT
     assert caught.value.got == f"this run used other versions: {told}"
     folder = begin_stretch(folder, toycar, records="0002-*", accept=True)
     assert [list(stretch.accepted) for stretch in folder.stretches] == [[], [told]]
-    assert check_versions(folder) == ()  # from now on, these are the run's versions
+    assert accepted_version_differences(folder) == ()  # from now on, these are the run's versions
 
 
 def test_another_python_version_is_refused(
@@ -128,7 +135,7 @@ def test_another_python_version_is_refused(
     folder = begin_stretch(folder, toycar, records="0001-*", accept=False)
     monkeypatch.setattr("platform.python_version", lambda: "3.12.1")
     with pytest.raises(MutatorError, match=r"CPython 3\.11\.7, here CPython 3\.12\.1"):
-        check_versions(folder)
+        accepted_version_differences(folder)
 
 
 @pytest.mark.parametrize("changed", ["cpu", "platform", "threads"])
@@ -140,6 +147,6 @@ def test_another_machine_is_recorded_but_not_refused(
     other = {"threads": {"OMP_NUM_THREADS": "8"}}.get(changed, "another")
     name = "platform.platform" if changed == "platform" else f"mutator.campaigns.run_environment.{changed}"
     monkeypatch.setattr(name, lambda: other)
-    assert check_versions(folder) == ()
+    assert accepted_version_differences(folder) == ()
     folder = begin_stretch(folder, toycar, records="0002-*", accept=False)
     assert getattr(folder.stretches[1], changed) == other != getattr(folder.stretches[0], changed)

@@ -6,7 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs, spread
+from mutator.campaigns.sampling import (
+    draw_balanced,
+    draw_balanced_pairs,
+    draw_in_proportion,
+    evenly_spread_indices,
+)
 from mutator.model import AfterHazard, Experiment, Method
 
 SPECS = ("radar/chaff/distance", "radar/jamming/no_data", "car/speed/slower")
@@ -26,7 +31,7 @@ def many(experiment: Callable[..., Experiment]) -> list[Experiment]:
 
 @pytest.mark.parametrize("count", [6, 12, 24])
 def test_a_sample_is_balanced(many: list[Experiment], count: int) -> None:
-    picked = pick(many, count, seed=1)
+    picked = draw_balanced(many, count, seed=1)
     assert len(picked) == count
     assert set(Counter(e.fault.spec for e in picked).values()) == {count // 3}
     assert set(Counter(e.method for e in picked).values()) == {count // 2}
@@ -35,20 +40,20 @@ def test_a_sample_is_balanced(many: list[Experiment], count: int) -> None:
 
 
 def test_if_a_variant_has_too_few_experiments_others_fill_its_share(many: list[Experiment]) -> None:
-    picked = pick(many, 60, seed=1)
+    picked = draw_balanced(many, 60, seed=1)
     counts = Counter(e.fault.spec for e in picked)
     assert counts["radar/jamming/no_data"] == 8
     assert len({e.id for e in picked}) == 60
 
 
 def test_a_seed_always_picks_the_same_experiments(many: list[Experiment]) -> None:
-    picked = pick(many, 10, seed=1)
+    picked = draw_balanced(many, 10, seed=1)
     assert [many.index(e) for e in picked] == sorted(many.index(e) for e in picked)
-    assert pick(list(reversed(many)), 10, seed=1) == tuple(reversed(picked))
-    assert pick(many, 10, seed=2) != picked
+    assert draw_balanced(list(reversed(many)), 10, seed=1) == tuple(reversed(picked))
+    assert draw_balanced(many, 10, seed=2) != picked
 
 
-@pytest.mark.parametrize("draw", [pick, pick_pairs])
+@pytest.mark.parametrize("draw", [draw_balanced, draw_balanced_pairs])
 def test_stopping_after_a_hazard_does_not_change_the_sample(
     many: list[Experiment], draw: Callable[..., tuple[Experiment, ...]]
 ) -> None:
@@ -58,7 +63,7 @@ def test_stopping_after_a_hazard_does_not_change_the_sample(
 
 
 def test_a_sample_as_large_as_the_plan_is_the_plan(many: list[Experiment]) -> None:
-    assert pick(many, 1000, seed=1) == tuple(many)
+    assert draw_balanced(many, 1000, seed=1) == tuple(many)
 
 
 @pytest.mark.parametrize(
@@ -66,22 +71,22 @@ def test_a_sample_as_large_as_the_plan_is_the_plan(many: list[Experiment]) -> No
     [(10, 1, [5]), (10, 2, [2, 7]), (3, 3, [0, 1, 2]), (2, 5, [0, 1]), (1, 1, [0])],
 )
 def test_values_are_spread_evenly_over_the_range(count: int, wanted: int, indices: list[int]) -> None:
-    assert spread(count, wanted) == indices
+    assert evenly_spread_indices(count, wanted) == indices
 
 
 def test_a_proportional_sample_keeps_pairs_and_the_share_of_each_variant(many: list[Experiment]) -> None:
-    picked = pick_in_proportion(many, 56, seed=1)
+    picked = draw_in_proportion(many, 56, seed=1)
     assert len(picked) == len({e.id for e in picked}) == 56
     assert Counter(e.fault.spec for e in picked) == dict(zip(SPECS, (40, 4, 12), strict=True))
     keys = {m: {key(e) for e in picked if e.method is m} for m in Method}
     assert keys[Method.GUIDED] == keys[Method.RANDOM]
-    assert pick_in_proportion(many, 56, seed=1) == picked
-    assert pick_in_proportion(many, 56, seed=2) != picked
+    assert draw_in_proportion(many, 56, seed=1) == picked
+    assert draw_in_proportion(many, 56, seed=2) != picked
 
 
 @pytest.mark.parametrize("count", [2, 12, 24, 40, 54])
 def test_sampled_pairs_stay_together(many: list[Experiment], count: int) -> None:
-    picked = pick_pairs(many, count, seed=1)
+    picked = draw_balanced_pairs(many, count, seed=1)
     assert len(picked) == count
     keys = {m: {key(e) for e in picked if e.method is m} for m in Method}
     assert keys[Method.GUIDED] == keys[Method.RANDOM] and len(keys[Method.GUIDED]) == count // 2
@@ -90,19 +95,19 @@ def test_sampled_pairs_stay_together(many: list[Experiment], count: int) -> None
         for counts in (Counter(e.scenario for e in picked), Counter(key(e)[2] for e in picked)):
             assert max(counts.values()) - min(counts.values()) <= 2
     assert [many.index(e) for e in picked] == sorted(many.index(e) for e in picked)
-    assert pick_pairs(list(reversed(many)), count, seed=1) == tuple(reversed(picked))
+    assert draw_balanced_pairs(list(reversed(many)), count, seed=1) == tuple(reversed(picked))
 
 
 @pytest.mark.parametrize("count", [1, 11, 55])
 def test_a_sample_of_odd_size_splits_one_pair(many: list[Experiment], count: int) -> None:
-    picked = pick_pairs(many, count, seed=1)
+    picked = draw_balanced_pairs(many, count, seed=1)
     guided, random = ({key(e) for e in picked if e.method is m} for m in (Method.GUIDED, Method.RANDOM))
     assert len(picked) == count and len(guided - random) == 1 and random <= guided
 
 
 def test_unpaired_experiments_are_sampled_one_by_one(many: list[Experiment]) -> None:
     guided = [e for e in many if e.method is Method.GUIDED]
-    assert pick_pairs(guided, 9, seed=1) == pick(guided, 9, seed=1)
+    assert draw_balanced_pairs(guided, 9, seed=1) == draw_balanced(guided, 9, seed=1)
 
 
 def key(experiment: Experiment) -> tuple[str, str, str]:
@@ -113,4 +118,4 @@ def key(experiment: Experiment) -> tuple[str, str, str]:
 def test_a_proportional_sample_of_an_unsuitable_size_is_refused(many: list[Experiment], count: int) -> None:
     """The size must be even, and at least two for each variant in each scenario."""
     with pytest.raises(ValueError, match="a multiple of 2, 12 or more"):
-        pick_in_proportion(many, count, seed=1)
+        draw_in_proportion(many, count, seed=1)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import Plan, Planning, load_plan, make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import Plan, SeedBySeedPlan, build_plan, load_plan
 from mutator.errors import MutatorError
 from mutator.store import plan_file
 from mutator.store.plan_choices import Choices
@@ -31,7 +31,7 @@ def campaign(toycar: Workspace, tmp_path: Path) -> Callable[..., Path]:
 
 
 def alone(workspace: Workspace, path: Path, seed: int, **chosen: int) -> Plan:
-    return make_plan(workspace, path, Choices(seed=seed, **chosen))  # type: ignore[arg-type]
+    return build_plan(workspace, path, Choices(seed=seed, **chosen))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("more", [{}, {"sample": "4"}], ids=["all", "sample"])
@@ -39,35 +39,35 @@ def test_a_plan_for_several_seeds_joins_the_plans_for_each_seed(
     toycar: Workspace, campaign: Callable[..., Path], more: dict[str, str]
 ) -> None:
     path = campaign(**more)
-    plan, parts = make_plan(toycar, path), [alone(toycar, path, seed) for seed in (3, 4, 5)]
+    plan, parts = build_plan(toycar, path), [alone(toycar, path, seed) for seed in (3, 4, 5)]
     assert plan.experiments == tuple(e for part in parts for e in part.experiments)
     assert plan.chunks == tuple(n for part in parts for n in part.chunks)
     assert plan.runs == sum(part.runs for part in parts)
     assert len({e.id for e in plan.experiments}) == len(plan.experiments)
-    assert parts[0].experiments == make_plan(toycar, campaign("seed: 3", **more)).experiments
-    assert parts[0].digest == make_plan(toycar, path).digest
+    assert parts[0].experiments == build_plan(toycar, campaign("seed: 3", **more)).experiments
+    assert parts[0].digest == build_plan(toycar, path).digest
 
 
 def test_a_limit_is_spread_over_the_seeds(toycar: Workspace, campaign: Callable[..., Path]) -> None:
-    plan = make_plan(toycar, campaign(), Choices(limit=7))
+    plan = build_plan(toycar, campaign(), Choices(limit=7))
     assert [sum(e.seed == seed for e in plan.experiments) for seed in (3, 4, 5)] == [3, 2, 2]
-    assert {e.seed for e in make_plan(toycar, campaign(), Choices(limit=2)).experiments} == {3, 4}
+    assert {e.seed for e in build_plan(toycar, campaign(), Choices(limit=2)).experiments} == {3, 4}
 
 
 def test_a_filter_can_leave_a_seed_without_experiments(
     toycar: Workspace, campaign: Callable[..., Path]
 ) -> None:
-    plan = make_plan(toycar, campaign(), Choices(only="seed == 4"))
+    plan = build_plan(toycar, campaign(), Choices(only="seed == 4"))
     assert plan.experiments == alone(toycar, campaign(), 4).experiments
     with pytest.raises(MutatorError, match="no experiment is left"):
-        make_plan(toycar, campaign(), Choices(only="seed == 9"))
+        build_plan(toycar, campaign(), Choices(only="seed == 9"))
 
 
 def test_each_seed_has_its_own_golden_runs(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
     """Even a run without a fault uses the seed."""
-    folder = freeze(Planning(toycar, campaign()), tmp_path / "run", toycar)
+    folder = freeze_plan(SeedBySeedPlan(toycar, campaign()), tmp_path / "run", toycar)
     assert folder.seeds == range(3, 6)
     keys = {one.key for one in folder.golden_runs}
     assert {"A@3", "A@4", "A@5"} <= keys
@@ -79,13 +79,13 @@ def test_a_plan_written_in_parts_equals_the_one_in_memory(
 ) -> None:
     path = campaign()
     parts, whole = tmp_path / "parts", tmp_path / "whole"
-    freeze(Planning(toycar, path), parts, toycar)
-    freeze(make_plan(toycar, path), whole, toycar)
+    freeze_plan(SeedBySeedPlan(toycar, path), parts, toycar)
+    freeze_plan(build_plan(toycar, path), whole, toycar)
     names = sorted(one.relative_to(whole) for one in whole.rglob("*") if one.name != "owner.lock")
     assert names == sorted(one.relative_to(parts) for one in parts.rglob("*") if one.name != "owner.lock")
     files = [name for name in names if (whole / name).is_file()]
     assert [(parts / name).read_bytes() for name in files] == [(whole / name).read_bytes() for name in files]
-    plan = make_plan(toycar, path)
+    plan = build_plan(toycar, path)
     read = load_plan(RunFolder.open(parts))
     assert read.experiments == plan.experiments
     assert (read.tally, read.goldens()) == (plan.tally, plan.goldens())
@@ -94,7 +94,7 @@ def test_a_plan_written_in_parts_equals_the_one_in_memory(
 def test_planned_experiments_can_be_read_by_position(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
-    folder = freeze(Planning(toycar, campaign()), tmp_path / "run", toycar)
+    folder = freeze_plan(SeedBySeedPlan(toycar, campaign()), tmp_path / "run", toycar)
     planned = plan_file.ExperimentsInOrder(folder.path, folder.head.chunks)
     every = plan_file.load_experiments(folder.path)
     assert (len(planned), tuple(planned)) == (len(every), every)
@@ -120,5 +120,5 @@ def test_invalid_seeds_are_reported_with_their_line(
     toycar: Workspace, campaign: Callable[..., Path], lines: str, said: str
 ) -> None:
     with pytest.raises(MutatorError) as told:
-        make_plan(toycar, campaign(lines))
+        build_plan(toycar, campaign(lines))
     assert re.search(said, str(told.value)) and "small.yaml:" in str(told.value)

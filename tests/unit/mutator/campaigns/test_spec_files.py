@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
@@ -30,7 +30,7 @@ def test_a_spec_file_is_found_relative_to_the_campaign(
 ) -> None:
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    plan = make_plan(toycar, mine)
+    plan = build_plan(toycar, mine)
     specs = [experiment.fault.spec for experiment in plan.experiments]
     assert specs.count("sensor/drifting/shifted") == 4  # two values, two contexts
     assert specs.count("sensor/lane/shifted") == 2
@@ -42,7 +42,7 @@ def test_a_missing_spec_file_is_reported(toycar: Workspace, mine: Path) -> None:
     with pytest.raises(
         MutatorError, match=r"mine\.yaml:9: no file .*/specs/drifting\.yaml; expected the path of a spec file"
     ):
-        make_plan(toycar, mine)
+        build_plan(toycar, mine)
 
 
 @pytest.mark.parametrize("linked", [True, False])
@@ -59,7 +59,7 @@ def test_a_spec_file_outside_the_campaigns_folder_and_the_library_is_refused(
     with pytest.raises(
         MutatorError, match=r"mine\.yaml:9: .* is neither below the campaign's folder"
     ) as caught:
-        make_plan(toycar, mine)
+        build_plan(toycar, mine)
     assert "secret" not in str(caught.value)
 
 
@@ -73,7 +73,7 @@ def test_a_campaign_names_only_targets_and_tables_of_the_library(
     assert old in mine.read_text()
     mine.write_text(mine.read_text().replace(old, new))
     with pytest.raises(MutatorError, match=r"mine\.yaml:\d+: .* expected the name of a file in the library"):
-        make_plan(toycar, mine)
+        build_plan(toycar, mine)
 
 
 def test_two_specs_with_the_same_name_are_refused(toycar: Workspace, mine: Path) -> None:
@@ -81,11 +81,11 @@ def test_two_specs_with_the_same_name_are_refused(toycar: Workspace, mine: Path)
     file = mine.parent / "specs" / "drifting.yaml"
     file.write_text(file.read_text().replace("fault_type: drifting", "fault_type: lane"))
     with pytest.raises(MutatorError, match="has the name of a spec in the library, sensor/lane"):
-        make_plan(toycar, mine)
+        build_plan(toycar, mine)
     own = toycar.library / "faults" / "sensor" / "lane.yaml"
     text = mine.read_text().replace("specs/drifting.yaml", str(own)).replace("drifting/", "lane/")
     mine.write_text(text)
-    assert {e.fault.spec for e in make_plan(toycar, mine).experiments} >= {"sensor/lane/shifted"}
+    assert {e.fault.spec for e in build_plan(toycar, mine).experiments} >= {"sensor/lane/shifted"}
 
 
 def test_a_missing_campaign_file_is_reported(toycar: Workspace) -> None:

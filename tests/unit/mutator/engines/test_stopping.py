@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mutator._common.hashing import digest
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.plan import build_plan
 from mutator.engines.engine_jobs import Engine, RunMode
 from mutator.engines.fork_engine import ForkEngine
 from mutator.engines.in_target.early_stop import compiled
@@ -197,10 +197,10 @@ def test_missing_recorded_values_are_a_harness_error(stopping: Fork, edit: Edit)
 
 def test_after_hazard_changes_the_ids_of_all_experiments(stopping: Fork, edit: Edit) -> None:
     edit("fault_library/campaigns/small.yaml", "chunk: 2", "chunk: 2\nafter_hazard: stop")
-    stopped = make_plan(stopping.toy, "small")
+    stopped = build_plan(stopping.toy, "small")
     assert {e.after_hazard for e in (*stopped.experiments, stopped.canary)} == {AfterHazard.STOP}
     edit("fault_library/campaigns/small.yaml", "after_hazard: stop", "after_hazard: go_on")
-    whole = make_plan(stopping.toy, "small")
+    whole = build_plan(stopping.toy, "small")
     assert [replace(e, after_hazard=AfterHazard.GO_ON).id for e in stopped.experiments] == [
         e.id for e in whole.experiments
     ]
@@ -209,7 +209,7 @@ def test_after_hazard_changes_the_ids_of_all_experiments(stopping: Fork, edit: E
     edit("fault_library/campaigns/small.yaml", "after_hazard: go_on", "after_hazard: stop")
     edit(MANIFEST, "25 >= near", "ever(25 >= near)")
     with pytest.raises(MutatorError, match="cannot stop"):
-        make_plan(stopping.toy, "small")
+        build_plan(stopping.toy, "small")
 
 
 def test_a_trace_can_be_cut_at_a_time() -> None:

@@ -56,7 +56,7 @@ class Elsewhere:
         self.loaded: set[str] = set()
 
     def run(self, session: Session) -> None:
-        work = (session.inputs.packed(), assignment_of(session), session.pending, session.proof)
+        work = (session.inputs.to_bytes(), assignment_of(session), session.pending, session.proof)
         command = [sys.executable, "-c", WORKER]
         done = subprocess.run(command, input=pickle.dumps(work), stdout=subprocess.PIPE, check=True)
         written, self.loaded = pickle.loads(done.stdout)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.plan import build_plan
 from mutator.engines.engine_jobs import Execution, Job
 from mutator.errors import MutatorError
 from mutator.execution.experiment_runner import Goldens, Runner
@@ -75,7 +75,7 @@ def with_metrics(toycar: Workspace) -> None:
 @pytest.fixture
 def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
     manifest = toycar.manifest("toycar")
-    experiment = make_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
+    experiment = build_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
     (tmp_path / "golden").mkdir()
     write(tmp_path / "golden")
 
@@ -237,7 +237,7 @@ def test_a_metric_compares_each_judged_run_with_its_golden_run(judged: Callable[
 
 def test_mutants_that_cannot_be_built_are_not_run(toycar: Workspace, tmp_path: Path) -> None:
     manifest = toycar.manifest("toycar")
-    experiments: tuple[Experiment, ...] = make_plan(toycar, "hostile").experiments
+    experiments: tuple[Experiment, ...] = build_plan(toycar, "hostile").experiments
     engine = PlayedEngine(tmp_path / "faulty", Status.CRASHED, {"ran": RAN})
     goldens = Goldens(manifest, lambda experiment: tmp_path)
     runner = Runner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
@@ -256,7 +256,7 @@ def test_nothing_is_compared_with_a_changed_golden_run(
 ) -> None:
     """A mutant can write to it, and put the bytes back."""
     manifest = toycar.manifest("toycar")
-    experiment = make_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
+    experiment = build_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
     place = tmp_path / "golden" / "A"
     place.mkdir(parents=True)
     write(place)

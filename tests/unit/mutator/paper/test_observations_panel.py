@@ -7,8 +7,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.paper.observations_panel import build_observations_panel
 from mutator.paper.published_numbers import load_published_numbers
 from mutator.report.reported_run import ReportedRun
@@ -28,7 +28,7 @@ def test_claims_about_all_faults_need_the_whole_plan(
 ) -> None:
     """A shard is only a part of the plan."""
     shutil.copytree(REFERENCES, toycar.library / "references")
-    freeze(make_plan(toycar, "small", Choices(shard=shard)), tmp_path / "run", toycar)
+    freeze_plan(build_plan(toycar, "small", Choices(shard=shard)), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")
     kinds = [kind.split("/") for _, kind in load_published_numbers(REFERENCES).tally_by_fault_type]
     against = {
@@ -63,7 +63,7 @@ def test_a_report_without_activated_faults_of_the_paper_has_no_observations(
     toycar: Workspace, tmp_path: Path
 ) -> None:
     shutil.copytree(REFERENCES, toycar.library / "references")
-    freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+    freeze_plan(build_plan(toycar, "small"), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")
     frame = results({"module": "radar", "fault_type": "chaff"})
     run = ReportedRun(folder=folder, workspace=toycar, results=frame, frame=frame, study=None, seen=SEEN)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plan import Plan, make_plan
+from mutator.campaigns.plan import Plan, build_plan
 from mutator.model import Experiment, Method
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
@@ -44,12 +44,12 @@ def library() -> Workspace:
 
 @pytest.fixture(scope="module")
 def paper(library: Workspace) -> Plan:
-    return make_plan(library, "paper")
+    return build_plan(library, "paper")
 
 
 @pytest.fixture(scope="module")
 def sample(library: Workspace) -> Plan:
-    return make_plan(library, "paper_sample")
+    return build_plan(library, "paper_sample")
 
 
 def kinds(plan: Plan, method: Method) -> Counter[tuple[str, str]]:
@@ -86,13 +86,13 @@ def test_each_value_is_injected_in_each_scenario_and_context(paper: Plan) -> Non
 def test_the_campaign_of_each_method_is_half_of_the_paper_campaign(
     library: Workspace, paper: Plan, method: Method
 ) -> None:
-    half = make_plan(library, f"paper_{method.value}")
+    half = build_plan(library, f"paper_{method.value}")
     assert [e.id for e in half.experiments] == [e.id for e in paper.experiments if e.method is method]
     assert {e.setting for e in half.experiments} == {("pictures", "paper_detector")}
 
 
 def test_the_as_coded_campaign_has_the_same_counts(library: Workspace) -> None:
-    coded = make_plan(library, "paper_guided", Choices(reading="as_coded"))
+    coded = build_plan(library, "paper_guided", Choices(reading="as_coded"))
     assert kinds(coded, Method.GUIDED) == INJECTED
     assert {e.trigger.armed_after_s for e in coded.experiments} == {0.0}
     assert {e.setting for e in coded.experiments} == {("pictures", "coded_detector")}
@@ -109,7 +109,7 @@ def test_the_sample_is_a_tenth_of_the_paper_campaign(paper: Plan, sample: Plan) 
 
 
 def test_the_smoke_campaign_has_every_scenario_and_variant(library: Workspace, paper: Plan) -> None:
-    smoke = make_plan(library, "paper_smoke").experiments
+    smoke = build_plan(library, "paper_smoke").experiments
     assert len(smoke) == 113
     assert {e.id for e in smoke} <= {e.id for e in paper.experiments}
     assert of_method(paper, Method.GUIDED, lambda e: e.fault.spec) == {e.fault.spec for e in smoke}
@@ -117,7 +117,7 @@ def test_the_smoke_campaign_has_every_scenario_and_variant(library: Workspace, p
 
 
 def test_the_reference_campaign_uses_the_reading_as_coded(library: Workspace) -> None:
-    plan = make_plan(library, "paper_reference")
+    plan = build_plan(library, "paper_reference")
     assert kinds(plan, Method.GUIDED) == kinds(plan, Method.RANDOM) == INJECTED
     setting = ("pictures", "reference_plant", "coded_detector", "coded_translation")
     settings = {(e.setting, e.fault.reading) for e in plan.experiments}
@@ -135,4 +135,4 @@ def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:
     env = os.environ | {"PYTHONHASHSEED": "99", "LC_ALL": "C", "TZ": "Asia/Tokyo"}
     made = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
     assert made.stdout.strip() == sample.digest
-    assert make_plan(Workspace.find(root=ROOT), "paper_sample", Choices(seed=2)).digest != sample.digest
+    assert build_plan(Workspace.find(root=ROOT), "paper_sample", Choices(seed=2)).digest != sample.digest

@@ -10,8 +10,8 @@ import pytest
 
 from mutator._common import cached_folders
 from mutator._common.files import json_bytes
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.engines.engine_jobs import Execution, Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.preflight import preflight_cache
@@ -28,7 +28,7 @@ CopyToycar = Callable[[Path], Workspace]
 def checked(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Workspace, RunFolder]:
     root = tmp_path_factory.mktemp("checked")
     toy = copy_toycar(root)
-    folder = freeze(make_plan(toy, "small"), root / "run", toy)
+    folder = freeze_plan(build_plan(toy, "small"), root / "run", toy)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(root / "cache"))
         run_checks(toy, folder)
@@ -63,7 +63,7 @@ def only_golden_runs_start(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("cache", "only_golden_runs_start")
 def test_another_folder_uses_the_cached_results(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
     toy, before = checked
-    folder = freeze(make_plan(toy, "small", Choices(only='method == "guided"')), tmp_path / "run", toy)
+    folder = freeze_plan(build_plan(toy, "small", Choices(only='method == "guided"')), tmp_path / "run", toy)
     assert all(result.passed for result in run_checks(toy, folder))
     assert (folder.path / "checks.json").read_bytes() == (before.path / "checks.json").read_bytes()
     files = [p.relative_to(before.path) for p in (before.path / "golden").rglob("*") if p.is_file()]
@@ -84,7 +84,7 @@ def test_a_damaged_entry_is_ignored(
     else:
         (cache / damaged).write_bytes(content)
     toy, _ = checked
-    folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
+    folder = freeze_plan(build_plan(toy, "small"), tmp_path / "run", toy)
     with pytest.raises(RunStarted):
         run_checks(toy, folder)
 
@@ -105,7 +105,7 @@ def test_a_changed_entry_is_ignored(
         assert "the same bytes twice" in text
         (cache / "checks.json").write_text(text.replace("the same bytes twice", "the same bytes thrice"))
     toy, _ = checked
-    folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
+    folder = freeze_plan(build_plan(toy, "small"), tmp_path / "run", toy)
     with pytest.raises(RunStarted):
         run_checks(toy, folder)
 
@@ -124,9 +124,9 @@ def test_another_seed_target_or_machine_has_no_entry(
     if changed == "target":
         with (toycar.library.parent / "tree" / "toycar" / "go.py").open("a") as file:
             file.write("# another\n")
-    plan = make_plan(toycar, "small", Choices(seed=9 if changed == "seed" else None))
+    plan = build_plan(toycar, "small", Choices(seed=9 if changed == "seed" else None))
     with pytest.raises(RunStarted):
-        run_checks(toycar, freeze(plan, tmp_path / "run", toycar))
+        run_checks(toycar, freeze_plan(plan, tmp_path / "run", toycar))
 
 
 @pytest.mark.usefixtures("only_golden_runs_start")
@@ -142,7 +142,7 @@ def test_a_forged_golden_run_is_ignored(
     (cache / "checks.json").write_bytes(json_bytes(told))
     (cache / "sum").unlink()
     (cache / "sum").write_bytes(cached_folders._digest_of_files(cache))
-    folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
+    folder = freeze_plan(build_plan(toy, "small"), tmp_path / "run", toy)
     with pytest.raises(RunStarted):
         run_checks(toy, folder)
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns import run_environment
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import load_plan, make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan, load_plan
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.preflight.canary import run_until_hazard
@@ -22,7 +22,7 @@ from mutator.workspace import Workspace
 
 
 def frozen(toycar: Workspace, tmp_path: Path) -> RunFolder:
-    return freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+    return freeze_plan(build_plan(toycar, "small"), tmp_path / "run", toycar)
 
 
 def change(toycar: Workspace, old: str, new: str, name: str = "go") -> None:
@@ -49,7 +49,7 @@ def test_a_sound_target_passes_and_is_not_checked_again(
     stages = [(one.stage, one.done, one.total) for one in told]
     checks = [("checks", done, 3) for done in range(4)]
     assert stages == checks + [("golden", done, 4) for done in range(5)]
-    assert load_plan(folder).cost(2).measured
+    assert load_plan(folder).cost(2).is_measured
     monkeypatch.setattr(ReferenceEngine, "execute", None)
     assert run_checks(toycar, folder) == results
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.model import Experiment, Trigger
 from mutator.preflight.preflight_checks import describe_unreached_triggers, run_checks
 from mutator.preflight.unreached_triggers import describe_unreached, load_observations, save_observations
@@ -59,13 +59,13 @@ def test_triggers_are_checked_with_cached_golden_runs(toycar: Workspace, tmp_pat
     text = campaign.read_text().replace("methods: [guided, random]", "methods: [guided]")
     campaign.write_text(text.replace("table: near_far", "list: [{when: v_ego > 99}, {at_s: 50}]"))
     for name in ("fresh", "cached"):
-        folder = freeze(make_plan(toycar, "small"), tmp_path / name, toycar)
+        folder = freeze_plan(build_plan(toycar, "small"), tmp_path / name, toycar)
         run_checks(toycar, folder)
         late, never = describe_unreached_triggers(toycar, folder)
         assert late.startswith("the scenario ends before the time of 3 of 6 experiments, which")
         assert "v_ego > 99.0 in A: 3" in never
         assert (folder.path / "checks.json").is_file()
-    again = freeze(make_plan(toycar, "small"), tmp_path / name, toycar)
+    again = freeze_plan(build_plan(toycar, "small"), tmp_path / name, toycar)
     folder.path.joinpath("work").rename(tmp_path / "gone")
     run_checks(toycar, again)
     assert describe_unreached_triggers(toycar, again) == []

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.report import engine_summary, report_builder, report_digests
 from mutator.report.experiment_facts import timings_of
@@ -53,8 +53,8 @@ def finish(toycar: Workspace, tmp_path: Path) -> Finish:
         ways: Sequence[tuple[str | None, str]] = WAYS,
     ) -> Path:
         run = tmp_path / "run"
-        plan = make_plan(toycar, "small", Choices(**asdict(Choices(limit=4))))
-        freeze(plan, run, toycar)
+        plan = build_plan(toycar, "small", Choices(**asdict(Choices(limit=4))))
+        freeze_plan(plan, run, toycar)
         records = [record(experiment) for experiment in plan.experiments]
         write_records(run / "records/0001-main.jsonl", records)
         if proven is not None:

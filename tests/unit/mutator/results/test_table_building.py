@@ -15,8 +15,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from mutator._common.files import writing_temporary_path
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Record
 from mutator.outcomes.fault_paths import fault_paths_of
@@ -41,8 +41,8 @@ MakeRecord = Callable[..., Record]
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
     """A run with records of all experiments except two, in two files."""
-    plan = make_plan(toycar, "toy")
-    folder = freeze(plan, tmp_path / "run", toycar)
+    plan = build_plan(toycar, "toy")
+    folder = freeze_plan(plan, tmp_path / "run", toycar)
     for i in (0, 1):
         writer = LineWriter(
             folder.path / "records" / f"0001-gw{i}.jsonl", {"schema": SCHEMA, "plan": folder.head.plan}

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from mutator._common.version import VERSION
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import Plan, load_plan, make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import Plan, build_plan, load_plan
 from mutator.errors import CheckFailed
 from mutator.execution.campaign_running import run_campaign
 from mutator.review import approval_gate
@@ -19,7 +19,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def plan(toycar: Workspace) -> Plan:
-    return make_plan(toycar, "small", Choices(limit=2))
+    return build_plan(toycar, "small", Choices(limit=2))
 
 
 def decide(toy: Workspace, plan: Plan, kind: Kind = Kind.APPROVE, count: int | None = None) -> None:
@@ -31,7 +31,7 @@ def decide(toy: Workspace, plan: Plan, kind: Kind = Kind.APPROVE, count: int | N
 def test_the_run_folder_of_an_approved_plan_names_its_reviewers(
     toycar: Workspace, plan: Plan, tmp_path: Path
 ) -> None:
-    run = freeze(plan, tmp_path / "run", toycar).path
+    run = freeze_plan(plan, tmp_path / "run", toycar).path
     assert approval_summary(run) == ""
     decide(toycar, plan)
     decide(toycar, plan, count=1)
@@ -56,7 +56,7 @@ def test_groups_without_approval_are_named(toycar: Workspace, plan: Plan) -> Non
     template = toycar.templates / f"{changed.models[0]}.py.j2"
     template.write_text(template.read_text() + "{# another #}\n")
     with pytest.raises(CheckFailed) as caught:
-        approval_gate.approvals(toycar, make_plan(toycar, "small", Choices(limit=2, reading="as_coded")))
+        approval_gate.approvals(toycar, build_plan(toycar, "small", Choices(limit=2, reading="as_coded")))
     told = [line.split("  ")[2].partition(": ")[0] for line in caught.value.got.splitlines()[1:]]
     assert told[0].startswith("missing, ")
     assert all(line.startswith("changed (template), ") for line in told[1:-1]) and told[1:-1]
@@ -79,7 +79,7 @@ def test_a_users_own_file_is_named_by_its_path(toycar: Workspace, tmp_path: Path
     mine = tmp_path / "my own.yaml"
     mine.write_text(toycar.campaign("small").read_text() + "\n# mine\n")
     with pytest.raises(CheckFailed) as caught:
-        approval_gate.approvals(toycar, make_plan(toycar, mine, Choices(limit=1)))
+        approval_gate.approvals(toycar, build_plan(toycar, mine, Choices(limit=1)))
     assert f"--campaign '{mine}'" in str(caught.value.remedy)
 
 
@@ -98,10 +98,10 @@ def test_a_resumed_run_does_not_need_the_campaigns_spec_file(toycar: Workspace, 
     (mine / "mine.yaml").write_text(
         campaign.replace("spec: sensor/lane/shifted, values", "spec: lane.yaml, values")
     )
-    plan = make_plan(toycar, mine / "mine.yaml", Choices(only='fault_type == "mine"'))
+    plan = build_plan(toycar, mine / "mine.yaml", Choices(only='fault_type == "mine"'))
     lane = of_plan(toycar, plan)[0]
     assert lane.values == {"by": (0.0, 2.5)} and mine / "lane.yaml" in lane.made_from
-    run = freeze(plan, tmp_path / "run", toycar)
+    run = freeze_plan(plan, tmp_path / "run", toycar)
     decide(toycar, plan)
     (mine / "lane.yaml").unlink()
     assert approval_gate.approvals(toycar, load_plan(run))["groups"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.git_clone import user_name
+from mutator.campaigns.git_clone import find_user_name
 from mutator.errors import MutatorError
 from mutator.review.commits import library_commit
 from mutator.review.decisions import Change, Kind, Review, State, load_review, record
@@ -146,9 +146,9 @@ def test_the_user_name_never_comes_from_the_library(
     git(root, "config", "extensions.worktreeConfig", "true")
     git(root, "config", "user.name", "Jane Doe")
     git(root, "config", "--worktree", "user.name", "Jane Doe")
-    assert user_name(toycar.library) is None
+    assert find_user_name(toycar.library) is None
     git(root, "config", "--global", "user.name", "A User")
-    assert user_name(toycar.library) == "A User"
+    assert find_user_name(toycar.library) == "A User"
     (home / "at-work").write_text("[user]\n\tname = At Work\n")
     git(root, "config", "--global", f"includeIf.gitdir:{root}/.path", str(home / "at-work"))
-    assert user_name(toycar.library) == "At Work", "the user's own file names two names"
+    assert find_user_name(toycar.library) == "At Work", "the user's own file names two names"

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.model import Outcome, Status
 from mutator.results import table_building
@@ -29,7 +29,7 @@ def test_a_group_has_counts_a_typical_and_a_worst_experiment(
     toycar: Workspace, tmp_path: Path, write_run: WriteRun
 ) -> None:
     """The typical experiment is the median of the most frequent ending."""
-    plan = make_plan(toycar, "toy", Choices())
+    plan = build_plan(toycar, "toy", Choices())
     lane = [e.id for e in plan.experiments if e.fault.fault_type == "lane"]
     bad = {name: {"hazards": (("H3", 3.0 + i),), **HAZARD} for i, name in enumerate(lane[:2])}
     run = write_run(toycar, tmp_path / "run", lambda e: bad.get(e.id, {}))
@@ -52,13 +52,13 @@ def test_a_group_without_experiments_has_no_verdict(
     """The group of the probe has no experiments, because all mutants share the probe."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run", only='fault_type == "silence"'))
     table_building.ensure_tables(run.path)
-    groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
+    groups = of_plan(toycar, build_plan(toycar, "toy", Choices()))
     told = {group.models for group in groups if of_group(run, group)}
     assert told == {("omission",)}
 
 
 def test_later_results_are_counted(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
-    group = next(g for g in of_plan(toycar, make_plan(toycar, "toy", Choices())) if g.faults)
+    group = next(g for g in of_plan(toycar, build_plan(toycar, "toy", Choices())) if g.faults)
     write_run(toycar, tmp_path / "run", lambda e: None)
     with pytest.raises(MutatorError, match="no results here"):
         of_group(RunFolder.open(tmp_path / "run"), group)
@@ -75,7 +75,7 @@ def test_the_results_are_read_once_for_many_groups(
     """Reading a large table takes seconds and much memory."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run"))
     table_building.ensure_tables(run.path)
-    groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
+    groups = of_plan(toycar, build_plan(toycar, "toy", Choices()))
     read: list[Results] = []
     frame = Results.frame
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.review.decision_basis import fault_hunks
 from mutator.review.mutant_groups import Group, of_library, of_plan
@@ -39,7 +39,7 @@ def test_variants_are_grouped_by_place_model_and_arguments(groups: Groups) -> No
 
 
 def test_a_group_is_the_same_in_a_campaign(toycar: Workspace, groups: Groups) -> None:
-    picked = of_plan(toycar, make_plan(toycar, "small", Choices(limit=3)))
+    picked = of_plan(toycar, build_plan(toycar, "small", Choices(limit=3)))
     assert 1 < len(picked) <= 5
     for group in picked:
         assert group.bound == groups[group.id].bound
@@ -50,7 +50,7 @@ def test_a_group_is_the_same_in_a_campaign(toycar: Workspace, groups: Groups) ->
 
 def test_the_canary_is_reviewed_too(toycar: Workspace) -> None:
     """The canary runs before all experiments."""
-    plan = make_plan(toycar, "small", Choices(only='fault_type == "silence" and method == "guided"'))
+    plan = build_plan(toycar, "small", Choices(only='fault_type == "silence" and method == "guided"'))
     canary = next(g for g in of_plan(toycar, plan) if "after_assign offset" in g.what)
     assert canary.runs == 0
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.serve.job_requests import Desk, Work
 from mutator.serve.served_runs import Runs
@@ -103,7 +103,7 @@ def test_a_job_request_must_be_json(client: Client, kind: str) -> None:
 @pytest.fixture
 def desk(toycar: Workspace, tmp_path: Path) -> Desk:
     (tmp_path / "runs").mkdir()
-    freeze(make_plan(toycar, "small"), tmp_path / "runs" / "first", toycar)
+    freeze_plan(build_plan(toycar, "small"), tmp_path / "runs" / "first", toycar)
     return Desk(toycar, Runs((tmp_path / "runs",)))
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from mutator._common.doors import EXPORTS
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.exports import Table, find_export
 from mutator.store.allowed_contents import ALLOWED_FILE_GLOBS
@@ -20,7 +20,7 @@ PAGE = Path(__file__).parents[4] / "docs" / "reference" / "run-folder.md"
 
 @pytest.fixture
 def run(toycar: Workspace, tmp_path: Path) -> Path:
-    return freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar).path
+    return freeze_plan(build_plan(toycar, "toy"), tmp_path / "run", toycar).path
 
 
 def contents(folder: Path) -> set[Path]:

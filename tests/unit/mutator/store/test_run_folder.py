@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from mutator._common import folder_locks
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.store.cleaning import delete_run
 from mutator.store.run_folder import RunFolder
@@ -34,7 +34,7 @@ else:
 
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
-    return freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
+    return freeze_plan(build_plan(toycar, "toy"), tmp_path / "run", toycar)
 
 
 def holder(folder: RunFolder, *words: str) -> "subprocess.Popen[str]":
@@ -128,4 +128,4 @@ def test_a_run_folder_without_its_plan_is_reported(folder: RunFolder) -> None:
 @pytest.mark.parametrize("place", ["/proc/nosuch/run", "/dev/null/run"])
 def test_a_folder_that_cannot_be_created_is_reported(toycar: Workspace, place: str) -> None:
     with pytest.raises(MutatorError, match="cannot be written"):
-        freeze(make_plan(toycar, "toy"), Path(place), toycar)
+        freeze_plan(build_plan(toycar, "toy"), Path(place), toycar)

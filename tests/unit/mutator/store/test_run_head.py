@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError, Outside
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import RunHead, load_head
@@ -60,7 +60,7 @@ def test_optional_keys_and_those_of_the_target_have_their_place(toycar: Workspac
     path = toycar.library / "campaigns" / "small.yaml"
     lines = [line for line in path.read_text().splitlines() if not line.startswith("seed:")]
     path.write_text("\n".join([*lines, "seeds: {from: 3, to: 4}", ""]))
-    folder = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+    folder = freeze_plan(build_plan(toycar, "small"), tmp_path / "run", toycar)
     keys = list(json.loads((folder.path / "run.json").read_text()))
     assert keys[keys.index("seed") : keys.index("choices")] == ["seed", "seeds", "reading"]
     of_target = [field.name for field in dataclasses.fields(TargetFacts)]

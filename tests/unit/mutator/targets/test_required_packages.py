@@ -7,9 +7,9 @@ import pytest
 
 import mutator
 from mutator.api.trials import try_fault
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
-from mutator.campaigns.run_provenance import begin_stretch, check_versions
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
+from mutator.campaigns.run_provenance import accepted_version_differences, begin_stretch
 from mutator.checks.doctor import Level, examine_machine
 from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
@@ -65,8 +65,8 @@ def test_an_invalid_requirement_is_refused_at_its_line(toycar: Workspace) -> Non
 def test_versions_are_stored_with_a_stretch_of_work(toycar: Workspace, tmp_path: Path) -> None:
     """The versions of all required packages are stored, whether or not a run uses them."""
     requiring(toycar, "HypoThesis>=6")
-    folder = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+    folder = freeze_plan(build_plan(toycar, "small"), tmp_path / "run", toycar)
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     (stretch,) = RunFolder.open(folder.path).stretches
     assert stretch.packages["hypothesis"] == metadata.version("hypothesis")
-    assert check_versions(RunFolder.open(folder.path)) == ()
+    assert accepted_version_differences(RunFolder.open(folder.path)) == ()

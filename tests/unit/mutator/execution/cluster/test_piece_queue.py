@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.chunks import pending
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
+from mutator.campaigns.chunks import pending_chunks_of
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
 from mutator.execution.cluster.piece_queue import Board
 from mutator.execution.cluster.pieces import Kind, Piece
 from mutator.preflight.equivalence_check import SampledExperiment
@@ -33,7 +33,7 @@ class Clock:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
     """A frozen plan in which some experiments share a run."""
     shipped = Workspace.find(root=CLONE)
-    return freeze(make_plan(shipped, "paper_smoke"), tmp_path_factory.mktemp("board") / "run", shipped)
+    return freeze_plan(build_plan(shipped, "paper_smoke"), tmp_path_factory.mktemp("board") / "run", shipped)
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def board(folder: RunFolder, clock: Clock, proof: tuple[str, ...] = ()) -> Board
     """Return a board for two workers, with the whole plan and a proof that reruns the experiments in
     `proof`."""
     samples = [SampledExperiment(number, name) for number, name in enumerate(proof)]
-    made = Board(folder, pending(folder, {}), samples, now=clock)
+    made = Board(folder, pending_chunks_of(folder, {}), samples, now=clock)
     for name in ("alpha", "beta"):
         made.join(name, 1)
     return made

@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 from distributed.client import FutureCancelledError
 
-from mutator.campaigns.chunks import pending
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plan import make_plan
-from mutator.campaigns.run_provenance import add_stretch
+from mutator.campaigns.chunks import pending_chunks_of
+from mutator.campaigns.freezing import freeze_plan
+from mutator.campaigns.plan import build_plan
+from mutator.campaigns.run_provenance import append_stretch
 from mutator.errors import MutatorWarning
 from mutator.execution.cluster import cluster_distributor
 from mutator.execution.cluster.bundle import Bundle
@@ -118,7 +118,7 @@ class Workers:
 
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
-    return freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+    return freeze_plan(build_plan(toycar, "small"), tmp_path / "run", toycar)
 
 
 @pytest.fixture
@@ -126,12 +126,12 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
     """A session in which every experiment is pending, and the versions of workers are not checked."""
     monkeypatch.setattr(Bundle, "of", lambda *given: Bundle(b"", ""))
     monkeypatch.setattr(Crew, "objection", lambda *given: "")
-    folder = add_stretch(folder, Stretch(python="", packages={}, platform=""))
+    folder = append_stretch(folder, Stretch(python="", packages={}, platform=""))
     return SimpleNamespace(
         workspace=toycar,
         folder=folder,
         manifest=toycar.manifest("toycar"),
-        pending=pending(folder, {}),
+        pending=pending_chunks_of(folder, {}),
         proof=(),
         engine="fork",
         accept_versions=True,
