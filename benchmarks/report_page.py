@@ -38,7 +38,7 @@ from mutator.report.panels.fault_paths_panel import build_fault_paths_panel
 from mutator.report.reported_run import ReportedRun
 from mutator.results import table_building
 from mutator.results.outcome_counting import count_endings
-from mutator.review.patch_shapes import shapes
+from mutator.review.patch_shapes import shapes_of_patches
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
@@ -150,7 +150,7 @@ def write(size: int, out: Path) -> dict[str, float]:
     shown = [experiments[name] for name in ids]
     records = [record(e, n) for n, e in enumerate(shown)]
     traces = [one.trace_digest for one in records]
-    details = report_browse.details(shown, shapes(patches(workspace, shown)), ids, traces)
+    details = report_browse.details(shown, shapes_of_patches(patches(workspace, shown)), ids, traces)
     detail = embedded(details, "details")
     index_kb = write_series(workspace, records, out)
     browse = Browse(

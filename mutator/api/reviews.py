@@ -12,12 +12,12 @@ from mutator.campaigns.git_clone import find_user_name
 from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.review import approval_gate, mutant_groups
-from mutator.review.decisions import Change, Kind, Review, State, record
+from mutator.review.decisions import Review, ReviewAction, ReviewActionKind, ReviewState, record_actions
 from mutator.review.decisions import load_review as load_decisions
-from mutator.review.effect_pictures import of_groups
+from mutator.review.effect_pictures import pictures_of_groups
 from mutator.review.group_columns import COLUMNS
 from mutator.review.mutant_groups import Group
-from mutator.review.review_page import write_page
+from mutator.review.review_page import write_review_page
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
@@ -36,15 +36,18 @@ class ReviewedGroups:
     @property
     def undecided(self) -> tuple[Group, ...]:
         """The groups that are new or have changed since their decision."""
-        return tuple(g for g in self.groups if self.review.state(g) in (State.NEW, State.CHANGED))
+        return tuple(g for g in self.groups if self.review.state(g) in (ReviewState.NEW, ReviewState.CHANGED))
 
     @property
     def lacking(self) -> tuple[tuple[Group, str], ...]:
         """The groups that `run --require-reviewed` refuses, and why, e.g. `missing, 12 experiments`."""
         return tuple(
-            (group, f"{approval_gate.reason(self.review, group)}, {approval_gate.share(group)}")
-            for group in self.review.in_turn(self.groups)
-            if self.review.state(group) is not State.APPROVED
+            (
+                group,
+                f"{approval_gate.refusal_reason(self.review, group)}, {approval_gate.describe_share(group)}",
+            )
+            for group in self.review.in_list_order(self.groups)
+            if self.review.state(group) is not ReviewState.APPROVED
         )
 
     def reread(self) -> "ReviewedGroups":
@@ -80,39 +83,39 @@ class ReviewedGroups:
 
     def approve(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
         """Approve groups in their current state, and write the decision into the library."""
-        return self._record_actions(groups, Kind.APPROVE, by, remark)
+        return self._record_actions(groups, ReviewActionKind.APPROVE, by, remark)
 
     def reject(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
         """Reject groups in their current state, and write the decision into the library."""
-        return self._record_actions(groups, Kind.REJECT, by, remark)
+        return self._record_actions(groups, ReviewActionKind.REJECT, by, remark)
 
     def clear(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
         """Withdraw the decisions about groups; remarks and flags stay."""
-        return self._record_actions(groups, Kind.CLEAR, by, remark)
+        return self._record_actions(groups, ReviewActionKind.CLEAR, by, remark)
 
     def remark(self, groups: Sequence[Group], by: str, text: str) -> "ReviewedGroups":
         """Add a remark to groups."""
-        return self._record_actions(groups, Kind.REMARK, by, text)
+        return self._record_actions(groups, ReviewActionKind.REMARK, by, text)
 
     def flag(self, groups: Sequence[Group], by: str) -> "ReviewedGroups":
         """Flag groups for another look."""
-        return self._record_actions(groups, Kind.FLAG, by)
+        return self._record_actions(groups, ReviewActionKind.FLAG, by)
 
     def unflag(self, groups: Sequence[Group], by: str) -> "ReviewedGroups":
         """Remove flags."""
-        return self._record_actions(groups, Kind.UNFLAG, by)
+        return self._record_actions(groups, ReviewActionKind.UNFLAG, by)
 
     def write_page(self, out: str | Path) -> Path:
         """Write all groups to one self-contained HTML page."""
-        write_page(Path(out), self.review, self.groups, self.options)
+        write_review_page(Path(out), self.review, self.groups, self.options)
         return Path(out)
 
     def _record_actions(
-        self, groups: Sequence[Group], kind: Kind, by: str, text: str = ""
+        self, groups: Sequence[Group], kind: ReviewActionKind, by: str, text: str = ""
     ) -> "ReviewedGroups":
-        actions = [Change(group=group, kind=kind, by=by, text=text) for group in groups]
+        actions = [ReviewAction(group=group, kind=kind, by=by, text=text) for group in groups]
         revision_by_group = {group.id: self.review.revision(group.id) for group in groups}
-        return replace(self, review=record(self.workspace, self.review.target, actions, revision_by_group))
+        return replace(self, review=record_actions(self.workspace, self.review.target, actions, revision_by_group))
 
 
 def load_review(
@@ -135,10 +138,10 @@ def load_review(
     if campaign:
         plan = build_plan(opened_workspace, campaign, Choices(seed=seed, reading=reading))
         manifest = opened_workspace.manifest(plan.campaign.target)
-        groups = mutant_groups.of_plan(opened_workspace, plan)
+        groups = mutant_groups.groups_of_plan(opened_workspace, plan)
     else:
         manifest = opened_workspace.manifest(opened_workspace.target_name(target))
-        groups = mutant_groups.of_library(
+        groups = mutant_groups.groups_of_library(
             opened_workspace, manifest, specs=specs, reading=reading, seed=seed or 0
         )
     review = load_decisions(opened_workspace, manifest.name)
@@ -149,7 +152,7 @@ def load_review(
     return ReviewedGroups(
         workspace=opened_workspace,
         review=review,
-        groups=tuple(review.in_turn(groups)),
+        groups=tuple(review.in_list_order(groups)),
         options=tuple(options),
     )
 
@@ -165,11 +168,11 @@ def group_facts(review: Review, group: Group) -> dict[str, object]:
         "file": ", ".join(group.files),
         "function": ", ".join(group.functions),
         "model": ", ".join(group.models),
-        "trigger": group.trigger,
-        "hold": group.hold,
+        "trigger": group.trigger_kinds,
+        "hold": group.hold_kinds,
         "spec": ", ".join(group.specs),
         "faults": len(group.faults),
-        "runs": group.runs,
+        "runs": group.experiment_count,
     }
 
 
@@ -185,7 +188,7 @@ def write_pictures(
     the files by group, and the value that each file shows.
     """
     opened_workspace = open_workspace(workspace)
-    pictures_by_group = of_groups(opened_workspace, opened_workspace.manifest(target), groups)
+    pictures_by_group = pictures_of_groups(opened_workspace, opened_workspace.manifest(target), groups)
     written: PictureFiles = {}
     values: dict[str, str] = {}
     if pictures_by_group:

@@ -23,12 +23,12 @@ from mutator.model import AfterHazard, Limits, Method
 
 SCHEMA = "campaign/1"
 _SPEC_SUFFIXES = (".yaml", ".yml")
-_Value = TypeVar("_Told")
+_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultSelection:
-    """A selection of faults: a glob over `<module>/<fault_type>/<variant>`, a spec `file`, or `operators`."""
+    """A selection of faults: a glob over `<module>/<fault_type>/<variant>`, a spec file, or operators."""
 
     spec_pattern: str
     spec_file: Path | None = None
@@ -81,7 +81,7 @@ class Campaign:
         return _value_in(self.changes_by_reading, reading)
 
     def keys_of_changes(self, reading: str) -> KeyPath:
-        """Return where the campaign file has the value of `setting_in`."""
+        """Return where the campaign file has the value of `changes_in`."""
         return ("setting", reading) if reading in self.changes_by_reading else ("setting",)
 
     def error(self, keys: KeyPath, got: str, *, expected: str, remedy: str) -> MutatorError:
@@ -96,7 +96,7 @@ def _value_in(value_by_reading: Mapping[str, _Value], reading: str) -> _Value:
 def load_campaign(path: Path) -> Campaign:
     """Read a campaign file strictly; any mistake raises MutatorError with file and line.
 
-    The study need not be installed, so that old runs can be read. `load_study` checks it.
+    The study need not be installed, so that old runs can be read. `load_campaign_study` checks it.
     """
     model, source = load_yaml_model(path, CampaignModel, SCHEMA, prepare=with_list_below_triggers)
     _check_no_duplicates(model, source)

@@ -133,7 +133,7 @@ def _unchanged(value: object) -> object:
     return value
 
 
-# `with_list` has already converted the list, so that errors have its lines
+# `with_list_below_triggers` has already converted the list, so that errors have its lines
 Triggers = Annotated[
     TriggersModel, BeforeValidator(_unchanged, json_schema_input_type=TriggersModel | list[_TriggerOrAlways])
 ]

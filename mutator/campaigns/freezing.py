@@ -56,7 +56,7 @@ def freeze_plan(plan: Plan | SeedBySeedPlan, out: Path, workspace: Workspace) ->
 def freeze_plan_with_tally(
     plan: Plan | SeedBySeedPlan, out: Path, workspace: Workspace
 ) -> tuple[RunFolder, PlanTally]:
-    """Like `freeze`, but also return the plan's totals."""
+    """Like `freeze_plan`, but also return the plan's totals."""
     is_new = not out.exists()
     make_run_folder(out)
     try:
@@ -91,7 +91,7 @@ def make_run_folder(out: Path) -> None:
 def freeze_plan_in_owned_folder(
     plan: Plan | SeedBySeedPlan, out: Path, workspace: Workspace
 ) -> tuple[RunFolder, PlanTally]:
-    """Like `freeze_and_tell`, for a caller that owns the folder."""
+    """Like `freeze_plan_with_tally`, for a caller that owns the folder."""
     if RunFolder.exists(out):
         folder = RunFolder.open(out)
         tally, plan_digest = _count_parts(plan)

@@ -43,7 +43,7 @@ class _CommittedFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GitClone:
-    """A clone with a commit. `top` is its folder; `hash_name` is `sha1` or `sha256`."""
+    """A clone with a commit. `root` is its folder; `hash_name` is `sha1` or `sha256`."""
 
     root: Path
     commit: str
@@ -61,9 +61,9 @@ class GitClone:
         parts = [] if output is None else os.fsdecode(output).splitlines()
         if len(parts) != 6 or not folder.resolve().is_relative_to(parts[0]):
             return None
-        top, objects, shallow, excluded, hash_name, commit = parts
+        root, objects, shallow, excluded, hash_name, commit = parts
         return cls(
-            top=Path(top),
+            root=Path(root),
             commit=commit,
             hash_name=hash_name,
             _objects=(folder / objects).resolve(),

@@ -166,7 +166,7 @@ class SeedBySeedPlan:
         return self.seeds[0]
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def operator_notes(self) -> tuple[str, ...]:
         """How many mutants the operators produced, and what was left out; known once the parts exist."""
         return self._expansion.operator_notes
 
@@ -251,7 +251,7 @@ def build_plan(workspace: Workspace, campaign: str | Path, choices: Choices | No
         canary=canary,
         digest=plan_digest([e.id for e in experiments], chunks, canary.id, loaded),
         runs=sum(part.runs for part in parts),
-        operator_notes=planning.told,
+        operator_notes=planning.operator_notes,
     )
 
 

@@ -30,7 +30,8 @@ class IdleFaults:
         if labels := list(dict.fromkeys(self._idle_labels)):
             more = f" and {len(labels) - _MOST_NAMED_FAULTS} more" if len(labels) > _MOST_NAMED_FAULTS else ""
             warnings.warn(
-                f"the value changes nothing in {self._idle_count} of {counted(self._experiment_count, 'experiment')}: "
+                f"the value changes nothing in {self._idle_count} of "
+                f"{counted(self._experiment_count, 'experiment')}: "
                 f"{', '.join(labels[:_MOST_NAMED_FAULTS])}{more}",
                 MutatorWarning,
                 stacklevel=2,

@@ -32,11 +32,11 @@ class RunInputs:
     ) -> "RunInputs":
         """Return the inputs in a workspace; MutatorError for a missing scenario or a mistake in a model."""
         files = {name: workspace.scenario(name) for name in sorted(scenarios)}
-        return cls(manifest=manifest, models=workspace.fault_models(), scenarios=files)
+        return cls(manifest=manifest, fault_models=workspace.fault_models(), scenario_files=files)
 
     @classmethod
     def from_bytes(cls, data: bytes) -> "RunInputs":
-        """Return what `packed` packed. The data must come from the process that started this one."""
+        """Return what `to_bytes` packed. The data must come from the process that started this one."""
         inputs = pickle.loads(data)
         assert isinstance(inputs, cls)
         return inputs

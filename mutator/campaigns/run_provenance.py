@@ -67,7 +67,7 @@ def accepted_version_differences(folder: RunFolder, *, accept: bool = False) -> 
 
 
 def version_error(run: Path, beginning: str, version_differences: Iterable[str]) -> MutatorError:
-    """Return an error about different versions, for the caller to raise. Its text begins with `what`."""
+    """Return an error about different versions, for the caller to raise. Its text begins with `beginning`."""
     return MutatorError(
         f"{beginning} other versions: {'; '.join(version_differences)}",
         where=run,
@@ -92,7 +92,7 @@ def begin_stretch(
     folder with its new head.
 
     `records` is the glob of the session's files; `packages` are what it uses besides. MutatorError as in
-    `check_versions`.
+    `accepted_version_differences`.
     """
     manifest = workspace.manifest(folder.head.target)
     folder_by_name = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}

@@ -12,7 +12,7 @@ _Cell = tuple[str, str, str, str]  # variant, method or methods, scenario, trigg
 
 
 def evenly_spread_indices(count: int, size: int) -> list[int]:
-    """Return `wanted` of the indices 0 ... count-1, evenly spread."""
+    """Return `size` of the indices 0 ... count-1, evenly spread."""
     if size >= count:
         return list(range(count))
     return [(2 * i + 1) * count // (2 * size) for i in range(size)]
@@ -27,7 +27,7 @@ def draw_balanced(experiments: Sequence[Experiment], count: int, seed: int) -> t
 
 
 def draw_balanced_pairs(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
-    """Like `pick`, but take a guided experiment together with its random partner if both are present.
+    """Like `draw_balanced`, but take a guided experiment together with its random partner if both exist.
 
     If `count` does not fit whole pairs, the last pair is split.
     """
@@ -41,7 +41,7 @@ def draw_balanced_pairs(experiments: Sequence[Experiment], count: int, seed: int
 def _draw_units(
     experiments: Sequence[Experiment], units: Iterable[list[Experiment]], count: int, seed: int
 ) -> tuple[Experiment, ...]:
-    """Like `pick`, but draw whole `units`. Only the last one is split if `count` requires it."""
+    """Like `draw_balanced`, but draw whole `units`. Only the last one is split if `count` requires it."""
     if count >= len(experiments):
         return tuple(experiments)
     cells: dict[str, dict[_Cell, deque[list[Experiment]]]] = defaultdict(dict)

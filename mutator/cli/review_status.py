@@ -23,7 +23,7 @@ def print_status(terminal: Terminal, reviewed: "mutator.ReviewedGroups", campaig
     if review.four_eyes:
         terminal.say("four eyes: nobody can approve what they changed last")
     if not campaign:
-        changed = [(group, review.describe(group)) for group in reviewed.groups if review.changed(group)]
+        changed = [(group, review.describe(group)) for group in reviewed.groups if review.stale_parts(group)]
         _print_groups(terminal, "changed since the decision", changed)
     flags = [(group, review.flag(group.id)) for group in reviewed.groups]
     _print_groups(terminal, "flagged", [(group, f"by {flag.by}") for group, flag in flags if flag])
@@ -37,7 +37,7 @@ def _status_as_json(reviewed: "mutator.ReviewedGroups") -> dict[str, Any]:
     review, groups = reviewed.review, reviewed.groups
     states = Counter(review.state(group).value for group in groups)
     groups_by_list = {
-        "changed": [group for group in groups if review.changed(group)],
+        "changed": [group for group in groups if review.stale_parts(group)],
         "flagged": [group for group in groups if review.flag(group.id)],
         "lacking": [group for group, _ in reviewed.lacking],
     }
@@ -58,4 +58,4 @@ def _print_groups(terminal: Terminal, head: str, rows: "Sequence[tuple[Group, st
     if rows:
         terminal.say(f"{head}:", style="bold")
     for group, words in rows:
-        terminal.say(f"  {group.id}  {words}: {group.what}")
+        terminal.say(f"  {group.id}  {words}: {group.label}")

@@ -23,16 +23,20 @@ def group_as_json(review: "Review", group: "Group", *, whole: bool = False) -> d
     from mutator.review.readable_groups import value_table
 
     decision, flag = review.decision(group.id), review.flag(group.id)
-    facts = {**group_facts(review, group), "what": group.what, "injections": group.injections}
-    facts |= {"at": decision.at if decision else None, "changed": review.changed(group)}
+    facts = {**group_facts(review, group), "what": group.label, "injections": group.injection_labels}
+    facts |= {"at": decision.at if decision else None, "changed": review.stale_parts(group)}
     facts |= {"remarks": [asdict(remark) for remark in review.remarks(group.id)]}
-    facts |= {"flag": asdict(flag) if flag else None, "bound": asdict(group.bound), "ranges": group.values}
+    facts |= {
+        "flag": asdict(flag) if flag else None,
+        "bound": asdict(group.basis_digests),
+        "ranges": group.value_ranges,
+    }
     if not whole:
         return facts
     heads, rows = value_table(group)
     return facts | {
         "diff": group.diff,
-        "changes": review.changes(group),
+        "changes": review.diff_since_decision(group),
         "values": [dict(zip(heads, row, strict=True)) for row in rows],
         "triggers": [asdict(trigger) for trigger in group.triggers],
     }
@@ -54,10 +58,10 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
         (
             g.id,
             review.state(g).value,
-            "\n".join(map(_shorten_injection, g.injections)),
+            "\n".join(map(_shorten_injection, g.injection_labels)),
             _describe_trigger(g),
             len(g.faults),
-            g.runs,
+            g.experiment_count,
         )
         for g in groups
     ]
@@ -79,7 +83,7 @@ def _shorten_injection(injection: str) -> str:
 
 
 def _describe_trigger(group: "Group") -> str:
-    return f"{group.trigger}, {group.hold}" if group.trigger else "always"
+    return f"{group.trigger_kinds}, {group.hold_kinds}" if group.trigger_kinds else "always"
 
 
 def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
@@ -95,11 +99,11 @@ def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
 
 def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
     _print_head(terminal, review, group)
-    terminal.say(f"  {group.what}", style="bold")
+    terminal.say(f"  {group.label}", style="bold")
     terminal.say()
-    if changes := review.changes(group):
+    if changes := review.diff_since_decision(group):
         terminal.print_diff(changes)
-    elif review.changed(group):
+    elif review.stale_parts(group):
         terminal.say("the diff that the reviewer saw was not kept")
     else:
         terminal.say(
@@ -109,14 +113,14 @@ def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
 
 
 def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
-    from mutator.review.readable_groups import condition_lines, ranges, value_table
+    from mutator.review.readable_groups import condition_lines, describe_value_ranges, value_table
 
     _print_head(terminal, review, group)
-    for injection in group.injections:
+    for injection in group.injection_labels:
         terminal.say(f"  {injection}", style="bold")
-    runs = "" if group.runs is None else f", {counted(group.runs, 'experiment')}"
-    if group.values:
-        terminal.say(f"values: {ranges(group)}")
+    runs = "" if group.experiment_count is None else f", {counted(group.experiment_count, 'experiment')}"
+    if group.value_ranges:
+        terminal.say(f"values: {describe_value_ranges(group)}")
     terminal.say(f"when: {_describe_trigger(group)}; {counted(len(group.faults), 'fault')}{runs}")
     conditions = condition_lines(group.triggers)
     for line in conditions[:MOST_CONDITIONS]:

@@ -15,8 +15,8 @@ _TIME_DECIMALS = 6  # decimals of a time from activation; absorbs rounding error
 
 
 class ResultChange(StrEnum):
-    """A change in the second run of a pair, relative to the first. `comparison.Gate` explains the changes for
-    the worse.
+    """A change in the second run of a pair, relative to the first. `run_comparison.Gate` explains the changes
+    for the worse.
     """
 
     NEW_HAZARD = "new-hazard"

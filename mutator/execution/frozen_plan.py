@@ -27,11 +27,13 @@ def open_frozen(
     """
     if RunFolder.exists(out):
         folder = _found(workspace, campaign, out, choices)
-        approvals = approval_gate.approvals(workspace, load_plan(folder)) if reviewed else None
+        approvals = approval_gate.require_approvals(workspace, load_plan(folder)) if reviewed else None
     else:
         planning = SeedBySeedPlan(workspace, campaign, choices)
         approvals = (
-            approval_gate.approvals(workspace, build_plan(workspace, campaign, choices)) if reviewed else None
+            approval_gate.require_approvals(workspace, build_plan(workspace, campaign, choices))
+            if reviewed
+            else None
         )
         folder, _ = freeze_plan_in_owned_folder(planning, out, workspace)
     if approvals is not None:

@@ -35,7 +35,7 @@ from mutator.results.outcome_counting import (
     joined_hazards,
 )
 from mutator.results.result_rows import ResultRow, rows_of
-from mutator.review.patch_shapes import Shape, shapes
+from mutator.review.patch_shapes import PatchShape, shapes_of_patches
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -131,7 +131,7 @@ def _table(run: ReportedRun, listed: "DataFrame") -> dict[str, Any]:
 def _details(run: ReportedRun, ids: Sequence[str]) -> dict[str, Any]:
     records = map(run.records.get, ids)
     traces = [record.trace_digest[:_TRACE] if record else "" for record in records]
-    return details(list(map(run.experiments.get, ids)), shapes(_patches(run, ids)), ids, traces)
+    return details(list(map(run.experiments.get, ids)), shapes_of_patches(_patches(run, ids)), ids, traces)
 
 
 def table(
@@ -210,7 +210,10 @@ def _number(value: float) -> float | int | str | None:
 
 
 def details(
-    experiments: Sequence[Experiment | None], found: Sequence[Shape], ids: Sequence[str], traces: list[str]
+    experiments: Sequence[Experiment | None],
+    found: Sequence[PatchShape],
+    ids: Sequence[str],
+    traces: list[str],
 ) -> dict[str, Any]:
     """For each of the `ids`, the codes of its spec and trigger setting (-1: not in the plan), the index of
     its diff's shape (-1: no diff), and the start of its trace's digest, which its series must name. A shape
@@ -219,7 +222,7 @@ def details(
     specs, settings = _Codes(), _Codes()
     faults = {e.fault.id: e.fault for e in experiments if e}
     spec = {name: _spec(fault) for name, fault in faults.items()}
-    shape_of = {member: i for i, shape in enumerate(found) for member in shape.members}
+    shape_of = {member: i for i, shape in enumerate(found) for member in shape.member_ids}
     return {
         "schema": DETAILS_SCHEMA,
         "spec": [specs.code(spec[e.fault.id]) if e else -1 for e in experiments],
@@ -229,7 +232,12 @@ def details(
         "specs": specs.known,
         "settings": [json.loads(text) for text in settings.known],
         "shapes": [
-            {"parts": s.parts, "places": s.places, "values": list(zip(*s.values, strict=True))} for s in found
+            {
+                "parts": s.parts,
+                "places": s.hole_indices,
+                "values": list(zip(*s.values_by_member, strict=True)),
+            }
+            for s in found
         ],
     }
 

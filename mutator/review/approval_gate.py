@@ -8,75 +8,76 @@ from mutator._common.hashing import as_json_types
 from mutator._common.message_text import counted
 from mutator.campaigns.plan import Plan
 from mutator.errors import CheckFailed
-from mutator.review.decisions import Review, State, load_review
-from mutator.review.mutant_groups import Group, of_plan
+from mutator.review.decisions import Review, ReviewState, load_review
+from mutator.review.mutant_groups import Group, groups_of_plan
 from mutator.store.approvals import SCHEMA
 from mutator.workspace import Workspace
 
-_MOST_IDS = 10  # maximum number of ids in one printed command
+_MOST_PRINTED_IDS = 10  # maximum number of ids in one printed command
 
 
-def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
+def require_approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
     """Return the decisions that allow the plan to run (canary and probe included), for
     `mutator.store.approvals`.
 
     CheckFailed unless every group has a valid approval.
     """
     manifest = workspace.manifest(plan.campaign.target)
-    groups = of_plan(workspace, plan)
+    groups = groups_of_plan(workspace, plan)
     review = load_review(workspace, manifest.name)
-    refused = [group for group in groups if review.state(group) is not State.APPROVED]
+    refused = [group for group in groups if review.state(group) is not ReviewState.APPROVED]
     if refused:
         raise _refusal(workspace, plan, review, refused)
-    decisions = [_kept(review, group) for group in groups]
+    decisions = [_approval_as_json(review, group) for group in groups]
     return {"schema": SCHEMA, "target": manifest.name, "groups": decisions}
 
 
-def _kept(review: Review, group: Group) -> dict[str, Any]:
+def _approval_as_json(review: Review, group: Group) -> dict[str, Any]:
     remarks = [as_json_types(remark) for remark in review.remarks(group.id)]
     return {**as_json_types(review.decision(group.id)), "remarks": remarks}
 
 
 def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Group]) -> CheckFailed:
     lines = [
-        f"  {group.id}  {reason(review, group)}, {share(group)}: {group.what}"
-        for group in review.in_turn(refused)
+        f"  {group.id}  {refusal_reason(review, group)}, {describe_share(group)}: {group.label}"
+        for group in review.in_list_order(refused)
     ]
     several = len(refused) > 1
-    many = f"{len(refused)} groups of mutants are" if several else "a group of mutants is"
-    wanted = f"--campaign {_campaign(workspace, plan)}"
-    wanted += f" --reading {plan.reading}" if plan.choices.reading else ""
-    at_once = ""
-    if len(refused) <= _MOST_IDS:
+    subject = f"{len(refused)} groups of mutants are" if several else "a group of mutants is"
+    options = f"--campaign {_campaign_argument(workspace, plan)}"
+    options += f" --reading {plan.reading}" if plan.choices.reading else ""
+    approve_command = ""
+    if len(refused) <= _MOST_PRINTED_IDS:
         ids = " ".join(group.id for group in refused)
-        at_once = f"; or approve {'all of them' if several else 'it'}: "
-        at_once += f"`mutator review approve {ids} {wanted} --by NAME`"
+        approve_command = f"; or approve {'all of them' if several else 'it'}: "
+        approve_command += f"`mutator review approve {ids} {options} --by NAME`"
     return CheckFailed(
-        "\n".join([f"{many} not approved:", *lines]),
+        "\n".join([f"{subject} not approved:", *lines]),
         where=review.path,
         expected="a valid approval of each group",
-        remedy=f"review {'them' if several else 'it'}: `mutator review walk {wanted} --by NAME`{at_once}",
+        remedy=f"review {'them' if several else 'it'}: `mutator review walk {options} --by NAME`"
+        f"{approve_command}",
     )
 
 
-def reason(review: Review, group: Group) -> str:
+def refusal_reason(review: Review, group: Group) -> str:
     """Why a group cannot run: `missing`, what has `changed`, or who `rejected` it."""
     state, decision = review.state(group), review.decision(group.id)
     if decision is None:
         return "missing"
-    if state is State.CHANGED:
-        return f"changed ({', '.join(review.changed(group))})"
-    return decision.words
+    if state is ReviewState.CHANGED:
+        return f"changed ({', '.join(review.stale_parts(group))})"
+    return decision.summary
 
 
-def share(group: Group) -> str:
+def describe_share(group: Group) -> str:
     """Return the group's share of a campaign as text: a number of experiments, or only the canary."""
-    return counted(group.runs, "experiment") if group.runs else "the canary"
+    return counted(group.experiment_count, "experiment") if group.experiment_count else "the canary"
 
 
-def _campaign(workspace: Workspace, plan: Plan) -> str:
+def _campaign_argument(workspace: Workspace, plan: Plan) -> str:
     """Return the campaign's name if the library's file of that name has the same text, else its file."""
     name = plan.campaign.name
-    known = name in workspace.campaigns
-    same = known and read_bounded(workspace.campaign(name)) == plan.campaign.file_bytes
-    return name if same else shlex.quote(str(plan.campaign.path))
+    is_in_library = name in workspace.campaigns
+    is_same = is_in_library and read_bounded(workspace.campaign(name)) == plan.campaign.file_bytes
+    return name if is_same else shlex.quote(str(plan.campaign.path))

@@ -14,149 +14,174 @@ from pathlib import Path, PurePosixPath
 from mutator.config.location_syntax import PROBE_NAME
 from mutator.mutants.injected_lines import changed_value_positions, tag_of
 from mutator.review import source_names
-from mutator.review.source_names import SUPER, Import, Module, Use, uses_in
+from mutator.review.source_names import SUPER, NameUse, SourceImport, SourceModule, uses_in
 from mutator.targets.source_tree import SourceTree
 
-_Class = tuple[str, str]  # its file, its name
-_FURTHEST = 20  # maximum number of imports to follow for a name
+_ClassKey = tuple[str, str]  # its file, its name
+_MOST_IMPORT_STEPS = 20  # maximum number of imports to follow for a name
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class _Place:
+class _Definition:
     """A piece of the source tree: `name` in the file at `path`, or the whole file (no name). For a method,
-    `me` is the class of the object on which it is called.
+    `self_class` is the class of the object on which it is called.
     """
 
     path: str
     name: str
-    me: _Class | None = None
+    self_class: _ClassKey | None = None
 
 
 class CalledCode:
     def __init__(self, tree: SourceTree) -> None:
         self._tree = tree
 
-    def of_lines(self, path: str, data: bytes) -> dict[str, str]:
+    def called_by_injected_lines(self, path: str, data: bytes) -> dict[str, str]:
         """Return the code that the injected lines of a mutated file call: the source of each place, such as
         `car/weather.py Rain`. `data` is the content of the file at `path`. Files other than Python are
         included whole.
         """
-        module = source_names.read_module(path, data, Path())
-        return self._closure(path, uses_in(module.tree, wanted=_injected(data)))
+        module = source_names.parse_module(path, data, Path())
+        return self._sources_with_callees(
+            path, uses_in(module.tree, is_selected=_injected_node_predicate(data))
+        )
 
-    def of_expressions(self, path: str, function: str, texts: Iterable[str]) -> dict[str, str]:
+    def called_by_expressions(self, path: str, function: str, texts: Iterable[str]) -> dict[str, str]:
         """Return the code that expressions would call in a function. Invalid expressions are ignored."""
-        node, owner = self._module(path).function(function), function.rpartition(".")[0]
-        found: list[Use] = []
+        node, owner = self._module(path).find_function(function), function.rpartition(".")[0]
+        uses: list[NameUse] = []
         for text in texts:
             with suppress(SyntaxError):
-                found += source_names.uses_beside(node, owner, ast.parse(text, mode="eval"))
-        return self._closure(path, found)
+                uses += source_names.uses_inside_function(node, owner, ast.parse(text, mode="eval"))
+        return self._sources_with_callees(path, uses)
 
-    def _closure(self, path: str, uses: Iterable[Use]) -> dict[str, str]:
-        waiting = list(self._places(path, uses))
-        found: dict[_Place, str] = {}
-        while waiting:
-            place = waiting.pop()
-            if place not in found:
-                found[place] = self._source(place)
-                waiting += self._beyond(place)
-        return {f"{one.path} {one.name}".strip(): found[one] for one in sorted(found)}
+    def _sources_with_callees(self, path: str, uses: Iterable[NameUse]) -> dict[str, str]:
+        pending = list(self._definitions_of_uses(path, uses))
+        source_by_definition: dict[_Definition, str] = {}
+        while pending:
+            place = pending.pop()
+            if place not in source_by_definition:
+                source_by_definition[place] = self._source(place)
+                pending += self._called_definitions(place)
+        return {
+            f"{definition.path} {definition.name}".strip(): source_by_definition[definition]
+            for definition in sorted(source_by_definition)
+        }
 
-    def _beyond(self, place: _Place) -> Iterator[_Place]:
+    def _called_definitions(self, place: _Definition) -> Iterator[_Definition]:
         """Yield the places that the source of this place calls. A class includes its methods."""
         module = self._module(place.path)
         for node in module.nodes_of(place.name) if place.name else [module.tree]:
             uses = uses_in(node, place.name.rpartition(".")[0])
-            whole = isinstance(node, ast.ClassDef)
-            yield from self._places(place.path, (use for use in uses if not (whole and use.owner)), place.me)
-            yield from self._files(place.path, node)
+            is_class = isinstance(node, ast.ClassDef)
+            yield from self._definitions_of_uses(
+                place.path, (use for use in uses if not (is_class and use.owner)), place.self_class
+            )
+            yield from self._named_data_files(place.path, node)
 
-    def _source(self, place: _Place) -> str:
+    def _source(self, place: _Definition) -> str:
         data = self._tree.files[place.path]
         text = self._module(place.path).source_of(place.name, data) if place.name else data
         return text.decode("utf-8", "surrogateescape")
 
-    def _files(self, path: str, node: ast.AST) -> Iterator[_Place]:
+    def _named_data_files(self, path: str, node: ast.AST) -> Iterator[_Definition]:
         """Yield files in the same folder that the source names and that are not Python: C code, a table."""
         folder = PurePosixPath(path).parent
-        for one in ast.walk(node):
-            if isinstance(one, ast.Constant) and isinstance(one.value, str) and "." in one.value:
-                named = (folder / one.value).as_posix()
+        for constant in ast.walk(node):
+            if (
+                isinstance(constant, ast.Constant)
+                and isinstance(constant.value, str)
+                and "." in constant.value
+            ):
+                named = (folder / constant.value).as_posix()
                 if named in self._tree.files and not named.endswith(".py"):
-                    yield _Place(named, "")
+                    yield _Definition(named, "")
 
-    def _places(self, path: str, uses: Iterable[Use], me: _Class | None = None) -> Iterator[_Place]:
+    def _definitions_of_uses(
+        self, path: str, uses: Iterable[NameUse], self_class: _ClassKey | None = None
+    ) -> Iterator[_Definition]:
         for use in uses:
             if use.words[0] == PROBE_NAME:
                 continue
             if use.imported:
-                yield from self._imported(path, use.imported, use.words[1:], 0)
+                yield from self._definitions_of_import(path, use.imported, use.words[1:], 0)
             elif use.owner:
                 here, name = (path, use.owner), use.words[1]
                 if use.words[0] == SUPER:
-                    yield from self._of_bases(here, name, me or here, 0)
+                    yield from self._methods_of_bases(here, name, self_class or here, 0)
                 else:
-                    yield from self._of_self(me or here, name, me or here, 0)
+                    yield from self._methods_of_self(self_class or here, name, self_class or here, 0)
             else:
-                yield from self._named(path, use.words, 0)
+                yield from self._definitions_of_name(path, use.words, 0)
 
-    def _named(self, path: str, words: tuple[str, ...], depth: int) -> Iterator[_Place]:
+    def _definitions_of_name(self, path: str, words: tuple[str, ...], depth: int) -> Iterator[_Definition]:
         module = self._module(path)
-        if depth > _FURTHEST or not words:
+        if depth > _MOST_IMPORT_STEPS or not words:
             return
         if module.nodes_of(words[0]):
-            yield _Place(path, words[0])
-        for one in module.imports.get(words[0], ()):
-            yield from self._imported(path, one, words[1:], depth + 1)
-        for one in module.imports.get("*", ()) if not module.knows(words[0]) else ():
-            if (target := self._path(one.absolute(path))) and target != path:
-                yield from self._named(target, words, depth + 1)
+            yield _Definition(path, words[0])
+        for import_ in module.imports.get(words[0], ()):
+            yield from self._definitions_of_import(path, import_, words[1:], depth + 1)
+        for import_ in module.imports.get("*", ()) if not module.has_name(words[0]) else ():
+            if (target := self._path_of_module(import_.full_name(path))) and target != path:
+                yield from self._definitions_of_name(target, words, depth + 1)
 
-    def _imported(self, path: str, one: Import, words: tuple[str, ...], depth: int) -> Iterator[_Place]:
-        name = one.absolute(path)
-        if one.name is not None:
-            target, name = self._path(name), ".".join(filter(None, (name, one.name)))
-            own = target and target != path  # `from . import x` in a package: x is a module, not a name in it
-            if target and own and (self._module(target).knows(one.name) or not self._path(name)):
-                yield from self._named(target, (one.name, *words), depth + 1)
+    def _definitions_of_import(
+        self, path: str, import_: SourceImport, words: tuple[str, ...], depth: int
+    ) -> Iterator[_Definition]:
+        name = import_.full_name(path)
+        if import_.name is not None:
+            target, name = self._path_of_module(name), ".".join(filter(None, (name, import_.name)))
+            is_other_module = (
+                target and target != path
+            )  # `from . import x` in a package: x is a module, not a name in it
+            if (
+                target
+                and is_other_module
+                and (self._module(target).has_name(import_.name) or not self._path_of_module(name))
+            ):
+                yield from self._definitions_of_name(target, (import_.name, *words), depth + 1)
                 return
-        while words and self._path(f"{name}.{words[0]}"):
-            if (here := self._path(name)) and self._module(here).knows(words[0]):
+        while words and self._path_of_module(f"{name}.{words[0]}"):
+            if (here := self._path_of_module(name)) and self._module(here).has_name(words[0]):
                 break
             name, words = f"{name}.{words[0]}", words[1:]
-        if target := self._path(name):
+        if target := self._path_of_module(name):
             if words:
-                yield from self._named(target, words, depth + 1)
+                yield from self._definitions_of_name(target, words, depth + 1)
             else:
-                yield _Place(target, "")
+                yield _Definition(target, "")
 
-    def _of_self(self, owner: _Class, name: str, me: _Class, depth: int) -> Iterator[_Place]:
-        """Yield the method that `self.name` refers to in an object of `me`."""
+    def _methods_of_self(
+        self, owner: _ClassKey, name: str, self_class: _ClassKey, depth: int
+    ) -> Iterator[_Definition]:
+        """Yield the method that `self.name` refers to in an object of `self_class`."""
         path, inside = owner
         if self._module(path).nodes_of(f"{inside}.{name}"):
-            yield _Place(path, f"{inside}.{name}", me)
+            yield _Definition(path, f"{inside}.{name}", self_class)
         else:
-            yield from self._of_bases(owner, name, me, depth)
+            yield from self._methods_of_bases(owner, name, self_class, depth)
 
-    def _of_bases(self, owner: _Class, name: str, me: _Class, depth: int) -> Iterator[_Place]:
-        """Yield the method that `super().name` refers to in an object of `me`."""
+    def _methods_of_bases(
+        self, owner: _ClassKey, name: str, self_class: _ClassKey, depth: int
+    ) -> Iterator[_Definition]:
+        """Yield the method that `super().name` refers to in an object of `self_class`."""
         path, inside = owner
-        for words in self._module(path).bases_of(inside) if depth < _FURTHEST else ():
-            for base in self._named(path, words, 0):
-                yield from self._of_self((base.path, base.name), name, me, depth + 1)
+        for words in self._module(path).bases_of(inside) if depth < _MOST_IMPORT_STEPS else ():
+            for base in self._definitions_of_name(path, words, 0):
+                yield from self._methods_of_self((base.path, base.name), name, self_class, depth + 1)
 
-    def _module(self, path: str) -> Module:
-        return self._tree.derived(path, source_names.read_module)
+    def _module(self, path: str) -> SourceModule:
+        return self._tree.derived(path, source_names.parse_module)
 
-    def _path(self, module: str) -> str | None:
+    def _path_of_module(self, module: str) -> str | None:
         stem = module.replace(".", "/")
         return next(
             (path for path in (f"{stem}.py", f"{stem}/__init__.py") if path in self._tree.files), None
         )
 
 
-def _injected(data: bytes) -> Callable[[ast.expr], bool]:
+def _injected_node_predicate(data: bytes) -> Callable[[ast.expr], bool]:
     """Return a predicate for the injected nodes of a mutated file: those in inserted lines, and those in the
     new parts of changed lines.
     """

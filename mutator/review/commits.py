@@ -9,7 +9,7 @@ from mutator.errors import MutatorError
 from mutator.review.mutant_groups import Group
 from mutator.workspace import Workspace
 
-_FORMAT = "--format=%H%x00%an <%ae>%x00%(trailers:key=Co-authored-by,valueonly,separator=%x00)"
+_LOG_FORMAT = "--format=%H%x00%an <%ae>%x00%(trailers:key=Co-authored-by,valueonly,separator=%x00)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,14 +21,16 @@ class _Commit:
 
     id: str
     author: str  # such as `Jane Doe <jane@x.org>`
-    others: tuple[str, ...] = ()
+    co_authors: tuple[str, ...] = ()
 
     def is_by(self, reviewer: str) -> bool:
         """Whether `reviewer`, such as `Jane Doe`, `jane@x.org` or `Jane Doe <jane@x.org>`, is an author."""
-        return any(_names(reviewer) & _names(one) for one in (self.author, *self.others))
+        return any(
+            _person_names(reviewer) & _person_names(author) for author in (self.author, *self.co_authors)
+        )
 
 
-def _names(person: str) -> set[str]:
+def _person_names(person: str) -> set[str]:
     name, _, rest = person.partition("<")
     return {" ".join(text.split()).casefold() for text in (person, name, rest.rstrip("> "))} - {""}
 
@@ -47,40 +49,40 @@ def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
     """Raise MutatorError if a reviewer approves a group that they changed last, or if a group's last author
     is unknown.
     """
-    known: dict[tuple[Path, ...], dict[Path, _Commit]] = {}
+    commits_by_sources: dict[tuple[Path, ...], dict[Path, _Commit]] = {}
     for group, by in approvals:
-        if group.made_from not in known:
-            known[group.made_from] = _last_changes(group)
-        for folder, commit in known[group.made_from].items():
+        if group.source_files not in commits_by_sources:
+            commits_by_sources[group.source_files] = _last_commits_by_clone(group)
+        for folder, commit in commits_by_sources[group.source_files].items():
             if commit.is_by(by):
-                raise _refusal(
+                raise _four_eyes_error(
                     f"{by} changed group {group.id} last (commit {commit.id[:12]} by "
-                    f"{' and '.join((commit.author, *commit.others))}): {group.what}",
+                    f"{' and '.join((commit.author, *commit.co_authors))}): {group.label}",
                     folder,
                     "have somebody else approve it",
                 )
 
 
-def _last_changes(group: Group) -> dict[Path, _Commit]:
+def _last_commits_by_clone(group: Group) -> dict[Path, _Commit]:
     """Return the last commit that changed the group's sources, for each clone."""
     clones: dict[GitClone, list[Path]] = {}
-    for path in group.made_from:
+    for path in group.source_files:
         clone = GitClone.find(path.resolve().parent)
         if clone is None:
-            raise _refusal(
+            raise _four_eyes_error(
                 f"cannot determine who last changed group {group.id}: its file is not in a git clone",
                 path,
                 "put the file under git",
             )
         clones.setdefault(clone, []).append(path)
-    return {clone.root: _last_change(group, clone, paths) for clone, paths in clones.items()}
+    return {clone.root: _last_commit(group, clone, paths) for clone, paths in clones.items()}
 
 
-def _last_change(group: Group, clone: GitClone, paths: Sequence[Path]) -> _Commit:
+def _last_commit(group: Group, clone: GitClone, paths: Sequence[Path]) -> _Commit:
     changed = clone.find_changed(paths)
-    commit = (clone.describe_last_change(paths, _FORMAT) or "").strip("\n")
+    commit = (clone.describe_last_change(paths, _LOG_FORMAT) or "").strip("\n")
     if changed is not None or not commit:
-        raise _refusal(
+        raise _four_eyes_error(
             f"cannot determine who last changed group {group.id}: its latest change is not committed",
             changed or clone.root,
             "commit the change first",
@@ -89,7 +91,7 @@ def _last_change(group: Group, clone: GitClone, paths: Sequence[Path]) -> _Commi
     return _Commit(sha, author, tuple(others))
 
 
-def _refusal(got: str, where: Path, remedy: str) -> MutatorError:
+def _four_eyes_error(got: str, where: Path, remedy: str) -> MutatorError:
     return MutatorError(
         got,
         where=where,

@@ -19,14 +19,14 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError, ReviewConflict
 from mutator.review import review_file, seen_texts
 from mutator.review.commits import check_four_eyes, library_commit
-from mutator.review.entries import Decision, Entry, Flag, Remark, Verdict
+from mutator.review.entries import Decision, DecisionVerdict, Flag, Remark, ReviewEntry
 from mutator.review.mutant_groups import Group
 from mutator.workspace import Workspace
 
-_FOLDER = "reviews"  # in the library
+_REVIEWS_FOLDER = "reviews"  # in the library
 
 
-class State(StrEnum):
+class ReviewState(StrEnum):
     """The state of a group's review, in list order."""
 
     NEW = "new"  # no decision
@@ -35,7 +35,7 @@ class State(StrEnum):
     APPROVED = "approved"
 
 
-class Kind(StrEnum):
+class ReviewActionKind(StrEnum):
     """An action of a reviewer on a group."""
 
     APPROVE = "approve"
@@ -46,15 +46,18 @@ class Kind(StrEnum):
     UNFLAG = "unflag"
 
 
-_VERDICTS = {Kind.APPROVE: Verdict.APPROVED, Kind.REJECT: Verdict.REJECTED}
+_VERDICT_BY_ACTION = {
+    ReviewActionKind.APPROVE: DecisionVerdict.APPROVED,
+    ReviewActionKind.REJECT: DecisionVerdict.REJECTED,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
+class ReviewAction:
     """An action of the reviewer `by` on a group in its current state. `text` is stored as a remark."""
 
     group: Group
-    kind: Kind
+    kind: ReviewActionKind
     by: str
     text: str = ""
 
@@ -68,13 +71,13 @@ class Review:
 
     library: Path
     target: str
-    entries: Mapping[str, Entry]
+    entries: Mapping[str, ReviewEntry]
     four_eyes: bool = False
 
     @property
     def path(self) -> Path:
         """The file, which might not exist."""
-        return path_below(self.library, _name_of(self.target))
+        return path_below(self.library, _review_file_name(self.target))
 
     def decision(self, group: str) -> Decision | None:
         entry = self.entries.get(group)
@@ -94,33 +97,35 @@ class Review:
         entry = self.entries.get(group)
         return entry.revision if entry else ""
 
-    def changed(self, group: Group) -> list[str]:
+    def stale_parts(self, group: Group) -> list[str]:
         """Return the parts of a group that changed since the decision, as text."""
         decision = self.decision(group.id)
-        return decision.changed(group.bound, group.values) if decision else []
+        return decision.changed_parts(group.basis_digests, group.value_ranges) if decision else []
 
-    def state(self, group: Group) -> State:
+    def state(self, group: Group) -> ReviewState:
         decision = self.decision(group.id)
         if decision is None:
-            return State.NEW
-        return State.CHANGED if self.changed(group) else State(decision.verdict.value)
+            return ReviewState.NEW
+        return ReviewState.CHANGED if self.stale_parts(group) else ReviewState(decision.verdict.value)
 
-    def changes(self, group: Group) -> str:
+    def diff_since_decision(self, group: Group) -> str:
         """Return a unified diff from what the reviewer saw to the current state; empty if the decision is
         valid, or if what the reviewer saw was not stored.
         """
         decision = self.decision(group.id)
-        if decision is None or not self.changed(group):
+        if decision is None or not self.stale_parts(group):
             return ""
-        return seen_texts.changes(self.library, self.seen_name(group.id), decision.bound, group.seen)
+        return seen_texts.diff_from_reviewed_text(
+            self.library, self.name_of_reviewed_text(group.id), decision.bound, group.reviewed_text
+        )
 
-    def seen_name(self, group: str) -> str:
+    def name_of_reviewed_text(self, group: str) -> str:
         """Return the file in the library with the text of a group that the reviewer saw."""
-        return f"{_FOLDER}/seen/{self.target}/{group}.txt"
+        return f"{_REVIEWS_FOLDER}/seen/{self.target}/{group}.txt"
 
-    def in_turn(self, groups: Iterable[Group]) -> list[Group]:
+    def in_list_order(self, groups: Iterable[Group]) -> list[Group]:
         """Return the groups in list order: new and changed ones first."""
-        order = list(State)
+        order = list(ReviewState)
         return sorted(groups, key=lambda group: order.index(self.state(group)))
 
     def describe(self, group: Group) -> str:
@@ -128,67 +133,76 @@ class Review:
         decision = self.decision(group.id)
         if decision is None:
             return ""
-        changed = self.changed(group)
+        changed = self.stale_parts(group)
         since = f" (changed since: {', '.join(changed)})" if changed else ""
         older = "" if decision.bound.calls else " (made before called code and values were stored)"
-        return decision.words + since + older
+        return decision.summary + since + older
 
 
 def load_review(workspace: Workspace, target: str) -> Review:
     """Load the reviews of a target's groups; empty if there is no file. MutatorError, with the line, for a
     mistake. Links are refused: errors would reveal the linked file, and a change would replace the link.
     """
-    library, name = workspace.library, _name_of(target)
+    library, name = workspace.library, _review_file_name(target)
     try:
         open_below(library, name).close()
     except FileNotFoundError:
         return Review(library=library, target=target, entries={})
-    content = review_file.load(path_below(library, name), target)
+    content = review_file.load_review_file(path_below(library, name), target)
     return Review(library=library, target=target, entries=content.entries, four_eyes=content.four_eyes)
 
 
-def _name_of(target: str) -> str:
+def _review_file_name(target: str) -> str:
     """Return the file of a target's reviews in the library."""
-    return f"{_FOLDER}/{target}.yaml"
+    return f"{_REVIEWS_FOLDER}/{target}.yaml"
 
 
-def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: Mapping[str, str]) -> Review:
-    """Apply all changes or none, and return the stored review.
+def record_actions(
+    workspace: Workspace, target: str, requested: Sequence[ReviewAction], revision_by_group: Mapping[str, str]
+) -> Review:
+    """Apply all actions or none, and return the stored review.
 
-    `seen` are the revisions of the groups that the caller saw (`Review.revision`; missing groups had no
+    `revision_by_group` has the revisions that the caller saw (`Review.revision`; missing groups had no
     review). A lock serializes callers across processes. ReviewConflict if somebody else has changed the
     review of one of the groups since; MutatorError for an unusable name or text, for an approval that
     `four_eyes` forbids, and for the library shipped with mutator, which is read-only.
     """
-    made = [replace(change, by=_line(change.by, "by"), text=_line(change.text, "text")) for change in changes]
-    for change in made:
-        _check(change)
+    actions = [
+        replace(change, by=_one_line(change.by, "by"), text=_one_line(change.text, "text"))
+        for change in requested
+    ]
+    for change in actions:
+        _check_action(change)
     path = load_review(workspace, target).path  # an error here leaves the library unchanged
     check_not_shipped(path)
     make_folder(path.parent)
     with locking_folder(path.parent):
         review = load_review(workspace, target)
-        _refuse_unseen(review, made, seen)
+        _refuse_unseen(review, actions, revision_by_group)
         if review.four_eyes:
-            check_four_eyes([(c.group, c.by) for c in made if c.kind is Kind.APPROVE])
-        return _written(workspace, review, made)
+            check_four_eyes([(c.group, c.by) for c in actions if c.kind is ReviewActionKind.APPROVE])
+        return _store(workspace, review, actions)
 
 
-def _check(change: Change) -> None:
-    if not change.by:
+def _check_action(action: ReviewAction) -> None:
+    if not action.by:
         raise MutatorError("no name", argument="by", expected="the reviewer's name", remedy="give a name")
-    if change.kind is Kind.REMARK and not change.text:
+    if action.kind is ReviewActionKind.REMARK and not action.text:
         raise MutatorError("no text", argument="text", expected="a remark", remedy="write a remark")
 
 
-def _refuse_unseen(review: Review, changes: Sequence[Change], looked_at: Mapping[str, str]) -> None:
-    groups = {change.group.id: change.group for change in changes}
-    unseen = [one for one in groups.values() if review.revision(one.id) != looked_at.get(one.id, "")]
+def _refuse_unseen(
+    review: Review, actions: Sequence[ReviewAction], revision_by_group: Mapping[str, str]
+) -> None:
+    groups = {change.group.id: change.group for change in actions}
+    unseen = [
+        group for group in groups.values() if review.revision(group.id) != revision_by_group.get(group.id, "")
+    ]
     if not unseen:
         return
-    told = [f"  {one.id}  {_last_word(review, one)}" for one in unseen]
+    descriptions = [f"  {group.id}  {_describe_review(review, group)}" for group in unseen]
     conflict = ReviewConflict(
-        "\n".join(["somebody else has changed the review in the meantime:", *told]),
+        "\n".join(["somebody else has changed the review in the meantime:", *descriptions]),
         where=review.path,
         expected="no changes since you last looked",
         remedy="check again, then decide (nothing was written)",
@@ -197,7 +211,7 @@ def _refuse_unseen(review: Review, changes: Sequence[Change], looked_at: Mapping
     raise conflict
 
 
-def _last_word(review: Review, group: Group) -> str:
+def _describe_review(review: Review, group: Group) -> str:
     remarks = review.remarks(group.id)
     flag = review.flag(group.id)
     return "; ".join(
@@ -212,49 +226,55 @@ def _last_word(review: Review, group: Group) -> str:
     )
 
 
-def _written(workspace: Workspace, review: Review, changes: Sequence[Change]) -> Review:
+def _store(workspace: Workspace, review: Review, actions: Sequence[ReviewAction]) -> Review:
     """Store the changes. The texts that reviewers saw are written first."""
     at, commit = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", library_commit(workspace)
     entries = dict(review.entries)
-    for change in changes:
-        group = change.group
-        before = entries.get(group.id, Entry(group=group.id, what=group.what))
-        entries[group.id] = _applied(before, change, at, commit)
-    kept = {name: entry for name, entry in entries.items() if not entry.says_nothing}
-    made = replace(review, entries=kept)
-    for change in changes:
-        if change.kind in _VERDICTS:
-            seen_texts.keep(made.library, made.seen_name(change.group.id), change.group.seen)
-    content = review_file.Content(entries=made.entries, four_eyes=made.four_eyes)
-    write_below(made.library, _name_of(made.target), review_file.text(made.target, content).encode())
-    return made
+    for action in actions:
+        group = action.group
+        before = entries.get(group.id, ReviewEntry(group=group.id, what=group.label))
+        entries[group.id] = _entry_after_action(before, action, at, commit)
+    nonempty_entries = {name: entry for name, entry in entries.items() if not entry.is_empty}
+    updated = replace(review, entries=nonempty_entries)
+    for action in actions:
+        if action.kind in _VERDICT_BY_ACTION:
+            seen_texts.write_reviewed_text(
+                updated.library, updated.name_of_reviewed_text(action.group.id), action.group.reviewed_text
+            )
+    content = review_file.ReviewFileContent(entries=updated.entries, four_eyes=updated.four_eyes)
+    write_below(
+        updated.library,
+        _review_file_name(updated.target),
+        review_file.render_review_file(updated.target, content).encode(),
+    )
+    return updated
 
 
-def _applied(entry: Entry, change: Change, at: str, commit: str | None) -> Entry:
-    group, kind = change.group, change.kind
-    if change.text:
-        entry = replace(entry, remarks=(*entry.remarks, Remark(by=change.by, at=at, text=change.text)))
-    if kind in _VERDICTS:
+def _entry_after_action(entry: ReviewEntry, action: ReviewAction, at: str, commit: str | None) -> ReviewEntry:
+    group, kind = action.group, action.kind
+    if action.text:
+        entry = replace(entry, remarks=(*entry.remarks, Remark(by=action.by, at=at, text=action.text)))
+    if kind in _VERDICT_BY_ACTION:
         decision = Decision(
             group=group.id,
-            what=group.what,
-            verdict=_VERDICTS[kind],
-            by=change.by,
+            what=group.label,
+            verdict=_VERDICT_BY_ACTION[kind],
+            by=action.by,
             at=at,
             commit=commit,
             tool=VERSION,
-            bound=group.bound,
-            values=group.values,
+            bound=group.basis_digests,
+            values=group.value_ranges,
         )
-        return replace(entry, what=group.what, decision=decision)
-    if kind is Kind.CLEAR:
+        return replace(entry, what=group.label, decision=decision)
+    if kind is ReviewActionKind.CLEAR:
         return replace(entry, decision=None)
-    if kind in (Kind.FLAG, Kind.UNFLAG):
-        return replace(entry, flag=Flag(by=change.by, at=at) if kind is Kind.FLAG else None)
+    if kind in (ReviewActionKind.FLAG, ReviewActionKind.UNFLAG):
+        return replace(entry, flag=Flag(by=action.by, at=at) if kind is ReviewActionKind.FLAG else None)
     return entry
 
 
-def _line(text: str, argument: str) -> str:
+def _one_line(text: str, argument: str) -> str:
     """Return the text as one line; MutatorError for characters that YAML cannot store."""
     line = " ".join(text.split())
     if not line.isprintable():

@@ -8,9 +8,9 @@ from mutator._common.hashing import content_id
 from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
 
 # for each parameter: least and greatest number, then values that are not finite (`nan`), as text
-Values = Mapping[str, tuple[float | str, ...]]
+ValueRanges = Mapping[str, tuple[float | str, ...]]
 
-_WORDS = {
+_PART_NAMES = {
     "template": "template",
     "function": "target function",
     "diff": "diff",
@@ -18,17 +18,17 @@ _WORDS = {
 }
 
 
-TIME = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$"  # how times are written
-_TEXT = yaml_metadata(pattern=r"\S")
+TIME_PATTERN = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$"  # how times are written
+_NON_EMPTY = yaml_metadata(pattern=r"\S")
 
 
-class Verdict(StrEnum):
+class DecisionVerdict(StrEnum):
     APPROVED = "approved"
     REJECTED = "rejected"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bound:
+class BasisDigests:
     """Digests of what a decision is about. If one changes, the decision is no longer valid."""
 
     diff: str  # the hunks with injected lines, without values and line numbers
@@ -36,10 +36,10 @@ class Bound:
     template: str  # the templates of the injected lines
     calls: str | None = None  # the target code that the injected lines call; None: not stored
 
-    def changed(self, now: "Bound") -> list[str]:
-        differs = {name: getattr(self, name) != getattr(now, name) for name in _WORDS}
+    def changed_parts(self, now: "BasisDigests") -> list[str]:
+        differs = {name: getattr(self, name) != getattr(now, name) for name in _PART_NAMES}
         differs["calls"] &= self.calls is not None
-        return [word for name, word in _WORDS.items() if differs[name]]
+        return [word for name, word in _PART_NAMES.items() if differs[name]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,21 +52,21 @@ class Decision:
 
     group: str
     what: str
-    verdict: Verdict
+    verdict: DecisionVerdict
     by: str
     at: str | None = None
     commit: str | None = None
     tool: str | None = None
-    bound: Bound
-    values: Values | None = None
+    bound: BasisDigests
+    values: ValueRanges | None = None
 
-    def changed(self, bound: Bound, values: Values) -> list[str]:
+    def changed_parts(self, bound: BasisDigests, values: ValueRanges) -> list[str]:
         """Return the parts of the group that changed since the decision, as text; empty if none did."""
-        beyond = _beyond(self.values, values) if self.values is not None else ""
-        return self.bound.changed(bound) + ([f"values ({beyond})"] if beyond else [])
+        beyond = _describe_wider_ranges(self.values, values) if self.values is not None else ""
+        return self.bound.changed_parts(bound) + ([f"values ({beyond})"] if beyond else [])
 
     @property
-    def words(self) -> str:
+    def summary(self) -> str:
         """Text such as `approved by Jane Doe on 2026-11-24`."""
         return f"{self.verdict} by {self.by}" + (f" on {self.at[:10]}" if self.at else "")
 
@@ -77,9 +77,9 @@ class Remark:
 
     __pydantic_config__ = mapping_config("A remark")
 
-    by: str = field(metadata=_TEXT)
-    at: str | None = field(default=None, metadata=yaml_metadata(pattern=TIME))
-    text: str = field(metadata=_TEXT)
+    by: str = field(metadata=_NON_EMPTY)
+    at: str | None = field(default=None, metadata=yaml_metadata(pattern=TIME_PATTERN))
+    text: str = field(metadata=_NON_EMPTY)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,12 +88,12 @@ class Flag:
 
     __pydantic_config__ = mapping_config("A flag")
 
-    by: str = field(metadata=_TEXT)
-    at: str = field(metadata=yaml_metadata(pattern=TIME))
+    by: str = field(metadata=_NON_EMPTY)
+    at: str = field(metadata=yaml_metadata(pattern=TIME_PATTERN))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
+class ReviewEntry:
     """The review of a group: its block in the target's review file."""
 
     group: str
@@ -103,7 +103,7 @@ class Entry:
     flag: Flag | None = None
 
     @property
-    def says_nothing(self) -> bool:
+    def is_empty(self) -> bool:
         return not (self.decision or self.remarks or self.flag)
 
     @property
@@ -111,19 +111,22 @@ class Entry:
         return content_id(asdict(self))
 
 
-def values_in_words(values: Values) -> str:
+def describe_ranges(values: ValueRanges) -> str:
     """Return the ranges as text: `by: -40 to 40; seed: 3`."""
-    return "; ".join(f"{name}: {_range(value)}" for name, value in values.items())
+    return "; ".join(f"{name}: {_describe_range(value)}" for name, value in values.items())
 
 
-def _beyond(approved: Values, now: Values) -> str:
+def _describe_wider_ranges(approved_ranges: ValueRanges, now: ValueRanges) -> str:
     """Return the values outside the approved ranges, as text."""
-    wider = [name for name in now if not _within(now[name], approved.get(name, ()))]
-    told = (f"{name}: {_range(now[name])}; approved {_range(approved.get(name, ()))}" for name in wider)
-    return "; ".join(told)
+    wider = [name for name in now if not _is_within(now[name], approved_ranges.get(name, ()))]
+    descriptions = (
+        f"{name}: {_describe_range(now[name])}; approved {_describe_range(approved_ranges.get(name, ()))}"
+        for name in wider
+    )
+    return "; ".join(descriptions)
 
 
-def _within(inner: tuple[float | str, ...], outer: tuple[float | str, ...]) -> bool:
+def _is_within(inner: tuple[float | str, ...], outer: tuple[float | str, ...]) -> bool:
     numbers = [value for value in outer if not isinstance(value, str)]
     return all(
         value in outer if isinstance(value, str) else bool(numbers) and numbers[0] <= value <= numbers[-1]
@@ -131,7 +134,7 @@ def _within(inner: tuple[float | str, ...], outer: tuple[float | str, ...]) -> b
     )
 
 
-def _range(values: tuple[float | str, ...]) -> str:
+def _describe_range(values: tuple[float | str, ...]) -> str:
     numbers = [f"{value:g}" for value in values if not isinstance(value, str)]
     words = [value for value in values if isinstance(value, str)]
     return ", ".join(filter(None, (" to ".join(dict.fromkeys(numbers)), *words))) or "none"

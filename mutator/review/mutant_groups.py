@@ -2,7 +2,7 @@
 
 A group does not depend on triggers, or on which of its mutants are selected. Its id follows from its label.
 Decisions are bound to its diff, which has holes instead of values, to the target's code and to the templates
-(`Material`).
+(`DecisionBasis`).
 """
 
 from collections import Counter
@@ -26,11 +26,11 @@ from mutator.operators.operator_lookup import OPERATOR_MODELS, operator_name_of
 from mutator.operators.statement_facts import facts_of
 from mutator.review import patch_shapes
 from mutator.review.called_code import CalledCode
-from mutator.review.decision_basis import Material, diffs_of, fault_hunks, functions_of
-from mutator.review.entries import Bound, Values
-from mutator.review.patch_shapes import Shape
-from mutator.review.seen_texts import text_of
-from mutator.review.value_ranges import ranges_of
+from mutator.review.decision_basis import DecisionBasis, distinct_diffs, fault_hunks, function_sources
+from mutator.review.entries import BasisDigests, ValueRanges
+from mutator.review.patch_shapes import PatchShape
+from mutator.review.seen_texts import render_reviewed_text
+from mutator.review.value_ranges import value_ranges_of
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
@@ -39,31 +39,31 @@ from mutator.workspace import Workspace
 @dataclass(frozen=True, kw_only=True)
 class Group:
     """Mutants that differ only in values and triggers, or all mutants that an operator makes in a function.
-    `what` is the label: location and template.
+    `label` is location and template.
 
     `shapes` are the group's diffs with holes, several if a template writes different lines for different
-    numbers. The members of the shapes are the ids of `faults`. `runs` is the number of the group's
-    experiments in a campaign; None if no campaign is given. `trigger` and `hold` list the kinds that occur,
-    joined by `or`. `values` is the range of each parameter in the specs. `seen` is the text that a decision
-    is bound to. `made_from` are the files of the specs and templates.
+    numbers. The members of the shapes are the ids of `faults`. `experiment_count` is that of the group in a
+    campaign; None if no campaign is given. `trigger_kinds` and `hold_kinds` list the kinds that occur, joined
+    by `or`. `value_ranges` has the range of each parameter in the specs. `reviewed_text` is the text that a
+    decision is bound to. `source_files` are the specs and templates.
     """
 
     id: str
-    what: str
-    injections: tuple[str, ...]  # `place: model(parameters)` of each
+    label: str
+    injection_labels: tuple[str, ...]  # `place: model(parameters)` of each
     files: tuple[str, ...]
     functions: tuple[str, ...]
     models: tuple[str, ...]
-    trigger: str
-    hold: str
-    shapes: tuple[Shape, ...]
+    trigger_kinds: str
+    hold_kinds: str
+    shapes: tuple[PatchShape, ...]
     faults: tuple[Fault, ...]
     triggers: tuple[Trigger, ...]
-    runs: int | None
-    bound: Bound
-    values: Values = field(default_factory=dict)
-    seen: str = ""
-    made_from: tuple[Path, ...] = ()
+    experiment_count: int | None
+    basis_digests: BasisDigests
+    value_ranges: ValueRanges = field(default_factory=dict)
+    reviewed_text: str = ""
+    source_files: tuple[Path, ...] = ()
 
     @property
     def diff(self) -> str:
@@ -75,23 +75,23 @@ class Group:
         return tuple(dict.fromkeys(fault.spec for fault in self.faults))
 
 
-_Member = tuple[Fault, Trigger]
+_FaultWithTrigger = tuple[Fault, Trigger]
 
 
-def of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
+def groups_of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
     """Return the groups of all mutants that the plan runs, canary included; the probe's group is last."""
     manifest = workspace.manifest(plan.campaign.target)
     members = [(e.fault, e.trigger) for e in (*plan.experiments, plan.canary)]
     runs = Counter(patch_shapes.group_label(e.fault) for e in plan.experiments)
-    files = [one.spec_file for one in plan.campaign.fault_selections if one.spec_file]
+    files = [selection.spec_file for selection in plan.campaign.fault_selections if selection.spec_file]
     named = [
         workspace.spec(file) for file in files if file.is_file()
     ]  # in a run folder's copy of a campaign, links can be dangling
     specs = (*workspace.specs(), *named)
-    return _Catalogue(workspace.fault_models(), manifest, specs).groups(members, runs)
+    return _GroupBuilder(workspace.fault_models(), manifest, specs).build_groups(members, runs)
 
 
-def of_library(
+def groups_of_library(
     workspace: Workspace,
     manifest: TargetManifest,
     *,
@@ -109,7 +109,7 @@ def of_library(
     tables = map(workspace.context_table, workspace.context_tables)
     contexts = [t for table in tables for t in table.triggers(armed_after_s=manifest.armed_after_s)]
     triggers = (*contexts, trigger_at_time(manifest.armed_after_s))
-    chosen = tuple(_specs(workspace, specs))
+    chosen = tuple(_selected_specs(workspace, specs))
     faults = [
         fault
         for spec in chosen
@@ -117,146 +117,162 @@ def of_library(
         for fault in expand(spec, seed, name, models=models, manifest=manifest)
     ]
     members = [(fault, trigger) for fault in faults for trigger in triggers]
-    return _Catalogue(models, manifest, chosen).groups(members, None)
+    return _GroupBuilder(models, manifest, chosen).build_groups(members, None)
 
 
-def _specs(workspace: Workspace, wanted: Sequence[str]) -> Iterator[FaultSpec]:
+def _selected_specs(workspace: Workspace, patterns: Sequence[str]) -> Iterator[FaultSpec]:
     library = workspace.specs()
-    if not wanted:
+    if not patterns:
         yield from library
-    for text in wanted:
+    for text in patterns:
         hits = [spec for spec in library if fnmatchcase(spec.name, text)]
         yield from hits or [workspace.spec(text)]
 
 
-class _Catalogue:
+class _GroupBuilder:
     """Builds the groups of one target; `specs` define which values can be drawn."""
 
     def __init__(self, models: FaultModels, manifest: TargetManifest, specs: Sequence[FaultSpec]) -> None:
         self.models = models
         self.manifest = manifest
         self.specs = {spec.name: spec for spec in specs}
-        self._called = CalledCode(manifest.tree)
+        self._called_code = CalledCode(manifest.tree)
 
-    def groups(self, members: Sequence[_Member], runs: Mapping[str, int] | None) -> tuple[Group, ...]:
+    def build_groups(
+        self, members: Sequence[_FaultWithTrigger], runs: Mapping[str, int] | None
+    ) -> tuple[Group, ...]:
         """Return the groups of `members`, sorted by label; `runs` counts experiments by label."""
-        found: dict[str, list[_Member]] = {}
+        members_by_label: dict[str, list[_FaultWithTrigger]] = {}
         for fault, trigger in members:
-            found.setdefault(patch_shapes.group_label(fault), []).append((fault, trigger))
+            members_by_label.setdefault(patch_shapes.group_label(fault), []).append((fault, trigger))
         patches: dict[tuple[Injection, ...], str] = {}
         for fault, trigger in members:
             if fault.injections not in patches:
                 mutant = build(self.manifest, self.models, fault, trigger)
                 patches[fault.injections] = fault_hunks(mutant.patch)
-        made = [self._group(what, found[what], patches, runs) for what in sorted(found)]
-        return (*made, self._probe(runs))
+        built = [
+            self._build_group(what, members_by_label[what], patches, runs)
+            for what in sorted(members_by_label)
+        ]
+        return (*built, self._build_probe_group(runs))
 
-    def _group(
+    def _build_group(
         self,
-        what: str,
-        members: Sequence[_Member],
+        label: str,
+        members: Sequence[_FaultWithTrigger],
         patches: dict[tuple[Injection, ...], str],
         runs: Mapping[str, int] | None,
     ) -> Group:
         faults = {fault.id: fault for fault, _ in members}
-        shapes = patch_shapes.shapes((fault.id, what, patches[fault.injections]) for fault in faults.values())
+        shapes = patch_shapes.shapes_of_patches(
+            (fault.id, label, patches[fault.injections]) for fault in faults.values()
+        )
         fault, _ = members[0]
         injections = tuple(dict.fromkeys(i for one in faults.values() for i in one.injections))
         models = tuple(dict.fromkeys(injection.model for injection in injections))
         operator = operator_name_of(fault)
-        values: Values = {}
+        values: ValueRanges = {}
         if operator:
-            material = self._material_of_operator(fault, operator)
+            material = self._basis_of_operator(fault, operator)
         else:
-            several = [faults[shape.members[0]] for shape in shapes]
-            material = self._material(several, [patches[one.injections] for one in several])
-            values = ranges_of(faults.values(), self.specs, self.models)
+            representatives = [faults[shape.member_ids[0]] for shape in shapes]
+            material = self._basis_of_mutants(
+                representatives, [patches[one.injections] for one in representatives]
+            )
+            values = value_ranges_of(faults.values(), self.specs, self.models)
         return Group(
-            id=self._id(what),
-            what=what,
-            injections=(what,) if operator else tuple(map(patch_shapes.injection_label, fault.injections)),
+            id=self._group_id(label),
+            label=label,
+            injection_labels=(label,)
+            if operator
+            else tuple(map(patch_shapes.injection_label, fault.injections)),
             files=tuple(dict.fromkeys(i.location.path for i in injections)),
             functions=tuple(dict.fromkeys(i.location.function for i in injections)),
             models=models,
-            trigger=" or ".join(sorted({patch_shapes.trigger_kind(trigger) for _, trigger in members})),
-            hold=" or ".join(sorted({patch_shapes.hold_of(*member).value for member in members})),
+            trigger_kinds=" or ".join(sorted({patch_shapes.trigger_kind(trigger) for _, trigger in members})),
+            hold_kinds=" or ".join(sorted({patch_shapes.hold_of(*member).value for member in members})),
             shapes=tuple(
-                s.with_named_holes(patch_shapes.parameter_values(faults[m]) for m in s.members)
+                s.with_named_holes(patch_shapes.parameter_values(faults[m]) for m in s.member_ids)
                 for s in shapes
             ),
             faults=tuple(faults.values()),
             triggers=tuple(dict.fromkeys(trigger for _, trigger in members)),
-            runs=None if runs is None else runs.get(what, 0),
-            bound=material.bound,
-            values=values,
-            seen=text_of(material.bound, values, material.sections),
-            made_from=self._made_from(faults.values(), models),
+            experiment_count=None if runs is None else runs.get(label, 0),
+            basis_digests=material.digests,
+            value_ranges=values,
+            reviewed_text=render_reviewed_text(material.digests, values, material.sections),
+            source_files=self._source_files(faults.values(), models),
         )
 
-    def _made_from(self, faults: Iterable[Fault], models: Iterable[str]) -> tuple[Path, ...]:
+    def _source_files(self, faults: Iterable[Fault], models: Iterable[str]) -> tuple[Path, ...]:
         names = dict.fromkeys(fault.spec.rpartition("/")[0] for fault in faults)
         specs = [self.specs[name].path for name in names if name in self.specs]
-        found = map(self.models.get, models)
-        return (*specs, *(path for one in found for path in (one.template_path, one.source.path)))
+        fault_models = map(self.models.get, models)
+        return (
+            *specs,
+            *(path for model in fault_models for path in (model.template_path, model.source.path)),
+        )
 
-    def _material(self, faults: Sequence[Fault], patches: Sequence[str]) -> Material:
+    def _basis_of_mutants(self, faults: Sequence[Fault], patches: Sequence[str]) -> DecisionBasis:
         """Return the texts that a decision about mutants is bound to; `faults` has one for each shape."""
         calls: dict[str, str] = {}
         for fault in faults:
             mutant = build(self.manifest, self.models, fault, always_trigger())
             for path in dict.fromkeys(i.location.path for i in fault.injections):
-                calls |= self._called.of_lines(path, mutant.files[path])
+                calls |= self._called_code.called_by_injected_lines(path, mutant.files[path])
         injections = faults[0].injections
-        return Material(
-            diff=diffs_of(patches),
-            functions=functions_of(self.manifest.tree, [i.location for i in injections]),
+        return DecisionBasis(
+            diff=distinct_diffs(patches),
+            functions=function_sources(self.manifest.tree, [i.location for i in injections]),
             templates={i.model: self.models.get(i.model).template for i in injections},
-            calls=calls,
+            called_code=calls,
         )
 
-    def _material_of_operator(self, fault: Fault, operator: str) -> Material:
+    def _basis_of_operator(self, fault: Fault, operator: str) -> DecisionBasis:
         """Return the texts that determine all mutants of an operator in a function, selected or not."""
-        at, tree = fault.injections[0].location, self.manifest.tree
-        file, facts = parsed_file(tree, at.path), facts_of(tree, at.path)
-        found = list(mutations_of(file, facts, at.function, self.models, [operator]))
-        models = {*OPERATOR_MODELS, *(one.model for one in found)}
-        return Material(
-            diff=[[one.source_before, one.source_after] for one in found],
-            functions=functions_of(tree, [at]),
-            templates={one.name: one.template for one in self.models if one.name in models},
-            calls=self._called.of_expressions(at.path, at.function, [one.source_after for one in found]),
+        location, tree = fault.injections[0].location, self.manifest.tree
+        file, facts = parsed_file(tree, location.path), facts_of(tree, location.path)
+        mutations = list(mutations_of(file, facts, location.function, self.models, [operator]))
+        models = {*OPERATOR_MODELS, *(mutation.model for mutation in mutations)}
+        return DecisionBasis(
+            diff=[[mutation.source_before, mutation.source_after] for mutation in mutations],
+            functions=function_sources(tree, [location]),
+            templates={model.name: model.template for model in self.models if model.name in models},
+            called_code=self._called_code.called_by_expressions(
+                location.path, location.function, [mutation.source_after for mutation in mutations]
+            ),
         )
 
-    def _probe(self, runs: Mapping[str, int] | None) -> Group:
+    def _build_probe_group(self, runs: Mapping[str, int] | None) -> Group:
         """Return the group of the code that every mutant has: the probe, its import, and the observing
         statement.
         """
         location = self.manifest.observation.location
-        what = f"the probe, observing at {patch_shapes.location_label(location)}"
+        label = f"the probe, observing at {patch_shapes.location_label(location)}"
         patch = build(self.manifest, self.models, None, always_trigger()).patch
-        material = Material(
-            diff=diffs_of([patch]),
-            functions=functions_of(self.manifest.tree, [location]),
+        material = DecisionBasis(
+            diff=distinct_diffs([patch]),
+            functions=function_sources(self.manifest.tree, [location]),
             templates={probe_templates.CODE: self.models.probe.text},
-            calls={},
+            called_code={},
         )
         return Group(
-            id=self._id(what),
-            what=what,
-            injections=(what,),
+            id=self._group_id(label),
+            label=label,
+            injection_labels=(label,),
             files=(location.path,),
             functions=(location.function,),
             models=(PROBE_NAME,),
-            trigger="",
-            hold="",
-            shapes=tuple(patch_shapes.shapes([("", what, patch)])),
+            trigger_kinds="",
+            hold_kinds="",
+            shapes=tuple(patch_shapes.shapes_of_patches([("", label, patch)])),
             faults=(),
             triggers=(),
-            runs=None if runs is None else sum(runs.values()),
-            bound=material.bound,
-            seen=text_of(material.bound, {}, material.sections),
-            made_from=(*(self.models.folder / name for name in probe_templates.FILES), self.manifest.path),
+            experiment_count=None if runs is None else sum(runs.values()),
+            basis_digests=material.digests,
+            reviewed_text=render_reviewed_text(material.digests, {}, material.sections),
+            source_files=(*(self.models.folder / name for name in probe_templates.FILES), self.manifest.path),
         )
 
-    def _id(self, what: str) -> str:
-        return content_id([self.manifest.name, what])[:12]
+    def _group_id(self, label: str) -> str:
+        return content_id([self.manifest.name, label])[:12]

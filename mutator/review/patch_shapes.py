@@ -18,81 +18,84 @@ from mutator.mutants.readable_patches import adds_file, file_patches
 from mutator.operators.operator_lookup import operator_name_of
 from mutator.triggers.conditions import TIME, names_in
 
-Span = tuple[int, int, str]  # position of a value in a patch: begin, end, name (empty: not yet known)
+ValueSpan = tuple[int, int, str]  # position of a value in a patch: begin, end, name (empty: not yet known)
 
 HOLE = "\0"  # never occurs in Python source
-_WORD = r"\w.\\\x80-\U0010ffff"  # next to one of these, a number is part of a longer number or of a name
-_NUMBER = (  # with its sign, and the operator of a sum: `- 3.0`
-    rf"(?:[+-] ?){{0,2}}(?:(?<![{_WORD}])[0-9]+(?:\.[0-9]*)?(?:e[+-]?[0-9]+)?(?![{_WORD}])"
+_WORD_CHARS = (
+    r"\w.\\\x80-\U0010ffff"  # next to one of these, a number is part of a longer number or of a name
+)
+_NUMBER_PATTERN = (  # with its sign, and the operator of a sum: `- 3.0`
+    rf"(?:[+-] ?){{0,2}}(?:(?<![{_WORD_CHARS}])[0-9]+(?:\.[0-9]*)?(?:e[+-]?[0-9]+)?(?![{_WORD_CHARS}])"
     r"|float\('-?(?:nan|inf)'\))|(?<![\w.])(?:True|False)(?!\w)"
 )
-_VALUE = re.compile(rf"(?P<id>{INJECTION_ID_PATTERN})|{_NUMBER}")
+_VALUE_PATTERN = re.compile(rf"(?P<id>{INJECTION_ID_PATTERN})|{_NUMBER_PATTERN}")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shape:
-    """Patches that differ only in values. A member's patch is `parts` with the member's values in between.
+class PatchShape:
+    """Patches that differ only in values. A member's patch is `parts` with its values in between.
 
-    Hole `places[i]` is between `parts[i]` and `parts[i + 1]`; a hole can be in several places. `values[m][h]`
-    fills hole `h` in the patch of `members[m]`. `id` depends only on `name` and the text without values.
+    Hole `hole_indices[i]` is between `parts[i]` and `parts[i + 1]`; a hole can be in several places.
+    `values_by_member[m][h]` fills hole `h` in the patch of `member_ids[m]`. `id` depends only on `name` and
+    the text without values.
     """
 
     id: str
     name: str
     parts: tuple[str, ...]
-    places: tuple[int, ...]
-    holes: tuple[str, ...]  # distinct names
-    members: tuple[str, ...]
-    values: tuple[tuple[str, ...], ...]
+    hole_indices: tuple[int, ...]
+    hole_names: tuple[str, ...]  # distinct names
+    member_ids: tuple[str, ...]
+    values_by_member: tuple[tuple[str, ...], ...]
 
     @cached_property
     def diff(self) -> str:
         """The patch with holes like `⟨by⟩`, for display."""
-        return self._with([f"⟨{name}⟩" for name in self.holes])
+        return self._filled_with([f"⟨{name}⟩" for name in self.hole_names])
 
-    def patch(self, member: int) -> str:
-        return self._with(self.values[member])
+    def patch_of(self, member: int) -> str:
+        return self._filled_with(self.values_by_member[member])
 
-    def _with(self, values: Iterable[str]) -> str:
-        known = list(values)
-        between = [known[place] for place in self.places]
+    def _filled_with(self, values: Iterable[str]) -> str:
+        value_by_hole = list(values)
+        between = [value_by_hole[place] for place in self.hole_indices]
         return "".join(a + b for a, b in zip(self.parts, [*between, ""], strict=True))
 
-    def with_named_holes(self, parameters: Iterable[Mapping[str, Value]]) -> "Shape":
+    def with_named_holes(self, parameters: Iterable[Mapping[str, Value]]) -> "PatchShape":
         """Return the shape with each numbered hole named after the parameter that fills it in every member;
         `parameters` are in member order.
         """
         each = list(parameters)
         names: list[str] = []
-        for hole, name in enumerate(self.holes):
+        for hole, name in enumerate(self.hole_names):
             if name.isdigit() and each:
-                texts = [row[hole] for row in self.values]
-                fitting = (p for p in each[0] if all(map(_shows, texts, (x.get(p) for x in each))))
-                name = next((p for p in fitting if p not in (*names, *self.holes)), name)
+                texts = [row[hole] for row in self.values_by_member]
+                fitting = (p for p in each[0] if all(map(_is_text_of_value, texts, (x.get(p) for x in each))))
+                name = next((p for p in fitting if p not in (*names, *self.hole_names)), name)
             names.append(name)
-        return replace(self, holes=tuple(names))
+        return replace(self, hole_names=tuple(names))
 
 
-def shapes(patches: Iterable[tuple[str, str, str]]) -> list[Shape]:
+def shapes_of_patches(patches: Iterable[tuple[str, str, str]]) -> list[PatchShape]:
     """Return the shapes of patches given as (key, name, patch), in the order of their first members.
 
     Keys are the members' names. Patches with different `name`s never share a shape (see `group_label`).
     """
-    found: dict[tuple[str, str], _ShapeBuilder] = {}
+    builders: dict[tuple[str, str], _ShapeBuilder] = {}
     for key, name, patch in patches:
-        spans = list(_spans(patch))
-        rest = _rest(patch, spans)
-        builder = found.get((name, rest))
+        spans = list(_value_spans(patch))
+        rest = _text_outside_spans(patch, spans)
+        builder = builders.get((name, rest))
         if builder is None:
-            builder = found[name, rest] = _ShapeBuilder(tuple(label for *_, label in spans))
-        builder.members.append(key)
+            builder = builders[name, rest] = _ShapeBuilder(tuple(label for *_, label in spans))
+        builder.member_ids.append(key)
         builder.values.append([patch[begin:end] for begin, end, _ in spans])
-    return [builder.shape(name, rest) for (name, rest), builder in found.items()]
+    return [builder.build(name, rest) for (name, rest), builder in builders.items()]
 
 
 def without_values(patch: str) -> str:
     """Return the patch without values, which is equal for all patches of a shape."""
-    return _rest(patch, list(_spans(patch)))
+    return _text_outside_spans(patch, list(_value_spans(patch)))
 
 
 def group_label(fault: Fault) -> str:
@@ -119,17 +122,16 @@ def injection_label(injection: Injection) -> str:
     """Location, model and parameters without numbers. Names and truth values stay, because they can change
     the injected code.
     """
-    given = (
+    parameters = (
         f"{name}={value}" if value is None or isinstance(value, str | bool) else name
         for name, value in injection.params
     )
-    return (
-        f"{location_label(injection.location)}: {injection.model}({', '.join(given)}){_instance(injection)}"
-    )
+    label = f"{location_label(injection.location)}: {injection.model}({', '.join(parameters)})"
+    return label + _instance_label(injection)
 
 
-def _instance(injection: Injection) -> str:
-    where = f" where {re.sub(_NUMBER, '#', injection.where)}" if injection.where else ""
+def _instance_label(injection: Injection) -> str:
+    where = f" where {re.sub(_NUMBER_PATTERN, '#', injection.where)}" if injection.where else ""
     return where + "".join(f", {name}" for name in ("call", "every") if getattr(injection, name) is not None)
 
 
@@ -148,33 +150,37 @@ def parameter_values(fault: Fault) -> dict[str, Value]:
     """Return the parameters of a fault's injections by name: `by`; with several injections also `1.by`,
     `2.by`.
     """
-    given = [dict(injection.params) for injection in fault.injections]
+    parameters = [dict(injection.params) for injection in fault.injections]
     common = {
         name: value
-        for name, value in chain.from_iterable(params.items() for params in given)
-        if all(repr(params.get(name, value)) == repr(value) for params in given)  # repr, since nan != nan
+        for name, value in chain.from_iterable(params.items() for params in parameters)
+        if all(
+            repr(params.get(name, value)) == repr(value) for params in parameters
+        )  # repr, since nan != nan
     }
-    numbered = {f"{i}.{k}": v for i, params in enumerate(given, start=1) for k, v in params.items()}
-    return common | numbered if len(given) > 1 else common
+    numbered = {f"{i}.{k}": v for i, params in enumerate(parameters, start=1) for k, v in params.items()}
+    return common | numbered if len(parameters) > 1 else common
 
 
 @dataclass(frozen=True, slots=True)
 class _ShapeBuilder:
-    """Collects a shape's members; `labels` are the names of its values."""
+    """Collects a shape's members; `value_labels` are the names of its values."""
 
-    labels: tuple[str, ...]
-    members: list[str] = field(default_factory=list)
+    value_labels: tuple[str, ...]
+    member_ids: list[str] = field(default_factory=list)
     values: list[list[str]] = field(default_factory=list)
 
-    def shape(self, name: str, rest: str) -> Shape:
+    def build(self, name: str, rest: str) -> PatchShape:
         """Build the shape: values equal in all members become text, and values equal to each other share a
         hole.
         """
-        pieces = rest.split(HOLE) if self.labels else [rest]
+        pieces = rest.split(HOLE) if self.value_labels else [rest]
         parts, places = [pieces[0]], []
         columns: dict[tuple[str, ...], int] = {}
         holes: list[str] = []
-        for label, column, after in zip(self.labels, zip(*self.values, strict=True), pieces[1:], strict=True):
+        for label, column, after in zip(
+            self.value_labels, zip(*self.values, strict=True), pieces[1:], strict=True
+        ):
             if len(set(column)) == 1:
                 parts[-1] += column[0] + after
                 continue
@@ -183,25 +189,25 @@ class _ShapeBuilder:
                 holes.append(_unused_name(label, holes))
             places.append(columns[column])
             parts.append(after)
-        return Shape(
+        return PatchShape(
             id=content_id([name, rest]),
             name=name,
             parts=tuple(parts),
-            places=tuple(places),
-            holes=tuple(holes),
-            members=tuple(self.members),
-            values=tuple(zip(*columns, strict=True)) if columns else ((),) * len(self.members),
+            hole_indices=tuple(places),
+            hole_names=tuple(holes),
+            member_ids=tuple(self.member_ids),
+            values_by_member=tuple(zip(*columns, strict=True)) if columns else ((),) * len(self.member_ids),
         )
 
 
-def _unused_name(label: str, taken: list[str]) -> str:
+def _unused_name(label: str, used_names: list[str]) -> str:
     if not label:
-        return str(1 + sum(name.isdigit() for name in taken))
-    same = sum(name.partition("_")[0] == label for name in taken)
+        return str(1 + sum(name.isdigit() for name in used_names))
+    same = sum(name.partition("_")[0] == label for name in used_names)
     return f"{label}_{same + 1}" if same else label
 
 
-def _spans(patch: str) -> Iterator[Span]:
+def _value_spans(patch: str) -> Iterator[ValueSpan]:
     if HOLE in patch:  # no holes, because it is not Python source
         return
     begin = 0
@@ -211,23 +217,23 @@ def _spans(patch: str) -> Iterator[Span]:
             yield from probe_setting_spans(patch, begin, end)
         else:
             for start, stop in tagged_addition_spans(patch, begin, end):
-                yield from _values(patch, start, stop)
+                yield from _line_value_spans(patch, start, stop)
         begin = end
 
 
-def _values(patch: str, begin: int, end: int) -> Iterator[Span]:
-    for match in _VALUE.finditer(patch, begin, end):
+def _line_value_spans(patch: str, begin: int, end: int) -> Iterator[ValueSpan]:
+    for match in _VALUE_PATTERN.finditer(patch, begin, end):
         label = match.lastgroup or ""
         yield *match.span(label or 0), label
 
 
-def _rest(patch: str, spans: list[Span]) -> str:
+def _text_outside_spans(patch: str, spans: list[ValueSpan]) -> str:
     ends = [0, *(end for _, end, _ in spans)]
     starts = [*(begin for begin, _, _ in spans), len(patch)]
     return HOLE.join(patch[a:b] for a, b in zip(ends, starts, strict=True))
 
 
-def _shows(text: str, value: Value) -> bool:
+def _is_text_of_value(text: str, value: Value) -> bool:
     """Whether the text in a patch is this parameter's value, ignoring the sign."""
     if isinstance(value, bool) or value is None or isinstance(value, str):
         return text == repr(value)

@@ -4,35 +4,35 @@ import re
 from collections.abc import Sequence
 
 from mutator.model import Trigger
-from mutator.review.entries import values_in_words
+from mutator.review.entries import describe_ranges
 from mutator.review.mutant_groups import Group
-from mutator.review.patch_shapes import Shape
+from mutator.review.patch_shapes import PatchShape
 
-_TIME = re.compile(r"t >= ([0-9.e+-]+)\Z")
-_ID_HOLE = re.compile(r"id(_\d+)?\Z")  # readers do not need ids
+_TIME_CONDITION_PATTERN = re.compile(r"t >= ([0-9.e+-]+)\Z")
+_ID_HOLE_PATTERN = re.compile(r"id(_\d+)?\Z")  # readers do not need ids
 
 
 def value_table(group: Group) -> tuple[list[str], list[list[str]]]:
     """Return the headings, and a row for each fault with the values of its holes, except ids."""
     faults = {fault.id: fault for fault in group.faults}
-    names = list(dict.fromkeys(name for shape in group.shapes for name in _shown_holes(shape)))
+    names = list(dict.fromkeys(name for shape in group.shapes for name in _displayed_holes(shape)))
     rows = []
     for shape in group.shapes:
-        for member, filled in zip(shape.members, shape.values, strict=True):
+        for member, filled in zip(shape.member_ids, shape.values_by_member, strict=True):
             fault = faults.get(member)
             if fault is not None:
-                found = dict(zip(shape.holes, filled, strict=True))
-                rows.append([fault.label, fault.reading, *(found.get(name, "") for name in names)])
+                text_by_hole = dict(zip(shape.hole_names, filled, strict=True))
+                rows.append([fault.label, fault.reading, *(text_by_hole.get(name, "") for name in names)])
     return ["fault", "reading", *names], rows
 
 
-def _shown_holes(shape: Shape) -> list[str]:
-    return [name for name in shape.holes if not _ID_HOLE.match(name)]
+def _displayed_holes(shape: PatchShape) -> list[str]:
+    return [name for name in shape.hole_names if not _ID_HOLE_PATTERN.match(name)]
 
 
-def ranges(group: Group) -> str:
+def describe_value_ranges(group: Group) -> str:
     """Return the ranges of values that an approval covers: `by: -40 to 40`."""
-    return values_in_words(group.values)
+    return describe_ranges(group.value_ranges)
 
 
 def condition_lines(triggers: Sequence[Trigger]) -> list[str]:
@@ -40,7 +40,7 @@ def condition_lines(triggers: Sequence[Trigger]) -> list[str]:
     named: dict[str, list[str]] = {}
     times: list[float] = []
     for trigger in triggers:
-        if time := _TIME.match(trigger.condition):
+        if time := _TIME_CONDITION_PATTERN.match(trigger.condition):
             times.append(float(time[1]))
         else:
             named.setdefault(trigger.condition, []).append(trigger.name)

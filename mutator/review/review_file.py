@@ -10,15 +10,23 @@ from pydantic import Field
 
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
-from mutator.review.entries import TIME, Bound, Decision, Entry, Flag, Remark, Verdict
+from mutator.review.entries import (
+    TIME_PATTERN,
+    BasisDigests,
+    Decision,
+    DecisionVerdict,
+    Flag,
+    Remark,
+    ReviewEntry,
+)
 
 SCHEMA = "review/2"
-_HEAD = """\
+_FILE_HEADER = """\
 # Reviews of this target's groups of mutants. `mutator review` reads and writes this file.
 # A decision is valid while diff, function, template and calls are unchanged and all values are in its ranges.
 """
-_DIGEST = r"^[0-9a-f]{16}$"
-_NEEDED = ("by", "diff", "function", "template")
+_DIGEST_PATTERN = r"^[0-9a-f]{16}$"
+_REQUIRED_KEYS = ("by", "diff", "function", "template")
 
 
 class _BlockModel(StrictModel):
@@ -26,13 +34,13 @@ class _BlockModel(StrictModel):
     what: str
     decision: Literal["approved", "rejected"] | None = None
     by: str | None = Field(None, pattern=r"\S")
-    at: str | None = Field(None, pattern=TIME)
+    at: str | None = Field(None, pattern=TIME_PATTERN)
     commit: str | None = Field(None, pattern=r"^[0-9a-f]{40,64}(-dirty)?$")
     tool: str | None = None
-    diff: str | None = Field(None, pattern=_DIGEST)
-    function: str | None = Field(None, pattern=_DIGEST)
-    template: str | None = Field(None, pattern=_DIGEST)
-    calls: str | None = Field(None, pattern=_DIGEST)
+    diff: str | None = Field(None, pattern=_DIGEST_PATTERN)
+    function: str | None = Field(None, pattern=_DIGEST_PATTERN)
+    template: str | None = Field(None, pattern=_DIGEST_PATTERN)
+    calls: str | None = Field(None, pattern=_DIGEST_PATTERN)
     values: dict[str, list[float | int | str]] | None = None
     remarks: list[YamlRecord[Remark]] = Field(default_factory=list)
     flag: YamlRecord[Flag] | None = None
@@ -45,19 +53,19 @@ class _FileModel(StrictModel):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Content:
-    entries: Mapping[str, Entry]
+class ReviewFileContent:
+    entries: Mapping[str, ReviewEntry]
     four_eyes: bool = False
 
 
-def load(path: Path, target: str) -> Content:
+def load_review_file(path: Path, target: str) -> ReviewFileContent:
     """Read an existing file for `target`; MutatorError, with the line, for a mistake."""
     model, source = load_yaml_model(path, _FileModel, SCHEMA)
     if model.target != target:
         raise source.error(
             ("target",), f"target '{model.target}'", expected=f"'{target}', as in the file name"
         )
-    entries: dict[str, Entry] = {}
+    entries: dict[str, ReviewEntry] = {}
     for i, block in enumerate(model.decisions):
         if block.group in entries:
             raise source.error(
@@ -66,55 +74,57 @@ def load(path: Path, target: str) -> Content:
                 expected="one block for each group",
                 remedy="keep the valid one",
             )
-        entries[block.group] = _entry(block, source, i)
-    return Content(entries=entries, four_eyes=model.four_eyes)
+        entries[block.group] = _parse_entry(block, source, i)
+    return ReviewFileContent(entries=entries, four_eyes=model.four_eyes)
 
 
-def text(target: str, content: Content) -> str:
+def render_review_file(target: str, content: ReviewFileContent) -> str:
     """Return the text of a file, sorted so that git can merge parallel work."""
-    blocks = [_block(content.entries[name]) for name in sorted(content.entries)]
+    blocks = [_render_block(content.entries[name]) for name in sorted(content.entries)]
     head = f"schema: {SCHEMA}\ntarget: {json.dumps(target)}\n" + "four_eyes: true\n" * content.four_eyes
-    return f"{_HEAD}{head}decisions:" + ("\n" + "".join(blocks) if blocks else " []\n")
+    return f"{_FILE_HEADER}{head}decisions:" + ("\n" + "".join(blocks) if blocks else " []\n")
 
 
-def _entry(block: _BlockModel, source: YamlSource, i: int) -> Entry:
-    given = block.model_dump(include={"by", "at", "commit", "tool", "diff", "function", "template", "calls"})
-    given["values"] = block.values
+def _parse_entry(block: _BlockModel, source: YamlSource, i: int) -> ReviewEntry:
+    decision_fields = block.model_dump(
+        include={"by", "at", "commit", "tool", "diff", "function", "template", "calls"}
+    )
+    decision_fields["values"] = block.values
     if block.decision is None:
-        if extra := [name for name, value in given.items() if value is not None]:
+        if extra := [name for name, value in decision_fields.items() if value is not None]:
             raise source.error(
                 ("decisions", i, extra[0]),
                 f"'{extra[0]}' without a decision",
                 expected="`decision: approved` or `rejected` with it",
                 remedy="add the decision, or remove its fields",
             )
-    elif missing := [name for name in _NEEDED if given[name] is None]:
+    elif missing := [name for name in _REQUIRED_KEYS if decision_fields[name] is None]:
         raise source.error(
             ("decisions", i),
             f"a decision without `{missing[0]}`",
-            expected=f"{', '.join(f'`{name}`' for name in _NEEDED)} with it",
+            expected=f"{', '.join(f'`{name}`' for name in _REQUIRED_KEYS)} with it",
             remedy="decide again with `mutator review`, which computes the digests",
         )
-    return Entry(
+    return ReviewEntry(
         group=block.group,
         what=block.what,
-        decision=_decision(block) if block.decision else None,
+        decision=_parse_decision(block) if block.decision else None,
         remarks=tuple(block.remarks),
         flag=block.flag,
     )
 
 
-def _decision(block: _BlockModel) -> Decision:
+def _parse_decision(block: _BlockModel) -> Decision:
     values = block.values
     return Decision(
         group=block.group,
         what=block.what,
-        verdict=Verdict(str(block.decision)),
+        verdict=DecisionVerdict(str(block.decision)),
         by=str(block.by),
         at=block.at,
         commit=block.commit,
         tool=block.tool,
-        bound=Bound(
+        bound=BasisDigests(
             diff=str(block.diff),
             function=str(block.function),
             template=str(block.template),
@@ -128,25 +138,29 @@ def _decision(block: _BlockModel) -> Decision:
     )
 
 
-def _block(entry: Entry) -> str:
+def _render_block(entry: ReviewEntry) -> str:
     facts: dict[str, Any] = {"group": entry.group, "what": entry.what}
     if entry.decision:
-        kept = asdict(entry.decision)
+        decision = asdict(entry.decision)
         names = ("by", "at", "commit", "tool")
-        facts |= {"decision": kept["verdict"], **{name: kept[name] for name in names}, **kept["bound"]}
-        facts["values"] = kept["values"]
+        facts |= {
+            "decision": decision["verdict"],
+            **{name: decision[name] for name in names},
+            **decision["bound"],
+        }
+        facts["values"] = decision["values"]
     if entry.flag:
         facts["flag"] = asdict(entry.flag)
-    lines = [f"{name}: {_json(value)}\n" for name, value in facts.items() if value is not None]
+    lines = [f"{name}: {_json_line(value)}\n" for name, value in facts.items() if value is not None]
     if entry.remarks:
-        lines += ["remarks:\n", *(f"  - {_json(_given(one))}\n" for one in entry.remarks)]
+        lines += ["remarks:\n", *(f"  - {_json_line(_remark_as_json(remark))}\n" for remark in entry.remarks)]
     return "  - " + "    ".join(lines)
 
 
-def _given(remark: Remark) -> dict[str, str]:
+def _remark_as_json(remark: Remark) -> dict[str, str]:
     return {name: value for name, value in asdict(remark).items() if value is not None}
 
 
-def _json(value: Any) -> str:
+def _json_line(value: Any) -> str:
     """Return the value as one line of JSON, which is also YAML."""
     return json.dumps(value, ensure_ascii=False)

@@ -12,24 +12,24 @@ from mutator._common.files import write_atomic
 from mutator._common.hashing import as_json_types, content_id
 from mutator.errors import MutatorError
 from mutator.mutants.injected_lines import tags_for_scripts
-from mutator.review.decisions import Review, State
+from mutator.review.decisions import Review, ReviewState
 from mutator.review.effect_pictures import has_pictures
 from mutator.review.mutant_groups import Group
 from mutator.review.readable_groups import condition_lines, value_table
 from mutator.web import asset, embedded, load_order, plainly_embedded
 
 
-def write_page(out: Path, review: Review, groups: Sequence[Group], options: Sequence[str]) -> None:
+def write_review_page(out: Path, review: Review, groups: Sequence[Group], options: Sequence[str]) -> None:
     """Write the page of `groups`; its commands include `options`, which select the groups."""
     try:
-        write_atomic(out, page_html(review, groups, options).encode())
+        write_atomic(out, review_page_html(review, groups, options).encode())
     except OSError as err:
         raise MutatorError(
             f"cannot be written ({err.strerror})", where=out, remedy="choose another file"
         ) from None
 
 
-def page_html(
+def review_page_html(
     review: Review,
     groups: Sequence[Group],
     options: Sequence[str],
@@ -40,15 +40,15 @@ def page_html(
     """
     data = {
         "target": review.target,
-        "states": [state.value for state in State],
+        "states": [state.value for state in ReviewState],
         "options": shlex.join(options),
-        "groups": [_group(review, group, like) for group, like in _in_stacks(review, groups)],
+        "groups": [_group_as_json(review, group, stack) for group, stack in _groups_by_stack(review, groups)],
         "served": served,
     }
-    return render_page(data)
+    return render_review_page(data)
 
 
-def render_page(data: dict[str, Any]) -> str:
+def render_review_page(data: dict[str, Any]) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -63,7 +63,7 @@ def render_page(data: dict[str, Any]) -> str:
     )
 
 
-def state_of(review: Review, group: Group) -> dict[str, Any]:
+def review_as_json(review: Review, group: Group) -> dict[str, Any]:
     """Return the review of a group, as the page shows it. `digest` identifies the mutants, so that decisions
     from a page that shows other mutants are refused.
     """
@@ -78,41 +78,50 @@ def state_of(review: Review, group: Group) -> dict[str, Any]:
             "commit": decision.commit or "",
             "tool": decision.tool or "",
             "text": "",
-            "changed": review.changed(group),
+            "changed": review.stale_parts(group),
         },
-        "remarks": [{"by": one.by, "at": one.at or "", "text": one.text} for one in review.remarks(group.id)],
+        "remarks": [
+            {"by": remark.by, "at": remark.at or "", "text": remark.text}
+            for remark in review.remarks(group.id)
+        ],
         "flag": flag and as_json_types(flag),
         "revision": review.revision(group.id),
-        "digest": content_id([group.bound, group.values])[:12],
+        "digest": content_id([group.basis_digests, group.value_ranges])[:12],
     }
 
 
-def _in_stacks(review: Review, groups: Sequence[Group]) -> list[tuple[Group, int]]:
+def _groups_by_stack(review: Review, groups: Sequence[Group]) -> list[tuple[Group, int]]:
     """Return the groups with stack numbers, in stack order. The groups of a stack share state, template,
     function and called code.
     """
-    kinds: dict[tuple[object, ...], int] = {}
+    stack_by_key: dict[tuple[object, ...], int] = {}
     numbered = []
     for group in groups:
-        kind = (review.state(group), group.files, group.functions, group.models, group.bound.calls)
-        numbered.append((group, kinds.setdefault(kind, len(kinds))))
+        stack_key = (
+            review.state(group),
+            group.files,
+            group.functions,
+            group.models,
+            group.basis_digests.calls,
+        )
+        numbered.append((group, stack_by_key.setdefault(stack_key, len(stack_by_key))))
     return sorted(numbered, key=lambda pair: pair[1])
 
 
-def _group(review: Review, group: Group, like: int) -> dict[str, Any]:
+def _group_as_json(review: Review, group: Group, stack: int) -> dict[str, Any]:
     heads, rows = value_table(group)
-    return state_of(review, group) | {
+    return review_as_json(review, group) | {
         "id": group.id,
-        "like": like,
-        "injections": group.injections,
+        "like": stack,
+        "injections": group.injection_labels,
         "specs": group.specs,
-        "trigger": group.trigger,
-        "hold": group.hold,
+        "trigger": group.trigger_kinds,
+        "hold": group.hold_kinds,
         "conditions": condition_lines(group.triggers),
         "faults": len(group.faults),
-        "runs": group.runs,
+        "runs": group.experiment_count,
         "diff": group.diff,
-        "changes": review.changes(group),
+        "changes": review.diff_since_decision(group),
         "pictures": has_pictures(group),
         "heads": heads,
         "rows": rows,

@@ -9,51 +9,61 @@ from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec, Variant
 from mutator.faults.injection_parameters import resolve
 from mutator.model import Fault, Injection
-from mutator.review.entries import Values
+from mutator.review.entries import ValueRanges
 
 _Value = float | str
 
 
-def ranges_of(faults: Iterable[Fault], specs: Mapping[str, FaultSpec], models: FaultModels) -> Values:
+def value_ranges_of(
+    faults: Iterable[Fault], specs: Mapping[str, FaultSpec], models: FaultModels
+) -> ValueRanges:
     """Return the range of each parameter of `faults`: all drawn values and all that their specs can draw.
 
     `specs` maps names to specs; a fault without a spec contributes only its own values. With several
     injections, names are numbered: `1.by`, `2.by`. Texts and truth values define the group, so they are not
     included.
     """
-    found: dict[str, set[_Value]] = {}
-    known: set[tuple[str, str]] = set()
+    values_by_name: dict[str, set[_Value]] = {}
+    handled_specs: set[tuple[str, str]] = set()
     for fault in faults:
         ends = [fault.injections]
-        if (fault.spec, fault.reading) not in known:
-            known.add((fault.spec, fault.reading))
-            ends += _ends(fault, specs.get(fault.spec.rpartition("/")[0]), models)
+        if (fault.spec, fault.reading) not in handled_specs:
+            handled_specs.add((fault.spec, fault.reading))
+            ends += _injections_at_bounds(fault, specs.get(fault.spec.rpartition("/")[0]), models)
         for injections in ends:
-            for name, value in _values(injections, models):
-                found.setdefault(name, set()).add(value)
-    return {name: _range(values) for name, values in sorted(found.items())}
+            for name, value in _ranged_values(injections, models):
+                values_by_name.setdefault(name, set()).add(value)
+    return {name: _range_of(values) for name, values in sorted(values_by_name.items())}
 
 
-def _ends(fault: Fault, spec: FaultSpec | None, models: FaultModels) -> Iterator[tuple[Injection, ...]]:
+def _injections_at_bounds(
+    fault: Fault, spec: FaultSpec | None, models: FaultModels
+) -> Iterator[tuple[Injection, ...]]:
     """Yield the injections with the least and the greatest value that the fault's spec can draw."""
     name = fault.spec.rpartition("/")[2]
     for variant in spec or ():
         if variant.name == name and variant.draw and spec:
-            for value in _bounds(variant):
+            for value in _drawn_bounds(variant):
                 with suppress(MutatorError):  # values out of range are never drawn
                     yield tuple(
-                        resolve(one, models.get(one.model), spec.source, draw=variant.draw, value=value)
-                        for one in variant.injections(fault.reading)
+                        resolve(
+                            injection,
+                            models.get(injection.model),
+                            spec.source,
+                            draw=variant.draw,
+                            value=value,
+                        )
+                        for injection in variant.injections(fault.reading)
                     )
 
 
-def _bounds(variant: Variant) -> tuple[float, ...]:
+def _drawn_bounds(variant: Variant) -> tuple[float, ...]:
     assert variant.draw is not None
     digits = variant.draw.decimals
     return tuple(end if digits is None else round(end, digits) for end in variant.draw.bounds)
 
 
-def _values(injections: tuple[Injection, ...], models: FaultModels) -> Iterator[tuple[str, _Value]]:
+def _ranged_values(injections: tuple[Injection, ...], models: FaultModels) -> Iterator[tuple[str, _Value]]:
     for number, injection in enumerate(injections, start=1):
         prefix = f"{number}." if len(injections) > 1 else ""
         model = models.get(injection.model)
@@ -69,7 +79,7 @@ def _values(injections: tuple[Injection, ...], models: FaultModels) -> Iterator[
             yield f"{prefix}where", injection.where
 
 
-def _range(values: set[_Value]) -> tuple[_Value, ...]:
+def _range_of(values: set[_Value]) -> tuple[_Value, ...]:
     numbers = [value for value in values if not isinstance(value, str)]
     words = sorted(value for value in values if isinstance(value, str))
     return (*((min(numbers), max(numbers)) if numbers else ()), *words)

@@ -15,9 +15,9 @@ from mutator.campaigns.plan import build_plan
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import Absent, GroupsChanged, MutatorError, ReviewConflict
 from mutator.review import effect_pictures, group_results, mutant_groups
-from mutator.review.decisions import Change, Kind, Review, load_review, record
+from mutator.review.decisions import Review, ReviewAction, ReviewActionKind, load_review, record_actions
 from mutator.review.mutant_groups import Group
-from mutator.review.review_page import page_html, state_of
+from mutator.review.review_page import review_as_json, review_page_html
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -44,7 +44,7 @@ class Selection:
 
 class _ChangeModel(StrictModel):
     group: str = Field(pattern=r"^[0-9a-f]{12}$")
-    kind: Annotated[Kind, Field(strict=False)]
+    kind: Annotated[ReviewActionKind, Field(strict=False)]
     text: Short = ""
 
 
@@ -111,7 +111,7 @@ class Reviews:
             "query": f"?{query}" if query else "",
             "runs": runs,
         }
-        return page_html(review, review.in_turn(groups), chosen.options, served)
+        return review_page_html(review, review.in_list_order(groups), chosen.options, served)
 
     def told(self, chosen: Selection) -> dict[str, Any]:
         groups = self.groups(chosen)  # first, because this can take seconds, and others can decide meanwhile
@@ -125,45 +125,50 @@ class Reviews:
             raise Absent(f"no group '{strangers[0]}'", expected="the id of a group on the page")
         if unseen := [one.group for one in wanted.changes if one.group not in wanted.seen]:
             raise MutatorError(f"no revision of group {unseen[0]}", where="seen")
-        decided = [one.group for one in wanted.changes if one.kind in (Kind.APPROVE, Kind.REJECT)]
+        decided = [
+            one.group
+            for one in wanted.changes
+            if one.kind in (ReviewActionKind.APPROVE, ReviewActionKind.REJECT)
+        ]
         if blind := [name for name in decided if name not in wanted.digests]:
             raise MutatorError(f"no digest of the diff of group {blind[0]}", where="digests")
         touched = [known[name] for name in dict.fromkeys(one.group for one in wanted.changes)]
         self._refuse_others(chosen, touched, wanted.digests)
         changes = [
-            Change(group=known[one.group], kind=one.kind, by=wanted.by, text=one.text)
+            ReviewAction(group=known[one.group], kind=one.kind, by=wanted.by, text=one.text)
             for one in wanted.changes
         ]
         try:
-            review = record(self.workspace, chosen.target, changes, wanted.seen)
+            review = record_actions(self.workspace, chosen.target, changes, wanted.seen)
         except ReviewConflict as conflict:
             others = [known[name] for name in conflict.groups]
             raise GroupsChanged(conflict.got, _states(conflict.review, others)) from None
         return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, touched)}
 
     def changes(self, chosen: Selection, name: str) -> str:
-        return load_review(self.workspace, chosen.target).changes(self.group(chosen, name))
+        return load_review(self.workspace, chosen.target).diff_since_decision(self.group(chosen, name))
 
     def picture(self, chosen: Selection, name: str, level: str, *, after: bool) -> bytes:
         """Return a frame before or after the group's effect, as a JPEG file; Absent if there is none."""
         manifest = self.workspace.manifest(chosen.target)
-        found = effect_pictures.of_group(self.workspace, manifest, self.group(chosen, name), level)
+        found = effect_pictures.pictures_at_level(self.workspace, manifest, self.group(chosen, name), level)
         if found is None:
             raise Absent(
-                "no such picture", expected=f"one of the group's levels ({', '.join(effect_pictures.LEVELS)})"
+                "no such picture",
+                expected=f"one of the group's levels ({', '.join(effect_pictures.LEVEL_NAMES)})",
             )
         return found[after]
 
     def levels(self, chosen: Selection, name: str) -> list[dict[str, str]]:
         """Return the levels that have frames, with their values as text."""
         manifest, group = self.workspace.manifest(chosen.target), self.group(chosen, name)
-        found = effect_pictures.of_groups(self.workspace, manifest, [group]).get(name)
+        found = effect_pictures.pictures_of_groups(self.workspace, manifest, [group]).get(name)
         return [{"name": level.name, "label": level.label} for level in found.levels] if found else []
 
     def typical(self, chosen: Selection, name: str, run: Path) -> dict[str, Any] | None:
         """Return the group's results in a run; None if the run does not have the group."""
         folder, group = RunFolder.open(run), self.group(chosen, name)
-        found = group_results.of_group(folder, group) if folder.head.target == chosen.target else None
+        found = group_results.results_of_group(folder, group) if folder.head.target == chosen.target else None
         return asdict(found) if found else None
 
     def _refuse_others(self, chosen: Selection, groups: Sequence[Group], digests: Mapping[str, str]) -> None:
@@ -180,11 +185,13 @@ class Reviews:
     def _found(self, chosen: Selection) -> tuple[Group, ...]:
         workspace = self.workspace
         if chosen.campaign is None:
-            return mutant_groups.of_library(workspace, workspace.manifest(chosen.target), specs=chosen.specs)
+            return mutant_groups.groups_of_library(
+                workspace, workspace.manifest(chosen.target), specs=chosen.specs
+            )
         plan = build_plan(workspace, chosen.campaign, Choices())
         if plan.campaign.target != chosen.target:
             raise Absent(f"campaign '{chosen.campaign}' belongs to target '{plan.campaign.target}'")
-        return mutant_groups.of_plan(workspace, plan)
+        return mutant_groups.groups_of_plan(workspace, plan)
 
     def _stamp(self, target: str) -> object:
         manifest = self.workspace.manifest(target)
@@ -193,7 +200,7 @@ class Reviews:
 
 
 def _states(review: Review, groups: Iterable[Group]) -> dict[str, Any]:
-    return {group.id: state_of(review, group) for group in groups}
+    return {group.id: review_as_json(review, group) for group in groups}
 
 
 def _files_in(place: Path) -> list[tuple[str, int, int]]:

@@ -104,7 +104,7 @@ class _SortedBlocks:
         return medians
 
     def _values_of_rank(self, rank: np.ndarray, until: np.ndarray, counts: np.ndarray) -> np.ndarray:
-        """For each draw, the value with the index `place` among its sorted values."""
+        """For each draw, the value with the index `rank` among its sorted values."""
         block = (until <= rank).sum(axis=1)
         before = np.take_along_axis(until, np.maximum(block - 1, 0)[:, None], axis=1)[:, 0]
         indices = np.minimum(

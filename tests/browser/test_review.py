@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from mutator.review.decisions import Change, Kind, record
-from mutator.review.mutant_groups import of_library
-from mutator.review.review_page import write_page
+from mutator.review.decisions import ReviewAction, ReviewActionKind, record_actions
+from mutator.review.mutant_groups import groups_of_library
+from mutator.review.review_page import write_review_page
 from mutator.workspace import Workspace
 
 
@@ -17,10 +17,10 @@ def file(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path],
     """A page of the toy's five groups, one of which is approved."""
     folder = tmp_path_factory.mktemp("review")
     toy = copy_toycar(folder)
-    groups = of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
-    approval = Change(group=groups[-1], kind=Kind.APPROVE, by="Jane <b>Doe</b>")
-    review = record(toy, "toycar", [approval], {})
-    write_page(folder / "review.html", review, review.in_turn(groups), ["--spec", "sensor/*"])
+    groups = groups_of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
+    approval = ReviewAction(group=groups[-1], kind=ReviewActionKind.APPROVE, by="Jane <b>Doe</b>")
+    review = record_actions(toy, "toycar", [approval], {})
+    write_review_page(folder / "review.html", review, review.in_list_order(groups), ["--spec", "sensor/*"])
     return folder / "review.html"
 
 

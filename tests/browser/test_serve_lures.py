@@ -12,8 +12,8 @@ from mutator._common.hashing import digest
 from mutator.report.panels import figures_panel
 from mutator.report.report_digests import made_from
 from mutator.review.decisions import load_review
-from mutator.review.mutant_groups import of_library
-from mutator.review.review_page import page_html
+from mutator.review.mutant_groups import groups_of_library
+from mutator.review.review_page import review_page_html
 from mutator.serve.jobs import Jobs
 from mutator.store import file_digests
 from mutator.store.run_folder import RunFolder
@@ -80,9 +80,9 @@ def runs(run: Path, workspace: Workspace) -> Path:
 
 def stored_pages(workspace: Workspace) -> dict[str, str]:
     """The review page under a lure: wherever the user clicks, all mutants are approved."""
-    groups = of_library(workspace, workspace.manifest("toycar"))
+    groups = groups_of_library(workspace, workspace.manifest("toycar"))
     served = {"target": "toycar", "by": "Jane", "api": "/api/review/toycar", "query": "", "runs": []}
-    page = page_html(load_review(workspace, "toycar"), groups, [], served)
+    page = review_page_html(load_review(workspace, "toycar"), groups, [], served)
     for button in ("approve-shown", "ask-yes"):
         page = page.replace(f'id="{button}"', f'id="{button}" style="{LURE}"')
     page = page.replace("<body>", "<body><h1>Drive 12: click to play</h1>")

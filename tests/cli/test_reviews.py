@@ -14,7 +14,7 @@ import typer
 
 from mutator.cli import review_walk
 from mutator.cli.app import main
-from mutator.review.mutant_groups import of_library
+from mutator.review.mutant_groups import groups_of_library
 from mutator.workspace import Workspace
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
@@ -30,8 +30,8 @@ def known(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
 ) -> dict[str, str]:
     toy = copy_toycar(tmp_path_factory.mktemp("known"))
-    groups = of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
-    return {group.id: group.what for group in groups}
+    groups = groups_of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
+    return {group.id: group.label for group in groups}
 
 
 def about(known: dict[str, str], words: str) -> str:

@@ -112,7 +112,9 @@ def test_a_worker_with_another_version_is_refused(
     toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     real = run_environment.package_versions
-    monkeypatch.setattr(run_environment, "versions", lambda names=None: real(names) | {"numpy": "1.0"})
+    monkeypatch.setattr(
+        run_environment, "package_versions", lambda names=None: real(names) | {"numpy": "1.0"}
+    )
     with pytest.warns(MutatorWarning, match=r"worker beta.*gets no work: numpy 1\.0, there 2"):
         summary = on(two, toy, tmp_path / "run")
     assert "no worker is left" in summary.problem

@@ -172,12 +172,12 @@ def test_another_machine_repeats_the_golden_runs(
     assert sorted(executed) == ["a-A", "a-A+alone", "b-A", "b-A+alone"]
     run_campaign(toy, "small", out, distributor=OnePiece())
     assert len(executed) == 4  # this machine is already checked
-    monkeypatch.setattr(run_environment, "cpu", lambda: "another")
+    monkeypatch.setattr(run_environment, "processor_name", lambda: "another")
     assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 6
     assert len(executed) == 8
     assert [stretch.cpu == "another" for stretch in RunFolder.open(out).stretches] == [False, False, True]
 
-    monkeypatch.setattr(run_environment, "cpu", lambda: "a third")
+    monkeypatch.setattr(run_environment, "processor_name", lambda: "a third")
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
     before = contents(out)
     with pytest.raises(CheckFailed, match=r"the golden run A.* differs from the one this run began with"):
@@ -194,7 +194,7 @@ def shard(
 ) -> Shard:
     def run(number: int, version: str = "3.11.7") -> Path:
         python(version)
-        monkeypatch.setattr(run_environment, "cpu", lambda: f"machine {number}")
+        monkeypatch.setattr(run_environment, "processor_name", lambda: f"machine {number}")
         out = tmp_path / f"part{number}"
         assert run_campaign(toy, "small", out, choices=Choices(shard=f"{number}/2")).exit_code == 0
         return out

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.mutant_building import build
-from mutator.review.patch_shapes import group_label, parameter_values, shapes
+from mutator.review.patch_shapes import group_label, parameter_values, shapes_of_patches
 from mutator.workspace import Workspace
 
 WORKSPACE = Workspace.find(root=Path(__file__).parents[2])
@@ -56,10 +56,10 @@ def test_each_patch_can_be_restored_from_its_shape(families: list[list[tuple[Fau
         for fault, trigger in family:
             patch = build(manifest, models, fault, trigger).patch  # type: ignore[arg-type]
             made[str(len(made))] = (fault, group_label(fault), patch)
-    found = shapes((key, name, patch) for key, (_, name, patch) in made.items())
+    found = shapes_of_patches((key, name, patch) for key, (_, name, patch) in made.items())
     assert len(found) == len({name for _, name, _ in made.values()})
     for shape in found:
-        named = shape.with_named_holes(parameter_values(made[key][0]) for key in shape.members)
-        assert len(set(named.holes)) == len(named.holes)
-        for i, key in enumerate(named.members):
-            assert named.patch(i) == made[key][2]
+        named = shape.with_named_holes(parameter_values(made[key][0]) for key in shape.member_ids)
+        assert len(set(named.hole_names)) == len(named.hole_names)
+        for i, key in enumerate(named.member_ids):
+            assert named.patch_of(i) == made[key][2]

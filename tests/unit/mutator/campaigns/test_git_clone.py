@@ -162,7 +162,7 @@ def test_ten_thousand_files_take_a_second(tmp_path: Path) -> None:
 
 
 def test_git_that_does_not_answer_is_not_waited_for(clone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(git_clone, "_PATIENCE_S", 0.2)
+    monkeypatch.setattr(git_clone, "_MOST_GIT_TIME_S", 0.2)
     (clone / ".git/HEAD").unlink()
     os.mkfifo(clone / ".git/HEAD")
     assert find_clone_state(clone) is None
@@ -182,7 +182,7 @@ def test_a_commit_with_more_files_than_memory_is_unknown(
         )
         mode, kind, inner = "040000", "tree", made.stdout.strip()
     git(tmp_path, "update-ref", "HEAD", git(tmp_path, "commit-tree", inner, "-m", "bomb").strip())
-    monkeypatch.setattr(git_clone, "_MOST_SAID", 1 << 20)
+    monkeypatch.setattr(git_clone, "_MOST_OUTPUT_BYTES", 1 << 20)
     assert find_clone_state(tmp_path) is None
 
 

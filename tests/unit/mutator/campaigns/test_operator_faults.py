@@ -14,7 +14,7 @@ from mutator.campaigns.plan import Plan, build_plan, load_plan
 from mutator.errors import MutatorError
 from mutator.model import Hold, Limits, Method
 from mutator.operators.executed_lines import ExecutedLines, GoldenRunInputs
-from mutator.review.mutant_groups import of_plan
+from mutator.review.mutant_groups import groups_of_plan
 from mutator.store.plan_choices import Choices
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -102,7 +102,9 @@ def test_another_seed_draws_other_mutants(toycar: Workspace, campaign: Path) -> 
 
 def test_review_groups_do_not_depend_on_the_draw(toycar: Workspace, campaign: Path) -> None:
     def groups(plan: Plan) -> dict[str, object]:
-        return {one.what: one.bound for one in of_plan(toycar, plan) if ": operator" in one.what}
+        return {
+            one.label: one.basis_digests for one in groups_of_plan(toycar, plan) if ": operator" in one.label
+        }
 
     some = groups(build_plan(toycar, campaign))
     assert set(some) == {
@@ -117,7 +119,7 @@ def test_a_campaign_can_name_an_operator_of_another_package(
 ) -> None:
     plan = build_plan(toycar, _edited(campaign, "[arithmetic, branch]", "[zero]"))
     assert {one.fault.fault_type for one in plan.experiments} == {"zero"}
-    assert [one for one in of_plan(toycar, plan) if one.what.endswith(": operator zero")]
+    assert [one for one in groups_of_plan(toycar, plan) if one.label.endswith(": operator zero")]
 
 
 @pytest.mark.parametrize(

@@ -20,12 +20,14 @@ def test_requirements_that_do_not_apply_are_left_out(monkeypatch: pytest.MonkeyP
         "a": ("1", ["b", "c; extra == 'fast'", "d; extra == 'slow'", "gone"]),
         **{name: ("1", []) for name in "bcdtw"},
     }
-    monkeypatch.setattr(run_environment, "_installed", lambda: told)
+    monkeypatch.setattr(run_environment, "_installed_packages", lambda: told)
     assert run_environment.required_packages() == {"a", "b", "c"}
 
 
 def test_without_an_installed_mutator_every_package_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_environment, "_installed", lambda: {"numpy": ("1", []), "stranger": ("2", [])})
+    monkeypatch.setattr(
+        run_environment, "_installed_packages", lambda: {"numpy": ("1", []), "stranger": ("2", [])}
+    )
     assert run_environment.required_packages() == {"numpy", "stranger"}
 
 

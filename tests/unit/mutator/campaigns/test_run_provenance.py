@@ -37,7 +37,7 @@ def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
         found = real(names)
         return found | {name: version for name, version in other.items() if name in found}
 
-    monkeypatch.setattr(run_environment, "versions", versions)
+    monkeypatch.setattr(run_environment, "package_versions", versions)
 
 
 def test_a_session_records_everything_that_affects_results(folder: RunFolder, toycar: Workspace) -> None:
@@ -145,7 +145,11 @@ def test_another_machine_is_recorded_but_not_refused(
     """Golden runs show whether two machines compute the same results."""
     folder = begin_stretch(folder, toycar, records="0001-*", accept=False)
     other = {"threads": {"OMP_NUM_THREADS": "8"}}.get(changed, "another")
-    name = "platform.platform" if changed == "platform" else f"mutator.campaigns.run_environment.{changed}"
+    name = {
+        "cpu": "mutator.campaigns.run_environment.processor_name",
+        "platform": "platform.platform",
+        "threads": "mutator.campaigns.run_environment.thread_limits",
+    }[changed]
     monkeypatch.setattr(name, lambda: other)
     assert accepted_version_differences(folder) == ()
     folder = begin_stretch(folder, toycar, records="0002-*", accept=False)

@@ -127,10 +127,10 @@ def test_the_reference_campaign_uses_the_reading_as_coded(library: Workspace) ->
 @pytest.mark.slow
 def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:
     code = (
-        "from pathlib import Path; from mutator.campaigns.plan import make_plan;"
+        "from pathlib import Path; from mutator.campaigns.plan import build_plan;"
         "from mutator.store.plan_choices import Choices;"
         "from mutator.workspace import Workspace;"
-        f"print(make_plan(Workspace.find(root=Path({str(ROOT)!r})), 'paper_sample').digest)"
+        f"print(build_plan(Workspace.find(root=Path({str(ROOT)!r})), 'paper_sample').digest)"
     )
     env = os.environ | {"PYTHONHASHSEED": "99", "LC_ALL": "C", "TZ": "Asia/Tokyo"}
     made = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)

@@ -150,11 +150,11 @@ def test_changed_golden_runs_are_refused(
     LineWriter(
         folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head.plan}
     ).close()
-    monkeypatch.setattr(run_environment, "cpu", lambda: "another")
+    monkeypatch.setattr(run_environment, "processor_name", lambda: "another")
     assert all(result.passed for result in run_checks(toycar, folder))
     shutil.rmtree(folder.scratch_folder)
     before = {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()}
-    monkeypatch.setattr(run_environment, "cpu", lambda: "a third")
+    monkeypatch.setattr(run_environment, "processor_name", lambda: "a third")
     original = ReferenceEngine.execute
 
     def other(self: ReferenceEngine, job, folder):  # type: ignore[no-untyped-def]

@@ -11,7 +11,7 @@ from mutator.model import Experiment
 from mutator.report import experiment_list
 from mutator.report.experiment_facts import PLACE
 from mutator.report.experiment_list import column, details, media, table
-from mutator.review.patch_shapes import shapes
+from mutator.review.patch_shapes import shapes_of_patches
 from mutator.store.run_folder import RunFolder
 from tests.made_head import made_head
 
@@ -60,7 +60,7 @@ def test_diffs_are_stored_as_shapes_and_values(experiment: Callable[..., Experim
     one, two = experiment(3.0), experiment(4.0)
     ids = [two.id, "none", one.id]
     patches = [(two.id, "", PATCH.format(4)), (one.id, "", PATCH.format(3))]
-    made = details([two, None, one], shapes(patches), ids, ["2" * 16, "", "1" * 16])
+    made = details([two, None, one], shapes_of_patches(patches), ids, ["2" * 16, "", "1" * 16])
     assert made["shape"] == [0, -1, 0] and made["trace"] == ["2" * 16, "", "1" * 16]
     [shape] = made["shapes"]
     values = list(zip(*shape["values"], strict=True))

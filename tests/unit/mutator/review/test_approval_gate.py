@@ -10,8 +10,8 @@ from mutator.campaigns.plan import Plan, build_plan, load_plan
 from mutator.errors import CheckFailed
 from mutator.execution.campaign_running import run_campaign
 from mutator.review import approval_gate
-from mutator.review.decisions import Change, Kind, load_review, record
-from mutator.review.mutant_groups import of_plan
+from mutator.review.decisions import ReviewAction, ReviewActionKind, load_review, record_actions
+from mutator.review.mutant_groups import groups_of_plan
 from mutator.store.approvals import approval_summary, write_approvals
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
@@ -22,10 +22,17 @@ def plan(toycar: Workspace) -> Plan:
     return build_plan(toycar, "small", Choices(limit=2))
 
 
-def decide(toy: Workspace, plan: Plan, kind: Kind = Kind.APPROVE, count: int | None = None) -> None:
-    changes = [Change(group=one, kind=kind, by=f"Reviewer {count}") for one in of_plan(toy, plan)[:count]]
+def decide(
+    toy: Workspace, plan: Plan, kind: ReviewActionKind = ReviewActionKind.APPROVE, count: int | None = None
+) -> None:
+    changes = [
+        ReviewAction(group=one, kind=kind, by=f"Reviewer {count}")
+        for one in groups_of_plan(toy, plan)[:count]
+    ]
     review = load_review(toy, "toycar")
-    record(toy, "toycar", changes, {change.group.id: review.revision(change.group.id) for change in changes})
+    record_actions(
+        toy, "toycar", changes, {change.group.id: review.revision(change.group.id) for change in changes}
+    )
 
 
 def test_the_run_folder_of_an_approved_plan_names_its_reviewers(
@@ -35,28 +42,30 @@ def test_the_run_folder_of_an_approved_plan_names_its_reviewers(
     assert approval_summary(run) == ""
     decide(toycar, plan)
     decide(toycar, plan, count=1)
-    write_approvals(run, approvals := approval_gate.approvals(toycar, plan))
+    write_approvals(run, approvals := approval_gate.require_approvals(toycar, plan))
     for kept in approvals["groups"]:
         assert (kept["verdict"], kept["tool"], kept["commit"]) == ("approved", VERSION, None)
         assert kept["at"] and set(kept["bound"]) == {"diff", "function", "template", "calls"}
-    total = len(of_plan(toycar, plan))
+    total = len(groups_of_plan(toycar, plan))
     assert approval_summary(run) == (
         f"{total} groups approved by Reviewer 1 (1), Reviewer None ({total - 1})"
     )
 
 
 def test_groups_without_approval_are_named(toycar: Workspace, plan: Plan) -> None:
-    groups = of_plan(toycar, plan)
+    groups = groups_of_plan(toycar, plan)
     missing, changed, rejected = groups[0], groups[1], groups[-1]
     decide(toycar, plan)
-    decide(toycar, plan, Kind.CLEAR, count=1)
+    decide(toycar, plan, ReviewActionKind.CLEAR, count=1)
     review = load_review(toycar, "toycar")
-    no = Change(group=rejected, kind=Kind.REJECT, by="Joe")
-    record(toycar, "toycar", [no], {rejected.id: review.revision(rejected.id)})
+    no = ReviewAction(group=rejected, kind=ReviewActionKind.REJECT, by="Joe")
+    record_actions(toycar, "toycar", [no], {rejected.id: review.revision(rejected.id)})
     template = toycar.templates / f"{changed.models[0]}.py.j2"
     template.write_text(template.read_text() + "{# another #}\n")
     with pytest.raises(CheckFailed) as caught:
-        approval_gate.approvals(toycar, build_plan(toycar, "small", Choices(limit=2, reading="as_coded")))
+        approval_gate.require_approvals(
+            toycar, build_plan(toycar, "small", Choices(limit=2, reading="as_coded"))
+        )
     told = [line.split("  ")[2].partition(": ")[0] for line in caught.value.got.splitlines()[1:]]
     assert told[0].startswith("missing, ")
     assert all(line.startswith("changed (template), ") for line in told[1:-1]) and told[1:-1]
@@ -68,9 +77,9 @@ def test_groups_without_approval_are_named(toycar: Workspace, plan: Plan) -> Non
 
 
 def test_groups_used_only_by_the_canary_have_no_count(toycar: Workspace, plan: Plan) -> None:
-    alone = [group for group in of_plan(toycar, plan) if not group.runs]
+    alone = [group for group in groups_of_plan(toycar, plan) if not group.experiment_count]
     with pytest.raises(CheckFailed) as caught:
-        approval_gate.approvals(toycar, plan)
+        approval_gate.require_approvals(toycar, plan)
     assert alone
     assert all(f"{group.id}  missing, the canary: " in caught.value.got for group in alone)
 
@@ -79,7 +88,7 @@ def test_a_users_own_file_is_named_by_its_path(toycar: Workspace, tmp_path: Path
     mine = tmp_path / "my own.yaml"
     mine.write_text(toycar.campaign("small").read_text() + "\n# mine\n")
     with pytest.raises(CheckFailed) as caught:
-        approval_gate.approvals(toycar, build_plan(toycar, mine, Choices(limit=1)))
+        approval_gate.require_approvals(toycar, build_plan(toycar, mine, Choices(limit=1)))
     assert f"--campaign '{mine}'" in str(caught.value.remedy)
 
 
@@ -99,9 +108,9 @@ def test_a_resumed_run_does_not_need_the_campaigns_spec_file(toycar: Workspace, 
         campaign.replace("spec: sensor/lane/shifted, values", "spec: lane.yaml, values")
     )
     plan = build_plan(toycar, mine / "mine.yaml", Choices(only='fault_type == "mine"'))
-    lane = of_plan(toycar, plan)[0]
-    assert lane.values == {"by": (0.0, 2.5)} and mine / "lane.yaml" in lane.made_from
+    lane = groups_of_plan(toycar, plan)[0]
+    assert lane.value_ranges == {"by": (0.0, 2.5)} and mine / "lane.yaml" in lane.source_files
     run = freeze_plan(plan, tmp_path / "run", toycar)
     decide(toycar, plan)
     (mine / "lane.yaml").unlink()
-    assert approval_gate.approvals(toycar, load_plan(run))["groups"]
+    assert approval_gate.require_approvals(toycar, load_plan(run))["groups"]

@@ -90,7 +90,7 @@ def called(line: str, tag: str = TAG, **changed: str) -> dict[str, str]:
     pristine = EYE.format(line="picture = picture")
     files = {**TREE, "car/eye.py": pristine, **changed}
     tree = SourceTree(Path(), {path: text.encode() for path, text in files.items()}, "", {})
-    return CalledCode(tree).of_lines("car/eye.py", EYE.format(line=line + tag).encode())
+    return CalledCode(tree).called_by_injected_lines("car/eye.py", EYE.format(line=line + tag).encode())
 
 
 @pytest.mark.parametrize(
@@ -213,7 +213,7 @@ def test_names_are_followed_through_packages_and_bases(line: str, found: set[str
     files = {**TREE, **PACKAGE, "car/eye.py": pristine}
     tree = SourceTree(Path(), {path: text.encode() for path, text in files.items()}, "", {})
     mutated = PACKAGE["car/eye.py"].format(line=line + TAG).encode()
-    assert set(CalledCode(tree).of_lines("car/eye.py", mutated)) == found
+    assert set(CalledCode(tree).called_by_injected_lines("car/eye.py", mutated)) == found
 
 
 @pytest.mark.parametrize(
@@ -228,4 +228,4 @@ def test_names_are_followed_through_packages_and_bases(line: str, found: set[str
 def test_names_in_expressions_are_resolved_in_their_function(texts: list[str], found: set[str]) -> None:
     files = {**TREE, "car/eye.py": EYE.format(line="pass")}
     tree = SourceTree(Path(), {path: text.encode() for path, text in files.items()}, "", {})
-    assert set(CalledCode(tree).of_expressions("car/eye.py", "Eye.look", texts)) == found
+    assert set(CalledCode(tree).called_by_expressions("car/eye.py", "Eye.look", texts)) == found

@@ -9,8 +9,15 @@ import pytest
 from mutator.campaigns.git_clone import find_user_name
 from mutator.errors import MutatorError
 from mutator.review.commits import library_commit
-from mutator.review.decisions import Change, Kind, Review, State, load_review, record
-from mutator.review.mutant_groups import Group, of_library
+from mutator.review.decisions import (
+    Review,
+    ReviewAction,
+    ReviewActionKind,
+    ReviewState,
+    load_review,
+    record_actions,
+)
+from mutator.review.mutant_groups import Group, groups_of_library
 from mutator.workspace import Workspace
 
 HEAD = 'schema: review/2\ntarget: "toycar"\nfour_eyes: true\ndecisions: []\n'
@@ -44,15 +51,15 @@ def root(toycar: Workspace) -> Path:
 
 
 def lane(toy: Workspace) -> Group:
-    return of_library(toy, toy.manifest("toycar"), specs=["sensor/lane"])[0]
+    return groups_of_library(toy, toy.manifest("toycar"), specs=["sensor/lane"])[0]
 
 
-def say(toy: Workspace, by: str, kind: Kind = Kind.APPROVE) -> Review:
+def say(toy: Workspace, by: str, kind: ReviewActionKind = ReviewActionKind.APPROVE) -> Review:
     group, review = lane(toy), load_review(toy, "toycar")
-    return record(
+    return record_actions(
         toy,
         "toycar",
-        [Change(group=group, kind=kind, by=by)],
+        [ReviewAction(group=group, kind=kind, by=by)],
         {group.id: review.revision(group.id)},
     )
 
@@ -64,9 +71,9 @@ def test_the_last_author_cannot_approve(toycar: Workspace, root: Path) -> None:
     assert git(root, "rev-parse", "HEAD")[:12] in str(caught.value)
     assert load_review(toycar, "toycar").entries == {}
     review = say(toycar, "Jane Doe")
-    assert review.state(lane(toycar)) is State.APPROVED
+    assert review.state(lane(toycar)) is ReviewState.APPROVED
     assert load_review(toycar, "toycar").four_eyes
-    assert say(toycar, "Git Smith", Kind.REJECT).state(lane(toycar)) is State.REJECTED
+    assert say(toycar, "Git Smith", ReviewActionKind.REJECT).state(lane(toycar)) is ReviewState.REJECTED
 
 
 @pytest.mark.parametrize("path", [LANE, OFFSET, "templates/offset.yaml"])
@@ -114,7 +121,7 @@ def test_changes_that_are_not_in_git_are_refused(toycar: Workspace, root: Path) 
     (root / ".git").rename(root / "git")
     with pytest.raises(MutatorError, match=r"not in a git clone.*put the file under git"):
         say(toycar, "Jane Doe")
-    assert say(toycar, "Jane Doe", Kind.REJECT).decision(lane(toycar).id)
+    assert say(toycar, "Jane Doe", ReviewActionKind.REJECT).decision(lane(toycar).id)
 
 
 def test_a_decision_stores_the_librarys_commit(toycar: Workspace, root: Path) -> None:

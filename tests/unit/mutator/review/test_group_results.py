@@ -15,8 +15,8 @@ from mutator.model import Outcome, Status
 from mutator.results import table_building
 from mutator.results.result_rows import ResultRow
 from mutator.results.table_reader import Results
-from mutator.review.group_results import of_group, verdict_of
-from mutator.review.mutant_groups import of_plan
+from mutator.review.group_results import describe_result, results_of_group
+from mutator.review.mutant_groups import groups_of_plan
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -34,8 +34,8 @@ def test_a_group_has_counts_a_typical_and_a_worst_experiment(
     bad = {name: {"hazards": (("H3", 3.0 + i),), **HAZARD} for i, name in enumerate(lane[:2])}
     run = write_run(toycar, tmp_path / "run", lambda e: bad.get(e.id, {}))
     table_building.ensure_tables(run)
-    group = next(g for g in of_plan(toycar, plan) if "offset: offset" in g.what)
-    found = of_group(RunFolder.open(run), group)
+    group = next(g for g in groups_of_plan(toycar, plan) if "offset: offset" in g.label)
+    found = results_of_group(RunFolder.open(run), group)
     assert found is not None
     assert found.experiments == len(lane) > 4
     assert found.outcomes == {"masked": len(lane) - 2, "hazard": 2}
@@ -52,21 +52,21 @@ def test_a_group_without_experiments_has_no_verdict(
     """The group of the probe has no experiments, because all mutants share the probe."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run", only='fault_type == "silence"'))
     table_building.ensure_tables(run.path)
-    groups = of_plan(toycar, build_plan(toycar, "toy", Choices()))
-    told = {group.models for group in groups if of_group(run, group)}
+    groups = groups_of_plan(toycar, build_plan(toycar, "toy", Choices()))
+    told = {group.models for group in groups if results_of_group(run, group)}
     assert told == {("omission",)}
 
 
 def test_later_results_are_counted(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
-    group = next(g for g in of_plan(toycar, build_plan(toycar, "toy", Choices())) if g.faults)
+    group = next(g for g in groups_of_plan(toycar, build_plan(toycar, "toy", Choices())) if g.faults)
     write_run(toycar, tmp_path / "run", lambda e: None)
     with pytest.raises(MutatorError, match="no results here"):
-        of_group(RunFolder.open(tmp_path / "run"), group)
+        results_of_group(RunFolder.open(tmp_path / "run"), group)
     table_building.ensure_tables(tmp_path / "run")
-    assert of_group(RunFolder.open(tmp_path / "run"), group) is None
+    assert results_of_group(RunFolder.open(tmp_path / "run"), group) is None
     shutil.rmtree(tmp_path / "run")
     table_building.ensure_tables(write_run(toycar, tmp_path / "run"))
-    assert of_group(RunFolder.open(tmp_path / "run"), group)
+    assert results_of_group(RunFolder.open(tmp_path / "run"), group)
 
 
 def test_the_results_are_read_once_for_many_groups(
@@ -75,7 +75,7 @@ def test_the_results_are_read_once_for_many_groups(
     """Reading a large table takes seconds and much memory."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run"))
     table_building.ensure_tables(run.path)
-    groups = of_plan(toycar, build_plan(toycar, "toy", Choices()))
+    groups = groups_of_plan(toycar, build_plan(toycar, "toy", Choices()))
     read: list[Results] = []
     frame = Results.frame
 
@@ -86,7 +86,7 @@ def test_the_results_are_read_once_for_many_groups(
 
     monkeypatch.setattr(Results, "frame", slowly)
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(lambda group: of_group(run, group), groups))
+        found = list(pool.map(lambda group: results_of_group(run, group), groups))
     assert len(read) == 1 < len([one for one in found if one])
 
 
@@ -121,4 +121,4 @@ def row(**given: Any) -> ResultRow:
     ],
 )
 def test_a_verdict_is_put_into_words(given: dict[str, Any], words: str) -> None:
-    assert verdict_of(row(**given), {"H1": "a crash"}) == words
+    assert describe_result(row(**given), {"H1": "a crash"}) == words

@@ -7,7 +7,13 @@ import pytest
 from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.mutant_building import build
-from mutator.review.patch_shapes import Shape, group_label, parameter_values, shapes, without_values
+from mutator.review.patch_shapes import (
+    PatchShape,
+    group_label,
+    parameter_values,
+    shapes_of_patches,
+    without_values,
+)
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
 
@@ -21,9 +27,9 @@ def faults(toy: Workspace, name: str, spec: str = "sensor/distance") -> list[Fau
     return [fault for fault in found if fault.spec == f"{spec}/{name}"]
 
 
-def grouped(toy: Workspace, pairs: list[tuple[Fault, Trigger]]) -> list[Shape]:
+def grouped(toy: Workspace, pairs: list[tuple[Fault, Trigger]]) -> list[PatchShape]:
     manifest, models = toy.manifest("toycar"), toy.fault_models()
-    return shapes(
+    return shapes_of_patches(
         (f"{i}", group_label(fault), build(manifest, models, fault, trigger).patch)
         for i, (fault, trigger) in enumerate(pairs)
     )
@@ -32,20 +38,22 @@ def grouped(toy: Workspace, pairs: list[tuple[Fault, Trigger]]) -> list[Shape]:
 def test_a_shape_with_a_faults_values_is_its_patch(toycar: Workspace) -> None:
     pairs = [(fault, trigger) for fault in faults(toycar, "longer") for trigger in (NEAR, FAR)]
     (shape,) = grouped(toycar, pairs)
-    assert shape.members == tuple(str(i) for i in range(8))
+    assert shape.member_ids == tuple(str(i) for i in range(8))
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     for i, pair in enumerate(pairs):
-        assert shape.patch(i) == build(manifest, models, *pair).patch
+        assert shape.patch_of(i) == build(manifest, models, *pair).patch
 
 
 def test_holes_have_names(toycar: Workspace) -> None:
     pairs = [(fault, NEAR) for fault in faults(toycar, "nearer")]
     (shape,) = grouped(toycar, pairs)
     named = shape.with_named_holes(parameter_values(fault) for fault, _ in pairs)
-    assert named.holes == ("mutant", "id", "by")
+    assert named.hole_names == ("mutant", "id", "by")
     assert "gap = gap ⟨by⟩  # fi:⟨id⟩" in named.diff
     assert "gap = max(gap, _fi.like(gap, 0.0))" in named.diff
-    assert [row[2] for row in named.values] == [f"- {-dict(parameter_values(f))['by']:.0f}" for f, _ in pairs]
+    assert [row[2] for row in named.values_by_member] == [
+        f"- {-dict(parameter_values(f))['by']:.0f}" for f, _ in pairs
+    ]
 
 
 def test_a_sign_is_part_of_the_value(toycar: Workspace) -> None:
@@ -53,7 +61,7 @@ def test_a_sign_is_part_of_the_value(toycar: Workspace) -> None:
     (injection,) = second.injections
     less = replace(second, injections=(replace(injection, params=(("by", -3.0), ("target", "gap"))),))
     (shape,) = grouped(toycar, [(first, NEAR), (less, NEAR)])
-    assert shape.values[1][shape.holes.index("1")] == "- 3"
+    assert shape.values_by_member[1][shape.hole_names.index("1")] == "- 3"
 
 
 def test_nan_fills_a_hole(toycar: Workspace) -> None:
@@ -63,7 +71,7 @@ def test_nan_fills_a_hole(toycar: Workspace) -> None:
     wrong = replace(second, injections=(replace(injection, params=params),))
     (shape,) = grouped(toycar, [(first, NEAR), (wrong, NEAR)])
     named = shape.with_named_holes(map(parameter_values, (first, wrong)))
-    assert named.values[1][named.holes.index("by")] == "+ float('nan')"
+    assert named.values_by_member[1][named.hole_names.index("by")] == "+ float('nan')"
 
 
 def test_place_model_and_bound_are_part_of_the_shape(toycar: Workspace) -> None:
@@ -97,8 +105,8 @@ def test_the_id_of_a_shape_does_not_depend_on_its_members(toycar: Workspace) -> 
     ],
 )
 def test_a_patch_of_any_text_round_trips(patch: str) -> None:
-    (shape,) = shapes([("a", "", patch), ("b", "", patch)])
-    assert shape.patch(1) == patch
+    (shape,) = shapes_of_patches([("a", "", patch), ("b", "", patch)])
+    assert shape.patch_of(1) == patch
 
 
 def test_numbers_outside_injected_lines_are_part_of_the_shape() -> None:

@@ -7,18 +7,18 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.review import review_file
-from mutator.review.entries import Bound, Decision, Entry, Flag, Remark, Verdict
-from mutator.review.review_file import Content
+from mutator.review.entries import BasisDigests, Decision, DecisionVerdict, Flag, Remark, ReviewEntry
+from mutator.review.review_file import ReviewFileContent
 
-BOUND = Bound(diff="d" * 16, function="f" * 16, template="0" * 16, calls="c" * 16)
+BOUND = BasisDigests(diff="d" * 16, function="f" * 16, template="0" * 16, calls="c" * 16)
 AT = "2026-11-24T16:00:00Z"
 
 
-def entry(name: str) -> Entry:
+def entry(name: str) -> ReviewEntry:
     decision = Decision(
         group=name * 12,
         what=f"group {name}",
-        verdict=Verdict.APPROVED,
+        verdict=DecisionVerdict.APPROVED,
         by="Jane Doe",
         at=AT,
         commit="1" * 40 + "-dirty",
@@ -28,21 +28,23 @@ def entry(name: str) -> Entry:
     )
     remarks = (Remark(by="Joe", at=AT, text="why?"), Remark(by="Jane", at=None, text="{so: \"'}"))
     flag = Flag(by="Joe", at=AT)
-    return Entry(group=name * 12, what=f"group {name}", decision=decision, remarks=remarks, flag=flag)
+    return ReviewEntry(group=name * 12, what=f"group {name}", decision=decision, remarks=remarks, flag=flag)
 
 
 def written(path: Path, *names: str) -> Path:
     entries = {name * 12: entry(name) for name in names}
-    path.write_text(review_file.text("toycar", Content(entries=entries, four_eyes=True)))
+    path.write_text(
+        review_file.render_review_file("toycar", ReviewFileContent(entries=entries, four_eyes=True))
+    )
     return path
 
 
 def test_a_review_file_round_trips(tmp_path: Path) -> None:
     path = written(tmp_path / "toycar.yaml", "b", "a")
-    found = review_file.load(path, "toycar")
-    assert found == Content(entries={name * 12: entry(name) for name in "ab"}, four_eyes=True)
+    found = review_file.load_review_file(path, "toycar")
+    assert found == ReviewFileContent(entries={name * 12: entry(name) for name in "ab"}, four_eyes=True)
     text = path.read_text()
-    path.write_text(review_file.text("toycar", found))
+    path.write_text(review_file.render_review_file("toycar", found))
     assert path.read_text() == text
 
 
@@ -50,7 +52,7 @@ def test_decisions_about_different_groups_merge(tmp_path: Path) -> None:
     files = [written(tmp_path / f"{i}", *names) for i, names in enumerate(("018f", "08f", "08ef"))]
     merged = subprocess.run(["git", "merge-file", "-p", *files], capture_output=True, check=True).stdout
     (path := tmp_path / "toycar.yaml").write_bytes(merged)
-    assert "".join(name[0] for name in review_file.load(path, "toycar").entries) == "018ef"
+    assert "".join(name[0] for name in review_file.load_review_file(path, "toycar").entries) == "018ef"
 
 
 @pytest.mark.parametrize(
@@ -83,6 +85,6 @@ def test_mistakes_are_reported_with_their_line(
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(MutatorError) as caught:
-        review_file.load(path, "toycar")
+        review_file.load_review_file(path, "toycar")
     assert (caught.value.where, caught.value.line) == (str(path), line)
     assert words in str(caught.value)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.review.decisions import Change, Kind, State, load_review, record
-from mutator.review.mutant_groups import Group, of_library
+from mutator.review.decisions import ReviewAction, ReviewActionKind, ReviewState, load_review, record_actions
+from mutator.review.mutant_groups import Group, groups_of_library
 from mutator.workspace import Workspace
 
 EFFECTS = """\
@@ -114,8 +114,10 @@ def original(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Pa
     ] + [VARIANT.format(name="helper", model="helped", params="by: amount")]
     spec = toycar.library / "faults" / "sensor" / "seen.yaml"
     spec.write_text(SPEC.format(variants="".join(variants)))
-    changes = [Change(group=group, kind=Kind.APPROVE, by="Jane") for group in groups(toycar)]
-    review = record(toycar, "toycar", changes, {})
+    changes = [
+        ReviewAction(group=group, kind=ReviewActionKind.APPROVE, by="Jane") for group in groups(toycar)
+    ]
+    review = record_actions(toycar, "toycar", changes, {})
     assert len(review.entries) == len(IN_SENSE) + 1
     return toycar.library.parent
 
@@ -127,7 +129,7 @@ def approved(original: Path, tmp_path: Path) -> Workspace:
 
 
 def groups(toy: Workspace) -> tuple[Group, ...]:
-    return of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
+    return groups_of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
 
 
 @pytest.mark.parametrize(
@@ -158,7 +160,9 @@ def test_a_change_makes_exactly_its_groups_stale(
     assert old in text
     path.write_text(text.replace(old, new, 1))
     review, now = load_review(approved, "toycar"), groups(approved)
-    changed = {group.what: review.changed(group) for group in now if review.state(group) is State.CHANGED}
+    changed = {
+        group.label: review.stale_parts(group) for group in now if review.state(group) is ReviewState.CHANGED
+    }
     assert len(changed) == len(stale)
     assert all(any(words in what for what in changed) for words in stale)
     assert all(reasons[0].startswith(why) for reasons in changed.values())
@@ -175,10 +179,17 @@ def test_a_change_in_a_shipped_effect_makes_exactly_its_groups_stale(
     here = replace(clone, library=library, target=target)
 
     def found() -> dict[str, Group]:
-        return {one.id: one for one in of_library(here, here.manifest("openpilot"), specs=["vision*/*"])}
+        return {
+            one.id: one for one in groups_of_library(here, here.manifest("openpilot"), specs=["vision*/*"])
+        }
 
     before = found()
-    record(here, "openpilot", [Change(group=g, kind=Kind.APPROVE, by="Jane") for g in before.values()], {})
+    record_actions(
+        here,
+        "openpilot",
+        [ReviewAction(group=g, kind=ReviewActionKind.APPROVE, by="Jane") for g in before.values()],
+        {},
+    )
     review = load_review(here, "openpilot")
 
     def stale(file: str, old: str, new: str) -> set[str]:
@@ -186,17 +197,17 @@ def test_a_change_in_a_shipped_effect_makes_exactly_its_groups_stale(
         text = path.read_text()
         assert old in text
         path.write_text(text.replace(old, new, 1))
-        changed = {name: review.changed(group) for name, group in found().items()}
+        changed = {name: review.stale_parts(group) for name, group in found().items()}
         path.write_text(text)
         assert {tuple(why) for why in changed.values()} <= {(), ("called code",)}
         return {name for name, why in changed.items() if why}
 
     def uses(*names: str) -> set[str]:
         groups = before.values()
-        return {g.id for g in groups if any(f"effects.{name}" in g.what for name in names)}
+        return {g.id for g in groups if any(f"effects.{name}" in g.label for name in names)}
 
     def calls(place: str) -> set[str]:
-        return {g.id for g in before.values() if f"-- selfdrive/sim/effects/{place}\n" in g.seen}
+        return {g.id for g in before.values() if f"-- selfdrive/sim/effects/{place}\n" in g.reviewed_text}
 
     assert stale("air.py", "class Fog(Effect):\n", "class Fog(Effect):\n    # another line\n") == uses("Fog,")
     assert len(uses("Fog,")) == 2  # the effect alone, and together with rain
@@ -205,5 +216,7 @@ def test_a_change_in_a_shipped_effect_makes_exactly_its_groups_stale(
     assert uses("AveragingBlur", "MedianBlur") <= (helper := calls("canvas.py filtered")) < base
     assert stale("canvas.py", "def filtered(", "def  filtered(") == helper
     kernel = stale("gaussian.c", "/*", "/* another line\n")
-    assert kernel == {g.id for g in before.values() if "-- selfdrive/sim/effects/gaussian.c\n" in g.seen}
+    assert kernel == {
+        g.id for g in before.values() if "-- selfdrive/sim/effects/gaussian.c\n" in g.reviewed_text
+    }
     assert uses("GaussianBlur") <= kernel < base

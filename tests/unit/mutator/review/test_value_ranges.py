@@ -6,7 +6,7 @@ import pytest
 
 from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Value
-from mutator.review.value_ranges import ranges_of
+from mutator.review.value_ranges import value_ranges_of
 from mutator.workspace import Workspace
 
 
@@ -21,14 +21,14 @@ def test_a_range_covers_all_ranges_of_the_specs(toycar: Workspace) -> None:
             [one for one in faults(toycar, "sensor/distance", seed) if one.spec.endswith(name)]
             for name in ("longer", "nearer")
         )
-        assert ranges_of(longer, specs, models) == {"by": (1.0, 65.0)}
-        assert ranges_of(nearer[:1], specs, models) == {"by": (-459.0, -400.0), "low": (0.0, 0.0)}
-        assert ranges_of(faults(toycar, "sensor/lane", seed)[:1], specs, models) == {"by": (0.0, 2.5)}
+        assert value_ranges_of(longer, specs, models) == {"by": (1.0, 65.0)}
+        assert value_ranges_of(nearer[:1], specs, models) == {"by": (-459.0, -400.0), "low": (0.0, 0.0)}
+        assert value_ranges_of(faults(toycar, "sensor/lane", seed)[:1], specs, models) == {"by": (0.0, 2.5)}
 
 
 def test_without_a_spec_the_range_is_the_faults_value(toycar: Workspace) -> None:
     fault = faults(toycar, "sensor/distance")[0]
-    assert ranges_of([fault], {}, toycar.fault_models()) == {"by": (fault.value, fault.value)}
+    assert value_ranges_of([fault], {}, toycar.fault_models()) == {"by": (fault.value, fault.value)}
 
 
 @pytest.mark.parametrize(
@@ -46,16 +46,16 @@ def test_values_without_an_order_are_listed_next_to_the_range(
     fault = faults(toycar, "sensor/distance")[0]
     (injection,) = fault.injections
     made = [replace(fault, injections=(replace(injection, params=(("by", one),)),)) for one in values]
-    assert ranges_of(made, {}, toycar.fault_models()).get("by") == found
+    assert value_ranges_of(made, {}, toycar.fault_models()).get("by") == found
 
 
 def test_the_selected_execution_and_instance_are_values(toycar: Workspace) -> None:
     fault = faults(toycar, "sensor/distance")[0]
     (injection,) = fault.injections
     made = replace(fault, injections=(injection, replace(injection, call=3, where="index == 2")))
-    found = ranges_of([made], {}, toycar.fault_models())
+    found = value_ranges_of([made], {}, toycar.fault_models())
     assert set(found) == {"1.by", "2.by", "2.call", "2.where"}
     assert (found["2.call"], found["2.where"]) == ((3.0, 3.0), ("index == 2",))
     seeded = replace(injection, model="image_effect", params=(("amount", 2.0), ("seed", 9)))
-    found = ranges_of([replace(fault, injections=(seeded,))], {}, toycar.fault_models())
+    found = value_ranges_of([replace(fault, injections=(seeded,))], {}, toycar.fault_models())
     assert found == {"amount": (2.0, 2.0)}

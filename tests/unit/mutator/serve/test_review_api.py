@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from mutator.review.decisions import Change, Kind, load_review, record
-from mutator.review.mutant_groups import of_library
+from mutator.review.decisions import ReviewAction, ReviewActionKind, load_review, record_actions
+from mutator.review.mutant_groups import groups_of_library
 from mutator.workspace import Workspace
 
 from .conftest import SECRET, Client
@@ -59,9 +59,13 @@ def test_a_decision_that_the_reviewer_has_not_seen_is_not_overwritten(
 ) -> None:
     client, (first, second, *_) = reviewed
     group = next(
-        one for one in of_library(toycar, toycar.manifest("toycar"), specs=("sensor/*",)) if one.id == first
+        one
+        for one in groups_of_library(toycar, toycar.manifest("toycar"), specs=("sensor/*",))
+        if one.id == first
     )
-    record(toycar, "toycar", [Change(group=group, kind=Kind.REJECT, by="John")], {first: ""})
+    record_actions(
+        toycar, "toycar", [ReviewAction(group=group, kind=ReviewActionKind.REJECT, by="John")], {first: ""}
+    )
     answer = decided(client, (first, "approve"), (second, "approve"), seen={first: "", second: ""})
     assert answer.status == 409
     assert "John" in answer.json["conflict"]
