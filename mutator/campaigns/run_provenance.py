@@ -58,12 +58,12 @@ def accepted_version_differences(folder: RunFolder, *, accept: bool = False) -> 
     """
     if not folder.stretches:
         return ()
-    version_differences = version_differences(
+    changes = version_differences(
         folder.stretches[-1], run_environment.python_version(), _versions_to_record(folder)
     )
-    if version_differences and not accept:
-        raise version_error(folder.path, "this run used", version_differences)
-    return version_differences
+    if changes and not accept:
+        raise version_error(folder.path, "this run used", changes)
+    return changes
 
 
 def version_error(run: Path, beginning: str, version_differences: Iterable[str]) -> MutatorError:

@@ -182,7 +182,9 @@ def _awaited_triggers(
         yield from _listed_triggers(campaign, manifest, earliest)
         if (until := campaign.random_until_s) is not None and Method.RANDOM in campaign.methods:
             what = f"{campaign.name}: random times until {until:g} s"
-            place = _yaml_place(campaign.path, campaign.yaml_source.line_of(("triggers", "random_until_s")), what)
+            place = _yaml_place(
+                campaign.path, campaign.yaml_source.line_of(("triggers", "random_until_s")), what
+            )
             yield AwaitedTrigger(trigger=trigger_at_time(until, name=campaign.name), place=place)
     for name in {table: None for table, _ in armed_after_s_by_row} if campaigns else workspace.context_tables:
         table = workspace.context_table(name)

@@ -40,7 +40,9 @@ class CampaignItem(pytest.Item):
 class WorkItem(CampaignItem):
     """One chunk of the plan, or one experiment of the proof. A hazard is a result, not a failure."""
 
-    def __init__(self, *, work: PendingChunk | SampledExperiment, worker: "LazyWorker", **keywords: Any) -> None:
+    def __init__(
+        self, *, work: PendingChunk | SampledExperiment, worker: "LazyWorker", **keywords: Any
+    ) -> None:
         super().__init__(**keywords)
         self.work = work
         self.worker = worker

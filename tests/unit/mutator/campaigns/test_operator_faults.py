@@ -31,7 +31,7 @@ def lines(monkeypatch: pytest.MonkeyPatch) -> None:
     ) -> list[ExecutedLines]:
         return [{"toycar/driver.py": frozenset(range(1, 17))} for _ in drives]
 
-    monkeypatch.setattr(operator_faults, "lines_of", known)
+    monkeypatch.setattr(operator_faults, "measure_executed_lines", known)
 
 
 @pytest.fixture
