@@ -115,7 +115,9 @@ class ReviewedGroups:
     ) -> "ReviewedGroups":
         actions = [ReviewAction(group=group, kind=kind, by=by, text=text) for group in groups]
         revision_by_group = {group.id: self.review.revision(group.id) for group in groups}
-        return replace(self, review=record_actions(self.workspace, self.review.target, actions, revision_by_group))
+        return replace(
+            self, review=record_actions(self.workspace, self.review.target, actions, revision_by_group)
+        )
 
 
 def load_review(

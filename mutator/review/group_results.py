@@ -95,7 +95,8 @@ def _build_results(
     for row in rows:
         by_ending.setdefault(ended[row], []).append(row)
     usable = {
-        name: ending_rows for name, ending_rows in by_ending.items() if name not in UNUSABLE_STATUSES} or by_ending
+        name: ending_rows for name, ending_rows in by_ending.items() if name not in UNUSABLE_STATUSES
+    } or by_ending
     most = max(usable.values(), key=len)
     order = [*Outcome, *Status]
     counts = {name.value: len(by_ending[name.value]) for name in order if name.value in by_ending}
