@@ -33,9 +33,9 @@ from mutator.campaigns.run_provenance import append_stretch
 from mutator.execution.cluster import cluster_distributor, crew, worker_tasks
 from mutator.execution.cluster import result_intake as intakes
 from mutator.execution.cluster.bundle import Bundle
-from mutator.execution.cluster.cluster_choice import parse
-from mutator.execution.cluster.piece_queue import Board
-from mutator.execution.cluster.pieces import Ending, Piece, Result
+from mutator.execution.cluster.cluster_choice import parse_cluster_choice
+from mutator.execution.cluster.piece_queue import PieceQueue
+from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceResult
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.patch_files import pack_patches
 from mutator.store.run_folder import RunFolder
@@ -109,7 +109,7 @@ def planned(name: str = "paper") -> Iterator[tuple[Workspace, RunFolder, tuple[P
 # These functions replace those of a real worker and take no time. Dask sends them to the workers.
 
 
-def facts(packages: Any) -> dict[str, Any]:
+def machine_facts(packages: Any) -> dict[str, Any]:
     return dict.fromkeys(("mutator", "python", "platform", "cpu"), "") | {
         "host": "here",
         "blas": [],
@@ -117,42 +117,42 @@ def facts(packages: Any) -> dict[str, Any]:
     }
 
 
-def deliver(*given: Any) -> None:
+def deliver_bundle(*given: Any) -> None:
     return None
 
 
-def attend(run: str) -> None:
+def attend_run(run: str) -> None:
     from distributed import secede
 
     secede()
     time.sleep(3600)
 
 
-def leave(run: str) -> None:
+def leave_run(run: str) -> None:
     return None
 
 
-def work(run: str, data: bytes) -> bytes:
-    piece = Piece.of(data)
+def run_piece(run: str, data: bytes) -> bytes:
+    piece = Piece.from_bytes(data)
     line = json.dumps({"experiment_id": "@"} | RECORD, separators=(",", ":")).encode()
     timing = b'{"cpu_s":0.3,"engine":"fork","experiment_id":"@","host":"here","wall_s":0.3,"worker":"w"}'
     patch, series = random.Random(1).randbytes(PATCH_BYTES // 4) * 4, random.Random(2).randbytes(SERIES_BYTES)
-    return Result(
+    return PieceResult(
         number=piece.number,
-        ending=Ending.DONE,
-        seconds=0.0005 * len(piece.lines),
+        ending=PieceEnding.FINISHED,
+        seconds=0.0005 * len(piece.plan_lines),
         forked=True,
-        records=tuple(line.replace(b"@", name.encode()) for name in piece.lines),
-        timings=tuple(timing.replace(b"@", name.encode()) for name in piece.lines),
-        patches=pack_patches((name, patch) for name in piece.lines),
+        records=tuple(line.replace(b"@", name.encode()) for name in piece.plan_lines),
+        timings=tuple(timing.replace(b"@", name.encode()) for name in piece.plan_lines),
+        patches=pack_patches((name, patch) for name in piece.plan_lines),
         series=b"".join(
-            block_bytes(EXPERIMENT_BLOCK, f"{name} {piece.golden}", series) for name in piece.lines
+            block_bytes(EXPERIMENT_BLOCK, f"{name} {piece.golden_key}", series) for name in piece.plan_lines
         ),
-    ).packed()
+    ).to_bytes()
 
 
 def intake() -> None:
-    for fake in (facts, deliver, attend, leave, work):
+    for fake in (machine_facts, deliver_bundle, attend_run, leave_run, run_piece):
         setattr(worker_tasks, fake.__name__, fake)
     with planned() as (workspace, folder, left):
         folder = append_stretch(folder, Stretch(python="", packages={}, platform=""))
@@ -164,26 +164,26 @@ def intake() -> None:
             proof=(),
             engine="fork",
             accept_versions=True,
-            worker_name=lambda name: f"0001-{name}",
+            new_worker_name=lambda name: f"0001-{name}",
             note_machine=lambda machine: None,
             problem="",
             interrupted=False,
-            working="",
+            workers_note="",
         )
-        Bundle.of = classmethod(lambda cls, *given: cls(b"", ""))  # type: ignore[assignment, method-assign]
-        crew.Crew.objection = lambda self, facts: ""  # type: ignore[method-assign]
+        Bundle.pack_for_run = classmethod(lambda cls, *given: cls(b"", ""))  # type: ignore[assignment, method-assign]
+        crew.Crew.reason_to_refuse = lambda self, facts: ""  # type: ignore[method-assign]
         times: list[float] = []
-        take = intakes.Intake.take
+        take = intakes.ResultIntake.append_result
 
-        def timed(self: Any, piece: Piece, result: Result) -> None:
+        def timed(self: Any, piece: Piece, result: PieceResult) -> None:
             take(self, piece, result)
             times.append(time.monotonic())
-            counts.append(len(piece.lines))
+            counts.append(len(piece.plan_lines))
 
         counts: list[int] = []
-        intakes.Intake.take = timed  # type: ignore[method-assign]
+        intakes.ResultIntake.append_result = timed  # type: ignore[method-assign]
         before = time.process_time()
-        cluster_distributor.ClusterWorkers(parse("local:2")).run(session)
+        cluster_distributor.ClusterDistributor(parse_cluster_choice("local:2")).run(session)
         used = time.process_time() - before
         if session.problem:
             raise SystemExit(session.problem)
@@ -214,10 +214,10 @@ def simulated(
 ) -> tuple[list[float], float, int]:
     """Return when each worker finished, their total working time and the number of pieces."""
     now = [0.0]
-    board = Board(folder, left, (), now=lambda: now[0])
+    board = PieceQueue(folder, left, (), now=lambda: now[0])
     names = [f"w{number}" for number in range(WORKERS)]
     for name in names:
-        board.join(name, 1)
+        board.add_worker(name, 1)
     goldens: dict[str, str] = {}
     ended, busy, pieces = dict.fromkeys(names, 0.0), 0.0, 0
     events: list[tuple[float, int, str, Piece | None, float]] = [
@@ -226,15 +226,15 @@ def simulated(
     while not board.is_empty:
         now[0], _, name, piece, took = heapq.heappop(events)
         if piece is not None:
-            board.done(piece, name, took)
+            board.finish_piece(piece, name, took)
             ended[name] = now[0]
-        got = board.take(name)
+        got = board.take_piece(name)
         if got is None:
             heapq.heappush(events, (now[0] + 0.1, pieces, name, None, 0.0))
             continue
-        took = sum(draw.lognormvariate(-1.2, 0.7) for _ in range(got.runs))
-        took += GOLDEN_S if goldens.get(name) != got.golden else 0.0
-        goldens[name] = got.golden
+        took = sum(draw.lognormvariate(-1.2, 0.7) for _ in range(got.run_count))
+        took += GOLDEN_S if goldens.get(name) != got.golden_key else 0.0
+        goldens[name] = got.golden_key
         busy, pieces = busy + took, pieces + 1
         heapq.heappush(events, (now[0] + took, pieces + WORKERS, name, got, took))
     return list(ended.values()), busy, pieces

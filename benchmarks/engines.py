@@ -24,7 +24,7 @@ from mutator.campaigns.plan import Plan, build_plan  # noqa: E402
 from mutator.engines.engine_jobs import Engine, Job  # noqa: E402
 from mutator.engines.fork_engine import ForkEngine  # noqa: E402
 from mutator.engines.reference_engine import ReferenceEngine  # noqa: E402
-from mutator.execution.experiment_runner import Finished, Goldens, Runner  # noqa: E402
+from mutator.execution.experiment_runner import ExperimentRunner, FinishedExperiment, LoadedGoldens  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.outcomes import golden_comparison  # noqa: E402
@@ -59,8 +59,8 @@ class Bench:
         arguments = (self.manifest, work, plan.campaign.limits)
         self.engines: dict[str, Callable[[], Engine]] = {
             "reference": lambda: ReferenceEngine(*arguments),
-            "warm": lambda: ForkEngine(*arguments, null=null, warm=True),
-            "fork": lambda: ForkEngine(*arguments, null=null),
+            "warm": lambda: ForkEngine(*arguments, null_mutant=null, before_first_step=True),
+            "fork": lambda: ForkEngine(*arguments, null_mutant=null),
         }
         self._drive_goldens(ReferenceEngine(*arguments))
 
@@ -81,7 +81,7 @@ class Bench:
                 seed=self.plan.seed,
                 changes=one.changes,
             )
-            execution = engine.execute(job, engine.work / job.name)
+            execution = engine.execute(job, engine.work_folder / job.name)
             execution.out.rename(self.folder / "golden" / one.key)
 
     def measure(self, name: str, experiments: Sequence[Experiment]) -> tuple[Measured, float]:
@@ -89,8 +89,12 @@ class Bench:
         run.
         """
         engine = self.engines[name]()
-        runner = Runner(
-            self.manifest, self.models, engine, Goldens(self.manifest, self.golden), self.workspace.scenario
+        runner = ExperimentRunner(
+            self.manifest,
+            self.models,
+            engine,
+            LoadedGoldens(self.manifest, self.golden),
+            self.workspace.scenario,
         )
         firsts = {(e.scenario, e.changes): e for e in experiments}.values()
         before = _cpu()
@@ -105,13 +109,13 @@ class Bench:
         measured.cpu_s = _cpu() - before
         return measured, first_s
 
-    def _take(self, measured: Measured, finished: Finished) -> None:
+    def _take(self, measured: Measured, finished: FinishedExperiment) -> None:
         measured.records[finished.experiment.id] = finished.record
         measured.how[str(finished.mode)] += 1
-        measured.why[finished.why] += 1
+        measured.why[finished.fallback_reason] += 1
         measured.children_s += finished.cpu_s
         if finished.mode != "golden":
-            measured.steps += self.steps(finished.experiment) - finished.start
+            measured.steps += self.steps(finished.experiment) - finished.fork_step
 
 
 def _cpu() -> float:

@@ -29,7 +29,7 @@ from mutator.campaigns.plan import build_plan  # noqa: E402
 from mutator.engines.engine_jobs import Job  # noqa: E402
 from mutator.engines.fork_engine import ForkEngine  # noqa: E402
 from mutator.engines.reference_engine import ReferenceEngine  # noqa: E402
-from mutator.execution.experiment_runner import Goldens, Runner  # noqa: E402
+from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.store.checksummed_lines import LineWriter  # noqa: E402
@@ -88,9 +88,9 @@ class Bench:
     def cost(self, experiments: Sequence[Experiment]) -> Cost:
         """Return the cost of the experiments without the first `FEW`. All must be forked."""
         null = build(self.manifest, self.models, None, always_trigger())
-        engine = ForkEngine(*self.common, null=null)
-        goldens = Goldens(self.manifest, lambda experiment: self.folder / "golden" / "out")
-        runner = Runner(self.manifest, self.models, engine, goldens, self.workspace.scenario)
+        engine = ForkEngine(*self.common, null_mutant=null)
+        goldens = LoadedGoldens(self.manifest, lambda experiment: self.folder / "golden" / "out")
+        runner = ExperimentRunner(self.manifest, self.models, engine, goldens, self.workspace.scenario)
         records = LineWriter(self.folder / "records.jsonl", {"schema": SCHEMA})
 
         def run(some: Sequence[Experiment]) -> float:

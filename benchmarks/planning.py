@@ -17,7 +17,7 @@ from typing import Any
 from mutator._common.files import json_bytes
 from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
-from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
@@ -88,7 +88,7 @@ def until_the_first_run(workspace: Workspace, out: Path) -> float:
     """Return the CPU seconds until the first mutant would run."""
     reached = []
 
-    def stop(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
+    def stop(self: ReferenceEngine, job: Job, folder: Path) -> JobResult:
         reached.append(process_time())
         raise KeyboardInterrupt
 

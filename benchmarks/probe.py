@@ -16,7 +16,7 @@ from statistics import median
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.engines.job_tree_pool import BaseTree  # noqa: E402
+from mutator.engines.job_tree_pool import JobTreePool  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.mutants.probe import probe_path  # noqa: E402
 from mutator.triggers.trigger_kinds import always_trigger  # noqa: E402
@@ -61,10 +61,10 @@ def main() -> int:
     null = build(manifest, workspace.fault_models(), None, always_trigger()).files
     (changed,) = null.keys() - {probe_path(manifest.package)}
     with tempfile.TemporaryDirectory() as folder:
-        base = BaseTree(manifest.tree, Path(folder))
+        base = JobTreePool(manifest.tree, Path(folder))
         trees = {"pristine": Path(folder, "pristine"), "null mutant": Path(folder, "null")}
-        base.lay_out(trees["pristine"], {})
-        base.lay_out(trees["null mutant"], null)
+        base.lay_out_tree(trees["pristine"], {})
+        base.lay_out_tree(trees["null mutant"], null)
         files = [str(tree / changed) for tree in trees.values()]
         command = [sys.executable, "-c", DRIVE, str(workspace.scenario("S1")), str(options.rounds), *files]
         environment = os.environ | {"PYTHONPATH": str(trees["null mutant"]), "OPENBLAS_NUM_THREADS": "1"}

@@ -51,7 +51,7 @@ class Clock:
 
 def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
     made, series, patches = Clock(), Clock(), Clock()
-    made.on(experiment_runner.Runner, "_series")
+    made.on(experiment_runner.ExperimentRunner, "_encode_series")
     series.on(SeriesWriter, "append")
     patches.on(PatchWriter, "append")
     workspace = Workspace.find(root=ROOT)

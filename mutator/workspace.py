@@ -83,7 +83,9 @@ class Workspace:
         network. MutatorError if a named folder does not exist, or if this machine has no sandbox.
         """
         if sandbox:
-            import_module(_SANDBOX).check()  # late: what only reads loads nothing of the engines
+            import_module(
+                _SANDBOX
+            ).check_sandbox_available()  # late: what only reads loads nothing of the engines
         its_target = Path(target) if target else environment_path("MUTATOR_TARGET")
         if its_target and not its_target.is_dir():
             raise MutatorError(

@@ -17,7 +17,7 @@ from mutator.audit.seal import Seals, seals_of, unsealed_facts
 from mutator.audit.signatures import sign as write_signature
 from mutator.audit.signatures import verified_signer
 from mutator.errors import CheckFailed, MutatorError
-from mutator.execution.spot_check import drawn, driven_again
+from mutator.execution.spot_check import draw_experiments, rerun_and_compare
 from mutator.report.report_audit import pages
 from mutator.store.run_folder import RunFolder
 from mutator.store.work_stretches import describe_stretches, package_versions
@@ -208,11 +208,11 @@ def _rerun_check(
     if workspace is None:
         raise MutatorError("no library found", argument="rerun", expected="the library of the run")
     try:
-        ids = drawn(folder, count)
+        ids = draw_experiments(folder, count)
     except MutatorError as err:
         return AuditCheck(what=what, count=0, differences=(err,))
     facts["drawn at random"] = ", ".join(ids)
-    return AuditCheck.from_problems(what, len(ids), driven_again(workspace, folder, ids))
+    return AuditCheck.from_problems(what, len(ids), rerun_and_compare(workspace, folder, ids))
 
 
 def _signature_check(folder: RunFolder, seals: Seals, allowed_signers: Path) -> tuple[AuditCheck, str | None]:

@@ -6,11 +6,11 @@ from pathlib import Path
 from mutator._common.argument_checks import check_type, check_whole_number
 from mutator.api.runs import Run
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.engines.engine_choice import check_offered
+from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.errors import IncompleteRun
 from mutator.execution.campaign_running import run_campaign
-from mutator.execution.distribution import distributor
-from mutator.execution.session import Notify, Summary
+from mutator.execution.distribution import choose_distributor
+from mutator.execution.session import ProgressCallback, Summary
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 
@@ -26,7 +26,7 @@ def run(
     accept_versions: bool = False,
     cluster: str | None = None,
     insecure_network: bool = False,
-    progress: Notify | None = None,
+    progress: ProgressCallback | None = None,
     workspace: WorkspaceLike = None,
 ) -> Run:
     """Run a campaign (a name in the library, or a file) in the run folder `out`, or resume it there.
@@ -48,7 +48,7 @@ def run(
     approval is missing, or if the checks before the campaign or the equivalence check fail.
     """
     check_whole_number("workers", workers)
-    check_offered(engine)
+    check_engine_is_offered(engine)
     if choices is not None:
         check_type("choices", choices, Choices, "mutator.Choices")
     opened_workspace, folder = open_workspace(workspace), Path(out)
@@ -61,7 +61,7 @@ def run(
         engine=engine,
         reviewed=reviewed,
         accept_versions=accept_versions,
-        distributor=distributor(cluster, insecure=insecure_network),
+        distributor=choose_distributor(cluster, insecure=insecure_network),
         notify=progress,
     )
     if summary.exit_code:

@@ -8,7 +8,7 @@ from mutator._common.hashing import as_json_types
 from mutator.api.stored_experiments import StoredRun
 from mutator.campaigns.plan import Plan, load_plan
 from mutator.errors import MutatorError
-from mutator.execution.run_traces import Traces
+from mutator.execution.run_traces import RunTraces
 from mutator.model import Status
 from mutator.results import outcome_counting
 from mutator.results.table_reader import Results
@@ -70,9 +70,9 @@ class RunContents(StoredRun):
         return Results.up_to_date(self.path).frame()
 
     @cached_property
-    def traces(self) -> Traces:
+    def traces(self) -> RunTraces:
         """The traces. Traces that the run folder lacks are made when needed."""
-        return Traces(self.workspace, self.folder)
+        return RunTraces(self.workspace, self.folder)
 
     def _workspace_if_any(self) -> Workspace | None:
         try:

@@ -10,7 +10,7 @@ from mutator.api.run_contents import RunContents
 from mutator.api.stored_experiments import StoredExperiment
 from mutator.api.trials import Trial, build_trial
 from mutator.errors import MutatorError
-from mutator.execution.single_run import rerun
+from mutator.execution.single_run import rerun_experiment
 from mutator.outcomes.golden_comparison import Trace, load_trace
 from mutator.outcomes.series_sampling import write_sampled_series
 from mutator.report.film import Filming, Shot
@@ -42,7 +42,7 @@ class RunExperiment(StoredExperiment):
             return trial.traces()
         if self.record is None:
             raise self.not_run_error()
-        golden, faulty = self.run.traces.sampled(self.id, drive=True)
+        golden, faulty = self.run.traces.sampled_traces_of(self.id, rerun_if_missing=True)
         manifest = self._manifest()
         return TraceFrames(golden=trace_frame(golden, manifest), faulty=trace_frame(faulty, manifest))
 
@@ -55,7 +55,7 @@ class RunExperiment(StoredExperiment):
         run, folder = self.run, self.run.folder
         temporary = None if keep else ScratchFolder("mutator-rerun-")
         out = path_below(temporary.path, self.id) if temporary else None
-        single, same = rerun(run.workspace, folder.path, self.id, out=out)
+        single, same = rerun_experiment(run.workspace, folder.path, self.id, out=out)
         manifest = run.selected_target.manifest
         trial = build_trial(
             single,
@@ -80,4 +80,4 @@ class RunExperiment(StoredExperiment):
     def _load_traces(self) -> tuple[Trace, Trace]:
         if self.record is None:
             raise self.not_run_error()
-        return self.run.traces.of(self.id)
+        return self.run.traces.traces_of(self.id)

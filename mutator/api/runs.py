@@ -16,8 +16,8 @@ from mutator.api.run_experiments import RunExperiment
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
-from mutator.execution.session import Notify, Summary
-from mutator.execution.shard_merging import merge
+from mutator.execution.session import ProgressCallback, Summary
+from mutator.execution.shard_merging import merge_shards
 from mutator.exports import Format, Parts, find_export
 from mutator.exports import Table as ExportedTable
 from mutator.exports.write import export
@@ -63,7 +63,7 @@ def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions
     """
     if isinstance(shards, str | Path):
         raise MutatorError(repr(str(shards)), argument="shards", expected="a list of run folders")
-    merge([Path(shard) for shard in shards], Path(out), accept_versions=accept_versions)
+    merge_shards([Path(shard) for shard in shards], Path(out), accept_versions=accept_versions)
     return load_run(out)
 
 
@@ -177,7 +177,7 @@ class Run(RunContents):
         results_table.build_tables(self.path)
         return report_builder.write_report(self.path, workspace)
 
-    def take_stills(self, progress: Notify | None = None, *, workers: int = 1) -> str:
+    def take_stills(self, progress: ProgressCallback | None = None, *, workers: int = 1) -> str:
         """Rerun the worst camera experiments, and keep the frames at the activation, the first alert and the
         first hazard for the report. At most ten experiments are rerun, and at most one in 20 of those
         planned, `workers` at a time; none is started after two minutes.

@@ -11,7 +11,7 @@ from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
 from mutator.api.selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
-from mutator.execution.single_run import Single, run_single
+from mutator.execution.single_run import SingleRun, run_single
 from mutator.figures.run_plot import save
 from mutator.model import Experiment, Method, Record
 from mutator.outcomes.golden_comparison import Trace, load_trace
@@ -29,7 +29,7 @@ class Trial(ExperimentResult):
     """
 
     record: Record  #: the record of the run
-    single: Single  #: the run and its files
+    single: SingleRun  #: the run and its files
     manifest: TargetManifest  #: the target's manifest
     scale: Scale | None = None  #: the severity scale; None for a target without one
     #: whether the record equals the campaign's; None: the campaign has none
@@ -135,7 +135,7 @@ def try_fault(
 
 
 def build_trial(
-    single: Single,
+    single: SingleRun,
     manifest: TargetManifest,
     *,
     scale: Scale | None,

@@ -8,7 +8,7 @@ from pathlib import Path
 from mutator._common.confined_files import path_below
 from mutator._common.hashing import digest
 from mutator._common.message_text import counted
-from mutator.engines.engine_jobs import FAST
+from mutator.engines.engine_jobs import MODES_TO_PROVE
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, Fault, Record, Status, Trigger
@@ -224,7 +224,7 @@ def proof_problems(
     proof_folder = folder.path / PROOF_FOLDER
     if not proof_folder.is_dir():
         modes = {str(line["engine"]) for line in folder.timings().values()}
-        if forked := sorted(modes & FAST):
+        if forked := sorted(modes & MODES_TO_PROVE):
             yield MutatorError("missing", where=proof_folder, expected=f"a proof of the engine `{forked[0]}`")
         return
     record_by_id = {stored.record.experiment_id: stored.record for stored in records}

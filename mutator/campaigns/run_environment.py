@@ -15,7 +15,7 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from mutator.engines.target_processes import environment
+from mutator.engines.target_processes import run_environment
 from mutator.store.work_stretches import Blas
 from mutator.targets.process_environment import THREADS
 
@@ -62,7 +62,7 @@ def loaded_blas() -> tuple[Blas, ...]:
         process = subprocess.run(
             [sys.executable, "-P", "-s", "-c", _BLAS_SCRIPT],
             cwd=folder,
-            env=environment(0, Path(folder)),
+            env=run_environment(0, Path(folder)),
             capture_output=True,
             check=False,
         )

@@ -21,11 +21,11 @@ from mutator.checks.findings import CheckState, Finding
 from mutator.checks.first_difference import describe_first_difference
 from mutator.checks.reachability import ReachTracker
 from mutator.engines import forkable
-from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.fork_engine import ForkEngine
 from mutator.engines.in_target.nondeterminism_watch import CLOCK, THREAD
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.engines.thread_messages import too_many, turned_off
+from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import NotForkable
 from mutator.model import Experiment, Limits
 from mutator.mutants.injected_lines import tag_of
@@ -62,9 +62,9 @@ class _GoldenRuns:
     the pristine target with that seed; if no third run is needed, it is `watched`.
     """
 
-    first: Execution
-    watched: Execution
-    again: Execution
+    first: JobResult
+    watched: JobResult
+    again: JobResult
 
 
 class _DriveCheck:
@@ -117,7 +117,7 @@ class _DriveCheck:
         yield self._pristine_job("first", scenario, self.usual_changes)
         yield self._counting_job(scenario, self.usual_changes)
 
-    def _golden_runs(self, scenario: str, runs: Mapping[str, Execution]) -> _GoldenRuns:
+    def _golden_runs(self, scenario: str, runs: Mapping[str, JobResult]) -> _GoldenRuns:
         first, watched = runs[f"first-{scenario}"], runs[f"counting-{scenario}"]
         first_run, watched_run = self._check_run(first), self._check_run(watched)
         if first_run.problem or (
@@ -127,7 +127,7 @@ class _DriveCheck:
         again = replace(self._pristine_job("again", scenario, self.usual_changes), hash_seed=_OTHER_HASH_SEED)
         if watched_run.problem:  # watching might be the cause
             counting = self._counting_job(scenario, self.usual_changes)
-            watched = self._run(replace(counting, name=f"unwatched-{scenario}", watch=False))
+            watched = self._run(replace(counting, name=f"unwatched-{scenario}", watch_nondeterminism=False))
         return _GoldenRuns(first, watched, self._run(again))
 
     def _pristine_job(self, kind: str, scenario: str, changes: tuple[str, ...]) -> Job:
@@ -138,18 +138,18 @@ class _DriveCheck:
         mutant = self.reach_tracker.counting_mutant
         return replace(
             self._pristine_job("counting", scenario, changes),
-            files=mutant.files,
-            mutant=mutant.id,
-            injections=mutant.injection_ids,
+            changed_files=mutant.files,
+            mutant_id=mutant.id,
+            injection_ids=mutant.injection_ids,
             hash_seed=_OTHER_HASH_SEED,
-            watch=True,
+            watch_nondeterminism=True,
         )
 
-    def _run(self, job: Job) -> Execution:
-        folder = path_below(self.engine.work, f"{job.name}-{'-'.join(job.changes)}")
+    def _run(self, job: Job) -> JobResult:
+        folder = path_below(self.engine.work_folder, f"{job.name}-{'-'.join(job.changes)}")
         return self.engine.execute(job, folder)
 
-    def _check_run(self, execution: Execution) -> CheckRun:
+    def _check_run(self, execution: JobResult) -> CheckRun:
         return read_check_run(self.manifest, execution)
 
     # Determinism
@@ -195,10 +195,10 @@ class _DriveCheck:
                 if note["file"] in files
                 else note["line"]
             }
-            for note in golden.watched.watched.get("noted", ())
+            for note in golden.watched.watch_report.get("noted", ())
             if not is_probe_path(note["file"])
         ]
-        return {**golden.watched.watched, "noted": noted}
+        return {**golden.watched.watch_report, "noted": noted}
 
     def _clock_findings(self, goldens: Mapping[str, _GoldenRuns]) -> list[Finding]:
         places = [
@@ -227,7 +227,7 @@ class _DriveCheck:
         """
         scenario, golden = next(iter(goldens.items()))
         is_tried = is_deterministic and golden.first.wall_s <= _MOST_REPEATED_RUN_S
-        refusal = forkable.unfit(self.manifest)
+        refusal = forkable.find_obstacle_before_loading(self.manifest)
         if not refusal:
             refusal = self._forking_refusal(scenario, golden) if is_tried else _thread_refusal(golden.watched)
         if refusal is None and not is_tried:
@@ -257,18 +257,22 @@ class _DriveCheck:
         null = build(self.manifest, self.workspace.fault_models(), None, always_trigger())
         work = self._scratch / "fork"
         work.mkdir()
-        engine = ForkEngine(self.manifest, work, self.engine.limits, null=null)
+        engine = ForkEngine(self.manifest, work, self.engine.limits, null_mutant=null)
         try:
-            return engine.refusal(
-                replace(self._pristine_job("fork", scenario, self.usual_changes), golden=golden.first.out)
+            return engine.find_forking_obstacle(
+                replace(
+                    self._pristine_job("fork", scenario, self.usual_changes), golden_folder=golden.first.out
+                )
             )
         finally:
             engine.close()
 
     # Statements and triggers
 
-    def _record_reach(self, scenario: str, changes: tuple[str, ...], execution: Execution) -> None:
-        self.reach_tracker.record_run(scenario, changes, execution.probe, execution.watched.get("seen", ()))
+    def _record_reach(self, scenario: str, changes: tuple[str, ...], execution: JobResult) -> None:
+        self.reach_tracker.record_run(
+            scenario, changes, execution.probe_report, execution.watch_report.get("seen", ())
+        )
 
     def _run_with_further_changes(self) -> None:
         """Run with the changes that faults and campaigns make, until every statement and trigger is reached
@@ -332,9 +336,9 @@ class _DriveCheck:
         )
 
 
-def _thread_refusal(watched: Execution) -> NotForkable | None:
-    threads = watched.watched.get("threads", [])
-    return NotForkable(too_many(threads), turned_off(threads)) if threads else None
+def _thread_refusal(watched: JobResult) -> NotForkable | None:
+    threads = watched.watch_report.get("threads", [])
+    return NotForkable(describe_too_many_threads(threads), remedy_for_threads(threads)) if threads else None
 
 
 def _reading_of(workspace: Workspace, campaign: Campaign) -> str:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from mutator._common.files import ScratchFolder
 from mutator._common.message_text import counted
 from mutator.checks.findings import CheckState, Finding
-from mutator.engines.forkable import not_forked, not_loadable
+from mutator.engines.forkable import find_obstacle_by_loading, reasons_by_unforkable_variant
 from mutator.errors import MutatorError, NotForkable
 from mutator.faults.spec_expansion import expand
 from mutator.targets.manifest import TargetManifest
@@ -20,7 +20,7 @@ _MOST_LISTED = 3  # reasons
 def loading_finding(manifest: TargetManifest) -> Finding:
     """Import the target's modules, and report whether it can then be forked."""
     with ScratchFolder("mutator-check-") as scratch:
-        import_finding = forking_finding(not_loadable(manifest, scratch / "server"))
+        import_finding = forking_finding(find_obstacle_by_loading(manifest, scratch / "server"))
     return (
         replace(import_finding, remedy=f"{import_finding.remedy}; {_DRIVE_CHECK_NOTE}")
         if "thread" in import_finding.found
@@ -46,7 +46,7 @@ def variants_finding(workspace: Workspace, manifest: TargetManifest) -> Finding:
     count = len({fault.spec for fault in faults})
     reasons: dict[str, list[str]] = {}
     try:
-        for name, why in not_forked(manifest, models, faults).items():
+        for name, why in reasons_by_unforkable_variant(manifest, models, faults).items():
             reasons.setdefault(why, []).append(name)
     except MutatorError as error:
         return Finding(name="faults for fast engines", level=CheckState.WARN, found=str(error))

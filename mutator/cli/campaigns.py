@@ -33,12 +33,12 @@ from mutator.cli.options import (
 )
 from mutator.cli.run_folders import print_counts
 from mutator.errors import MutatorError
-from mutator.execution.progress_text import duration
+from mutator.execution.progress_text import describe_duration
 
 if TYPE_CHECKING:
     from mutator.api.runs import Run
     from mutator.campaigns.plan import PlanCost
-    from mutator.execution.session import Notify, Summary
+    from mutator.execution.session import ProgressCallback, Summary
     from mutator.report.report_builder import WrittenReport
 
 CampaignName = Annotated[
@@ -163,9 +163,9 @@ def _variants_by_reason(reason_by_variant: dict[str, str]) -> dict[str, list[str
 
 def _describe_cost(cost: "PlanCost") -> str:
     source = "measured in this folder" if cost.is_measured else "estimated with a default time per run"
-    time, disk = duration(cost.wall_s), cost.disk_bytes / 1e6
+    time, disk = describe_duration(cost.wall_s), cost.disk_bytes / 1e6
     who = counted(cost.workers, "worker")
-    return f"{time} with {who} ({duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}"
+    return f"{time} with {who} ({describe_duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}"
 
 
 RUN_EXAMPLES = """\b
@@ -255,12 +255,12 @@ def run(
         raise typer.Exit(finished_run.summary.exit_code)
 
 
-def _take_stills(terminal: Terminal, run: "Run", notify: "Notify", workers: int) -> None:
+def _take_stills(terminal: Terminal, run: "Run", notify: "ProgressCallback", workers: int) -> None:
     if problem := run.take_stills(notify, workers=workers):
         terminal.print_note(f"no stills of {problem}")
 
 
-def _write_report(out: Path, run: "Run", notify: "Notify") -> "WrittenReport | None":
+def _write_report(out: Path, run: "Run", notify: "ProgressCallback") -> "WrittenReport | None":
     if not (run.summary and run.summary.results):
         return None
     notify(mutator.Progress(stage="report"))
@@ -294,7 +294,7 @@ def _print_summary(
         print_counts(terminal, run)
     terminal.say(
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now; "
-        f"checks, experiments and proof took {duration(summary.elapsed_s)}"
+        f"checks, experiments and proof took {describe_duration(summary.elapsed_s)}"
     )
     if summary.proof_note:
         terminal.say(f"proof: {summary.proof_note}")

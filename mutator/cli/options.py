@@ -11,7 +11,7 @@ import typer
 
 import mutator
 from mutator.cli import completion
-from mutator.engines.engine_kinds import ENGINES, FORK, OFFERED
+from mutator.engines.engine_kinds import ENGINES, FORK, OFFERED_ENGINES
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -80,7 +80,7 @@ Engine = Annotated[
     str | None,
     typer.Option(
         metavar="NAME",
-        help="; ".join(f"{kind.name}: {kind.about}" for kind in map(ENGINES.__getitem__, OFFERED))
+        help="; ".join(f"{kind.name}: {kind.about}" for kind in map(ENGINES.__getitem__, OFFERED_ENGINES))
         + f". All give the same results. Default: {FORK}, where possible and worthwhile.",
     ),
 ]

@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING
 
 from mutator._common import progress_events
 from mutator.cli.console import Terminal
-from mutator.execution.progress_text import Lines, count, endings, rate, remaining, title
+from mutator.execution.progress_text import (
+    ProgressLines,
+    describe_count,
+    describe_outcomes,
+    describe_rate,
+    describe_remaining_time,
+    stage_title,
+)
 
 if TYPE_CHECKING:
     from mutator.store.run_progress import Progress
@@ -18,11 +25,13 @@ def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], Non
     with (
         _live_progress_bar(terminal)
         if terminal.err.is_terminal
-        else nullcontext(Lines(terminal.print_note)) as show
+        else nullcontext(ProgressLines(terminal.print_note)) as show
     ):
 
         def notify(progress: "Progress") -> None:
-            progress_events.report_phase(title(progress), progress.done, progress.total, progress.outcomes)
+            progress_events.report_phase(
+                stage_title(progress), progress.done, progress.total, progress.outcomes
+            )
             show(progress)
 
         yield notify
@@ -48,13 +57,13 @@ def _live_progress_bar(terminal: Terminal) -> Iterator[Callable[["Progress"], No
         def notify(progress: "Progress") -> None:
             bars.update(
                 task,
-                description=title(progress),
+                description=stage_title(progress),
                 completed=progress.done,
                 total=progress.total or 1,  # a stage without a count has an empty bar
-                count=count(progress),
-                rate=rate(progress),
-                outcomes=", ".join(filter(None, (endings(progress.outcomes), progress.detail))),
-                remaining=remaining(progress),
+                count=describe_count(progress),
+                rate=describe_rate(progress),
+                outcomes=", ".join(filter(None, (describe_outcomes(progress.outcomes), progress.detail))),
+                remaining=describe_remaining_time(progress),
             )
 
         yield notify

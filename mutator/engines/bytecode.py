@@ -12,25 +12,25 @@ from pathlib import Path
 
 from mutator.targets.source_tree import SourceTree
 
-_CHECKED_HASH = (0b11).to_bytes(4, "little")
+_CHECKED_HASH_FLAGS = (0b11).to_bytes(4, "little")
 
 
-def with_bytecode(tree: SourceTree) -> dict[str, bytes]:
+def files_with_bytecode(tree: SourceTree) -> dict[str, bytes]:
     """Return the files of a tree (relative path -> content) and the bytecode of its Python files."""
-    found = dict(tree.files)
+    files = dict(tree.files)
     for name in tree.files:
-        if name.endswith(".py") and (code := tree.derived(name, _compiled)):
-            found[bytecode_of(name)] = code
-    return found
+        if name.endswith(".py") and (code := tree.derived(name, _compile_to_pyc)):
+            files[bytecode_path(name)] = code
+    return files
 
 
-def bytecode_of(name: str) -> str:
+def bytecode_path(name: str) -> str:
     """Return the path of a Python file's bytecode."""
     path = Path(name)
     return str(path.parent / "__pycache__" / f"{path.stem}.{sys.implementation.cache_tag}.pyc")
 
 
-def write(files: Mapping[str, bytes], dest: Path) -> None:
+def write_files(files: Mapping[str, bytes], dest: Path) -> None:
     """Write files to the folder `dest`, which can exist."""
     for folder in {dest, *((dest / name).parent for name in files)}:
         folder.mkdir(parents=True, exist_ok=True)
@@ -38,21 +38,21 @@ def write(files: Mapping[str, bytes], dest: Path) -> None:
         (dest / name).write_bytes(data)
 
 
-def put(files: Mapping[str, bytes], tree: Path) -> None:
+def replace_files(files: Mapping[str, bytes], tree: Path) -> None:
     """Replace files of a tree and delete their bytecode."""
-    remove((*files, *map(bytecode_of, files)), tree)
-    write(files, tree)
+    remove_files((*files, *map(bytecode_path, files)), tree)
+    write_files(files, tree)
 
 
-def remove(names: Iterable[str], tree: Path) -> None:
+def remove_files(names: Iterable[str], tree: Path) -> None:
     for name in names:
         (tree / name).unlink(missing_ok=True)
 
 
-def _compiled(name: str, data: bytes, _: Path) -> bytes:
+def _compile_to_pyc(name: str, data: bytes, _: Path) -> bytes:
     """Compile a file. Errors are ignored, because importing the file reports them."""
     try:
         code = compile(data, name, "exec", dont_inherit=True, optimize=0)
     except Exception:
         return b""
-    return MAGIC_NUMBER + _CHECKED_HASH + source_hash(data) + marshal.dumps(code)
+    return MAGIC_NUMBER + _CHECKED_HASH_FLAGS + source_hash(data) + marshal.dumps(code)

@@ -20,33 +20,33 @@ from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
 
-_SUSPENDED = CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
-_IMPORT = re.compile(rb"\s*(?:from ([\w.]+) import|import ([\w.]+))")
+_SUSPENDABLE_FLAGS = CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
+_IMPORT_PATTERN = re.compile(rb"\s*(?:from ([\w.]+) import|import ([\w.]+))")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FunctionSwap:
-    """A function of `module`, before and after; `path`: the names that lead to it (class, method)."""
+    """A function of `module`, before and after; `name_path`: the names that lead to it (class, method)."""
 
     module: str
-    path: tuple[str, ...]
-    old: CodeType
-    new: CodeType
+    name_path: tuple[str, ...]
+    old_code: CodeType
+    new_code: CodeType
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CodeSwap:
     """Everything that turns a loaded pristine program into the mutant.
 
-    The two parts of `probe` run in order. `imports` are the modules that injected lines import. `settings`
-    has, for each module, the code of its lines that set values in the probe. These modules must already be
-    loaded, because loading a module runs those lines with the module's own constants.
+    The two parts of `probe_code` run in order. `imported_modules` are those that injected lines import.
+    `value_setters` has, for each module, the code of its lines that set values in the probe. These modules
+    must already be loaded, because loading a module runs those lines with the module's own constants.
     """
 
     functions: tuple[FunctionSwap, ...]
-    settings: tuple[tuple[str, CodeType], ...]
-    probe: tuple[CodeType, CodeType]
-    imports: tuple[str, ...]
+    value_setters: tuple[tuple[str, CodeType], ...]
+    probe_code: tuple[CodeType, CodeType]
+    imported_modules: tuple[str, ...]
 
 
 def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], probe: Probe, tree: str) -> CodeSwap:
@@ -65,54 +65,66 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], probe: Probe
             raise NotSwappable(f"{path} is read by the run itself")
         if path not in manifest.tree.files:
             raise NotSwappable(f"{path} is a new file")
-        found, needed = _in_file(path, manifest.tree.files[path], data, f"{tree}/{path}")
-        functions += found
-        settings += _settings(path, data, f"{tree}/{path}")
-        imports |= dict.fromkeys(needed)
-    own, shared = probe.settings_and_code
+        swaps, imported = _swaps_and_imports_of_file(path, manifest.tree.files[path], data, f"{tree}/{path}")
+        functions += swaps
+        settings += _value_setters_of_file(path, data, f"{tree}/{path}")
+        imports |= dict.fromkeys(imported)
+    mutant_part, shared_part = probe.settings_and_code
     name = f"{tree}/{probe_file}"
     # cached, because compiling the shared part takes ten times as long
-    code = (compile(own, name, "exec", dont_inherit=True), _compiled(shared.encode(), name))
-    return CodeSwap(functions=tuple(functions), settings=tuple(settings), probe=code, imports=tuple(imports))
+    code = (
+        compile(mutant_part, name, "exec", dont_inherit=True),
+        _compile_cached(shared_part.encode(), name),
+    )
+    return CodeSwap(
+        functions=tuple(functions),
+        value_setters=tuple(settings),
+        probe_code=code,
+        imported_modules=tuple(imports),
+    )
 
 
 @lru_cache(maxsize=256)  # cached, because all mutants change the observation's file, mostly in the same way
-def _in_file(
+def _swaps_and_imports_of_file(
     path: str, pristine: bytes, mutated: bytes, filename: str
 ) -> tuple[tuple[FunctionSwap, ...], tuple[str, ...]]:
     if unsplice(mutated) != pristine:
         raise NotSwappable(f"{path} differs by more than inserted lines")
     imports = _guarded_imports(path, mutated.splitlines())
-    old, new = _compiled(pristine, filename), _compiled(_only(mutated, sets=False), filename)
+    old, new = (
+        _compile_cached(pristine, filename),
+        _compile_cached(_select_lines(mutated, value_setters=False), filename),
+    )
     functions = [
-        FunctionSwap(module=module_name(path), path=names, old=before, new=after)
+        FunctionSwap(module=module_name(path), name_path=names, old_code=before, new_code=after)
         for names, before, after in changed_functions(old, new, path)
     ]
     return tuple(functions), imports
 
 
-def _settings(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeType]]:
+def _value_setters_of_file(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeType]]:
     if not has_value_settings(mutated):
         return []
-    lines = _only(mutated, sets=True)
-    return [(module_name(path), _compiled(lines, filename))] if lines.strip() else []
+    lines = _select_lines(mutated, value_setters=True)
+    return [(module_name(path), _compile_cached(lines, filename))] if lines.strip() else []
 
 
-def _only(mutated: bytes, *, sets: bool) -> bytes:
+def _select_lines(mutated: bytes, *, value_setters: bool) -> bytes:
     """Keep only a file's lines that set values in the probe, or only the others; line numbers stay."""
-    if not sets and not has_value_settings(mutated):
+    if not value_setters and not has_value_settings(mutated):
         return mutated
     lines = mutated.splitlines(keepends=True)
-    chosen = [((tag := tag_of(line)) is not None and tag.is_value_setting) is sets for line in lines]
+    chosen = [((tag := tag_of(line)) is not None and tag.is_value_setting) is value_setters for line in lines]
     if all(chosen):
         return mutated
     return b"".join(
-        (line.lstrip() if sets else line) if keep else b"\n" for line, keep in zip(lines, chosen, strict=True)
+        (line.lstrip() if value_setters else line) if keep else b"\n"
+        for line, keep in zip(lines, chosen, strict=True)
     )
 
 
 @lru_cache(maxsize=64)
-def _compiled(data: bytes, filename: str) -> CodeType:
+def _compile_cached(data: bytes, filename: str) -> CodeType:
     return compile(data, filename, "exec", dont_inherit=True)
 
 
@@ -134,8 +146,8 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
                 margin = indent
                 if not tag.is_guard:
                     raise NotSwappable(f"{path} has an injected statement that does not ask the probe first")
-            elif found := _IMPORT.match(tag.code):
-                imports.append((found[1] or found[2]).decode())
+            elif match := _IMPORT_PATTERN.match(tag.code):
+                imports.append((match[1] or match[2]).decode())
         before = tag.id if tag else ""
     return tuple(imports)
 
@@ -148,35 +160,39 @@ def changed_functions(
 
     Raises NotSwappable if anything except functions differs.
     """
-    before, after = _inner(old), _inner(new)
-    if [code.co_name for code in before] != [code.co_name for code in after]:
+    old_functions, new_functions = _nested_code(old), _nested_code(new)
+    if [code.co_name for code in old_functions] != [code.co_name for code in new_functions]:
         raise NotSwappable(f"{path} is changed outside its functions")
-    for one, other in zip(before, after, strict=True):
-        here = (*names, one.co_name)
-        if not one.co_flags & CO_OPTIMIZED:  # a class body
-            if (one.co_names, one.co_freevars, one.co_cellvars) != (
-                other.co_names,
-                other.co_freevars,
-                other.co_cellvars,
+    for old_function, new_function in zip(old_functions, new_functions, strict=True):
+        function_path = (*names, old_function.co_name)
+        if not old_function.co_flags & CO_OPTIMIZED:  # a class body
+            if (old_function.co_names, old_function.co_freevars, old_function.co_cellvars) != (
+                new_function.co_names,
+                new_function.co_freevars,
+                new_function.co_cellvars,
             ):
-                raise NotSwappable(f"the body of class {'.'.join(here)} in {path} is changed")
-            yield from changed_functions(one, other, path, here)
-        elif not same(one, other):
-            _check(one, other, f"{'.'.join(here)} in {path}")
-            yield here, one, other
+                raise NotSwappable(f"the body of class {'.'.join(function_path)} in {path} is changed")
+            yield from changed_functions(old_function, new_function, path, function_path)
+        elif not has_same_behaviour(old_function, new_function):
+            _check_swappable(old_function, new_function, f"{'.'.join(function_path)} in {path}")
+            yield function_path, old_function, new_function
 
 
-def _check(old: CodeType, new: CodeType, name: str) -> None:
+def _check_swappable(old: CodeType, new: CodeType, described_function: str) -> None:
     """Raise NotSwappable unless the new code acts like the old until a trigger holds."""
     if old.co_name.startswith("<"):
-        raise NotSwappable(f"{name} is a function without a name")
-    if new.co_flags & _SUSPENDED:
-        raise NotSwappable(f"{name} may be suspended between two steps")
+        raise NotSwappable(f"{described_function} is a function without a name")
+    if new.co_flags & _SUSPENDABLE_FLAGS:
+        raise NotSwappable(f"{described_function} may be suspended between two steps")
     if _signature(old) != _signature(new):
-        raise NotSwappable(f"{name} has another signature, or other variables of an outer function")
-    before = _inner(old)
-    if len(before) > sum(any(same(one, other) for other in _inner(new)) for one in before):
-        raise NotSwappable(f"a function inside {name} is changed")
+        raise NotSwappable(
+            f"{described_function} has another signature, or other variables of an outer function"
+        )
+    before = _nested_code(old)
+    if len(before) > sum(
+        any(has_same_behaviour(nested, new_nested) for new_nested in _nested_code(new)) for nested in before
+    ):
+        raise NotSwappable(f"a function inside {described_function} is changed")
 
 
 def _signature(code: CodeType) -> tuple[object, ...]:
@@ -185,20 +201,20 @@ def _signature(code: CodeType) -> tuple[object, ...]:
     return (*counts, code.co_varnames[:count], code.co_flags, code.co_freevars)
 
 
-def _inner(code: CodeType) -> list[CodeType]:
+def _nested_code(code: CodeType) -> list[CodeType]:
     return [const for const in code.co_consts if isinstance(const, CodeType)]
 
 
-def same(one: CodeType, other: CodeType) -> bool:
-    return essence(one) == essence(other)
+def has_same_behaviour(first: CodeType, second: CodeType) -> bool:
+    return behaviour_key(first) == behaviour_key(second)
 
 
-def essence(code: CodeType) -> tuple[object, ...]:
+def behaviour_key(code: CodeType) -> tuple[object, ...]:
     """Return a key for what the code does. Functions that do the same have equal keys."""
-    return (*_essence(code), *map(essence, _inner(code)))
+    return (*_behaviour_key_without_nested(code), *map(behaviour_key, _nested_code(code)))
 
 
-def _essence(code: CodeType) -> tuple[object, ...]:
+def _behaviour_key_without_nested(code: CodeType) -> tuple[object, ...]:
     values = tuple((type(c), None if isinstance(c, CodeType) else repr(c)) for c in code.co_consts)
     names = (code.co_name, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
     return (*names, _signature(code), code.co_code, code.co_exceptiontable, values)

@@ -4,47 +4,53 @@ import os
 import sys
 from pkgutil import resolve_name
 
-from mutator.engines.engine_jobs import Engine, Setting
-from mutator.engines.engine_kinds import ENGINES, FORK, OFFERED, REFERENCE
+from mutator.engines.engine_jobs import Engine, EngineArguments
+from mutator.engines.engine_kinds import ENGINES, FORK, OFFERED_ENGINES, REFERENCE
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
-WORTH_IT = 40  # with fewer experiments, the equivalence check would rerun most of them
+MIN_EXPERIMENTS_TO_FORK = 40  # with fewer experiments, the equivalence check would rerun most of them
 
 
-def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int) -> str:
+def choose_engine(engine: str | None, manifest: TargetManifest, experiment_count: int) -> str:
     """Return the name of the requested engine, or of the fastest that pays off for this many experiments.
 
     Raises MutatorError if the requested engine is unknown or cannot run this target here.
     """
-    if asked is None:
-        return REFERENCE if not_worth_forking(manifest, experiments) else FORK
-    why = not_forkable(manifest)
-    if asked not in ENGINES:
-        check_offered(asked)
-    if ENGINES[asked].forks and why:
-        raise MutatorError(f"engine '{asked}': {why}", argument="engine", remedy=f"use {REFERENCE}")
-    return asked
-
-
-def check_offered(asked: str | None) -> None:
-    """Raise MutatorError for an engine that users cannot choose; None leaves the choice to the harness."""
-    if asked is not None and asked not in OFFERED:
-        raise MutatorError(f"engine '{asked}'", argument="engine", expected=f"one of {', '.join(OFFERED)}")
-
-
-def make_engine(name: str, setting: Setting) -> Engine:
-    engine: Engine = resolve_name(ENGINES[name].factory)(setting)
+    if engine is None:
+        return REFERENCE if reason_not_to_fork(manifest, experiment_count) else FORK
+    why = reason_not_forkable(manifest)
+    if engine not in ENGINES:
+        check_engine_is_offered(engine)
+    if ENGINES[engine].needs_forkable_target and why:
+        raise MutatorError(f"engine '{engine}': {why}", argument="engine", remedy=f"use {REFERENCE}")
     return engine
 
 
-def not_worth_forking(manifest: TargetManifest, experiments: int) -> str:
+def check_engine_is_offered(engine: str | None) -> None:
+    """Raise MutatorError for an engine that users cannot choose; None leaves the choice to the harness."""
+    if engine is not None and engine not in OFFERED_ENGINES:
+        raise MutatorError(
+            f"engine '{engine}'", argument="engine", expected=f"one of {', '.join(OFFERED_ENGINES)}"
+        )
+
+
+def make_engine(name: str, arguments: EngineArguments) -> Engine:
+    engine: Engine = resolve_name(ENGINES[name].factory)(arguments)
+    return engine
+
+
+def reason_not_to_fork(manifest: TargetManifest, experiment_count: int) -> str:
     """Return why this many experiments are not forked unless requested; empty if they are."""
-    few = f"forking pays off only with {WORTH_IT} or more experiments" if experiments < WORTH_IT else ""
-    return not_forkable(manifest) or few
+    few = (
+        f"forking pays off only with {MIN_EXPERIMENTS_TO_FORK} or more experiments"
+        if experiment_count < MIN_EXPERIMENTS_TO_FORK
+        else ""
+    )
+    return reason_not_forkable(manifest) or few
 
 
-def not_forkable(manifest: TargetManifest) -> str:
+def reason_not_forkable(manifest: TargetManifest) -> str:
     if manifest.stepwise is None:
         return f"{manifest.path.name} names no `entry.stepwise`"
     if sys.platform != "linux":

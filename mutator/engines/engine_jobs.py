@@ -24,40 +24,41 @@ class RunMode(StrEnum):
 
 
 # modes that need the equivalence check
-FAST = frozenset({RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN.value})
+MODES_TO_PROVE = frozenset({RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN.value})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """One run of the target. `files` are the changed and new files of its tree; empty if pristine."""
+    """One run of the target. `changed_files` are the changed and new files of its tree; empty if pristine."""
 
     name: str
     scenario: Path
     seed: int
     changes: tuple[str, ...] = ()
-    files: Mapping[str, bytes] = field(default_factory=dict)
-    mutant: str | None = None  # the id that the probe must report; None for a tree without a probe
-    probe: Probe | None = None  # the probe in `files`; engines that fork need it
-    injections: tuple[str, ...] = ()  # all ids that the probe must report on
+    changed_files: Mapping[str, bytes] = field(default_factory=dict)
+    mutant_id: str | None = None  # the id that the probe must report; None for a tree without a probe
+    probe: Probe | None = None  # the probe in `changed_files`; engines that fork need it
+    injection_ids: tuple[str, ...] = ()  # all ids that the probe must report on
     hash_seed: int = 0
-    golden: Path | None = None  # output folder of the fault-free run, if known
-    observe: bool = False  # keep what the probe observes
-    stop: bool = False  # end the run at its first terminal hazard
-    golden_ends: bool = False  # whether the golden run has a terminal hazard, too
-    watch: bool = False  # like `observe`; also note calls that make a target nondeterministic
-    lines: bool = False  # note which lines of the tree run from the first observation on
+    golden_folder: Path | None = None  # output folder of the fault-free run, if known
+    keep_observations: bool = False  # keep what the probe observes
+    stop_at_hazard: bool = False  # end the run at its first terminal hazard
+    golden_has_terminal_hazard: bool = False  # whether the golden run has a terminal hazard, too
+    # like `keep_observations`; also note calls that make a target nondeterministic
+    watch_nondeterminism: bool = False
+    note_executed_lines: bool = False  # note which lines of the tree run from the first observation on
 
-    def problem_of(self, report: object) -> str:
+    def problem_of_probe_report(self, report: object) -> str:
         """Return the problem with the probe's report; empty if there is none, or no probe."""
-        return "" if self.mutant is None else report_problem(report, self.mutant, self.injections)
+        return "" if self.mutant_id is None else report_problem(report, self.mutant_id, self.injection_ids)
 
 
 # frames in the tree, innermost first: file, line, start byte in the line (-1 if unknown)
-Stack = tuple[tuple[str, int, int], ...]
+TargetStack = tuple[tuple[str, int, int], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Raised:
+class RaisedException:
     """The exception that ended a run.
 
     `stacks[0]` is its own stack. The others are those of its causes and of the exceptions that it groups.
@@ -65,57 +66,64 @@ class Raised:
 
     kind: str
     message: str
-    stacks: tuple[Stack, ...]
+    stacks: tuple[TargetStack, ...]
 
     @property
-    def place(self) -> str:
+    def file_and_line(self) -> str:
         """`file:line` of the innermost target line outside the probe; empty if there is none."""
         return next((f"{path}:{line}" for path, line, _ in self.stacks[0] if not is_probe_path(path)), "")
 
     @property
-    def text(self) -> str:
+    def description(self) -> str:
         if self.kind == SystemExit.__name__:
             what = f"exit status {self.message}"
         else:
             what = f"{self.kind}: {self.message}" if self.message else self.kind
-        return f"{what} ({self.place})" if self.place else what
+        return f"{what} ({self.file_and_line})" if self.file_and_line else what
 
 
 @dataclass(frozen=True, kw_only=True)
-class Execution:
+class JobResult:
     """The result of a job. `out` holds the target's trace and record if `status` is OK.
 
     * `status`: how the run ended; `outcomes.blame` decides what caused it
-    * `active`: whether an injection was active
-    * `log`: the tail of what the run printed
-    * `why`: why another engine executed the job; `start`: the step at which the run was forked
-    * `stopped`: whether a terminal hazard ended the run early
-    * `modules`: the third-party top-level modules that the run imported
-    * `watched`, `lines` (from 1, by file): what the reference engine noted
+    * `was_fault_active`: whether an injection was active
+    * `log_tail`: the tail of what the run printed
+    * `fallback_reason`: why another engine executed the job
+    * `fork_step`: the step before which the run was forked
+    * `was_stopped_at_hazard`: whether a terminal hazard ended the run early
+    * `third_party_modules`: the third-party top-level modules that the run imported
+    * `watch_report`, `executed_lines` (from 1, by file): what the reference engine noted
     """
 
     status: Status
     detail: str
     out: Path
-    probe: dict[str, Any] | None
+    probe_report: dict[str, Any] | None
     cpu_s: float
     wall_s: float
-    raised: Raised | None = None
-    active: bool = False
-    log: str = ""
+    exception: RaisedException | None = None
+    was_fault_active: bool = False
+    log_tail: str = ""
     mode: RunMode = RunMode.REFERENCE
-    why: str = ""
-    start: int = 0
-    stopped: bool = False
-    modules: tuple[str, ...] = ()
-    watched: Mapping[str, Any] = field(default_factory=dict)
-    lines: Mapping[str, list[int]] = field(default_factory=dict)
+    fallback_reason: str = ""
+    fork_step: int = 0
+    was_stopped_at_hazard: bool = False
+    third_party_modules: tuple[str, ...] = ()
+    watch_report: Mapping[str, Any] = field(default_factory=dict)
+    executed_lines: Mapping[str, list[int]] = field(default_factory=dict)
 
 
-def failed(why: str, out: Path, mode: RunMode) -> Execution:
+def harness_error_result(reason: str, out: Path, mode: RunMode) -> JobResult:
     """Return the result of a job that the harness could not run."""
-    return Execution(
-        status=Status.HARNESS_ERROR, detail=why, out=out, probe=None, cpu_s=0.0, wall_s=0.0, mode=mode
+    return JobResult(
+        status=Status.HARNESS_ERROR,
+        detail=reason,
+        out=out,
+        probe_report=None,
+        cpu_s=0.0,
+        wall_s=0.0,
+        mode=mode,
     )
 
 
@@ -125,23 +133,23 @@ class Engine(Protocol):
     Callers must not change `out`: if the trigger never holds, it is the golden run's.
     """
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]: ...
+    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, JobResult]]: ...
 
     def close(self) -> None:
         """End the processes that the engine keeps between jobs."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setting:
+class EngineArguments:
     """The arguments of an engine's factory.
 
-    `work` is an existing scratch folder. If `parent` is a process id, the engine exits once that process is
-    no longer its parent. Engines with the same `secret` share files in `work`.
+    `work_folder` is an existing scratch folder. Unless `parent_pid` is None, the engine exits once that
+    process is no longer its parent. Engines with the same `secret` share files in `work_folder`.
     """
 
     manifest: TargetManifest
     models: FaultModels
-    work: Path
+    work_folder: Path
     limits: Limits
-    parent: int | None = None
+    parent_pid: int | None = None
     secret: bytes = field(default_factory=partial(token_bytes, 16))

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 class EngineKind:
     """An engine.
 
-    `factory` is `module:function`, imported when the engine is made from a `Setting`. `forks`: the engine
-    needs a forkable target. `offered`: users can choose it; others are for tests and benchmarks.
+    `factory` is `module:function`, imported when the engine is made from `EngineArguments`. Users can choose
+    it if `is_offered`; others are for tests and benchmarks.
     """
 
     name: str
     about: str
     factory: str
-    forks: bool = False
-    offered: bool = True
+    needs_forkable_target: bool = False
+    is_offered: bool = True
 
 
 REFERENCE, WARM, FORK = "reference", "warm", "fork"
@@ -25,21 +25,21 @@ ENGINES = {
         EngineKind(
             name=REFERENCE,
             about="a fresh interpreter for each run",
-            factory="mutator.engines.reference_engine:make_reference",
+            factory="mutator.engines.reference_engine:make_reference_engine",
         ),
         EngineKind(
             name=WARM,
             about="a fork of the loaded target",
-            factory="mutator.engines.fork_engine:make_warm",
-            forks=True,
-            offered=False,
+            factory="mutator.engines.fork_engine:make_warm_engine",
+            needs_forkable_target=True,
+            is_offered=False,
         ),
         EngineKind(
             name=FORK,
             about="a fork of the golden run",
-            factory="mutator.engines.fork_engine:make_fork",
-            forks=True,
+            factory="mutator.engines.fork_engine:make_fork_engine",
+            needs_forkable_target=True,
         ),
     )
 }
-OFFERED = tuple(name for name, kind in ENGINES.items() if kind.offered)
+OFFERED_ENGINES = tuple(name for name, kind in ENGINES.items() if kind.is_offered)

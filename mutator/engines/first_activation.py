@@ -18,59 +18,66 @@ from mutator.triggers.trace_formulas import ARITHMETIC, COMPARISONS
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # hashed by identity, because hashing all values is slow
-class Observed:
+class GoldenObservations:
     """What a probe observes in a golden run.
 
-    `values` has a tuple for each observation: the time (s), then the observed values. `before` has the number
-    of observations made before each step. `libraries` lists the modules imported during the run.
+    `values` has a tuple for each observation: the time (s), then the observed values. `counts_before_steps`
+    has the number of observations made before each step. `imported_modules` are those of the run.
     """
 
     values: tuple[tuple[float, ...], ...]
-    before: tuple[int, ...]
-    libraries: tuple[str, ...] = ()
+    counts_before_steps: tuple[int, ...]
+    imported_modules: tuple[str, ...] = ()
 
     @cached_property
     def columns(self) -> np.ndarray:
         return np.array(self.values, dtype=float).T
 
-    def step_of(self, observation: int) -> int:
+    def step_of_observation(self, observation: int) -> int:
         """Return the step of this observation. No observation is made before the first step."""
-        return bisect_right(self.before, observation) - 1
+        return bisect_right(self.counts_before_steps, observation) - 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Start:
-    """The point where a mutant leaves the golden run: before `step`, after `observed` observations.
+class ForkPoint:
+    """The point where a mutant leaves the golden run: before `step`, after `observation_count` observations.
 
-    `began` is the time (s) of the earliest of these observations, `t` that of the last; None without any.
+    The times are those of these observations; None without any.
     """
 
     step: int
-    observed: int
-    began: float | None
-    t: float | None
+    observation_count: int
+    earliest_time_s: float | None
+    last_time_s: float | None
 
 
-def first_active(probe: Probe, seen: Observed) -> Start | None:
+def find_fork_point(probe: Probe, observations: GoldenObservations) -> ForkPoint | None:
     """Return the point where a mutant leaves the golden run; None if its trigger never holds."""
-    return _first_active(*probe.armed_condition, seen)
+    return _cached_fork_point(*probe.armed_condition, observations)
 
 
 @lru_cache(maxsize=64)  # cached, because faults share triggers (contexts of the hazard analysis)
-def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | None:
-    if not seen.values:
+def _cached_fork_point(armed_t: float, condition: str, observations: GoldenObservations) -> ForkPoint | None:
+    if not observations.values:
         return None
-    at = np.flatnonzero(active_at((armed_t, condition), seen.columns))
-    if not at.size:
+    active_observations = np.flatnonzero(activity_at_observations((armed_t, condition), observations.columns))
+    if not active_observations.size:
         return None
-    step = seen.step_of(int(at[0]))
-    done = seen.before[step]
-    times = seen.columns[0, :done].tolist()  # `min`, because time starts again if the run restarts
-    last = times[-1] if done else None
-    return Start(step=step, observed=done, began=min(times, default=None), t=last)
+    step = observations.step_of_observation(int(active_observations[0]))
+    observation_count = observations.counts_before_steps[step]
+    times = observations.columns[
+        0, :observation_count
+    ].tolist()  # `min`, because time starts again if the run restarts
+    last = times[-1] if observation_count else None
+    return ForkPoint(
+        step=step,
+        observation_count=observation_count,
+        earliest_time_s=min(times, default=None),
+        last_time_s=last,
+    )
 
 
-def active_at(decision: tuple[float, str], columns: np.ndarray) -> np.ndarray:
+def activity_at_observations(decision: tuple[float, str], columns: np.ndarray) -> np.ndarray:
     """Return for each observation whether a probe with this `Probe.decision` is active.
 
     `columns` are the times (s) of all observations, then the observed values.
@@ -79,26 +86,26 @@ def active_at(decision: tuple[float, str], columns: np.ndarray) -> np.ndarray:
     (function,) = ast.parse(condition).body
     assert isinstance(function, ast.FunctionDef)
     names = [argument.arg for argument in function.args.args]
-    holds = _holds(function, dict(zip(names, columns, strict=True)))
+    holds = _evaluate_condition(function, dict(zip(names, columns, strict=True)))
     active: np.ndarray = np.logical_and(columns[0] >= armed_t, holds)
     return active
 
 
-def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
+def _evaluate_condition(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
     """Evaluate a condition for each observation. numpy doubles give the same results as Python floats."""
     with np.errstate(all="ignore"):
         for node in function.body:
             if isinstance(node, ast.Assign):
                 assert isinstance(node.targets[0], ast.Name)
-                values[node.targets[0].id] = _value(node.value, values)
+                values[node.targets[0].id] = _evaluate_expression(node.value, values)
             elif isinstance(node, ast.Return) and node.value is not None:
-                return _value(node.value, values)
+                return _evaluate_expression(node.value, values)
     raise AssertionError(ast.unparse(function))
 
 
-def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
+def _evaluate_expression(node: ast.expr, values: Mapping[str, Any]) -> Any:
     def of(node: ast.expr) -> Any:
-        return _value(node, values)
+        return _evaluate_expression(node, values)
 
     match node:
         case ast.Constant():
@@ -115,33 +122,33 @@ def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
             return np.logical_not(of(node.operand)) if isinstance(node.op, ast.Not) else -of(node.operand)
         case ast.Compare():
             terms = [of(part) for part in (node.left, *node.comparators)]
-            return reduce(np.logical_and, map(_compared, node.ops, terms[:-1], terms[1:]))
+            return reduce(np.logical_and, map(_compare_values, node.ops, terms[:-1], terms[1:]))
         case ast.IfExp():
             return np.where(of(node.test), of(node.body), of(node.orelse))
         case ast.BinOp():
             return ARITHMETIC[type(node.op)](of(node.left), of(node.right))
         case ast.Call():
-            return _FUNCTIONS[ast.unparse(node.func)](*map(of, node.args))
+            return _FUNCTIONS_BY_NAME[ast.unparse(node.func)](*map(of, node.args))
     raise AssertionError(ast.unparse(node))
 
 
-def _compared(operator: ast.cmpop, one: Any, other: Any) -> Any:
-    return COMPARISONS[type(operator)](one, other)
+def _compare_values(operator: ast.cmpop, left: Any, right: Any) -> Any:
+    return COMPARISONS[type(operator)](left, right)
 
 
-def _least(*terms: Any) -> Any:
+def _elementwise_min(*terms: Any) -> Any:
     """Like Python's `min`, also for NaN."""
     return reduce(lambda least, term: np.where(term < least, term, least), terms)
 
 
-def _greatest(*terms: Any) -> Any:
+def _elementwise_max(*terms: Any) -> Any:
     return reduce(lambda greatest, term: np.where(term > greatest, term, greatest), terms)
 
 
-_FUNCTIONS: Mapping[str, Any] = {
+_FUNCTIONS_BY_NAME: Mapping[str, Any] = {
     "abs": np.abs,
-    "min": _least,
-    "max": _greatest,
+    "min": _elementwise_min,
+    "max": _elementwise_max,
     "math.hypot": np.vectorize(math.hypot, otypes=[float]),  # numpy's `hypot` differs in the last bit
     "_div": np.divide,
 }

@@ -26,19 +26,24 @@ from mutator._common.files import (
 )
 from mutator._common.hashing import content_id
 from mutator.engines.code_swap import CodeSwap, plan_swap
-from mutator.engines.engine_jobs import Execution, Job, RunMode, Setting, failed
-from mutator.engines.first_activation import Observed, Start, first_active
-from mutator.engines.fork_server_client import Golden, Pool, Waiting, used_unchanged
-from mutator.engines.job_folder import OUTPUT, RunHome, is_disturbance, make_work
+from mutator.engines.engine_jobs import EngineArguments, Job, JobResult, RunMode, harness_error_result
+from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
+from mutator.engines.fork_server_client import (
+    ForkServer,
+    GoldenRunRequest,
+    WaitingProcess,
+    raising_if_changed,
+)
+from mutator.engines.job_folder import OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.target_processes import (
-    PATIENCE_S,
-    Ended,
-    is_full,
-    judge,
-    steady,
+    GUARD_PATIENCE_S,
+    ProcessEnding,
+    judge_run,
+    was_disk_full,
+    without_run_specifics,
 )
-from mutator.engines.thread_messages import too_many, turned_off
+from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import ForkServerLost, NotForkable, NotSwappable
 from mutator.model import Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
@@ -47,11 +52,11 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_code import stop_source
 from mutator.triggers.trigger_kinds import always_trigger
 
-_Key = tuple[str, int, tuple[str, ...]]
+_GoldenKey = tuple[str, int, tuple[str, ...]]
 
 
 class ForkEngine:
-    """Takes the arguments of ReferenceEngine; `null` is the null mutant, `secret` is as in `Setting`.
+    """Takes the arguments of ReferenceEngine, the null mutant, and a `secret` as in `EngineArguments`.
 
     In a sandbox, the fork server and its mutants can write only to the folder that `run` uses.
     """
@@ -59,75 +64,81 @@ class ForkEngine:
     def __init__(
         self,
         manifest: TargetManifest,
-        work: Path,
+        work_folder: Path,
         limits: Limits,
-        parent: int | None = None,
+        parent_pid: int | None = None,
         *,
-        null: Mutant,
-        warm: bool = False,
+        null_mutant: Mutant,
+        before_first_step: bool = False,
         secret: bytes = b"",
     ) -> None:
-        self.reference = ReferenceEngine(manifest, work, limits, parent)
+        self.reference = ReferenceEngine(manifest, work_folder, limits, parent_pid)
         self._manifest = manifest
         self._limits = limits
-        self._work = self.reference.work
-        self._runs = self._work / f"{os.getpid()}-fork"
-        self._parent = parent
-        self._null = null
-        self._warm = warm
+        self._work_folder = self.reference.work_folder
+        self._runs_folder = self._work_folder / f"{os.getpid()}-fork"
+        self._parent_pid = parent_pid
+        self._null_mutant = null_mutant
+        self._forks_before_first_step = before_first_step
         self._secret = secret or token_bytes(16)
-        self._patience_s = limits.wall_s + PATIENCE_S
-        self._pool: Pool | None = None
-        self._pools = 0
-        self._unfit = None if manifest.stepwise else NotForkable(f"target {manifest.name} is not stepwise")
-        self._seen: dict[_Key, Observed | NotForkable] = {}  # observations, or why there are none
+        self._patience_s = limits.wall_s + GUARD_PATIENCE_S
+        self._server: ForkServer | None = None
+        self._server_count = 0
+        self._obstacle = None if manifest.stepwise else NotForkable(f"target {manifest.name} is not stepwise")
+        self._observations_by_golden: dict[
+            _GoldenKey, GoldenObservations | NotForkable
+        ] = {}  # observations, or why there are none
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
+    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, JobResult]]:
         for job in jobs:
-            folder = self._runs / job.name
+            folder = self._runs_folder / job.name
             try:
                 yield job, self.execute(job, folder)
             finally:
                 remove_folder(folder)
-                remove_folder(self.reference.folder_of(job))
+                remove_folder(self.reference.folder_of_job(job))
 
-    def execute(self, job: Job, folder: Path) -> Execution:
+    def execute(self, job: Job, folder: Path) -> JobResult:
         """Run one job in the new scratch folder `folder` or, if it cannot be forked, on the reference engine.
 
         The reference engine has another folder, which also gets the output: mutants of the fork server can
         write beside their own one, so a link could be in its place.
         """
         try:
-            with raising_disk_full(self._work):
-                return self._execute(job, folder)
+            with raising_disk_full(self._work_folder):
+                return self._execute_by_fork(job, folder)
         except (NotSwappable, NotForkable) as why:
-            return self._by_reference(job, steady(str(why), folder))
+            return self._run_on_reference_engine(job, without_run_specifics(str(why), folder))
         except ForkServerLost as why:
             self.close()
-            return failed(str(why), folder / OUTPUT, RunMode.FORK)
+            return harness_error_result(str(why), folder / OUTPUT_FOLDER, RunMode.FORK)
         except OSError as err:
-            if not is_disturbance(err):
+            if not can_be_disturbance(err):
                 raise
             self.close()
-            return self._by_reference(job, f"its folders were changed during the run ({err.strerror})")
+            return self._run_on_reference_engine(
+                job, f"its folders were changed during the run ({err.strerror})"
+            )
 
-    def _by_reference(self, job: Job, why: str) -> Execution:
-        another = self.reference.folder_of(job)
+    def _run_on_reference_engine(self, job: Job, fallback_reason: str) -> JobResult:
+        another = self.reference.folder_of_job(job)
         remove_anything_at(another)
-        return replace(self.reference.execute(job, another), why=why)
+        return replace(self.reference.execute(job, another), fallback_reason=fallback_reason)
 
-    def refusal(self, job: Job) -> NotForkable | None:
+    def find_forking_obstacle(self, job: Job) -> NotForkable | None:
         """Return why a job's golden run cannot be forked up to its last step; None if it can."""
-        assert job.golden is not None
+        assert job.golden_folder is not None
         try:
-            if self._unfit:
-                raise NotForkable(*self._unfit.args)
-            steps = len(self._observed(job, job.golden).before)
-            swap = self._swap(job, self._null.files, self._null.probe)
-            waiting = self._at(job, steps - 1, swap)
-            said, _ = waiting.ask({"do": "load", "modules": []}, self._patience_s)
-            if said["threads"]:
-                raise NotForkable(too_many(said["threads"]), turned_off(said["threads"]))
+            if self._obstacle:
+                raise NotForkable(*self._obstacle.args)
+            steps = len(self._golden_observations(job, job.golden_folder).counts_before_steps)
+            swap = self._plan_swap(job, self._null_mutant.files, self._null_mutant.probe)
+            waiting = self._process_before_step(job, steps - 1, swap)
+            reply, _ = waiting.send_request({"do": "load", "modules": []}, self._patience_s)
+            if reply["threads"]:
+                raise NotForkable(
+                    describe_too_many_threads(reply["threads"]), remedy_for_threads(reply["threads"])
+                )
         except NotForkable as why:
             return why
         except ForkServerLost as why:
@@ -135,137 +146,163 @@ class ForkEngine:
         return None
 
     def close(self) -> None:
-        if self._pool is not None:
-            self._pool.close()
-            self._pool = None
-            remove_folder(self._runs)
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+            remove_folder(self._runs_folder)
 
-    def _execute(self, job: Job, folder: Path) -> Execution:
-        if self._unfit:
-            raise NotForkable(*self._unfit.args)
-        if job.probe is None or job.golden is None or job.hash_seed:
+    def _execute_by_fork(self, job: Job, folder: Path) -> JobResult:
+        if self._obstacle:
+            raise NotForkable(*self._obstacle.args)
+        if job.probe is None or job.golden_folder is None or job.hash_seed:
             raise NotForkable("not an experiment")
-        swap = self._swap(job, job.files, job.probe)
-        if self._warm:
-            return self._from_the_start(job, folder, swap)
-        seen = self._observed(job, job.golden)
-        if job.stop and job.golden_ends:  # the run can stop before the fault is active, and so before a fork
-            return self._from_the_start(job, folder, swap)
-        start = first_active(job.probe, seen)
-        if start is None:
-            return _golden(job, job.golden)
-        return self._become(self._at(job, start.step, swap), job, folder, swap, start)
+        swap = self._plan_swap(job, job.changed_files, job.probe)
+        if self._forks_before_first_step:
+            return self._run_from_first_step(job, folder, swap)
+        observations = self._golden_observations(job, job.golden_folder)
+        if (
+            job.stop_at_hazard and job.golden_has_terminal_hazard
+        ):  # the run can stop before the fault is active, and so before a fork
+            return self._run_from_first_step(job, folder, swap)
+        fork_point = find_fork_point(job.probe, observations)
+        if fork_point is None:
+            return _result_without_run(job, job.golden_folder)
+        return self._run_in_fork(
+            self._process_before_step(job, fork_point.step, swap), job, folder, swap, fork_point
+        )
 
-    def _swap(self, job: Job, files: Mapping[str, bytes], probe: Probe) -> CodeSwap:
-        return plan_swap(self._manifest, files, probe, str(self._running(job).tree))
+    def _plan_swap(self, job: Job, files: Mapping[str, bytes], probe: Probe) -> CodeSwap:
+        return plan_swap(self._manifest, files, probe, str(self._running_server(job).tree_folder))
 
-    def _from_the_start(self, job: Job, folder: Path, swap: CodeSwap) -> Execution:
-        first = self._running(job).first
-        first.load(_needed(swap), self._patience_s)
-        return self._become(first, job, folder, swap, _FROM_THE_START)
+    def _run_from_first_step(self, job: Job, folder: Path, swap: CodeSwap) -> JobResult:
+        first = self._running_server(job).first_process
+        first.load_modules(_modules_to_load(swap), self._patience_s)
+        return self._run_in_fork(first, job, folder, swap, _BEFORE_FIRST_STEP)
 
-    def _running(self, job: Job) -> Pool:
-        scenarios = Path(_resolved(job.scenario)).parent
-        if self._pool is None:
-            self._pools += 1
-            home = self._runs / f"server-{self._pools}"
+    def _running_server(self, job: Job) -> ForkServer:
+        scenarios = Path(_resolved_path(job.scenario)).parent
+        if self._server is None:
+            self._server_count += 1
+            home = self._runs_folder / f"server-{self._server_count}"
             try:
-                self._pool = Pool(self._manifest, home, self._parent, scenarios)
+                self._server = ForkServer(self._manifest, home, self._parent_pid, scenarios)
             except NotForkable as why:
-                self._unfit = why
+                self._obstacle = why
                 raise
-        if self._manifest.sandbox and self._pool.scenarios != scenarios:
+        if self._manifest.sandbox and self._server.scenarios_folder != scenarios:
             raise NotForkable("the sandbox of the fork server has the scenarios of another folder")
-        return self._pool
+        return self._server
 
-    def _at(self, job: Job, step: int, swap: CodeSwap) -> Waiting:
-        pool = self._running(job)
-        key = _key(job)
-        golden = Golden(key=key, scenario=job.scenario, arguments=lambda: self._arguments(job, pool.home))
-        seen = self._seen.get(key)
-        libraries = seen.libraries if isinstance(seen, Observed) else ()
-        return pool.before(step, golden, [*libraries, *_needed(swap)], self._patience_s)
+    def _process_before_step(self, job: Job, step: int, swap: CodeSwap) -> WaitingProcess:
+        pool = self._running_server(job)
+        key = _golden_key(job)
+        golden = GoldenRunRequest(
+            key=key, scenario=job.scenario, arguments=lambda: self._target_arguments(job, pool.scratch_folder)
+        )
+        observations = self._observations_by_golden.get(key)
+        libraries = observations.imported_modules if isinstance(observations, GoldenObservations) else ()
+        return pool.process_before_step(step, golden, [*libraries, *_modules_to_load(swap)], self._patience_s)
 
-    def _arguments(self, job: Job, out: Path) -> list[str]:
+    def _target_arguments(self, job: Job, out: Path) -> list[str]:
         return list(
             self._manifest.arguments(
                 scenario=job.scenario.resolve(), seed=job.seed, out=out, changes=job.changes
             )
         )
 
-    def _become(
-        self, waiting: Waiting, job: Job, folder: Path, swap: CodeSwap, start: Start, watch: bool = False
-    ) -> Execution:
-        make_work(self._work)
-        with RunHome(folder) as home:
-            ended = self._forked(waiting, job, home, swap, start, watch)
-            place = self.reference.folder_of(job) / OUTPUT
-            return replace(self._judged(job, home, ended, place, watch), start=start.step)
+    def _run_in_fork(
+        self,
+        waiting: WaitingProcess,
+        job: Job,
+        folder: Path,
+        swap: CodeSwap,
+        fork_point: ForkPoint,
+        observe: bool = False,
+    ) -> JobResult:
+        ensure_work_folder(self._work_folder)
+        with JobFolder(folder) as home:
+            ended = self._fork_and_wait(waiting, job, home, swap, fork_point, observe)
+            place = self.reference.folder_of_job(job) / OUTPUT_FOLDER
+            return replace(self._result_of_fork(job, home, ended, place, observe), fork_step=fork_point.step)
 
-    def _forked(
-        self, waiting: Waiting, job: Job, home: RunHome, swap: CodeSwap, start: Start, watch: bool
-    ) -> Ended:
+    def _fork_and_wait(
+        self,
+        waiting: WaitingProcess,
+        job: Job,
+        home: JobFolder,
+        swap: CodeSwap,
+        fork_point: ForkPoint,
+        observe: bool,
+    ) -> ProcessEnding:
         request = {
             "home": str(home.path),
-            "out": str(home.out),
-            "log": str(home.log),
-            "report": str(home.report),
-            "inactive": str(home.inactive),
+            "out": str(home.output_folder),
+            "log": str(home.log_path),
+            "report": str(home.report_path),
+            "inactive": str(home.inactive_marker),
             "args": None,
             "cpu_s": self._limits.cpu_s,
             "memory_mb": self._limits.memory_mb,
             "disk_mb": self._limits.disk_mb,
             "steps": self._limits.steps,
             "probe_name": probe_module(self._manifest.package),
-            "probe": swap.probe,
-            "functions": [(f.module, f.path, f.old, f.new) for f in swap.functions],
-            "settings": swap.settings,
-            "probe_state": probe_state_after(start.observed, start.began, start.t),
-            "stop": stop_source(self._manifest) if job.stop else None,
-            "watch": [value.name for value in self._manifest.observation.values] if watch else None,
+            "probe": swap.probe_code,
+            "functions": [(f.module, f.name_path, f.old_code, f.new_code) for f in swap.functions],
+            "settings": swap.value_setters,
+            "probe_state": probe_state_after(
+                fork_point.observation_count, fork_point.earliest_time_s, fork_point.last_time_s
+            ),
+            "stop": stop_source(self._manifest) if job.stop_at_hazard else None,
+            "watch": [value.name for value in self._manifest.observation.values] if observe else None,
         }
         # the child must begin the run; a watched run has the arguments of the waiting processes
         if waiting.key is None:
-            request["args"] = self._arguments(job, self._running(job).home if watch else home.out)
+            request["args"] = self._target_arguments(
+                job, self._running_server(job).scratch_folder if observe else home.output_folder
+            )
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
         # a sandbox's /tmp is beside the run's folder
-        limited = self._runs if self._manifest.sandbox else home.path
-        asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(limited), **limits}
-        with nullcontext() if waiting.key else used_unchanged(job.scenario):
-            said, _ = waiting.ask(asked, self._patience_s)
-        self._running(job).clean()
-        if said["threads"]:
-            raise NotForkable(too_many(said["threads"]), turned_off(said["threads"]))
-        if said["touched"]:
+        limited_folder = self._runs_folder if self._manifest.sandbox else home.path
+        message = {"do": "mutant", "job": marshal.dumps(request), "home": str(limited_folder), **limits}
+        with nullcontext() if waiting.key else raising_if_changed(job.scenario):
+            reply, _ = waiting.send_request(message, self._patience_s)
+        self._running_server(job).clear_temporary_folders()
+        if reply["threads"]:
+            raise NotForkable(
+                describe_too_many_threads(reply["threads"]), remedy_for_threads(reply["threads"])
+            )
+        if reply["touched"]:
             self.close()
             raise NotForkable("it writes into its own tree")
-        return Ended(**{name: said[name] for name in Ended.__slots__})
+        return ProcessEnding(**{name: reply[name] for name in ProcessEnding.__slots__})
 
-    def _judged(self, job: Job, home: RunHome, ended: Ended, place: Path, watch: bool) -> Execution:
-        home.let_in()
+    def _result_of_fork(
+        self, job: Job, home: JobFolder, ended: ProcessEnding, place: Path, observe: bool
+    ) -> JobResult:
+        home.unlock()
         report = home.read_report(threads=list)
         if report is not None:
-            self._check(job, report)
-        status, detail = judge(self._limits, ended, report)
-        if status is not Status.OK and is_full(self._work, report):
-            raise disk_full_error(self._work)
+            self._check_fork_report(job, report)
+        status, detail = judge_run(self._limits, ended, report)
+        if status is not Status.OK and was_disk_full(self._work_folder, report):
+            raise disk_full_error(self._work_folder)
         if status is Status.CRASHED:
             raise NotForkable(f"ended as crashed: {detail}")
-        return Execution(
+        return JobResult(
             status=status,
             detail=detail,
             out=home.move_output(place),
-            probe=report["probe"] if report else None,
+            probe_report=report["probe"] if report else None,
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
-            active=home.was_active(),
-            log=home.log_tail(),
-            stopped=bool(report and report.get("stopped")),
-            watched={name: report[name] for name in _WATCHED} if watch and report else {},
-            mode=RunMode.WARM if self._warm else RunMode.FORK,
+            was_fault_active=home.was_fault_active(),
+            log_tail=home.log_tail(),
+            was_stopped_at_hazard=bool(report and report.get("stopped")),
+            watch_report={name: report[name] for name in _OBSERVATION_KEYS} if observe and report else {},
+            mode=RunMode.WARM if self._forks_before_first_step else RunMode.FORK,
         )
 
-    def _check(self, job: Job, report: dict[str, Any]) -> None:
+    def _check_fork_report(self, job: Job, report: dict[str, Any]) -> None:
         """Raise NotForkable if the child did not run the mutant's code, or if threads are left."""
         if report["ended"] == "swap refused":
             raise NotForkable(str(report.get("why")))
@@ -273,36 +310,38 @@ class ForkEngine:
             raise NotForkable(f"the target was also imported from {', '.join(report['outside'])}")
         if report["threads"]:
             others = report["threads"]
-            raise NotForkable(f"at its end {too_many(others)}", turned_off(others))
-        if report["ended"] == "ok" and (problem := job.problem_of(report["probe"])):
+            raise NotForkable(f"at its end {describe_too_many_threads(others)}", remedy_for_threads(others))
+        if report["ended"] == "ok" and (problem := job.problem_of_probe_report(report["probe"])):
             raise NotForkable(problem)
 
-    def _observed(self, job: Job, golden: Path) -> Observed:
+    def _golden_observations(self, job: Job, golden: Path) -> GoldenObservations:
         """Return what a probe observes in a job's golden run. The first call runs it."""
-        key = _key(job)
-        if key not in self._seen:
+        key = _golden_key(job)
+        if key not in self._observations_by_golden:
             try:
-                self._seen[key] = self._watch(job, golden)
+                self._observations_by_golden[key] = self._observe_golden_run(job, golden)
             except NotForkable as why:
-                self._seen[key] = why
-        seen = self._seen[key]
-        if isinstance(seen, NotForkable):
-            raise NotForkable(*seen.args)
-        return seen
+                self._observations_by_golden[key] = why
+        observations = self._observations_by_golden[key]
+        if isinstance(observations, NotForkable):
+            raise NotForkable(*observations.args)
+        return observations
 
-    def _watch(self, job: Job, golden: Path) -> Observed:
-        known = self._work / f"observed-{content_id(_key(job))}"  # shared by a session's workers
-        if known.is_file() and (data := self._authentic(known)):
+    def _observe_golden_run(self, job: Job, golden: Path) -> GoldenObservations:
+        cache_file = (
+            self._work_folder / f"observed-{content_id(_golden_key(job))}"
+        )  # shared by a session's workers
+        if cache_file.is_file() and (data := self._read_authenticated(cache_file)):
             values, before, libraries = marshal.loads(data)
-            return Observed(values=values, before=before, libraries=libraries)
-        folder = self._runs / f"watch-{content_id(_key(job))}"
+            return GoldenObservations(values=values, counts_before_steps=before, imported_modules=libraries)
+        folder = self._runs_folder / f"watch-{content_id(_golden_key(job))}"
         try:
-            swap = self._swap(job, self._null.files, self._null.probe)
-            null = replace(job, mutant=None, stop=False)
-            self._at(job, 0, swap)  # NotForkable, with the reason, if the run cannot begin
+            swap = self._plan_swap(job, self._null_mutant.files, self._null_mutant.probe)
+            null = replace(job, mutant_id=None, stop_at_hazard=False)
+            self._process_before_step(job, 0, swap)  # NotForkable, with the reason, if the run cannot begin
             # Fork before the first step, because a later fork misses earlier observations.
-            first = self._running(job).first
-            execution = self._become(first, null, folder, swap, _FROM_THE_START, watch=True)
+            first = self._running_server(job).first_process
+            execution = self._run_in_fork(first, null, folder, swap, _BEFORE_FIRST_STEP, observe=True)
             if execution.status is Status.HARNESS_ERROR:
                 raise ForkServerLost(execution.detail)
             if execution.status is not Status.OK:
@@ -310,73 +349,80 @@ class ForkEngine:
             for name in self._manifest.outputs:
                 if read_bounded(execution.out / name) != read_bounded(golden / name):
                     raise NotForkable(f"its {name} differs when it is driven step by step")
-            seen, *others = (execution.watched[name] for name in _WATCHED)
-            found = (tuple(map(tuple, seen)), *map(tuple, others))
-            if found[0] and found[1][:1] != (0,):
+            observed_values, *counts_and_modules = (
+                execution.watch_report[name] for name in _OBSERVATION_KEYS
+            )
+            content = (tuple(map(tuple, observed_values)), *map(tuple, counts_and_modules))
+            if content[0] and content[1][:1] != (0,):
                 raise NotForkable("it observes before its first step")
-            data = marshal.dumps(found)
-            write_atomic(known, self._code(known, data) + data)
-            return Observed(values=found[0], before=found[1], libraries=found[2])
+            data = marshal.dumps(content)
+            write_atomic(cache_file, self._authentication_code(cache_file, data) + data)
+            return GoldenObservations(
+                values=content[0], counts_before_steps=content[1], imported_modules=content[2]
+            )
         except NotSwappable as why:
             raise NotForkable(f"its observing statement cannot be inserted: {why}") from None
         finally:
             remove_folder(folder)
 
-    def _authentic(self, path: Path) -> bytes:
+    def _read_authenticated(self, path: Path) -> bytes:
         """Return what an engine with the same secret wrote to a file; empty for what a mutant wrote."""
-        code, data = (content := read_bounded(path))[:_CODE_BYTES], content[_CODE_BYTES:]
-        return data if hmac.compare_digest(code, self._code(path, data)) else b""
+        code, data = (
+            (content := read_bounded(path))[:_AUTHENTICATION_CODE_BYTES],
+            content[_AUTHENTICATION_CODE_BYTES:],
+        )
+        return data if hmac.compare_digest(code, self._authentication_code(path, data)) else b""
 
-    def _code(self, path: Path, data: bytes) -> bytes:
+    def _authentication_code(self, path: Path, data: bytes) -> bytes:
         return hmac.digest(self._secret, path.name.encode() + data, "sha256")
 
 
-_CODE_BYTES = 32
-_WATCHED = ("seen", "before", "libraries")
-_FROM_THE_START = Start(step=0, observed=0, began=None, t=None)
+_AUTHENTICATION_CODE_BYTES = 32
+_OBSERVATION_KEYS = ("seen", "before", "libraries")
+_BEFORE_FIRST_STEP = ForkPoint(step=0, observation_count=0, earliest_time_s=None, last_time_s=None)
 
 
-def _needed(swap: CodeSwap) -> list[str]:
-    return [*dict.fromkeys(function.module for function in swap.functions), *swap.imports]
+def _modules_to_load(swap: CodeSwap) -> list[str]:
+    return [*dict.fromkeys(function.module for function in swap.functions), *swap.imported_modules]
 
 
-def _key(job: Job) -> _Key:
-    return (_resolved(job.scenario), job.seed, job.changes)
+def _golden_key(job: Job) -> _GoldenKey:
+    return (_resolved_path(job.scenario), job.seed, job.changes)
 
 
 @cache
-def _resolved(scenario: Path) -> str:
+def _resolved_path(scenario: Path) -> str:
     return str(scenario.resolve())
 
 
-def _golden(job: Job, golden: Path) -> Execution:
-    return Execution(
+def _result_without_run(job: Job, golden: Path) -> JobResult:
+    return JobResult(
         status=Status.OK,
         detail="",
         out=golden,
-        probe=untriggered_report(job.mutant),
+        probe_report=untriggered_report(job.mutant_id),
         cpu_s=0.0,
         wall_s=0.0,
         mode=RunMode.GOLDEN,
     )
 
 
-def make_fork(setting: Setting) -> ForkEngine:
-    return _make(setting, warm=False)
+def make_fork_engine(arguments: EngineArguments) -> ForkEngine:
+    return _make_engine(arguments, before_first_step=False)
 
 
-def make_warm(setting: Setting) -> ForkEngine:
-    return _make(setting, warm=True)
+def make_warm_engine(arguments: EngineArguments) -> ForkEngine:
+    return _make_engine(arguments, before_first_step=True)
 
 
-def _make(setting: Setting, *, warm: bool) -> ForkEngine:
-    null = build(setting.manifest, setting.models, None, always_trigger())
+def _make_engine(arguments: EngineArguments, *, before_first_step: bool) -> ForkEngine:
+    null = build(arguments.manifest, arguments.models, None, always_trigger())
     return ForkEngine(
-        setting.manifest,
-        setting.work,
-        setting.limits,
-        setting.parent,
-        null=null,
-        warm=warm,
-        secret=setting.secret,
+        arguments.manifest,
+        arguments.work_folder,
+        arguments.limits,
+        arguments.parent_pid,
+        null_mutant=null,
+        before_first_step=before_first_step,
+        secret=arguments.secret,
     )

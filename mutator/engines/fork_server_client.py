@@ -21,28 +21,30 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.file_change_detection import UnchangedFiles
 from mutator._common.files import remove_folder
 from mutator.engines import bytecode
-from mutator.engines.job_tree import RunTree
+from mutator.engines.job_tree import JobTree
 from mutator.engines.sandbox import Sandbox
-from mutator.engines.target_processes import end, environment, raised_in
-from mutator.engines.thread_messages import too_many, turned_off
+from mutator.engines.target_processes import exception_in_report, run_environment, wait_for_guard
+from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import ForkServerLost, NotForkable
 from mutator.targets.manifest import TargetManifest
 
-_SERVER = Path(__file__).parent / "in_target" / "fork_server.py"
-_MOST = 8  # maximum number of waiting processes, because each takes about 20 MB
-_NEAR = 100  # steps; a process at most this far behind is advanced, not copied: it is quickly remade
-_LOOK_UP_S = 0.5  # interval between two checks that the parent is alive
-_START_S = 120.0
+_SERVER_SCRIPT = Path(__file__).parent / "in_target" / "fork_server.py"
+_MOST_WAITING_PROCESSES = 8  # maximum number of waiting processes, because each takes about 20 MB
+_MOST_STEPS_TO_ADVANCE = (
+    100  # steps; a process at most this far behind is advanced, not copied: it is quickly remade
+)
+_PARENT_CHECK_INTERVAL_S = 0.5  # interval between two checks that the parent is alive
+_START_TIMEOUT_S = 120.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Golden:
+class GoldenRunRequest:
     key: Hashable
     scenario: Path
     arguments: Callable[[], list[str]]
 
 
-class Waiting:
+class WaitingProcess:
     """A waiting process of the server.
 
     The first waits before any run (`key` None). Others wait before `step` of the golden run `key`.
@@ -51,60 +53,62 @@ class Waiting:
     def __init__(
         self,
         connection: socket.socket,
-        parent: int | None,
-        wake: Callable[[], None],
+        parent_pid: int | None,
+        wake_processes: Callable[[], None],
         key: Hashable = None,
     ) -> None:
         self.key = key
         self.step = 0
-        self.loaded: set[str] = set()  # modules loaded for mutants
-        self.used = 0.0
+        self.loaded_modules: set[str] = set()  # modules loaded for mutants
+        self.last_used_s = 0.0
         self._connection = connection
-        self._parent = parent
-        self._wake = wake
-        connection.settimeout(_LOOK_UP_S)
+        self._parent_pid = parent_pid
+        self._wake_processes = wake_processes
+        connection.settimeout(_PARENT_CHECK_INTERVAL_S)
 
-    def ask(self, request: dict[str, Any], patience_s: float) -> tuple[dict[str, Any], list[int]]:
+    def send_request(self, request: dict[str, Any], patience_s: float) -> tuple[dict[str, Any], list[int]]:
         data = marshal.dumps(request)
         self._connection.settimeout(patience_s)
         try:
             self._connection.sendall(struct.pack("<I", len(data)) + data)
         except OSError as err:
             raise ForkServerLost(f"a process of the fork server is gone ({err})") from None
-        return self.reply(patience_s)
+        return self.receive_reply(patience_s)
 
-    def reply(self, patience_s: float) -> tuple[dict[str, Any], list[int]]:
-        self._connection.settimeout(_LOOK_UP_S)
+    def receive_reply(self, patience_s: float) -> tuple[dict[str, Any], list[int]]:
+        self._connection.settimeout(_PARENT_CHECK_INTERVAL_S)
         deadline = time.monotonic() + patience_s
         handles: list[int] = []
-        head = self._read(4, deadline, handles)
-        reply: dict[str, Any] = marshal.loads(self._read(struct.unpack("<I", head)[0], deadline, handles))
+        head = self._receive_bytes(4, deadline, handles)
+        reply: dict[str, Any] = marshal.loads(
+            self._receive_bytes(struct.unpack("<I", head)[0], deadline, handles)
+        )
         return reply, handles
 
-    def load(self, modules: Sequence[str], patience_s: float) -> None:
+    def load_modules(self, modules: Sequence[str], patience_s: float) -> None:
         """Import modules now, so that each fork finds them loaded."""
-        if new := [name for name in modules if name not in self.loaded]:
-            self.ask({"do": "load", "modules": new}, patience_s)
-            self.loaded.update(new)
+        if new := [name for name in modules if name not in self.loaded_modules]:
+            self.send_request({"do": "load", "modules": new}, patience_s)
+            self.loaded_modules.update(new)
 
     def close(self) -> None:
         self._connection.close()
 
-    def _read(self, count: int, deadline: float, handles: list[int]) -> bytes:
+    def _receive_bytes(self, byte_count: int, deadline: float, handles: list[int]) -> bytes:
         data = b""
-        while len(data) < count:
+        while len(data) < byte_count:
             try:
-                part, found, _, _ = socket.recv_fds(self._connection, count - len(data), 1)
+                part, new_handles, _, _ = socket.recv_fds(self._connection, byte_count - len(data), 1)
             except TimeoutError:
-                self._wake()
-                if self._parent is not None and os.getppid() != self._parent:
+                self._wake_processes()
+                if self._parent_pid is not None and os.getppid() != self._parent_pid:
                     raise SystemExit("the process that started this one is gone") from None
                 if time.monotonic() > deadline:
                     raise ForkServerLost("the fork server does not answer") from None
                 continue
             except OSError as err:
                 raise ForkServerLost(f"a process of the fork server is gone ({err})") from None
-            handles += found
+            handles += new_handles
             if not part:
                 raise ForkServerLost("a process of the fork server is gone")
             data += part
@@ -112,7 +116,7 @@ class Waiting:
 
 
 @contextmanager
-def used_unchanged(path: Path) -> Iterator[None]:
+def raising_if_changed(path: Path) -> Iterator[None]:
     """Raise ForkServerLost if a file is written to while the server uses it."""
     used = UnchangedFiles({str(path.resolve()): read_bounded(path)})
     yield
@@ -120,133 +124,165 @@ def used_unchanged(path: Path) -> Iterator[None]:
         raise ForkServerLost(f"{path.name} was changed while it was in use")
 
 
-class Pool:
-    """A fork server with its waiting processes, in the new scratch folder `home`.
+class ForkServer:
+    """A fork server with its waiting processes, in the new folder `scratch_folder`.
 
-    In a sandbox, they can read the folder `scenarios`, and write to the folder in which `home` is.
+    In a sandbox, they can read `scenarios_folder`, and write to the folder in which `scratch_folder` is.
 
     Its tree has no bytecode, which a mutant could exchange before the server loads one more module. Raises
     NotForkable if the target cannot be loaded or has more than one thread, and ForkServerLost if the server
     ends without an answer, or if its tree is not the pristine one.
     """
 
-    def __init__(self, manifest: TargetManifest, home: Path, parent: int | None, scenarios: Path) -> None:
+    def __init__(
+        self, manifest: TargetManifest, scratch_folder: Path, parent_pid: int | None, scenarios_folder: Path
+    ) -> None:
         assert manifest.stepwise is not None
-        self.home = home
-        self.scenarios = scenarios
-        self.tree = home / "tree"
-        self._parent = parent
-        self._waiting: list[Waiting] = []
-        self._group = 0  # the server's process group, once known
-        bytecode.write(manifest.tree.files, self.tree)
-        self._files = RunTree(self.tree, manifest.tree.files, {})
+        self.scratch_folder = scratch_folder
+        self.scenarios_folder = scenarios_folder
+        self.tree_folder = scratch_folder / "tree"
+        self._parent_pid = parent_pid
+        self._waiting_processes: list[WaitingProcess] = []
+        self._process_group = 0  # the server's process group, once known
+        bytecode.write_files(manifest.tree.files, self.tree_folder)
+        self._tree = JobTree(self.tree_folder, manifest.tree.files, {})
         start = {
-            "tree": str(self.tree),
-            "home": str(home),
+            "tree": str(self.tree_folder),
+            "home": str(scratch_folder),
             "packages": list(manifest.import_names),
             "module": manifest.entry_module,
             "stepwise": manifest.stepwise,
         }
-        told, data = home / "start.marshal", marshal.dumps(start)
-        told.write_bytes(data)
-        self._told = UnchangedFiles({str(told): data})
-        ours, theirs = socket.socketpair()
-        command = [sys.executable, "-P", "-s", str(_SERVER), str(theirs.fileno()), str(told)]
-        self._sandbox = Sandbox.of(manifest, home.parent, [scenarios])
+        start_path, data = scratch_folder / "start.marshal", marshal.dumps(start)
+        start_path.write_bytes(data)
+        self._start_file = UnchangedFiles({str(start_path): data})
+        harness_socket, server_socket = socket.socketpair()
+        command = [
+            sys.executable,
+            "-P",
+            "-s",
+            str(_SERVER_SCRIPT),
+            str(server_socket.fileno()),
+            str(start_path),
+        ]
+        self._sandbox = Sandbox.of_target(manifest, scratch_folder.parent, [scenarios_folder])
         if self._sandbox:
-            command = self._sandbox.command(command)
-        with theirs, (home / "log").open("wb") as log:
+            command = self._sandbox.wrap_command(command)
+        with server_socket, (scratch_folder / "log").open("wb") as log:
             self._process = subprocess.Popen(
                 command,
-                cwd=home,
+                cwd=scratch_folder,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
-                env=environment(0, home, manifest.env),
-                pass_fds=[theirs.fileno()],
+                env=run_environment(0, scratch_folder, manifest.env),
+                pass_fds=[server_socket.fileno()],
                 start_new_session=True,
             )
-        self.first = Waiting(ours, parent, self._wake)
+        self.first_process = WaitingProcess(harness_socket, parent_pid, self._wake_processes)
         try:
-            self._welcome()
+            self._receive_welcome()
         except BaseException:
             self.close()
             raise
 
-    def _welcome(self) -> None:
-        said, _ = self.first.reply(_START_S)
-        if "failed" in said:
-            raise NotForkable(f"it cannot be loaded: {_why(said['failed'])}")
-        if said["threads"]:
-            others = said["threads"]
-            raise NotForkable(f"once it is loaded, {too_many(others)}", turned_off(others))
-        self._group = said["group"]
-        if self._files.first_changed() or self._told.first_changed():
+    def _receive_welcome(self) -> None:
+        welcome, _ = self.first_process.receive_reply(_START_TIMEOUT_S)
+        if "failed" in welcome:
+            raise NotForkable(f"it cannot be loaded: {_describe_failure(welcome['failed'])}")
+        if welcome["threads"]:
+            others = welcome["threads"]
+            raise NotForkable(
+                f"once it is loaded, {describe_too_many_threads(others)}", remedy_for_threads(others)
+            )
+        self._process_group = welcome["group"]
+        if self._tree.first_changed() or self._start_file.first_changed():
             raise ForkServerLost("the tree of the fork server is not the pristine one")
         if self._sandbox:
-            self._sandbox.begin()
+            self._sandbox.note_first_paths()
 
-    def clean(self) -> None:
+    def clear_temporary_folders(self) -> None:
         """Delete what a run has left in the temporary folders of the sandbox."""
         if self._sandbox:
-            self._sandbox.clear()
+            self._sandbox.delete_new_paths()
 
-    def before(self, step: int, golden: Golden, modules: Sequence[str], patience_s: float) -> Waiting:
+    def process_before_step(
+        self, step: int, golden: GoldenRunRequest, modules: Sequence[str], patience_s: float
+    ) -> WaitingProcess:
         """Return a process that waits before `step` of the golden run, with these modules loaded."""
         if self._process.poll() is not None:
             raise ForkServerLost("the fork server is gone")
-        mine = [w for w in self._waiting if w.key == golden.key and w.step <= step]
+        mine = [w for w in self._waiting_processes if w.key == golden.key and w.step <= step]
         if not mine:
-            self.first.load(modules, patience_s)
-            with used_unchanged(golden.scenario):
-                mine = [self._branch(self.first, golden.key, 0, patience_s, golden.arguments())]
+            self.first_process.load_modules(modules, patience_s)
+            with raising_if_changed(golden.scenario):
+                mine = [
+                    self._branch_process(self.first_process, golden.key, 0, patience_s, golden.arguments())
+                ]
         best = max(mine, key=lambda waiting: waiting.step)
-        best.load(modules, patience_s)
-        if 0 < best.step < step <= best.step + _NEAR:
-            reply, _ = best.ask({"do": "advance", "step": step}, patience_s)
+        best.load_modules(modules, patience_s)
+        if 0 < best.step < step <= best.step + _MOST_STEPS_TO_ADVANCE:
+            reply, _ = best.send_request({"do": "advance", "step": step}, patience_s)
             best.step = reply["step"]
         elif best.step < step:
-            best = self._branch(best, golden.key, step, patience_s)
-        best.used = time.monotonic()
+            best = self._branch_process(best, golden.key, step, patience_s)
+        best.last_used_s = time.monotonic()
         return best
 
-    def _branch(
-        self, source: Waiting, key: Hashable, step: int, patience_s: float, arguments: list[str] | None = None
-    ) -> Waiting:
-        source.used = time.monotonic()
-        while len(self._waiting) >= _MOST:
-            oldest = min((w for w in self._waiting if w is not source), key=lambda waiting: waiting.used)
-            self._waiting.remove(oldest)
+    def _branch_process(
+        self,
+        source: WaitingProcess,
+        key: Hashable,
+        step: int,
+        patience_s: float,
+        arguments: list[str] | None = None,
+    ) -> WaitingProcess:
+        source.last_used_s = time.monotonic()
+        while len(self._waiting_processes) >= _MOST_WAITING_PROCESSES:
+            oldest = min(
+                (w for w in self._waiting_processes if w is not source),
+                key=lambda waiting: waiting.last_used_s,
+            )
+            self._waiting_processes.remove(oldest)
             oldest.close()
-        said, handles = source.ask({"do": "branch", "step": step, "args": arguments}, patience_s)
-        if said["threads"] or len(handles) != 1:
-            raise NotForkable(too_many(said["threads"]), turned_off(said["threads"]))
-        made = Waiting(socket.socket(fileno=handles[0]), self._parent, self._wake, key)
-        made.loaded |= source.loaded
-        reply, _ = made.reply(patience_s)
+        branch_reply, handles = source.send_request(
+            {"do": "branch", "step": step, "args": arguments}, patience_s
+        )
+        if branch_reply["threads"] or len(handles) != 1:
+            raise NotForkable(
+                describe_too_many_threads(branch_reply["threads"]),
+                remedy_for_threads(branch_reply["threads"]),
+            )
+        branched = WaitingProcess(
+            socket.socket(fileno=handles[0]), self._parent_pid, self._wake_processes, key
+        )
+        branched.loaded_modules |= source.loaded_modules
+        reply, _ = branched.receive_reply(patience_s)
         if "failed" in reply:
-            made.close()
-            raise NotForkable(f"its golden run cannot be driven step by step: {_why(reply['failed'])}")
-        made.step = reply["step"]
-        self._waiting.append(made)
-        return made
+            branched.close()
+            raise NotForkable(
+                f"its golden run cannot be driven step by step: {_describe_failure(reply['failed'])}"
+            )
+        branched.step = reply["step"]
+        self._waiting_processes.append(branched)
+        return branched
 
-    def _wake(self) -> None:
+    def _wake_processes(self) -> None:
         """Continue the server's processes, which a mutant can stop. Mutants have other process groups."""
         self._process.send_signal(signal.SIGCONT)
-        if self._group:
+        if self._process_group:
             with suppress(ProcessLookupError):
-                os.killpg(self._group, signal.SIGCONT)
+                os.killpg(self._process_group, signal.SIGCONT)
 
     def close(self) -> None:
-        for waiting in (self.first, *self._waiting):
+        for waiting in (self.first_process, *self._waiting_processes):
             waiting.close()
-        end(self._process)
+        wait_for_guard(self._process)
         if self._sandbox:
             self._sandbox.close()
-        remove_folder(self.home)
+        remove_folder(self.scratch_folder)
 
 
-def _why(failed: dict[str, Any]) -> str:
-    raised = raised_in(failed)
-    return raised.text if raised else ""
+def _describe_failure(failure: dict[str, Any]) -> str:
+    raised = exception_in_report(failure)
+    return raised.description if raised else ""

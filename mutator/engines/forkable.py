@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mutator.engines.code_swap import plan_swap
-from mutator.engines.engine_choice import not_forkable
-from mutator.engines.fork_server_client import Pool
+from mutator.engines.engine_choice import reason_not_forkable
+from mutator.engines.fork_server_client import ForkServer
 from mutator.errors import ForkServerLost, MutatorError, NotForkable, NotSwappable
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault
@@ -14,24 +14,24 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 
 
-def unfit(manifest: TargetManifest) -> NotForkable | None:
+def find_obstacle_before_loading(manifest: TargetManifest) -> NotForkable | None:
     """Return why the target cannot be forked here, as far as that is known without loading it."""
-    why = not_forkable(manifest)
+    why = reason_not_forkable(manifest)
     stepwise = (
         "" if manifest.stepwise else f"in {manifest.path.name}, name a function that makes stepwise runs"
     )
     return NotForkable(why, stepwise) if why else None
 
 
-def not_loadable(manifest: TargetManifest, home: Path) -> NotForkable | None:
+def find_obstacle_by_loading(manifest: TargetManifest, scratch_folder: Path) -> NotForkable | None:
     """Load the target, and return why it cannot be forked; None if it can.
 
-    `home` is a new scratch folder.
+    `scratch_folder` is a new folder.
     """
-    if found := unfit(manifest):
-        return found
+    if obstacle := find_obstacle_before_loading(manifest):
+        return obstacle
     try:
-        Pool(manifest, home, None, home).close()
+        ForkServer(manifest, scratch_folder, None, scratch_folder).close()
     except NotForkable as why:
         return why
     except ForkServerLost as why:
@@ -39,18 +39,20 @@ def not_loadable(manifest: TargetManifest, home: Path) -> NotForkable | None:
     return None
 
 
-def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> dict[str, str]:
+def reasons_by_unforkable_variant(
+    manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]
+) -> dict[str, str]:
     """Return the variants that only the reference engine can run, with reasons; test one fault of each."""
     variants = {fault.spec: fault for fault in faults}
-    if why := not_forkable(manifest):
+    if why := reason_not_forkable(manifest):
         return dict.fromkeys(variants, why)
-    found = {}
+    reasons = {}
     for name, fault in variants.items():
         try:
             mutant = build(manifest, models, fault, always_trigger())
             plan_swap(manifest, mutant.files, mutant.probe, "")
         except NotSwappable as reason:
-            found[name] = str(reason)
+            reasons[name] = str(reason)
         except MutatorError:
             continue  # a fault that cannot be built never runs; the checks before a campaign report it
-    return found
+    return reasons

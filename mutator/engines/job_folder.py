@@ -19,93 +19,93 @@ from typing import Any
 
 from mutator._common.confined_files import move_plain_files, open_folder, read_below
 from mutator._common.files import remove_anything_at
-from mutator.engines.target_processes import parsed_report, tail
+from mutator.engines.target_processes import parse_report, read_log_tail
 from mutator.errors import Outside
 
-OUTPUT = "output"  # the name of the folder with the output's plain files
+OUTPUT_FOLDER = "output"  # the name of the folder with the output's plain files
 _OUT, _LOG, _REPORT, _INACTIVE = "out", "log", "report.json", "inactive"
 
 
-_DISTURBED = (errno.ENOENT, errno.EEXIST, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENOTEMPTY)
-_LOCKED = (errno.EACCES, errno.EPERM)
+_DISTURBANCE_ERRNOS = (errno.ENOENT, errno.EEXIST, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENOTEMPTY)
+_LOCKED_ERRNOS = (errno.EACCES, errno.EPERM)
 
 
-def is_disturbance(err: OSError) -> bool:
+def can_be_disturbance(err: OSError) -> bool:
     """Return whether an error can result from what a run did to the folders of this or another run."""
-    return err.errno in (*_DISTURBED, *_LOCKED)
+    return err.errno in (*_DISTURBANCE_ERRNOS, *_LOCKED_ERRNOS)
 
 
-def make_work(work: Path) -> None:
+def ensure_work_folder(work_folder: Path) -> None:
     """Make the folder of all runs again if a run has deleted it, or put something else in its place."""
     try:
-        if stat.S_ISDIR(os.lstat(work).st_mode):
+        if stat.S_ISDIR(os.lstat(work_folder).st_mode):
             return
-        work.unlink()
+        work_folder.unlink()
     except FileNotFoundError:
         pass
-    work.mkdir(parents=True, exist_ok=True)
+    work_folder.mkdir(parents=True, exist_ok=True)
 
 
-class RunHome:
+class JobFolder:
     """The new folder `path`, open until the end of a `with` block. OSError if it cannot be made."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.out, self.log = path / _OUT, path / _LOG
-        self.report = path / _REPORT
-        self.inactive = path / _INACTIVE  # the first activation deletes it
-        self._open = ExitStack()
+        self.output_folder, self.log_path = path / _OUT, path / _LOG
+        self.report_path = path / _REPORT
+        self.inactive_marker = path / _INACTIVE  # the first activation deletes it
+        self._open_handles = ExitStack()
 
-    def __enter__(self) -> "RunHome":
+    def __enter__(self) -> "JobFolder":
         self.path.mkdir(parents=True, exist_ok=True)
         with ExitStack() as opened:
-            self._home = opened.enter_context(open_folder(self.path))
-            os.mkdir(_OUT, dir_fd=self._home)
-            self._out = opened.enter_context(open_folder(_OUT, self._home))
-            os.close(os.open(_INACTIVE, os.O_CREAT | os.O_EXCL, 0o644, dir_fd=self._home))
-            self._open = opened.pop_all()
-        self._held = Path(f"/proc/self/fd/{self._home}")
+            self._folder_handle = opened.enter_context(open_folder(self.path))
+            os.mkdir(_OUT, dir_fd=self._folder_handle)
+            self._output_handle = opened.enter_context(open_folder(_OUT, self._folder_handle))
+            os.close(os.open(_INACTIVE, os.O_CREAT | os.O_EXCL, 0o644, dir_fd=self._folder_handle))
+            self._open_handles = opened.pop_all()
+        self._path_by_handle = Path(f"/proc/self/fd/{self._folder_handle}")
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._open.close()
+        self._open_handles.close()
 
-    def is_moved(self) -> bool:
+    def was_moved(self) -> bool:
         """Return whether the folder or that of the output is no longer in its place."""
-        places = ((self.path, self._home), (self.out, self._out))
-        return not all(_is_at(path, handle) for path, handle in places)
+        places = ((self.path, self._folder_handle), (self.output_folder, self._output_handle))
+        return not all(_is_path_of_handle(path, handle) for path, handle in places)
 
-    def read_report(self, **more: type) -> dict[str, Any] | None:
+    def read_report(self, **extra_fields: type) -> dict[str, Any] | None:
         """Return the child's report; None if it is missing, incomplete or invalid (`parsed_report`)."""
         try:
-            return parsed_report(read_below(self._held, _REPORT), **more)
+            return parse_report(read_below(self._path_by_handle, _REPORT), **extra_fields)
         except (OSError, Outside, ValueError):
             return None
 
     def log_tail(self) -> str:
-        return tail(self._held, _LOG)
+        return read_log_tail(self._path_by_handle, _LOG)
 
-    def was_active(self) -> bool:
+    def was_fault_active(self) -> bool:
         try:
-            os.stat(_INACTIVE, dir_fd=self._home, follow_symlinks=False)
+            os.stat(_INACTIVE, dir_fd=self._folder_handle, follow_symlinks=False)
         except OSError:
             return True
         return False
 
-    def let_in(self) -> None:
+    def unlock(self) -> None:
         """Make the folder readable again, which a run can lock."""
-        os.fchmod(self._home, 0o700)
+        os.fchmod(self._folder_handle, 0o700)
 
-    def move_output(self, place: Path) -> Path:
-        """Move the plain files of the output to the new folder `place`; return it."""
-        remove_anything_at(place)
-        place.mkdir(parents=True)
-        with open_folder(place) as target:
-            move_plain_files(self._out, target)
-        return place
+    def move_output(self, destination: Path) -> Path:
+        """Move the plain files of the output to the new folder `destination`; return it."""
+        remove_anything_at(destination)
+        destination.mkdir(parents=True)
+        with open_folder(destination) as target:
+            move_plain_files(self._output_handle, target)
+        return destination
 
 
-def _is_at(path: Path, handle: int) -> bool:
+def _is_path_of_handle(path: Path, handle: int) -> bool:
     try:
         return os.path.samestat(os.lstat(path), os.fstat(handle))
     except OSError:

@@ -13,52 +13,59 @@ from pathlib import Path
 
 from mutator._common.file_change_detection import UnchangedFiles
 
-_IMPORTED = tuple(all_suffixes())
+_IMPORTABLE_SUFFIXES = tuple(all_suffixes())
 
 
-class RunTree:
-    """The tree of one run in `place`: the files of a base tree, some of them `changed` by a mutant."""
+class JobTree:
+    """The tree of one run in `folder`: a pristine tree, but for the `changed_files` of a mutant."""
 
-    def __init__(self, place: Path, files: Mapping[str, bytes], changed: Mapping[str, bytes]) -> None:
-        self.place = place
-        self.changed = changed
-        self._expected: dict[str, set[str]] = {}  # names by folder
+    def __init__(self, place: Path, files: Mapping[str, bytes], changed_files: Mapping[str, bytes]) -> None:
+        self.folder = place
+        self.changed_files = changed_files
+        self._expected_names_by_folder: dict[str, set[str]] = {}  # names by folder
         for name in files:
             while name:
                 folder, _, last = name.rpartition("/")
-                self._expected.setdefault(folder, set()).add(last)
+                self._expected_names_by_folder.setdefault(folder, set()).add(last)
                 name = folder
-        self._folders = {folder: _number(place / folder) for folder in self._expected}
+        self._inodes_by_folder = {
+            folder: _inode_number(place / folder) for folder in self._expected_names_by_folder
+        }
         self._files = UnchangedFiles({f"{place}/{name}": data for name, data in files.items()})
 
     def first_changed(self) -> str:
         """Return a file that was changed, removed, or added where an import finds it; empty if none was."""
-        if path := self._files.first_changed() or self._first_moved():
-            return path.removeprefix(f"{self.place}/")
-        imported = (name for path in self.added() for name in _files(path) if name.endswith(_IMPORTED))
-        return next(imported, "").removeprefix(f"{self.place}/")
+        if path := self._files.first_changed() or self._first_moved_folder():
+            return path.removeprefix(f"{self.folder}/")
+        imported = (
+            name
+            for path in self.added_paths()
+            for name in _files_below(path)
+            if name.endswith(_IMPORTABLE_SUFFIXES)
+        )
+        return next(imported, "").removeprefix(f"{self.folder}/")
 
-    def added(self) -> list[Path]:
+    def added_paths(self) -> list[Path]:
         """Return the new files and folders, without what is in the latter."""
-        found = []
-        for folder, names in self._expected.items():
-            with suppress(OSError), os.scandir(self.place / folder) as entries:
-                found += [Path(entry.path) for entry in entries if entry.name not in names]
-        return found
+        paths = []
+        for folder, names in self._expected_names_by_folder.items():
+            with suppress(OSError), os.scandir(self.folder / folder) as entries:
+                paths += [Path(entry.path) for entry in entries if entry.name not in names]
+        return paths
 
-    def move(self, place: Path) -> bool:
+    def move_to(self, place: Path) -> bool:
         """Move the tree; return whether its folders are still the same, and no links in their place."""
-        self.place = self.place.rename(place)
-        return not self._first_moved()
+        self.folder = self.folder.rename(place)
+        return not self._first_moved_folder()
 
-    def _first_moved(self) -> str:
-        for folder, number in self._folders.items():
-            if not number or _number(self.place / folder) != number:
-                return f"{self.place}/{folder}"
+    def _first_moved_folder(self) -> str:
+        for folder, number in self._inodes_by_folder.items():
+            if not number or _inode_number(self.folder / folder) != number:
+                return f"{self.folder}/{folder}"
         return ""
 
 
-def _number(folder: Path) -> int:
+def _inode_number(folder: Path) -> int:
     """Return the number of a folder's inode; 0 if it is missing."""
     try:
         return os.lstat(folder).st_ino
@@ -66,7 +73,7 @@ def _number(folder: Path) -> int:
         return 0
 
 
-def _files(path: Path) -> Iterator[str]:
+def _files_below(path: Path) -> Iterator[str]:
     if path.is_symlink() or not path.is_dir():
         yield str(path)
         return

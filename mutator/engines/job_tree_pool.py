@@ -14,58 +14,64 @@ from pathlib import Path
 
 from mutator._common.files import is_disk_full_error, remove_anything_at, remove_folder
 from mutator.engines import bytecode
-from mutator.engines.job_tree import RunTree
+from mutator.engines.job_tree import JobTree
 from mutator.targets.source_tree import SourceTree
 
 
-class BaseTree:
-    """A target's files, with bytecode that this process compiled. The folder `work` has the unused trees."""
+class JobTreePool:
+    """A target's files, with bytecode that this process compiled. Unused trees wait in `work_folder`."""
 
-    def __init__(self, tree: SourceTree, work: Path) -> None:
-        self._sources = tree.files
-        self._files = bytecode.with_bytecode(tree)
-        self._work = work
-        self._unused: list[RunTree] = []  # threads share it, which `pop` and `append` allow
-        self._numbers = count()
+    def __init__(self, tree: SourceTree, work_folder: Path) -> None:
+        self._source_files = tree.files
+        self._files_with_bytecode = bytecode.files_with_bytecode(tree)
+        self._work_folder = work_folder
+        self._unused_trees: list[JobTree] = []  # threads share it, which `pop` and `append` allow
+        self._tree_numbers = count()
 
-    def lay_out(self, place: Path, changed: Mapping[str, bytes], *, new: bool = False) -> RunTree:
-        """Make a tree in `place`, with the files `changed`.
+    def lay_out_tree(self, folder: Path, changed_files: Mapping[str, bytes], *, new: bool = False) -> JobTree:
+        """Make a tree in `folder`, with the `changed_files`.
 
         With `new`, no earlier run has used it, and it has no bytecode that anybody could exchange.
         """
-        place.parent.mkdir(parents=True, exist_ok=True)
-        pristine = self._sources if new else self._files
-        if new or not self._reused(place, changed):
-            bytecode.write(pristine, place)
-            bytecode.put(changed, place)
-        stale = set(map(bytecode.bytecode_of, changed))
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        pristine = self._source_files if new else self._files_with_bytecode
+        if new or not self._reuse_tree(folder, changed_files):
+            bytecode.write_files(pristine, folder)
+            bytecode.replace_files(changed_files, folder)
+        stale = set(map(bytecode.bytecode_path, changed_files))
         files = {name: data for name, data in pristine.items() if name not in stale}
-        return RunTree(place, {**files, **changed}, changed)
+        return JobTree(folder, {**files, **changed_files}, changed_files)
 
-    def take_back(self, tree: RunTree) -> None:
+    def take_back_tree(self, tree: JobTree) -> None:
         """Keep an unchanged tree, made pristine, for another run; leave one with new files."""
-        if tree.added():
+        if tree.added_paths():
             return
         with suppress(OSError):
-            bytecode.remove(tree.changed, tree.place)
-            changed = {*tree.changed, *map(bytecode.bytecode_of, tree.changed)}
-            bytecode.write({name: self._files[name] for name in changed & self._files.keys()}, tree.place)
-            unused = self._work / f"{os.getpid()}-tree-{next(self._numbers)}"
-            if tree.move(unused):
-                self._unused.append(tree)
+            bytecode.remove_files(tree.changed_files, tree.folder)
+            changed_names = {*tree.changed_files, *map(bytecode.bytecode_path, tree.changed_files)}
+            bytecode.write_files(
+                {
+                    name: self._files_with_bytecode[name]
+                    for name in changed_names & self._files_with_bytecode.keys()
+                },
+                tree.folder,
+            )
+            unused = self._work_folder / f"{os.getpid()}-tree-{next(self._tree_numbers)}"
+            if tree.move_to(unused):
+                self._unused_trees.append(tree)
 
     def close(self) -> None:
-        while self._unused:
-            remove_folder(self._unused.pop().place)
+        while self._unused_trees:
+            remove_folder(self._unused_trees.pop().folder)
 
-    def _reused(self, place: Path, changed: Mapping[str, bytes]) -> bool:
-        while self._unused:
+    def _reuse_tree(self, folder: Path, changed_files: Mapping[str, bytes]) -> bool:
+        while self._unused_trees:
             try:
-                if self._unused.pop().move(place):
-                    bytecode.put(changed, place)
+                if self._unused_trees.pop().move_to(folder):
+                    bytecode.replace_files(changed_files, folder)
                     return True
             except OSError as err:
                 if is_disk_full_error(err):
                     raise
-            remove_anything_at(place)  # a run has deleted the tree, or put something else in its place
+            remove_anything_at(folder)  # a run has deleted the tree, or put something else in its place
         return False

@@ -15,21 +15,28 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.file_change_detection import UnchangedFiles
 from mutator._common.files import disk_full_error, raising_disk_full, remove_anything_at, remove_folder
 from mutator._common.hashing import digest
-from mutator.engines.engine_jobs import Execution, Job, Raised, RunMode, Setting, failed
-from mutator.engines.job_folder import OUTPUT, RunHome, is_disturbance, make_work
-from mutator.engines.job_tree_pool import BaseTree
+from mutator.engines.engine_jobs import (
+    EngineArguments,
+    Job,
+    JobResult,
+    RaisedException,
+    RunMode,
+    harness_error_result,
+)
+from mutator.engines.job_folder import OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
+from mutator.engines.job_tree_pool import JobTreePool
 from mutator.engines.sandbox import Sandbox
 from mutator.engines.target_processes import (
-    LOST,
-    PATIENCE_S,
-    Ended,
+    GUARD_LOST,
+    GUARD_PATIENCE_S,
+    ProcessEnding,
     check_limits,
-    end,
-    environment,
-    is_full,
-    judge,
-    raised_in,
-    steady,
+    exception_in_report,
+    judge_run,
+    run_environment,
+    wait_for_guard,
+    was_disk_full,
+    without_run_specifics,
 )
 from mutator.model import Limits, Status
 from mutator.mutants.anchors import parsed_file
@@ -37,130 +44,131 @@ from mutator.mutants.probe import probe_module, probe_state_after
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_code import stop_source
 
-_CHILD = Path(__file__).parent / "in_target" / "run_once.py"
-_LOOK_UP_S = 0.5  # interval between two checks that the parent is alive
-_LONGEST = 4096  # maximum size of the guard's report, in bytes
+_CHILD_SCRIPT = Path(__file__).parent / "in_target" / "run_once.py"
+_PARENT_CHECK_INTERVAL_S = 0.5  # interval between two checks that the parent is alive
+_MOST_GUARD_REPORT_BYTES = 4096  # maximum size of the guard's report, in bytes
 
 
 class ReferenceEngine:
     """Runs each job in a fresh interpreter on its own tree.
 
-    The parameters are those of `Setting`. If the manifest supports it, runs of an `independent` engine use no
-    data left by other runs. The same holds for mutants that change a file in the manifest's `reads_itself`.
+    The parameters are those of `EngineArguments`. If the manifest supports it, runs of an `independent`
+    engine use no data left by other runs. The same holds for mutants that change a file in the manifest's
+    `reads_itself`.
     """
 
     def __init__(
         self,
         manifest: TargetManifest,
-        work: Path,
+        work_folder: Path,
         limits: Limits,
-        parent: int | None = None,
+        parent_pid: int | None = None,
         *,
         independent: bool = False,
     ) -> None:
         check_limits(limits)
         self.manifest = manifest
-        self.work = work.resolve()
-        self._base_tree = BaseTree(manifest.tree, self.work)
+        self.work_folder = work_folder.resolve()
+        self._tree_pool = JobTreePool(manifest.tree, self.work_folder)
         self.limits = limits
-        self._pristine = {path: digest(data) for path, data in manifest.tree.files.items()}
-        self._parent = parent
-        self._independent = independent
+        self._pristine_digests = {path: digest(data) for path, data in manifest.tree.files.items()}
+        self._parent_pid = parent_pid
+        self._is_independent = independent
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
+    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, JobResult]]:
         for job in jobs:
-            folder = self.folder_of(job)
+            folder = self.folder_of_job(job)
             try:
                 yield job, self.execute(job, folder)
             finally:
                 remove_folder(folder)
 
-    def folder_of(self, job: Job) -> Path:
+    def folder_of_job(self, job: Job) -> Path:
         """Return the scratch folder in which `run` runs a job. In a sandbox, no other run reaches it."""
-        return self.work / f"{os.getpid()}-{job.name}"
+        return self.work_folder / f"{os.getpid()}-{job.name}"
 
     def close(self) -> None:
-        self._base_tree.close()
+        self._tree_pool.close()
 
-    def execute(self, job: Job, folder: Path) -> Execution:
+    def execute(self, job: Job, folder: Path) -> JobResult:
         """Run one job in the new scratch folder `folder`, which the caller deletes.
 
         It runs again, once, if it or another run changed what it uses.
         """
-        with raising_disk_full(self.work):
+        with raising_disk_full(self.work_folder):
             try:
-                execution, disturbed = self._try(job, folder)
+                execution, disturbed = self._try_once(job, folder)
             except OSError as err:
-                if not is_disturbance(err):
+                if not can_be_disturbance(err):
                     raise
                 disturbed = True
             if disturbed:
                 remove_anything_at(folder)
                 try:
-                    execution, _ = self._try(job, folder, new=True)
+                    execution, _ = self._try_once(job, folder, new=True)
                 except OSError as err:
-                    if not is_disturbance(err):
+                    if not can_be_disturbance(err):
                         raise
                     why = f"the folder of the run was changed while it was in use ({err.strerror})"
-                    return failed(why, folder, RunMode.REFERENCE)
+                    return harness_error_result(why, folder, RunMode.REFERENCE)
         return execution
 
-    def _try(self, job: Job, folder: Path, *, new: bool = False) -> tuple[Execution, bool]:
+    def _try_once(self, job: Job, folder: Path, *, new: bool = False) -> tuple[JobResult, bool]:
         """Run a job; return the result, and whether its input or folders were changed meanwhile.
 
         With `new`, the job gets a tree of its own, without bytecode.
         """
-        make_work(self.work)
-        with RunHome(folder) as home:
-            ended, changed = self._run(job, home, new=new)
-            moved = home.is_moved()
-            return self._execution(job, home, ended, changed), bool(changed) or moved
+        ensure_work_folder(self.work_folder)
+        with JobFolder(folder) as home:
+            ended, changed = self._run_in_folder(job, home, new=new)
+            moved = home.was_moved()
+            return self._result_of_run(job, home, ended, changed), bool(changed) or moved
 
-    def _run(self, job: Job, home: RunHome, *, new: bool) -> tuple[Ended, str]:
+    def _run_in_folder(self, job: Job, home: JobFolder, *, new: bool) -> tuple[ProcessEnding, str]:
         """Run a job; return how it ended, and a file of its input that was changed meanwhile (or nothing)."""
         folder = home.path
-        tree = self._base_tree.lay_out(folder / "tree", job.files, new=new)
-        request = json.dumps(self._request(job, home)).encode()
+        tree = self._tree_pool.lay_out_tree(folder / "tree", job.changed_files, new=new)
+        request = json.dumps(self._job_request(job, home)).encode()
         path = folder / "job.json"
         path.write_bytes(request)
         scenario = job.scenario.resolve()
         inputs = UnchangedFiles({str(path): request, str(scenario): read_bounded(scenario)})
-        ended = self._guarded(job, path, home)
+        ended = self._run_guarded(job, path, home)
         changed = tree.first_changed() or inputs.first_changed().removeprefix(f"{folder}/")
         if not (changed or new):
-            self._base_tree.take_back(tree)
+            self._tree_pool.take_back_tree(tree)
         return ended, changed
 
-    def _execution(self, job: Job, home: RunHome, ended: Ended, changed: str) -> Execution:
-        home.let_in()
+    def _result_of_run(self, job: Job, home: JobFolder, ended: ProcessEnding, changed: str) -> JobResult:
+        home.unlock()
         report = home.read_report(files=dict, modules=list)
-        status, detail = self._judge(job, ended, report, changed)
-        if status is not Status.OK and is_full(self.work, report):
-            raise disk_full_error(self.work)
-        raised = raised_in(report) if report and status is Status.CRASHED else None
-        return Execution(
+        status, detail = self._judge_status(job, ended, report, changed)
+        if status is not Status.OK and was_disk_full(self.work_folder, report):
+            raise disk_full_error(self.work_folder)
+        raised = exception_in_report(report) if report and status is Status.CRASHED else None
+        return JobResult(
             status=status,
-            detail=steady(detail, home.path),
-            out=home.move_output(home.path / OUTPUT),
-            probe=report["probe"] if report else None,
+            detail=without_run_specifics(detail, home.path),
+            out=home.move_output(home.path / OUTPUT_FOLDER),
+            probe_report=report["probe"] if report else None,
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
-            raised=raised and _steady(raised, home.path),
-            active=home.was_active(),
-            log=home.log_tail(),
-            stopped=bool(report and report.get("stopped")),
-            modules=tuple(report["modules"]) if report else (),
-            watched=report.get("watched", {}) if report else {},
-            lines=report.get("lines", {}) if report else {},
+            exception=raised and _exception_without_run_specifics(raised, home.path),
+            was_fault_active=home.was_fault_active(),
+            log_tail=home.log_tail(),
+            was_stopped_at_hazard=bool(report and report.get("stopped")),
+            third_party_modules=tuple(report["modules"]) if report else (),
+            watch_report=report.get("watched", {}) if report else {},
+            executed_lines=report.get("lines", {}) if report else {},
         )
 
-    def _request(self, job: Job, home: RunHome) -> dict[str, Any]:
+    def _job_request(self, job: Job, home: JobFolder) -> dict[str, Any]:
         arguments = self.manifest.arguments(
             scenario=job.scenario.resolve(),
             seed=job.seed,
-            out=home.out,
+            out=home.output_folder,
             changes=job.changes,
-            independent=self._independent or self.manifest.reads_any(job.files),
+            independent=self._is_independent or self.manifest.reads_any(job.changed_files),
         )
         return {
             "home": str(home.path),
@@ -168,113 +176,129 @@ class ReferenceEngine:
             "packages": list(self.manifest.import_names),
             "module": self.manifest.entry_module,
             "args": list(arguments),
-            "probe": probe_module(self.manifest.package) if job.mutant is not None else None,
-            "out": str(home.out),
-            "report": str(home.report),
-            "inactive": str(home.inactive),
+            "probe": probe_module(self.manifest.package) if job.mutant_id is not None else None,
+            "out": str(home.output_folder),
+            "report": str(home.report_path),
+            "inactive": str(home.inactive_marker),
             "cpu_s": self.limits.cpu_s,
             "wall_s": self.limits.wall_s,
             "memory_mb": self.limits.memory_mb,
             "disk_mb": self.limits.disk_mb,
             "steps": self.limits.steps,
-            "stop": stop_source(self.manifest) if job.stop else None,
+            "stop": stop_source(self.manifest) if job.stop_at_hazard else None,
             "stepwise": self.manifest.stepwise,
-            "watch": job.watch,
-            "observe": self._observed() if job.watch or job.observe else None,
-            "lines": self._observation() if job.lines else None,
+            "watch": job.watch_nondeterminism,
+            "observe": self._observed_names() if job.watch_nondeterminism or job.keep_observations else None,
+            "lines": self._observation_lines() if job.note_executed_lines else None,
         }
 
-    def _observation(self) -> tuple[str, list[int]]:
+    def _observation_lines(self) -> tuple[str, list[int]]:
         location = self.manifest.observation.location
         first, last = parsed_file(self.manifest.tree, location.path).line_span(location)
         return location.path, [line + 1 for line in range(first, max(last, first + 1))]
 
-    def _observed(self) -> tuple[str, list[str]]:
+    def _observed_names(self) -> tuple[str, list[str]]:
         holder, _ = probe_state_after(0, None, None)
         return holder, [value.name for value in self.manifest.observation.values]
 
-    def _guarded(self, job: Job, request: Path, home: RunHome) -> Ended:
+    def _run_guarded(self, job: Job, request_path: Path, home: JobFolder) -> ProcessEnding:
         """Run the job in a guarded process. Process and guard end when the connection is closed."""
         began, folder = time.monotonic(), home.path
-        ours, theirs = socket.socketpair()
-        command = [sys.executable, "-P", "-s", str(_CHILD), str(request), str(theirs.fileno())]
-        scenario, fault_free = job.scenario.resolve(), not job.files
-        sandbox = Sandbox.of(self.manifest, folder, [scenario], fault_free=fault_free)
+        harness_socket, guard_socket = socket.socketpair()
+        command = [
+            sys.executable,
+            "-P",
+            "-s",
+            str(_CHILD_SCRIPT),
+            str(request_path),
+            str(guard_socket.fileno()),
+        ]
+        scenario, fault_free = job.scenario.resolve(), not job.changed_files
+        sandbox = Sandbox.of_target(self.manifest, folder, [scenario], fault_free=fault_free)
         if sandbox:
-            command = sandbox.command(command)
-        with ours:
-            with theirs, home.log.open("wb") as log:
-                guarding = subprocess.Popen(
+            command = sandbox.wrap_command(command)
+        with harness_socket:
+            with guard_socket, home.log_path.open("wb") as log:
+                guard_process = subprocess.Popen(
                     command,
                     cwd=folder,
                     stdin=subprocess.DEVNULL,
                     stdout=log,
                     stderr=subprocess.STDOUT,
-                    env=environment(job.hash_seed, folder, self.manifest.env),
-                    pass_fds=[theirs.fileno()],
+                    env=run_environment(job.hash_seed, folder, self.manifest.env),
+                    pass_fds=[guard_socket.fileno()],
                     start_new_session=True,  # Ctrl-C at the terminal is for the command, not for the target
                 )
             try:
-                told = self._told(ours, guarding, began + self.limits.wall_s + PATIENCE_S)
+                guard_report = self._receive_guard_report(
+                    harness_socket, guard_process, began + self.limits.wall_s + GUARD_PATIENCE_S
+                )
             finally:
-                ours.close()
-                end(guarding)
+                harness_socket.close()
+                wait_for_guard(guard_process)
                 if sandbox:
-                    sandbox.clear()
+                    sandbox.delete_new_paths()
                     sandbox.close()
-        if not told:
+        if not guard_report:
             seconds = time.monotonic() - began
-            return Ended(code=guarding.returncode, cpu_s=0.0, wall_s=seconds, stopped=LOST)
-        return Ended(**json.loads(told))
+            return ProcessEnding(code=guard_process.returncode, cpu_s=0.0, wall_s=seconds, stopped=GUARD_LOST)
+        return ProcessEnding(**json.loads(guard_report))
 
-    def _told(self, connection: socket.socket, guarding: subprocess.Popen[bytes], deadline: float) -> bytes:
+    def _receive_guard_report(
+        self, connection: socket.socket, guard_process: subprocess.Popen[bytes], deadline: float
+    ) -> bytes:
         """Return the guard's report; empty if none arrives in time. Exit if this process's parent is gone."""
-        connection.settimeout(_LOOK_UP_S)
+        connection.settimeout(_PARENT_CHECK_INTERVAL_S)
         while time.monotonic() < deadline:
             try:
-                return connection.recv(_LONGEST)
+                return connection.recv(_MOST_GUARD_REPORT_BYTES)
             except TimeoutError:
-                guarding.send_signal(signal.SIGCONT)  # a run can stop its guard
-                if self._parent is not None and os.getppid() != self._parent:
+                guard_process.send_signal(signal.SIGCONT)  # a run can stop its guard
+                if self._parent_pid is not None and os.getppid() != self._parent_pid:
                     raise SystemExit("the process that started this one is gone") from None
         return b""
 
-    def _judge(
-        self, job: Job, ended: Ended, report: dict[str, Any] | None, changed: str
+    def _judge_status(
+        self, job: Job, ended: ProcessEnding, report: dict[str, Any] | None, changed: str
     ) -> tuple[Status, str]:
-        if report is not None and (problem := self._wrong_tree(job, report, changed)):
+        if report is not None and (problem := self._problem_with_tree(job, report, changed)):
             return Status.HARNESS_ERROR, problem
-        status, detail = judge(self.limits, ended, report)
+        status, detail = judge_run(self.limits, ended, report)
         if report is None and changed and status is Status.CRASHED:  # whoever changed it can have caused this
-            return Status.HARNESS_ERROR, _in_use(changed)
+            return Status.HARNESS_ERROR, _describe_change(changed)
         if report is None or (status is not Status.OK and report["probe"] is None):
             return status, detail
-        problem = job.problem_of(report["probe"])
+        problem = job.problem_of_probe_report(report["probe"])
         return (Status.HARNESS_ERROR, problem) if problem else (status, detail)
 
-    def _wrong_tree(self, job: Job, report: dict[str, Any], changed: str) -> str:
+    def _problem_with_tree(self, job: Job, report: dict[str, Any], changed: str) -> str:
         """Return the problem with the tree that ran; empty if it was the job's."""
         if report["outside"]:
             return f"the target was also imported from {', '.join(report['outside'])}"
-        expected = self._pristine | {path: digest(data) for path, data in job.files.items()}
+        expected = self._pristine_digests | {path: digest(data) for path, data in job.changed_files.items()}
         # a data cache can leave other files in the tree
         more = {path for path in report["files"] if path.endswith(".py")}
         for path in sorted(expected.keys() | more):
             if report["files"].get(path) != expected.get(path):
                 return f"{path} in the tree that ran is not the one of this job"
-        return _in_use(changed) if changed else ""
+        return _describe_change(changed) if changed else ""
 
 
-def _in_use(changed: str) -> str:
+def _describe_change(changed: str) -> str:
     return f"{changed} was changed while it was in use"
 
 
-def _steady(raised: Raised, folder: Path) -> Raised:
+def _exception_without_run_specifics(raised: RaisedException, folder: Path) -> RaisedException:
     stacks = tuple(
-        tuple((steady(path, folder), line, column) for path, line, column in stack) for stack in raised.stacks
+        tuple((without_run_specifics(path, folder), line, column) for path, line, column in stack)
+        for stack in raised.stacks
     )
-    return Raised(kind=steady(raised.kind, folder), message=steady(raised.message, folder), stacks=stacks)
+    return RaisedException(
+        kind=without_run_specifics(raised.kind, folder),
+        message=without_run_specifics(raised.message, folder),
+        stacks=stacks,
+    )
 
 
-def make_reference(setting: Setting) -> ReferenceEngine:
-    return ReferenceEngine(setting.manifest, setting.work, setting.limits, setting.parent)
+def make_reference_engine(arguments: EngineArguments) -> ReferenceEngine:
+    return ReferenceEngine(arguments.manifest, arguments.work_folder, arguments.limits, arguments.parent_pid)

@@ -17,25 +17,27 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from mutator._common.files import remove_anything_at
-from mutator.engines.target_processes import environment
+from mutator.engines.target_processes import run_environment
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
-_PACKAGE = Path(__file__).parents[1]  # the harness, parts of which run inside
-_ALONE = ("--unshare-all", "--die-with-parent", "--new-session", "--as-pid-1", "--cap-drop", "ALL")
-_SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store", "/gnu/store")
-_ETC = ("alternatives", "fonts", "group", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "localtime")
-_ETC_MORE = ("mime.types", "nsswitch.conf", "passwd", "timezone")
-_CPUS = "/sys/devices/system/cpu"
-_PYTHON = "import json, sys; print(json.dumps([sys.prefix, sys.base_prefix, sys.exec_prefix, *sys.path]))"
-_PATIENCE_S = 60.0
-_TEMPORARY = {"/tmp": "tmp", "/dev/shm": "shm"}  # folders of the sandbox -> their names in its folder
+_HARNESS_FOLDER = Path(__file__).parents[1]  # the harness, parts of which run inside
+_ISOLATION_FLAGS = ("--unshare-all", "--die-with-parent", "--new-session", "--as-pid-1", "--cap-drop", "ALL")
+_SYSTEM_FOLDERS = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store", "/gnu/store")
+_ETC_NAMES = ("alternatives", "fonts", "group", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "localtime")
+_MORE_ETC_NAMES = ("mime.types", "nsswitch.conf", "passwd", "timezone")
+_CPUS_FOLDER = "/sys/devices/system/cpu"
+_PRINT_PYTHON_FOLDERS = (
+    "import json, sys; print(json.dumps([sys.prefix, sys.base_prefix, sys.exec_prefix, *sys.path]))"
+)
+_TRIAL_TIMEOUT_S = 60.0
+_TEMPORARY_FOLDERS = {"/tmp": "tmp", "/dev/shm": "shm"}  # folders of the sandbox -> their names in its folder
 
 
 class Sandbox:
-    """A sandbox in which processes read `reads`, and write to the existing folder `folder` and to `cache`."""
+    """A sandbox in which processes read `readable_paths`, and write to the folder `folder` and to `cache`."""
 
-    def __init__(self, folder: Path, reads: Iterable[Path], cache: Path | None = None) -> None:
+    def __init__(self, folder: Path, readable_paths: Iterable[Path], cache: Path | None = None) -> None:
         if folder.is_symlink():
             raise MutatorError(
                 "a link in the place of a run's folder",
@@ -45,26 +47,44 @@ class Sandbox:
             )
         self._folder = folder
         binds: list[str] = []
-        self._temporary: list[int] = []  # descriptors, because runs can exchange what is in `folder`
-        for place, name in _TEMPORARY.items():
+        self._temporary_handles: list[int] = []  # descriptors, because runs can exchange what is in `folder`
+        for place, name in _TEMPORARY_FOLDERS.items():
             (folder / name).mkdir(exist_ok=True)
-            self._temporary.append(os.open(folder / name, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW))
+            self._temporary_handles.append(
+                os.open(folder / name, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+            )
             binds += ["--bind", str(folder / name), place]
-        self._first: set[Path] = set()
-        system = [word for path in _system() for word in _read_only(path)]
+        self._first_paths: set[Path] = set()
+        system = [word for path in _system_paths() for word in _read_only_arguments(path)]
         devices = ("--proc", "/proc", "--dev", "/dev")
-        readable = [word for path in (*_python(), *reads) for word in _read_only(path)]
-        writable = [word for path in (folder, *([cache] if cache else [])) for word in _bind(path)]
+        readable = [
+            word for path in (*_python_paths(), *readable_paths) for word in _read_only_arguments(path)
+        ]
+        writable = [word for path in (folder, *([cache] if cache else [])) for word in _bind_arguments(path)]
         sealed = ("--remount-ro", "/dev", "--remount-ro", "/", "--")
-        self._words = [_bwrap(), *_ALONE, *system, *devices, *binds, *readable, *writable, *sealed]
+        self._command_prefix = [
+            _bwrap_path(),
+            *_ISOLATION_FLAGS,
+            *system,
+            *devices,
+            *binds,
+            *readable,
+            *writable,
+            *sealed,
+        ]
 
     @classmethod
-    def of(
-        cls, manifest: TargetManifest, folder: Path, reads: Iterable[Path], *, fault_free: bool = False
+    def of_target(
+        cls,
+        manifest: TargetManifest,
+        folder: Path,
+        readable_paths: Iterable[Path],
+        *,
+        fault_free: bool = False,
     ) -> "Sandbox | None":
         """Return the sandbox of a run in `folder`, or None if the target's code runs without one.
 
-        Besides `reads`, a run reads what the target's arguments name: its root and its cache. Only
+        Besides `readable_paths`, a run reads what the target's arguments name: its root and its cache. Only
         `fault_free` runs write to the cache.
         """
         if not manifest.sandbox:
@@ -72,35 +92,35 @@ class Sandbox:
         if fault_free:
             with suppress(OSError):
                 manifest.cache.mkdir(parents=True, exist_ok=True)
-                return cls(folder, (*reads, *manifest.read_by_runs()), manifest.cache)
-        return cls(folder, (*reads, *manifest.read_by_runs(), manifest.cache))
+                return cls(folder, (*readable_paths, *manifest.read_by_runs()), manifest.cache)
+        return cls(folder, (*readable_paths, *manifest.read_by_runs(), manifest.cache))
 
-    def command(self, words: Sequence[str]) -> list[str]:
+    def wrap_command(self, words: Sequence[str]) -> list[str]:
         """Return the command that runs `words` in the sandbox."""
-        return [*self._words, *words]
+        return [*self._command_prefix, *words]
 
-    def begin(self) -> None:
+    def note_first_paths(self) -> None:
         """Note what /tmp and /dev/shm contain before the first run. Folders can be mounted there."""
-        self._first = set(self._left())
+        self._first_paths = set(self._paths_in_temporary_folders())
 
-    def clear(self) -> None:
+    def delete_new_paths(self) -> None:
         """Delete what a run left in /tmp and /dev/shm."""
-        for path in set(self._left()) - self._first:
+        for path in set(self._paths_in_temporary_folders()) - self._first_paths:
             remove_anything_at(path)
 
     def close(self) -> None:
-        while self._temporary:
-            os.close(self._temporary.pop())
+        while self._temporary_handles:
+            os.close(self._temporary_handles.pop())
 
-    def _left(self) -> Iterator[Path]:
-        for handle in self._temporary:
+    def _paths_in_temporary_folders(self) -> Iterator[Path]:
+        for handle in self._temporary_handles:
             with suppress(OSError):
                 yield from Path(f"/proc/self/fd/{handle}").iterdir()
 
 
-def check() -> None:
+def check_sandbox_available() -> None:
     """Raise MutatorError if no sandbox can be made here."""
-    if problem := shortcoming():
+    if problem := reason_not_available():
         raise MutatorError(
             f"no sandbox: {problem}",
             argument="sandbox",
@@ -110,65 +130,65 @@ def check() -> None:
 
 
 @lru_cache(maxsize=1)
-def shortcoming() -> str:
+def reason_not_available() -> str:
     """Return why no sandbox can be made here; empty if one can."""
     if shutil.which("bwrap") is None:
         return "`bwrap` is not installed (Debian, Ubuntu, Fedora: package bubblewrap)"
     with TemporaryDirectory(prefix="mutator-") as folder:
         try:
             trial = Sandbox(Path(folder), ())
-            command = trial.command([sys.executable, "-P", "-s", "-c", "import numpy"])
+            command = trial.wrap_command([sys.executable, "-P", "-s", "-c", "import numpy"])
             trial.close()
-            done = subprocess.run(
+            trial_run = subprocess.run(
                 command,
                 cwd=folder,
-                env=environment(0, Path(folder)),
+                env=run_environment(0, Path(folder)),
                 capture_output=True,
                 text=True,
-                timeout=_PATIENCE_S,
+                timeout=_TRIAL_TIMEOUT_S,
                 check=False,
             )
         except (OSError, subprocess.TimeoutExpired) as err:
             return str(err)
-    said = done.stderr.strip().splitlines() or [f"`bwrap` ended with status {done.returncode}"]
-    return said[-1] if done.returncode else ""
+    messages = trial_run.stderr.strip().splitlines() or [f"`bwrap` ended with status {trial_run.returncode}"]
+    return messages[-1] if trial_run.returncode else ""
 
 
-def _bwrap() -> str:
+def _bwrap_path() -> str:
     return shutil.which("bwrap") or "bwrap"
 
 
-def _bind(path: Path) -> tuple[str, str, str]:
+def _bind_arguments(path: Path) -> tuple[str, str, str]:
     return ("--bind", str(path), str(path))
 
 
-def _read_only(path: str | Path) -> tuple[str, str, str]:
+def _read_only_arguments(path: str | Path) -> tuple[str, str, str]:
     return ("--ro-bind-try", str(path), str(path))
 
 
-def _system() -> Iterator[str]:
-    yield from _SYSTEM
-    yield from (f"/etc/{name}" for name in (*_ETC, *_ETC_MORE))
-    yield _CPUS
+def _system_paths() -> Iterator[str]:
+    yield from _SYSTEM_FOLDERS
+    yield from (f"/etc/{name}" for name in (*_ETC_NAMES, *_MORE_ETC_NAMES))
+    yield _CPUS_FOLDER
 
 
 @lru_cache(maxsize=1)
-def _python() -> tuple[Path, ...]:
+def _python_paths() -> tuple[Path, ...]:
     """Return the folders and files of Python, its packages, their libraries, and the harness.
 
     A folder that contains the user's home is left out, because the sandbox hides the home.
     """
     with TemporaryDirectory(prefix="mutator-") as folder:
-        done = subprocess.run(
-            [sys.executable, "-P", "-s", "-c", _PYTHON],
+        printed = subprocess.run(
+            [sys.executable, "-P", "-s", "-c", _PRINT_PYTHON_FOLDERS],
             cwd=folder,
-            env=environment(0, Path(folder)),
+            env=run_environment(0, Path(folder)),
             capture_output=True,
             check=True,
         )
     libraries = os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep)
-    named = [_PACKAGE, *map(Path, (*json.loads(done.stdout), *libraries))]
-    found = {place for path in named for place in (path, path.resolve()) if path.is_absolute()}
+    named = [_HARNESS_FOLDER, *map(Path, (*json.loads(printed.stdout), *libraries))]
+    candidates = {place for path in named for place in (path, path.resolve()) if path.is_absolute()}
     home = Path(os.environ.get("HOME") or "/").resolve()
-    shown = {path for path in found if path.exists() and not home.is_relative_to(path.resolve())}
-    return tuple(sorted(path for path in shown if not shown & set(path.parents)))
+    readable = {path for path in candidates if path.exists() and not home.is_relative_to(path.resolve())}
+    return tuple(sorted(path for path in readable if not readable & set(path.parents)))

@@ -14,25 +14,25 @@ from typing import Any
 
 from mutator._common.confined_files import open_below
 from mutator._common.files import is_disk_full_error
-from mutator.engines.engine_jobs import Raised
+from mutator.engines.engine_jobs import RaisedException
 from mutator.engines.in_target import process_guard
 from mutator.errors import MutatorError, Outside
 from mutator.model import Limits, Status
 from mutator.targets.process_environment import FIXED, KEPT
 
-LOST = "lost"  # no process is left to report the ending
-PATIENCE_S = 60.0  # time for the guard's report, after a run's wall limit
-_END_S = 10.0
-_REPORT = {"ended": str, "disk_full": bool, "outside": list, "probe": object}
-_NAMES = ("outside", "modules", "libraries", "threads")  # lists of texts in a report
-_LOG_TAIL = 4000
-_LEAST_FREE = 4 << 20  # with less free space than this, a failed run is not blamed on the target
-_TRIAL = 1 << 20  # the same applies if a file of this size cannot be written
+GUARD_LOST = "lost"  # no process is left to report the ending
+GUARD_PATIENCE_S = 60.0  # time for the guard's report, after a run's wall limit
+_GUARD_END_TIMEOUT_S = 10.0
+_REPORT_FIELD_TYPES = {"ended": str, "disk_full": bool, "outside": list, "probe": object}
+_TEXT_LIST_FIELDS = ("outside", "modules", "libraries", "threads")  # lists of texts in a report
+_LOG_TAIL_BYTES = 4000
+_MIN_FREE_BYTES = 4 << 20  # with less free space than this, a failed run is not blamed on the target
+_TRIAL_FILE_BYTES = 1 << 20  # the same applies if a file of this size cannot be written
 _OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ended:
+class ProcessEnding:
     """How a run's process ended: exit code (negative for a signal), CPU time and wall time.
 
     `stopped` is why it was stopped: WALL or DISK of `process_guard`, LOST, or "".
@@ -49,12 +49,12 @@ def check_limits(limits: Limits) -> None:
 
     With lower limits, a run that finishes on other machines could be stopped here.
     """
-    wanted = (
+    required = (
         (resource.RLIMIT_AS, "memory_mb", limits.memory_mb << 20, "ulimit -v"),
         (resource.RLIMIT_CPU, "cpu_s", limits.cpu_s + process_guard.HARD_CPU_EXTRA_S, "ulimit -t"),
         (resource.RLIMIT_FSIZE, "disk_mb", limits.disk_mb << 20, "ulimit -f"),
     )
-    for number, name, least, command in wanted:
+    for number, name, least, command in required:
         soft, hard = resource.getrlimit(number)
         if hard != resource.RLIM_INFINITY and hard < least:
             try:
@@ -67,26 +67,26 @@ def check_limits(limits: Limits) -> None:
                 ) from None
 
 
-def judge(limits: Limits, ended: Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
-    if stopped := _judge_stopped(limits, ended):
+def judge_run(limits: Limits, ending: ProcessEnding, report: dict[str, Any] | None) -> tuple[Status, str]:
+    if stopped := _judge_stopped_run(limits, ending):
         return stopped
     if report is not None:
         return _judge_report(limits, report)
-    if ended.code < 0:
-        return Status.CRASHED, f"killed by {signal.Signals(-ended.code).name}"
-    return Status.CRASHED, f"left with status {ended.code} without a report"
+    if ending.code < 0:
+        return Status.CRASHED, f"killed by {signal.Signals(-ending.code).name}"
+    return Status.CRASHED, f"left with status {ending.code} without a report"
 
 
-def _judge_stopped(limits: Limits, ended: Ended) -> tuple[Status, str] | None:
+def _judge_stopped_run(limits: Limits, ending: ProcessEnding) -> tuple[Status, str] | None:
     """Judge a run that a limit or an outside signal stopped, even after its report."""
-    killed = signal.Signals(-ended.code) if ended.code < 0 else None
-    if ended.stopped == LOST:
-        return Status.HARNESS_ERROR, f"the process that guarded the run is gone (exit code {ended.code})"
-    if ended.stopped == process_guard.WALL:
+    killed = signal.Signals(-ending.code) if ending.code < 0 else None
+    if ending.stopped == GUARD_LOST:
+        return Status.HARNESS_ERROR, f"the process that guarded the run is gone (exit code {ending.code})"
+    if ending.stopped == process_guard.WALL:
         return Status.TIMEOUT, f"wall time limit of {limits.wall_s} s"
-    if ended.stopped == process_guard.DISK:
+    if ending.stopped == process_guard.DISK:
         return Status.TIMEOUT, f"disk limit of {limits.disk_mb} MiB"
-    if killed is signal.SIGXCPU or (killed is signal.SIGKILL and ended.cpu_s >= limits.cpu_s):
+    if killed is signal.SIGXCPU or (killed is signal.SIGKILL and ending.cpu_s >= limits.cpu_s):
         return Status.TIMEOUT, f"CPU time limit of {limits.cpu_s} s"
     if killed in _OUTSIDE_SIGNALS:
         return Status.HARNESS_ERROR, f"killed from outside by {killed.name}"
@@ -96,84 +96,90 @@ def _judge_stopped(limits: Limits, ended: Ended) -> tuple[Status, str] | None:
 def _judge_report(limits: Limits, report: dict[str, Any]) -> tuple[Status, str]:
     if report["ended"] == "steps":
         return Status.TIMEOUT, f"limit of {limits.steps} simulation steps"
-    if raised := raised_in(report):
-        return Status.CRASHED, raised.text
+    if raised := exception_in_report(report):
+        return Status.CRASHED, raised.description
     return Status.OK, ""
 
 
-def raised_in(report: dict[str, Any]) -> Raised | None:
+def exception_in_report(report: dict[str, Any]) -> RaisedException | None:
     error = report["error"]
     if error is None:
         return None
-    own, *others = (
+    first_stack, *other_stacks = (
         tuple((str(path), int(line), int(column)) for path, line, column in stack)
         for stack in error["stacks"]
     )
-    stacks = (own, *others)
-    return Raised(kind=str(error["kind"]), message=str(error["message"]), stacks=stacks)
+    stacks = (first_stack, *other_stacks)
+    return RaisedException(kind=str(error["kind"]), message=str(error["message"]), stacks=stacks)
 
 
-def environment(hash_seed: int, folder: Path, more: Mapping[str, str] | None = None) -> dict[str, str]:
+def run_environment(
+    hash_seed: int, temporary_folder: Path, extra_variables: Mapping[str, str] | None = None
+) -> dict[str, str]:
     """Return the environment of a run. Of the user's variables, it has only those that Python needs."""
-    kept = {name: os.environ[name] for name in KEPT if name in os.environ}
-    own = {**FIXED, "PYTHONHASHSEED": str(hash_seed), "TMPDIR": str(folder)}
-    return {**kept, **(more or {}), **own}
+    inherited = {name: os.environ[name] for name in KEPT if name in os.environ}
+    fixed = {**FIXED, "PYTHONHASHSEED": str(hash_seed), "TMPDIR": str(temporary_folder)}
+    return {**inherited, **(extra_variables or {}), **fixed}
 
 
-def end(guarding: subprocess.Popen[bytes]) -> None:
+def wait_for_guard(guard_process: subprocess.Popen[bytes]) -> None:
     """Wait for a guarding process. It ends when its connection is closed."""
     try:
-        guarding.wait(_END_S)
+        guard_process.wait(_GUARD_END_TIMEOUT_S)
     except subprocess.TimeoutExpired:
-        guarding.kill()
-        guarding.wait()
+        guard_process.kill()
+        guard_process.wait()
 
 
-def tail(folder: Path, name: str) -> str:
+def read_log_tail(folder: Path, name: str) -> str:
     """Return the end of a text file that a run wrote; empty if there is none."""
     try:
         with open_below(folder, name) as file:
-            file.seek(max(0, os.fstat(file.fileno()).st_size - _LOG_TAIL))
-            return file.read(_LOG_TAIL).decode("utf-8", "replace")
+            file.seek(max(0, os.fstat(file.fileno()).st_size - _LOG_TAIL_BYTES))
+            return file.read(_LOG_TAIL_BYTES).decode("utf-8", "replace")
     except (OSError, Outside):
         return ""
 
 
-def parsed_report(data: bytes, **more: type) -> dict[str, Any] | None:
+def parse_report(data: bytes, **extra_fields: type) -> dict[str, Any] | None:
     """Return the child's report; None if it is incomplete or invalid.
 
-    Each field is checked, because a run can write anything to this file. `more` has fields that only
-    one engine reports.
+    Each field is checked, because a run can write anything to this file. `extra_fields` are those that
+    only one engine reports.
     """
     try:
         report: dict[str, Any] = json.loads(data)
-        raised_in(report)
-        sound = all(isinstance(report[key], kind) for key, kind in (_REPORT | more).items())
-        sound = sound and all(isinstance(name, str) for key in _NAMES for name in report.get(key, ()))
+        exception_in_report(report)
+        is_valid = all(
+            isinstance(report[key], kind) for key, kind in (_REPORT_FIELD_TYPES | extra_fields).items()
+        )
+        is_valid = is_valid and all(
+            isinstance(name, str) for key in _TEXT_LIST_FIELDS for name in report.get(key, ())
+        )
     except (LookupError, TypeError, ValueError, RecursionError):
         return None
-    return report if sound else None
+    return report if is_valid else None
 
 
-def is_full(work: Path, report: dict[str, Any] | None) -> bool:
+def was_disk_full(work_folder: Path, report: dict[str, Any] | None) -> bool:
     """Return whether a failed run lacked space on the disk or in a quota."""
     if report is not None and report["disk_full"]:
         return True
     try:
-        state = os.statvfs(work)
+        state = os.statvfs(work_folder)
     except OSError as err:
         return is_disk_full_error(err)  # a run can delete the folder
-    if state.f_bavail * state.f_frsize < _LEAST_FREE:
+    if state.f_bavail * state.f_frsize < _MIN_FREE_BYTES:
         return True
     try:
-        with TemporaryFile(dir=work) as trial:
-            trial.write(bytes(_TRIAL))
+        with TemporaryFile(dir=work_folder) as trial:
+            trial.write(bytes(_TRIAL_FILE_BYTES))
     except OSError as err:
         return is_disk_full_error(err)
     return False
 
 
-def steady(detail: str, folder: Path) -> str:
+def without_run_specifics(detail: str, folder: Path) -> str:
     """Remove what differs between runs (scratch paths, addresses); keep the text printable and short."""
     text = detail.replace(str(folder / "tree") + os.sep, "").replace(str(folder), "...")
     text = re.sub(r"0x[0-9a-fA-F]{4,}", "0x...", text)[:500]

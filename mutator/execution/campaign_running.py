@@ -7,15 +7,15 @@ import warnings
 from pathlib import Path
 
 from mutator.errors import MutatorWarning
-from mutator.execution.distribution import Distributor, packages_of
-from mutator.execution.local_distributor import LocalWorkers
-from mutator.execution.progress_reporting import followed
-from mutator.execution.session import Notify, Summary, open_session
-from mutator.execution.stray_files import LeftFiles
+from mutator.execution.distribution import Distributor, packages_of_distributor
+from mutator.execution.local_distributor import LocalDistributor
+from mutator.execution.progress_reporting import reporting_progress
+from mutator.execution.session import ProgressCallback, Summary, open_session
+from mutator.execution.stray_files import StrayFiles
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
-LOCAL = LocalWorkers()
+LOCAL_DISTRIBUTOR = LocalDistributor()
 
 
 def run_campaign(
@@ -28,8 +28,8 @@ def run_campaign(
     engine: str | None = None,
     reviewed: bool = False,
     accept_versions: bool = False,
-    distributor: Distributor = LOCAL,
-    notify: Notify | None = None,
+    distributor: Distributor = LOCAL_DISTRIBUTOR,
+    notify: ProgressCallback | None = None,
 ) -> Summary:
     """Run or resume the campaign in the run folder `out` with `workers` processes (0: in this process).
 
@@ -53,11 +53,11 @@ def run_campaign(
         accept_versions=accept_versions,
         notify=notify,
     ) as session:
-        session.prepare(packages_of(distributor))
+        session.prepare(packages_of_distributor(distributor))
         if session.pending or session.proof:
-            left = LeftFiles()
-            with followed(session):
+            stray_files = StrayFiles()
+            with reporting_progress(session):
                 distributor.run(session)
-            if remark := left.remark():
+            if remark := stray_files.remark_on_new_files():
                 warnings.warn(remark, MutatorWarning, stacklevel=2)
         return session.finish()

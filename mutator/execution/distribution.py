@@ -10,10 +10,10 @@ from typing import Protocol
 
 from mutator._common.doors import DISTRIBUTORS
 from mutator.errors import MutatorError
-from mutator.execution.local_distributor import LocalWorkers
+from mutator.execution.local_distributor import LocalDistributor
 from mutator.execution.session import Session
 
-_DEFAULT = "dask"
+_DEFAULT_DISTRIBUTOR = "dask"
 
 
 class Distributor(Protocol):
@@ -39,7 +39,7 @@ class DistributorKind:
     open: Callable[[str, bool], Distributor]
 
 
-def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distributor:
+def choose_distributor(cluster: str | None = None, *, insecure: bool = False) -> Distributor:
     """Make the distributor for a cluster or, without one, for this machine. Opens no connection.
 
     A cluster is `NAME:WHERE` for a distributor of another package, and anything else is for Dask.
@@ -52,28 +52,28 @@ def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distri
                 argument="insecure_network",
                 remedy="leave out `insecure_network`: without a cluster, all work runs on this machine",
             )
-        return LocalWorkers()
+        return LocalDistributor()
     name, colon, where = cluster.partition(":")
     if not (colon and DISTRIBUTORS.has(name)):
-        name, where = _DEFAULT, cluster
+        name, where = _DEFAULT_DISTRIBUTOR, cluster
     kind = DISTRIBUTORS.load(name)
     assert isinstance(kind, DistributorKind)
     with DISTRIBUTORS.blaming_package(name):
         opened = kind.open(where, insecure)
-    return opened if name in DISTRIBUTORS.shipped_names() else _OfAnotherPackage(name, opened)
+    return opened if name in DISTRIBUTORS.shipped_names() else _ForeignDistributor(name, opened)
 
 
-def packages_of(distributor: Distributor) -> tuple[str, ...]:
+def packages_of_distributor(distributor: Distributor) -> tuple[str, ...]:
     """Return the package that adds a distributor, if the harness does not."""
-    name = distributor.name if isinstance(distributor, _OfAnotherPackage) else ""
+    name = distributor.name if isinstance(distributor, _ForeignDistributor) else ""
     return (package,) if (package := DISTRIBUTORS.package_of(name)) else ()
 
 
 @dataclass(frozen=True, slots=True)
-class _OfAnotherPackage:
+class _ForeignDistributor:
     name: str
-    opened: Distributor
+    distributor: Distributor
 
     def run(self, session: Session) -> None:
         with DISTRIBUTORS.blaming_package(self.name):
-            self.opened.run(session)
+            self.distributor.run(session)

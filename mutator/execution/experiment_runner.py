@@ -12,7 +12,7 @@ from mutator._common.confined_files import path_below
 from mutator._common.file_change_detection import UnchangedFiles
 from mutator._common.hashing import digest
 from mutator.campaigns.shared_runs import group_by_run
-from mutator.engines.engine_jobs import Engine, Execution, Job, RunMode
+from mutator.engines.engine_jobs import Engine, Job, JobResult, RunMode
 from mutator.errors import BadAddition, BadOutput, InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, AfterHazard, Experiment, Record, Status
@@ -32,31 +32,31 @@ from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
 
 _T = TypeVar("_T")
-_KEPT = 32  # golden runs in memory: enough for the current seed and the next
+_MOST_GOLDENS_IN_MEMORY = 32  # golden runs in memory: enough for the current seed and the next
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finished:
+class FinishedExperiment:
     """An experiment with its record.
 
-    `out` (the target's output folder) is valid until the next result; None without a mutant or a run.
+    `output_folder` (of the target) is valid until the next result; None without a mutant or a run.
     `series` is None if not requested or if the run failed.
     """
 
     experiment: Experiment
     record: Record
     mutant: Mutant | None = None
-    out: Path | None = None
+    output_folder: Path | None = None
     cpu_s: float = 0.0
     wall_s: float = 0.0
-    log: str = ""
+    log_tail: str = ""
     mode: RunMode | None = None  # None if nothing ran
-    why: str = ""
-    start: int = 0
+    fallback_reason: str = ""
+    fork_step: int = 0
     series: EncodedSeries | None = None
 
 
-class Goldens:
+class LoadedGoldens:
     """The channels of golden runs, loaded on request. Only the last few are kept in memory."""
 
     def __init__(
@@ -67,51 +67,57 @@ class Goldens:
         several_seeds: bool = False,
         digests: Mapping[Path, str] | None = None,
     ) -> None:
-        self.folder = folder_of  # finds the output folder of the fault-free run
+        self.folder_of = folder_of  # finds the output folder of the fault-free run
         self._manifest = manifest
         self._several_seeds = several_seeds
         self._digests = digests  # what `digest_of` must return, by folder
-        self._files = lru_cache(_KEPT)(self._watched)
-        self._trace = lru_cache(_KEPT)(lambda folder: self._unchanged(folder, load_manifest_channels))
-        self._sampler = lru_cache(_KEPT)(lambda folder: SeriesSampler(manifest, self._trace(folder)))
-        self._judged = lru_cache(_KEPT)(lambda folder: self._unchanged(folder, load_judged_run)[1])
+        self._files_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(self._read_files)
+        self._trace_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
+            lambda folder: self._load_unchanged(folder, load_manifest_channels)
+        )
+        self._sampler_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
+            lambda folder: SeriesSampler(manifest, self._trace_of_folder(folder))
+        )
+        self._judged_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
+            lambda folder: self._load_unchanged(folder, load_judged_run)[1]
+        )
 
-    def begin(self, experiment: Experiment) -> None:
+    def read_files_of(self, experiment: Experiment) -> None:
         """Read the golden run's files before they are used. MutatorError if their digest is another."""
-        self._files(self.folder(experiment))
+        self._files_of_folder(self.folder_of(experiment))
 
-    def check(self, folder: Path) -> None:
+    def check_unchanged(self, folder: Path) -> None:
         """Raise MutatorError if the files of a golden run have been written to since they were read."""
-        if changed := self._files(folder).first_changed():
-            raise _changed(Path(changed))
+        if changed := self._files_of_folder(folder).first_changed():
+            raise _changed_file_error(Path(changed))
 
-    def _unchanged(self, folder: Path, load: Callable[[TargetManifest, Path], _T]) -> _T:
-        self._files(folder)
+    def _load_unchanged(self, folder: Path, load: Callable[[TargetManifest, Path], _T]) -> _T:
+        self._files_of_folder(folder)
         loaded = load(self._manifest, folder)
-        self.check(folder)
+        self.check_unchanged(folder)
         return loaded
 
-    def _watched(self, folder: Path) -> UnchangedFiles:
+    def _read_files(self, folder: Path) -> UnchangedFiles:
         paths = [path for name in self._manifest.outputs if (path := path_below(folder, name)).is_file()]
         files = UnchangedFiles({str(path): read_bounded(path) for path in paths})
         if self._digests is not None and output_digest_of(self._manifest, folder) != self._digests[folder]:
-            raise _changed(folder)
+            raise _changed_file_error(folder)
         return files
 
-    def key(self, experiment: Experiment) -> str:
+    def key_of(self, experiment: Experiment) -> str:
         return GoldenRun.for_experiment(experiment, several_seeds=self._several_seeds).key
 
-    def trace(self, experiment: Experiment) -> Trace:
-        return self._trace(self.folder(experiment))
+    def trace_of(self, experiment: Experiment) -> Trace:
+        return self._trace_of_folder(self.folder_of(experiment))
 
-    def ends(self, experiment: Experiment) -> bool:
-        return self._judged(self.folder(experiment)).t_end is not None
+    def has_terminal_hazard(self, experiment: Experiment) -> bool:
+        return self._judged_of_folder(self.folder_of(experiment)).t_end is not None
 
-    def sampler(self, experiment: Experiment) -> SeriesSampler:
-        return self._sampler(self.folder(experiment))
+    def sampler_of(self, experiment: Experiment) -> SeriesSampler:
+        return self._sampler_of_folder(self.folder_of(experiment))
 
 
-class Runner:
+class ExperimentRunner:
     """Runs experiments on an engine, which chooses their order."""
 
     def __init__(
@@ -119,7 +125,7 @@ class Runner:
         manifest: TargetManifest,
         models: FaultModels,
         engine: Engine,
-        goldens: Goldens,
+        goldens: LoadedGoldens,
         scenario_file: Callable[[str], Path],
         *,
         with_series: bool = False,
@@ -131,20 +137,20 @@ class Runner:
         self.scenario_file = cache(scenario_file)
         self.with_series = with_series
 
-    def run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
+    def run(self, experiments: Iterable[Experiment]) -> Iterator[FinishedExperiment]:
         """Yield each experiment with its record.
 
         A mutant that cannot be built is not run. Experiments that share a run get the same record.
         """
         shared = {same[0].id: same for same in group_by_run(self.manifest, experiments)}
-        for finished in self._run([same[0] for same in shared.values()]):
+        for finished in self._run_distinct([same[0] for same in shared.values()]):
             yield finished
             for other in shared[finished.experiment.id][1:]:
                 record = replace(finished.record, experiment_id=other.id)
                 yield replace(finished, experiment=other, record=record, cpu_s=0.0, wall_s=0.0)
 
-    def _run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
-        refused: deque[Finished] = deque()
+    def _run_distinct(self, experiments: Iterable[Experiment]) -> Iterator[FinishedExperiment]:
+        refused: deque[FinishedExperiment] = deque()
         started: dict[str, tuple[Experiment, Mutant]] = {}
 
         def jobs() -> Iterator[Job]:
@@ -152,145 +158,159 @@ class Runner:
                 try:
                     built = build(self.manifest, self.models, experiment.fault, experiment.trigger)
                 except MutatorError as err:
-                    refused.append(self._refused(experiment, err))
+                    refused.append(self._finish_without_run(experiment, err))
                     continue
-                self.goldens.begin(experiment)
+                self.goldens.read_files_of(experiment)
                 started[experiment.id] = (experiment, built)
-                yield self._job(experiment, built)
+                yield self._build_job(experiment, built)
 
         for job, execution in self.engine.run(jobs()):
             while refused:
                 yield refused.popleft()
-            yield self._finish(*started.pop(job.name), execution)
+            yield self._finish_run(*started.pop(job.name), execution)
         yield from refused
 
-    def _job(self, experiment: Experiment, built: Mutant) -> Job:
+    def _build_job(self, experiment: Experiment, mutant: Mutant) -> Job:
         stop = experiment.after_hazard is AfterHazard.STOP
         return Job(
             name=experiment.id,
             scenario=self.scenario_file(experiment.scenario),
             seed=experiment.seed,
             changes=experiment.changes,
-            files=built.files,
-            mutant=built.id,
-            probe=built.probe,
-            injections=built.injection_ids,
-            golden=self.goldens.folder(experiment),
-            stop=stop,
-            golden_ends=stop and self.goldens.ends(experiment),
+            changed_files=mutant.files,
+            mutant_id=mutant.id,
+            probe=mutant.probe,
+            injection_ids=mutant.injection_ids,
+            golden_folder=self.goldens.folder_of(experiment),
+            stop_at_hazard=stop,
+            golden_has_terminal_hazard=stop and self.goldens.has_terminal_hazard(experiment),
         )
 
-    def _refused(self, experiment: Experiment, err: MutatorError) -> Finished:
+    def _finish_without_run(self, experiment: Experiment, err: MutatorError) -> FinishedExperiment:
         status = Status.INVALID_MUTANT if isinstance(err, InvalidMutant) else Status.HARNESS_ERROR
         place = f"{self.manifest.tree.named(err.where)}: " if err.where else ""
-        return Finished(experiment=experiment, record=_bare(experiment, status, place + err.got, None))
-
-    def _finish(self, experiment: Experiment, built: Mutant, execution: Execution) -> Finished:
-        faulty = None
-        try:
-            record, faulty = self._record(experiment, built, execution)
-        except (BadOutput, BadAddition) as err:
-            record = _bare(experiment, Status.HARNESS_ERROR, _problem_of(err), built)
-        self._check_input(experiment, execution)
-        return Finished(
+        return FinishedExperiment(
             experiment=experiment,
-            record=record,
-            mutant=built,
-            out=execution.out,
-            cpu_s=execution.cpu_s,
-            wall_s=execution.wall_s,
-            log=execution.log,
-            mode=execution.mode,
-            why=execution.why,
-            start=execution.start,
-            series=self._series(experiment, record, faulty) if faulty is not None else None,
+            record=_record_of_mutant_without_outcome(experiment, status, place + err.got, None),
         )
 
-    def _check_input(self, experiment: Experiment, execution: Execution) -> None:
+    def _finish_run(self, experiment: Experiment, mutant: Mutant, execution: JobResult) -> FinishedExperiment:
+        faulty = None
+        try:
+            record, faulty = self._build_record(experiment, mutant, execution)
+        except (BadOutput, BadAddition) as err:
+            record = _record_of_mutant_without_outcome(
+                experiment, Status.HARNESS_ERROR, _describe_problem(err), mutant
+            )
+        self._check_input_unchanged(experiment, execution)
+        return FinishedExperiment(
+            experiment=experiment,
+            record=record,
+            mutant=mutant,
+            output_folder=execution.out,
+            cpu_s=execution.cpu_s,
+            wall_s=execution.wall_s,
+            log_tail=execution.log_tail,
+            mode=execution.mode,
+            fallback_reason=execution.fallback_reason,
+            fork_step=execution.fork_step,
+            series=self._encode_series(experiment, record, faulty) if faulty is not None else None,
+        )
+
+    def _check_input_unchanged(self, experiment: Experiment, execution: JobResult) -> None:
         """Raise MutatorError if a run has written to what this experiment used, so its record would not
         count.
         """
         if execution.mode is RunMode.GOLDEN:
-            self.goldens.check(execution.out)
+            self.goldens.check_unchanged(execution.out)
         scenario = self.scenario_file(experiment.scenario)
         if digest(read_bounded(scenario)) != experiment.scenario_digest:
-            raise _changed(scenario)
+            raise _changed_file_error(scenario)
 
-    def _series(self, experiment: Experiment, record: Record, faulty: Trace) -> EncodedSeries | None:
+    def _encode_series(self, experiment: Experiment, record: Record, faulty: Trace) -> EncodedSeries | None:
         if not self.with_series:
             return None
-        sampler = self.goldens.sampler(experiment)
+        sampler = self.goldens.sampler_of(experiment)
         return EncodedSeries(
-            golden_key=self.goldens.key(experiment),
+            golden_key=self.goldens.key_of(experiment),
             golden=sampler.encoded_golden,
             faulty=encode_series(sampler.faulty_series(faulty, record), sampler.golden),
         )
 
-    def _raising(self, experiment: Experiment, built: Mutant) -> set[str]:
+    def _injections_that_raise(self, experiment: Experiment, mutant: Mutant) -> set[str]:
         models = [self.models.get(injection.model) for injection in experiment.fault.injections]
-        return {name for name, model in zip(built.injection_ids, models, strict=True) if model.raises}
+        return {name for name, model in zip(mutant.injection_ids, models, strict=True) if model.raises}
 
-    def _record(
-        self, experiment: Experiment, built: Mutant, execution: Execution
+    def _build_record(
+        self, experiment: Experiment, mutant: Mutant, execution: JobResult
     ) -> tuple[Record, Trace | None]:
-        if execution.status is not Status.OK or execution.probe is None:
-            return self._failed(experiment, built, execution), None
-        activation = activation_of(execution.probe)
-        reference = self.goldens.trace(experiment)
+        if execution.status is not Status.OK or execution.probe_report is None:
+            return self._record_of_failed_run(experiment, mutant, execution), None
+        activation = activation_of(execution.probe_report)
+        reference = self.goldens.trace_of(experiment)
         try:
             faulty, judged = load_judged_run(self.manifest, execution.out, reference)
         except BadOutput as err:
             if activation is None:
                 raise
-            return _bare(experiment, Status.CRASHED, _problem_of(err), built, activation), None
-        record = self._judged(experiment, built, execution, faulty, judged)
+            return _record_of_mutant_without_outcome(
+                experiment, Status.CRASHED, _describe_problem(err), mutant, activation
+            ), None
+        record = self._judge_run(experiment, mutant, execution, faulty, judged)
         return record, faulty if record.status is Status.OK else None
 
-    def _judged(
-        self, experiment: Experiment, built: Mutant, execution: Execution, faulty: Trace, judged: RunJudgement
+    def _judge_run(
+        self,
+        experiment: Experiment,
+        mutant: Mutant,
+        execution: JobResult,
+        faulty: Trace,
+        judged: RunJudgement,
     ) -> Record:
-        activation = activation_of(execution.probe or {})
-        reference, time = self.goldens.trace(experiment), self.manifest.time_channel
-        if execution.stopped:
+        activation = activation_of(execution.probe_report or {})
+        reference, time = self.goldens.trace_of(experiment), self.manifest.time_channel
+        if execution.was_stopped_at_hazard:
             if judged.t_end is None:
                 why = "was stopped, but no terminal hazard is in its trace"
-                return _bare(experiment, Status.HARNESS_ERROR, why, built)
+                return _record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, why, mutant)
             reference = golden_comparison.trace_until(reference, faulty[time][-1], time)
         faulty = golden_comparison.with_golden_times(reference, faulty, time)
         difference = golden_comparison.compare_traces(
             reference, faulty, self.manifest.compared, time, judged.t_end
         )
-        if problem := _not_by_the_fault(difference.t_first, activation):
-            return _bare(experiment, Status.HARNESS_ERROR, problem, built)
+        if problem := _reason_not_by_fault(difference.t_first, activation):
+            return _record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, problem, mutant)
         hazards = first_events_after(judged.hazards, activation)
         return Record(
             experiment_id=experiment.id,
             status=Status.OK,
             outcome=outcome_of(activation=activation, t_manifest=difference.t_first, hazards=hazards),
             detail="",
-            tree=built.tree_digest,
+            tree=mutant.tree_digest,
             activation=activation,
             t_manifest=difference.t_first,
             max_dev=difference.max_dev,
             hazards=tuple(hazards),
             alerts=tuple(first_events_after(judged.alerts, activation)),
             trace_digest=golden_comparison.trace_digest(self.manifest, execution.out),
-            patch=digest(built.patch_bytes),
+            patch=digest(mutant.patch_bytes),
             t_end=judged.t_end,
             dev=() if judged.t_end is None else difference.dev,
             metrics=judged.metrics,
             left=departures_from_golden(reference, faulty, self.manifest.channels, time, judged.t_end),
         )
 
-    def _failed(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
-        status, detail = status_by_cause(execution, built.files, self._raising(experiment, built))
+    def _record_of_failed_run(self, experiment: Experiment, mutant: Mutant, execution: JobResult) -> Record:
+        status, detail = status_by_cause(
+            execution, mutant.files, self._injections_that_raise(experiment, mutant)
+        )
         # the number of activations before a crash is reproducible; before a timeout it is not
-        activation = activation_of(execution.probe or {}) if status is Status.CRASHED else None
-        bare = _bare(experiment, status, detail, built, activation)
-        return replace(bare, error=run_error(execution.raised))
+        activation = activation_of(execution.probe_report or {}) if status is Status.CRASHED else None
+        bare = _record_of_mutant_without_outcome(experiment, status, detail, mutant, activation)
+        return replace(bare, error=run_error(execution.exception))
 
 
-def _changed(path: Path) -> MutatorError:
+def _changed_file_error(path: Path) -> MutatorError:
     return MutatorError(
         "changed while it was in use",
         where=path,
@@ -300,11 +320,11 @@ def _changed(path: Path) -> MutatorError:
     )
 
 
-def _problem_of(err: MutatorError) -> str:
+def _describe_problem(err: MutatorError) -> str:
     return f"{Path(err.where or '').name}: {err.got}"
 
 
-def _not_by_the_fault(t_first: float | None, activation: Activation | None) -> str:
+def _reason_not_by_fault(t_first: float | None, activation: Activation | None) -> str:
     """Return why the fault cannot have caused a difference from the golden run; empty if it can."""
     if t_first is None or (activation is not None and t_first >= activation.first):
         return ""
@@ -314,20 +334,20 @@ def _not_by_the_fault(t_first: float | None, activation: Activation | None) -> s
     return f"differs from the golden run at {t_first} s, {when}"
 
 
-def _bare(
+def _record_of_mutant_without_outcome(
     experiment: Experiment,
     status: Status,
     detail: str,
-    built: Mutant | None,
+    mutant: Mutant | None,
     activation: Activation | None = None,
 ) -> Record:
-    bare = without_outcome(experiment.id, status, detail)
-    if built is not None:
-        bare = replace(bare, tree=built.tree_digest, patch=digest(built.patch_bytes))
+    bare = record_without_outcome(experiment.id, status, detail)
+    if mutant is not None:
+        bare = replace(bare, tree=mutant.tree_digest, patch=digest(mutant.patch_bytes))
     return replace(bare, activation=activation)
 
 
-def without_outcome(experiment_id: str, status: Status, detail: str) -> Record:
+def record_without_outcome(experiment_id: str, status: Status, detail: str) -> Record:
     """Make the record of an experiment that has a status but no outcome."""
     return Record(
         experiment_id=experiment_id,

@@ -10,7 +10,7 @@ from mutator.store.run_folder import RunFolder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ended:
+class FinishedRunOutcome:
     """The outcome that every later session of a finished run reports."""
 
     outcomes: Counter[str]
@@ -18,24 +18,24 @@ class Ended:
     seals: Seals
 
 
-def keep_end(folder: RunFolder, ended: Ended) -> None:
+def remember_finished_run(folder: RunFolder, outcome: FinishedRunOutcome) -> None:
     if key := integrity.verified_content_key(folder.path):
-        proof = ended.proof and {"sampled": ended.proof.sampled, "same": ended.proof.same}
-        told = {"outcomes": dict(ended.outcomes), "proof": proof, "seals": asdict(ended.seals)}
-        verified_runs_cache.remember_facts(key, ended=told)
+        proof = outcome.proof and {"sampled": outcome.proof.sampled, "same": outcome.proof.same}
+        outcome_as_json = {"outcomes": dict(outcome.outcomes), "proof": proof, "seals": asdict(outcome.seals)}
+        verified_runs_cache.remember_facts(key, ended=outcome_as_json)
 
 
-def ended_before(folder: RunFolder) -> Ended | None:
+def find_finished_run(folder: RunFolder) -> FinishedRunOutcome | None:
     """Return the stored outcome of a finished run whose verified bytes have not changed; else None."""
     if not folder.is_finished or not (key := integrity.verified_content_key(folder.path)):
         return None
-    known = verified_runs_cache.recall_facts(key)
-    if not known.get("verified") or "ended" not in known:
+    remembered = verified_runs_cache.recall_facts(key)
+    if not remembered.get("verified") or "ended" not in remembered:
         return None
-    told = known["ended"]
-    proof = told["proof"]
-    return Ended(
-        outcomes=Counter(told["outcomes"]),
+    outcome_as_json = remembered["ended"]
+    proof = outcome_as_json["proof"]
+    return FinishedRunOutcome(
+        outcomes=Counter(outcome_as_json["outcomes"]),
         proof=EquivalenceResult(sampled=proof["sampled"], same=proof["same"]) if proof else None,
-        seals=Seals(**told["seals"]),
+        seals=Seals(**outcome_as_json["seals"]),
     )

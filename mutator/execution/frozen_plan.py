@@ -17,7 +17,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 
-def open_frozen(
+def open_frozen_run(
     workspace: Workspace, campaign: str | Path, out: Path, choices: Choices, *, reviewed: bool
 ) -> RunFolder:
     """Open the run folder `out`, which the caller owns, with a frozen plan of the campaign.
@@ -26,7 +26,7 @@ def open_frozen(
     plan. Raises MutatorError if the folder has a different plan, sources or version of mutator.
     """
     if RunFolder.exists(out):
-        folder = _found(workspace, campaign, out, choices)
+        folder = _open_existing_run(workspace, campaign, out, choices)
         approvals = approval_gate.require_approvals(workspace, load_plan(folder)) if reviewed else None
     else:
         planning = SeedBySeedPlan(workspace, campaign, choices)
@@ -41,7 +41,7 @@ def open_frozen(
     return folder
 
 
-def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choices) -> RunFolder:
+def _open_existing_run(workspace: Workspace, campaign: str | Path, out: Path, choices: Choices) -> RunFolder:
     folder = RunFolder.open(out)
     head = folder.head
     check_version(folder)

@@ -8,13 +8,13 @@ from importlib import metadata
 
 import pytest
 
-from mutator.execution.pytest_session import Controller
+from mutator.execution.pytest_session import CampaignController
 from mutator.execution.session import Session
 
-_PLUGIN = "mutator.execution.pytest_plugin"
+_PLUGIN_MODULE = "mutator.execution.pytest_plugin"
 
 
-class LocalWorkers:
+class LocalDistributor:
     """The distributor of `mutator run`: `session.workers` processes, or only this process if 0."""
 
     def run(self, session: Session) -> None:
@@ -23,27 +23,27 @@ class LocalWorkers:
         folder = session.folder.path
         arguments = [
             *("--campaign", str(folder / "campaign.yaml"), "--campaign-out", str(folder)),
-            *("--disable-plugin-autoload", "-p", "xdist", "-p", "mutator" if installed else _PLUGIN),
+            *("--disable-plugin-autoload", "-p", "xdist", "-p", "mutator" if installed else _PLUGIN_MODULE),
             *("-p", "no:cacheprovider", "-p", "no:tmpdir", "--noconftest", "--assert=plain"),
             *("-c", os.devnull, "--rootdir", str(folder), "-s", "-n", str(session.workers)),
         ]
-        output = _Silent()
-        with _without("PYTEST_ADDOPTS", "PYTEST_PLUGINS"):
-            code = pytest.main(arguments, plugins=[Controller(session), output])
+        output = _SilentReporter()
+        with _without_variables("PYTEST_ADDOPTS", "PYTEST_PLUGINS"):
+            code = pytest.main(arguments, plugins=[CampaignController(session), output])
         if code in (pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR) and not session.problem:
             session.problem = output.text.getvalue().strip()[-2000:] or f"pytest ended with {code!r}"
 
 
 @contextmanager
-def _without(*names: str) -> Iterator[None]:
-    kept = {name: os.environ.pop(name) for name in names if name in os.environ}
+def _without_variables(*names: str) -> Iterator[None]:
+    removed = {name: os.environ.pop(name) for name in names if name in os.environ}
     try:
         yield
     finally:
-        os.environ.update(kept)
+        os.environ.update(removed)
 
 
-class _Silent:
+class _SilentReporter:
     """Pytest plugin that buffers the terminal reporter's output, because the caller owns the terminal."""
 
     def __init__(self) -> None:

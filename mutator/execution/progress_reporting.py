@@ -10,17 +10,17 @@ from mutator.preflight import equivalence_check
 from mutator.store.records import PROOF_FOLDER
 from mutator.store.run_progress import Progress, RecordTail
 
-_NOTIFY_S = 0.5
+_NOTIFY_INTERVAL_S = 0.5
 
 
 @contextmanager
-def followed(session: Session) -> Iterator[None]:
-    stages = _stages(session)
+def reporting_progress(session: Session) -> Iterator[None]:
+    stages = _progress_stages(session)
     stop = threading.Event()
 
     def follow() -> None:
-        while not stop.wait(_NOTIFY_S):
-            session.notify(replace(next(stages), detail=session.working))
+        while not stop.wait(_NOTIFY_INTERVAL_S):
+            session.notify(replace(next(stages), detail=session.workers_note))
 
     thread = threading.Thread(target=follow, daemon=True)
     thread.start()
@@ -32,7 +32,7 @@ def followed(session: Session) -> Iterator[None]:
         session.notify(next(stages))
 
 
-def _stages(session: Session) -> Iterator[Progress]:
+def _progress_stages(session: Session) -> Iterator[Progress]:
     """Yield the current progress: of the experiments until all have a record, then of the proof."""
     folder = session.folder
     experiments = RecordTail("experiments", folder.path / "records", folder.planned_count)

@@ -61,22 +61,22 @@ def pytest_configure(config: pytest.Config) -> None:
     if out is None:
         raise pytest.UsageError("--campaign needs --campaign-out DIR, the folder for its results")
     if hasattr(config, "workerinput"):
-        from mutator.execution.pytest_worker import WorkerSide
+        from mutator.execution.pytest_worker import WorkerPlugin
 
-        config.pluginmanager.register(WorkerSide(config, config.workerinput))
+        config.pluginmanager.register(WorkerPlugin(config, config.workerinput))
         return
     from mutator.errors import MutatorError
-    from mutator.execution.distribution import distributor, packages_of
-    from mutator.execution.pytest_session import configure
+    from mutator.execution.distribution import choose_distributor, packages_of_distributor
+    from mutator.execution.pytest_session import register_controller
 
     cluster, insecure = config.getoption("campaign_cluster"), config.getoption("insecure_network")
     if cluster and getattr(config.option, "numprocesses", None):
         raise pytest.UsageError("--campaign-cluster with -n: leave out -n (the cluster has its own workers)")
     try:
-        deals = distributor(cluster, insecure=insecure) if cluster or insecure else None
+        deals = choose_distributor(cluster, insecure=insecure) if cluster or insecure else None
     except MutatorError as err:
         raise pytest.UsageError(str(err)) from None
-    configure(
+    register_controller(
         config,
         campaign,
         out,
@@ -84,5 +84,5 @@ def pytest_configure(config: pytest.Config) -> None:
         accept_versions=config.getoption("accept_versions"),
         sandbox=config.getoption("campaign_sandbox"),
         distributor=deals,
-        packages=packages_of(deals) if deals else (),
+        packages=packages_of_distributor(deals) if deals else (),
     )

@@ -14,37 +14,44 @@ import pytest
 from mutator._common.folder_locks import living_worker_pids
 from mutator._common.resource_shortages import find_shortage
 from mutator.errors import HarnessErrors, MutatorError
-from mutator.execution.progress_reporting import followed
-from mutator.execution.progress_text import Lines
-from mutator.execution.pytest_worker import INPUT, PROBLEM, WRITTEN, CampaignItem, LazyWorker, collect
-from mutator.execution.session import Notify, Session, Summary, open_session
-from mutator.execution.stopped_workers import Continuing
-from mutator.execution.worker import Assignment, dying_python
+from mutator.execution.progress_reporting import reporting_progress
+from mutator.execution.progress_text import ProgressLines
+from mutator.execution.pytest_worker import (
+    INPUT_KEY,
+    PROBLEM_KEY,
+    WRITTEN_KEY,
+    CampaignItem,
+    LazyWorker,
+    collect_items,
+)
+from mutator.execution.session import ProgressCallback, Session, Summary, open_session
+from mutator.execution.stopped_workers import WorkerContinuer
+from mutator.execution.worker import WorkerAssignment, python_dying_with
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 
-class Deals(Protocol):
+class WorkDistributor(Protocol):
     def run(self, session: Session) -> None: ...
 
 
-class DealItem(CampaignItem):
+class DistributedItem(CampaignItem):
     """All of a session's work, done by a cluster."""
 
-    def __init__(self, *, begun: Session, distributor: Deals, **keywords: Any) -> None:
+    def __init__(self, *, campaign_session: Session, distributor: WorkDistributor, **keywords: Any) -> None:
         super().__init__(**keywords)
-        self._begun, self._distributor = begun, distributor
+        self._campaign_session, self._distributor = campaign_session, distributor
 
     def runtest(self) -> None:
-        with followed(self._begun):
-            self._distributor.run(self._begun)
-        if self._begun.interrupted:
+        with reporting_progress(self._campaign_session):
+            self._distributor.run(self._campaign_session)
+        if self._campaign_session.interrupted:
             raise KeyboardInterrupt
-        if self._begun.problem:
-            raise HarnessErrors(self._begun.problem)
+        if self._campaign_session.problem:
+            raise HarnessErrors(self._campaign_session.problem)
 
 
-def configure(
+def register_controller(
     config: pytest.Config,
     campaign: str,
     out: Path,
@@ -52,7 +59,7 @@ def configure(
     reviewed: bool,
     accept_versions: bool,
     sandbox: bool,
-    distributor: "Deals | None" = None,
+    distributor: "WorkDistributor | None" = None,
     packages: Sequence[str] = (),
 ) -> None:
     """Register the plugin of the process that is no worker.
@@ -62,9 +69,9 @@ def configure(
     """
     if getattr(config.option, "dist", "no") != "no":
         config.option.dist = "load"
-    if not any(isinstance(plugin, Controller) for plugin in config.pluginmanager.get_plugins()):
+    if not any(isinstance(plugin, CampaignController) for plugin in config.pluginmanager.get_plugins()):
         config.pluginmanager.register(
-            PlainController(
+            StandaloneController(
                 campaign,
                 out,
                 reviewed=reviewed,
@@ -76,80 +83,87 @@ def configure(
         )
 
 
-class Controller:
+class CampaignController:
     """Plugin of the controller: distributes chunks or, without xdist, runs them itself."""
 
-    def __init__(self, begun: Session | None = None) -> None:
-        self.begun = begun
-        self._worker: LazyWorker | None = None
-        self._continuing: Continuing | None = None
+    def __init__(self, campaign_session: Session | None = None) -> None:
+        self.campaign_session = campaign_session
+        self._lazy_worker: LazyWorker | None = None
+        self._worker_continuer: WorkerContinuer | None = None
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_xdist_setupnodes(self, specs: Sequence[Any]) -> None:
-        self._continuing = Continuing()
+        self._worker_continuer = WorkerContinuer()
         for spec in specs:
             if spec.popen and not spec.python:
-                spec.python = shlex.join(dying_python(os.getpid()))
+                spec.python = shlex.join(python_dying_with(os.getpid()))
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_configure_node(self, node: Any) -> None:
-        assert self.begun is not None
-        worker_input = node.workerinput[INPUT] = self.begun.worker_input()
-        self.begun.written.begin(worker_input["session"] + node.gateway.id)
+        assert self.campaign_session is not None
+        worker_input = node.workerinput[INPUT_KEY] = self.campaign_session.worker_input()
+        self.campaign_session.written.note_worker_began(worker_input["session"] + node.gateway.id)
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any, error: object | None) -> None:
         if error:
-            self._note(f"worker {node.gateway.id} died: {error}")
-        assert self.begun is not None
-        output, given = getattr(node, "workeroutput", {}), node.workerinput[INPUT]
-        self._note(output.get(PROBLEM, ""))
-        if WRITTEN in output:
-            self.begun.written.report(output[WRITTEN], given["session"] + node.gateway.id)
+            self._note_problem(f"worker {node.gateway.id} died: {error}")
+        assert self.campaign_session is not None
+        output, campaign_input = getattr(node, "workeroutput", {}), node.workerinput[INPUT_KEY]
+        self._note_problem(output.get(PROBLEM_KEY, ""))
+        if WRITTEN_KEY in output:
+            self.campaign_session.written.add_report(
+                output[WRITTEN_KEY], campaign_input["session"] + node.gateway.id
+            )
 
     def pytest_collection(self, session: pytest.Session) -> bool | None:
         if session.config.pluginmanager.hasplugin("dsession"):
             return None  # xdist's hook collects nothing in this process
-        assert self.begun is not None
-        begun = self.begun
-        name = begun.worker_name("main")
-        assignment = Assignment(
-            run=begun.folder.path,
-            name=name,
+        assert self.campaign_session is not None
+        begun = self.campaign_session
+        name = begun.new_worker_name("main")
+        assignment = WorkerAssignment(
+            run_folder=begun.folder.path,
+            worker_name=name,
             engine=begun.engine,
-            goldens=begun.golden_digests,
+            golden_digests=begun.golden_digests,
             secret=begun.secret,
         )
-        self._worker = LazyWorker(lambda: begun.inputs, assignment)
-        return collect(session, (*begun.pending, *begun.proof), self._worker)
+        self._lazy_worker = LazyWorker(lambda: begun.inputs, assignment)
+        return collect_items(session, (*begun.pending, *begun.proof), self._lazy_worker)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        self._note(str(dict(report.user_properties).get(PROBLEM, "")))
+        self._note_problem(str(dict(report.user_properties).get(PROBLEM_KEY, "")))
 
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
-        if self.begun is None:
+        if self.campaign_session is None:
             return
         if type(excinfo.value) is KeyboardInterrupt:  # pytest's own exceptions mean a regular stop
-            self.begun.interrupted = True
-        for pid in living_worker_pids(self.begun.folder.path):
+            self.campaign_session.interrupted = True
+        for pid in living_worker_pids(self.campaign_session.folder.path):
             os.kill(pid, signal.SIGTERM)
 
     def pytest_internalerror(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
-        self._note(str(find_shortage(excinfo.value) or ""))
+        self._note_problem(str(find_shortage(excinfo.value) or ""))
 
     @pytest.hookimpl(trylast=True)  # after xdist has ended its workers
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        if self._worker is not None and self.begun is not None:
-            self.begun.written.report(self._worker.close())
-        if self._continuing is not None:
-            self._continuing.end()
+        if self._lazy_worker is not None and self.campaign_session is not None:
+            self.campaign_session.written.add_report(self._lazy_worker.close())
+        if self._worker_continuer is not None:
+            self._worker_continuer.end()
 
-    def _note(self, problem: str) -> None:
-        if self.begun and problem and not self.begun.problem and not self.begun.interrupted:
-            self.begun.problem = problem
+    def _note_problem(self, problem: str) -> None:
+        if (
+            self.campaign_session
+            and problem
+            and not self.campaign_session.problem
+            and not self.campaign_session.interrupted
+        ):
+            self.campaign_session.problem = problem
 
 
-class PlainController(Controller):
+class StandaloneController(CampaignController):
     """Controller for a user's pytest command: also plans, checks, and prints the summary."""
 
     def __init__(
@@ -160,7 +174,7 @@ class PlainController(Controller):
         reviewed: bool,
         accept_versions: bool,
         sandbox: bool,
-        distributor: "Deals | None" = None,
+        distributor: "WorkDistributor | None" = None,
         packages: Sequence[str] = (),
     ) -> None:
         super().__init__()
@@ -186,26 +200,26 @@ class PlainController(Controller):
                 choices=Choices(),
                 reviewed=self._reviewed,
                 accept_versions=self._accept_versions,
-                notify=_told(session.config),
+                notify=_progress_notifier(session.config),
             )
-            self.begun = self._open.enter_context(opened)
-            self.begun.prepare(self._packages)
+            self.campaign_session = self._open.enter_context(opened)
+            self.campaign_session.prepare(self._packages)
         except MutatorError as err:
             self._open.close()
-            self.begun = None
+            self.campaign_session = None
             print(err, file=sys.stderr)  # pytest would print the reason twice
             pytest.exit("no campaign was run", returncode=err.exit_code)
 
     def pytest_collection(self, session: pytest.Session) -> bool | None:
-        if self._distributor is None or self.begun is None:
+        if self._distributor is None or self.campaign_session is None:
             return super().pytest_collection(session)
         session.items = []
-        if self.begun.pending or self.begun.proof:
-            item = DealItem.from_parent(
+        if self.campaign_session.pending or self.campaign_session.proof:
+            item = DistributedItem.from_parent(
                 session,
                 name="cluster",
                 nodeid="campaign::cluster",
-                begun=self.begun,
+                campaign_session=self.campaign_session,
                 distributor=self._distributor,
             )
             session.items.append(item)
@@ -215,12 +229,12 @@ class PlainController(Controller):
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        if self.begun is None:
+        if self.campaign_session is None:
             return
         try:
             super().pytest_sessionfinish(session)
-            summary = self.begun.finish()
-            self._closing_lines = _lines(summary)
+            summary = self.campaign_session.finish()
+            self._closing_lines = _summary_lines(summary)
             if not summary.interrupted:
                 session.exitstatus = summary.exit_code
         except MutatorError as err:
@@ -236,7 +250,7 @@ class PlainController(Controller):
             terminalreporter.write_line(line)
 
 
-def _told(config: pytest.Config) -> Notify | None:
+def _progress_notifier(config: pytest.Config) -> ProgressCallback | None:
     reporter = config.pluginmanager.get_plugin("terminalreporter")
     if reporter is None or config.get_verbosity() < 0:
         return None
@@ -245,10 +259,10 @@ def _told(config: pytest.Config) -> Notify | None:
         reporter.ensure_newline()
         reporter.write_line(line)
 
-    return Lines(write)
+    return ProgressLines(write)
 
 
-def _lines(summary: Summary) -> list[str]:
+def _summary_lines(summary: Summary) -> list[str]:
     lines = [
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now",
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),

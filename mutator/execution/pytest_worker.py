@@ -16,13 +16,13 @@ from mutator.campaigns.chunks import PendingChunk
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage
 from mutator.execution.stopped_workers import on_stop
-from mutator.execution.worker import Assignment, Worker, bind_to_parent
-from mutator.execution.written_files import Sums
+from mutator.execution.worker import Worker, WorkerAssignment, bind_to_parent
+from mutator.execution.written_files import FileDigests
 from mutator.preflight.equivalence_check import SampledExperiment
 
-INPUT = "mutator_campaign"
-PROBLEM = "mutator_problem"
-WRITTEN = "mutator_written"
+INPUT_KEY = "mutator_campaign"
+PROBLEM_KEY = "mutator_problem"
+WRITTEN_KEY = "mutator_written"
 
 
 class CampaignItem(pytest.Item):
@@ -50,37 +50,36 @@ class WorkItem(CampaignItem):
     def runtest(self) -> None:
         try:
             with raising_disk_full(self.config.rootpath):
-                worker, work = self.worker.get(), self.work
+                worker, work = self.worker.get_worker(), self.work
                 errors = worker.run(work) if isinstance(work, PendingChunk) else worker.prove(work)
         except Exception as err:
-            known = err if isinstance(err, MutatorError) else find_shortage(err)
-            problem = str(known) if known else _defect(err, self.name)
-            self.user_properties.append((PROBLEM, problem))
-            if isinstance(known, DiskFull | Shortage):
+            reported_error = err if isinstance(err, MutatorError) else find_shortage(err)
+            problem = str(reported_error) if reported_error else _describe_defect(err, self.name)
+            self.user_properties.append((PROBLEM_KEY, problem))
+            if isinstance(reported_error, DiskFull | Shortage):
                 self.session.shouldstop = problem
             raise
         if errors:
             raise HarnessErrors("\n".join(f"{name}: {detail}" for name, detail in errors))
 
 
-def _defect(err: Exception, chunk: str) -> str:
+def _describe_defect(err: Exception, item_name: str) -> str:
     lines = "".join(traceback.format_exception(err))
-    return (
-        f"{chunk} failed because of a defect in mutator; please report it with these lines:\n{lines}".rstrip()
-    )
+    request = f"{item_name} failed because of a defect in mutator; please report it with these lines:"
+    return f"{request}\n{lines}".rstrip()
 
 
 class LazyWorker:
     """The worker of this process, made when the first chunk runs, because collection does not need it."""
 
-    def __init__(self, inputs: Callable[[], RunInputs], assignment: Assignment) -> None:
-        self._inputs = inputs
+    def __init__(self, load_inputs: Callable[[], RunInputs], assignment: WorkerAssignment) -> None:
+        self._load_inputs = load_inputs
         self._assignment = assignment
         self._worker: Worker | None = None
 
-    def get(self) -> Worker:
+    def get_worker(self) -> Worker:
         if self._worker is None:
-            self._worker = Worker(self._inputs(), self._assignment)
+            self._worker = Worker(self._load_inputs(), self._assignment)
         return self._worker
 
     def note_stop(self) -> None:
@@ -88,24 +87,24 @@ class LazyWorker:
         if self._worker is not None:
             self._worker.was_stopped = True
 
-    def close(self) -> Sums:
+    def close(self) -> FileDigests:
         """Close the worker's files; return their digests."""
         worker, self._worker = self._worker, None
         if worker is None:
             return {}
         worker.close()
-        return worker.written
+        return worker.file_digests
 
 
-def collect(
-    session: pytest.Session, works: Sequence[PendingChunk | SampledExperiment], worker: LazyWorker
+def collect_items(
+    session: pytest.Session, work_parts: Sequence[PendingChunk | SampledExperiment], worker: LazyWorker
 ) -> bool:
     """Make the session's items: chunks, then experiments of the proof.
 
     The proof has the smallest items and comes last, so that the workers finish at about the same time.
     """
     session.items = []
-    for work in works:
+    for work in work_parts:
         name = (
             f"chunk-{work.chunk_index:05d}" if isinstance(work, PendingChunk) else f"proof-{work.number:05d}"
         )
@@ -117,37 +116,37 @@ def collect(
     return True
 
 
-class WorkerSide:
+class WorkerPlugin:
     """Plugin of an xdist worker: collects the pending work, and runs the items that it receives."""
 
     def __init__(self, config: pytest.Config, worker_input: dict[str, Any]) -> None:
-        given = worker_input[INPUT]
-        bind_to_parent(given["parent"])
-        run = Path(given["run"])
-        assignment = Assignment(
-            run=run,
-            name=given["session"] + worker_input["workerid"],
-            engine=given["engine"],
-            goldens=given["goldens"],
-            secret=given["secret"],
-            parent=given["parent"],
+        campaign_input = worker_input[INPUT_KEY]
+        bind_to_parent(campaign_input["parent"])
+        run = Path(campaign_input["run"])
+        assignment = WorkerAssignment(
+            run_folder=run,
+            worker_name=campaign_input["session"] + worker_input["workerid"],
+            engine=campaign_input["engine"],
+            golden_digests=campaign_input["goldens"],
+            secret=campaign_input["secret"],
+            parent_pid=campaign_input["parent"],
         )
         self._config = config
         self._registration = register_worker(run)
-        self._work: list[PendingChunk | SampledExperiment] = [
-            *(PendingChunk(chunk, tuple(places)) for chunk, places in given["pending"]),
-            *(SampledExperiment(number, name) for number, name in given["proof"]),
+        self._pending_work: list[PendingChunk | SampledExperiment] = [
+            *(PendingChunk(chunk, tuple(places)) for chunk, places in campaign_input["pending"]),
+            *(SampledExperiment(number, name) for number, name in campaign_input["proof"]),
         ]
-        self._worker = LazyWorker(partial(RunInputs.from_bytes, given["inputs"]), assignment)
-        on_stop(self._worker.note_stop)
+        self._lazy_worker = LazyWorker(partial(RunInputs.from_bytes, campaign_input["inputs"]), assignment)
+        on_stop(self._lazy_worker.note_stop)
 
     def pytest_collection(self, session: pytest.Session) -> bool:
-        return collect(session, self._work, self._worker)
+        return collect_items(session, self._pending_work, self._lazy_worker)
 
     def pytest_sessionfinish(self) -> None:
         try:
-            written = self._worker.close()
-            self._config.workeroutput[WRITTEN] = dict(written)  # type: ignore[attr-defined]
+            written = self._lazy_worker.close()
+            self._config.workeroutput[WRITTEN_KEY] = dict(written)  # type: ignore[attr-defined]
         except MutatorError as err:
-            self._config.workeroutput[PROBLEM] = str(err)  # type: ignore[attr-defined]
+            self._config.workeroutput[PROBLEM_KEY] = str(err)  # type: ignore[attr-defined]
         os.close(self._registration)

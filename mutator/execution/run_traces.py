@@ -6,7 +6,7 @@ from functools import cached_property
 
 from mutator._common.confined_files import path_below
 from mutator.errors import MutatorError
-from mutator.execution.single_run import rerun
+from mutator.execution.single_run import rerun_experiment
 from mutator.model import Experiment, Record
 from mutator.outcomes.golden_comparison import Trace, load_trace, trace_digest
 from mutator.outcomes.series_sampling import traces_of_series, write_sampled_series
@@ -18,7 +18,7 @@ from mutator.workspace import Workspace
 
 
 @dataclass(frozen=True)
-class Traces:
+class RunTraces:
     """The fault-free and faulty traces of any experiment in a run folder."""
 
     workspace: Workspace
@@ -41,45 +41,45 @@ class Traces:
             raise MutatorError(f"the record of {experiment_id} is missing", where=self.folder.path)
         return self._records[experiment_id]
 
-    def of(self, experiment_id: str) -> tuple[Trace, Trace]:
+    def traces_of(self, experiment_id: str) -> tuple[Trace, Trace]:
         """Return the fault-free and the faulty trace of an experiment that ended normally.
 
         Reruns the experiment if no trace is stored. Raises MutatorError if that is impossible, or if the
         result differs from the campaign's.
         """
-        kept = self.folder.kept_traces_folder(experiment_id)
+        stored = self.folder.kept_traces_folder(experiment_id)
         experiment = self._experiments[experiment_id]
         golden = self.folder.golden_folder_of(experiment)
         if not golden.is_dir():
-            golden = kept / "golden"
-        if not (golden.is_dir() and self.is_kept(experiment_id)):
-            single, same = rerun(self.workspace, self.folder.path, experiment_id)
+            golden = stored / "golden"
+        if not (golden.is_dir() and self.is_stored(experiment_id)):
+            single, same = rerun_experiment(self.workspace, self.folder.path, experiment_id)
             if not same:
                 raise MutatorError(f"the rerun of {experiment_id} differs from the campaign's record")
             golden = single.golden
-        return load_trace(self.manifest, golden), load_trace(self.manifest, kept / "faulty")
+        return load_trace(self.manifest, golden), load_trace(self.manifest, stored / "faulty")
 
-    def sampled(self, experiment_id: str, *, drive: bool = False) -> tuple[Trace, Trace]:
+    def sampled_traces_of(self, experiment_id: str, *, rerun_if_missing: bool = False) -> tuple[Trace, Trace]:
         """Return the fault-free and the faulty trace from an experiment's series, at most 20 values a second.
 
-        Without a series, the experiment is rerun if `drive` is set. Raises MutatorError if there is no
-        series, if it is damaged, or if the rerun fails.
+        Without a series, the experiment is rerun if `rerun_if_missing` is set. Raises MutatorError if there
+        is no series, if it is damaged, or if the rerun fails.
         """
         series = SeriesFolder(self.folder.path)
         record = self.record(experiment_id)
-        found = series.load_series(experiment_id, record)
-        if found is None and drive:
-            write_sampled_series(self.folder.path, self.manifest, *self.of(experiment_id), record)
-            found = series.load_series(experiment_id, record)
-        if found is None:
+        series_pair = series.load_series(experiment_id, record)
+        if series_pair is None and rerun_if_missing:
+            write_sampled_series(self.folder.path, self.manifest, *self.traces_of(experiment_id), record)
+            series_pair = series.load_series(experiment_id, record)
+        if series_pair is None:
             raise MutatorError(
                 f"no series of {experiment_id}",
                 where=self.folder.path,
                 remedy=f"rerun the experiment: {rerun_command(self.folder.path, experiment_id)}",
             )
-        return traces_of_series(*found, self.manifest.time_channel)
+        return traces_of_series(*series_pair, self.manifest.time_channel)
 
-    def is_kept(self, experiment_id: str) -> bool:
+    def is_stored(self, experiment_id: str) -> bool:
         """Return whether a stored faulty trace matches the record."""
         faulty = self.folder.kept_traces_folder(experiment_id) / "faulty"
         if not path_below(faulty, self.manifest.trace_file).is_file():

@@ -26,12 +26,12 @@ from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
 from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import accepted_version_differences, append_machine, begin_stretch
-from mutator.engines.engine_choice import choose_engine, not_worth_forking
+from mutator.engines.engine_choice import choose_engine, reason_not_to_fork
 from mutator.engines.engine_kinds import REFERENCE
-from mutator.engines.job_folder import make_work
+from mutator.engines.job_folder import ensure_work_folder
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, DiskFull, MutatorError, MutatorWarning
-from mutator.execution.finished_run_cache import Ended, ended_before, keep_end
-from mutator.execution.frozen_plan import open_frozen
+from mutator.execution.finished_run_cache import FinishedRunOutcome, find_finished_run, remember_finished_run
+from mutator.execution.frozen_plan import open_frozen_run
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record
 from mutator.preflight import equivalence_check
@@ -57,7 +57,7 @@ from mutator.workspace import Workspace
 EXIT_INTERRUPTED = 130
 _SECRET_BYTES = 16
 
-Notify = Callable[[Progress], None]
+ProgressCallback = Callable[[Progress], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,31 +111,31 @@ class Session:
         workers: int = 0,
         engine: str | None = None,
         accept_versions: bool = False,
-        notify: Notify | None = None,
+        notify: ProgressCallback | None = None,
     ) -> None:
         self.workspace = workspace
         self.folder = folder
         self.workers = workers
         self.accept_versions = accept_versions
-        self.notify: Notify = notify or (lambda progress: None)
+        self.notify: ProgressCallback = notify or (lambda progress: None)
         self.pending: tuple[PendingChunk, ...] = ()
         self.proof: tuple[equivalence_check.SampledExperiment, ...] = ()
         self.manifest = workspace.manifest(folder.head.target)
         # count the whole plan, so that all shards and an unsharded run agree on whether a proof is needed
         experiments = folder.head.experiments
         self.engine = choose_engine(engine, self.manifest, experiments)
-        self._not_forked = "" if engine else not_worth_forking(self.manifest, experiments)
+        self._not_forked = "" if engine else reason_not_to_fork(self.manifest, experiments)
         self.problem = ""
         self.interrupted = False
         self.secret = token_bytes(_SECRET_BYTES)
         self.golden_digests: Mapping[str, str] = {}
         self.written = WrittenFiles()
-        self._ledger: file_digests.DigestLedger | None = None  # as it was when the work began
-        self.working = ""  # the present workers, if known
-        self._began = time.monotonic()
-        self._done_before = 0
+        self._ledger_at_start: file_digests.DigestLedger | None = None  # as it was when the work began
+        self.workers_note = ""  # the present workers, if known
+        self._start_s = time.monotonic()
+        self._finished_count_before = 0
         self._records: Mapping[str, Record] | None = None
-        self._known: Ended | None = None
+        self._earlier_outcome: FinishedRunOutcome | None = None
 
     def prepare(self, packages: Iterable[str] = ()) -> None:
         """Find the work to do. If there is any, run the checks and begin a stretch, which records the
@@ -143,18 +143,18 @@ class Session:
 
         Unless `accept_versions`, raises MutatorError if versions of Python or packages have changed.
         """
-        self._known = ended_before(self.folder)
-        if self._known and checks_and_goldens_exist(self.folder):
-            self._done_before = self.folder.planned_count
+        self._earlier_outcome = find_finished_run(self.folder)
+        if self._earlier_outcome and checks_and_goldens_exist(self.folder):
+            self._finished_count_before = self.folder.planned_count
             return
-        self._known = None
+        self._earlier_outcome = None
         records = self.folder.records()
-        self._done_before = sum(one.is_final for one in endings_of(records))
-        left = pending_chunks_of(self.folder, records)
-        if left and self.engine != REFERENCE:
+        self._finished_count_before = sum(ending.is_final for ending in endings_of(records))
+        pending_chunks = pending_chunks_of(self.folder, records)
+        if pending_chunks and self.engine != REFERENCE:
             equivalence_check.mark_as_needed(self.folder.path)
         self.proof = equivalence_check.remaining_sample(self.folder)
-        if left or self.proof or not checks_and_goldens_exist(self.folder):
+        if pending_chunks or self.proof or not checks_and_goldens_exist(self.folder):
             check_requirements(self.manifest)
             accepted_version_differences(self.folder, accept=self.accept_versions)
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
@@ -163,26 +163,26 @@ class Session:
             self.folder = begin_stretch(
                 self.folder,
                 self.workspace,
-                records=self.worker_name("*"),
+                records=self.new_worker_name("*"),
                 packages=packages,
                 accept=self.accept_versions,
             )
             self.golden_digests = golden_digests(self.folder)
-            self._ledger = file_digests.load_ledger(self.folder.path)
-        self.pending = left
-        self._records = None if left else records
+            self._ledger_at_start = file_digests.load_ledger(self.folder.path)
+        self.pending = pending_chunks
+        self._records = None if pending_chunks else records
 
     def note_machine(self, machine: Machine) -> None:
         self.folder = append_machine(self.folder, machine)
-        self._ledger = file_digests.load_ledger(self.folder.path)
+        self._ledger_at_start = file_digests.load_ledger(self.folder.path)
 
-    def worker_name(self, name: str) -> str:
+    def new_worker_name(self, name: str) -> str:
         """Return a name for a worker's files that no session used before."""
         files = chain.from_iterable(
             (self.folder.path / kind).glob("*.jsonl") for kind in LINE_SCHEMA_BY_FOLDER
         )
-        taken = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
-        return f"{max(taken, default=0) + 1:04d}-{name}"
+        used_numbers = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
+        return f"{max(used_numbers, default=0) + 1:04d}-{name}"
 
     @cached_property
     def inputs(self) -> RunInputs:
@@ -192,7 +192,7 @@ class Session:
         return {
             "parent": os.getpid(),
             "run": str(self.folder.path),
-            "session": self.worker_name(""),
+            "session": self.new_worker_name(""),
             "inputs": self.inputs.to_bytes(),
             "engine": self.engine,
             "goldens": dict(self.golden_digests),
@@ -203,31 +203,31 @@ class Session:
 
     def finish(self) -> Summary:
         self.notify(Progress(stage="tables"))
-        if self._known:
-            return self._finish_again(self._known)
-        make_work(self.folder.scratch_folder)  # readers refuse what a mutant can put in its place
+        if self._earlier_outcome:
+            return self._finish_finished_run(self._earlier_outcome)
+        ensure_work_folder(self.folder.scratch_folder)  # readers refuse what a mutant can put in its place
         self._undo_writes_of_mutants()
         records = self.folder.records() if self._records is None else self._records
-        ends = Counter((one.status, one.outcome) for one in endings_of(records))
-        failed = (one.experiment_id for one in endings_of(records) if not one.is_final)
-        wrong = {name: records[name].detail for name in failed}
-        done = len(records) - len(wrong)
-        built = None
+        ends = Counter((ending.status, ending.outcome) for ending in endings_of(records))
+        failed = (ending.experiment_id for ending in endings_of(records) if not ending.is_final)
+        harness_errors = {name: records[name].detail for name in failed}
+        finished_count = len(records) - len(harness_errors)
+        results_path = None
         with self._noting_full_disk():
             self._close_segments()
-            built = table_building.ensure_tables(self.folder.path)
+            results_path = table_building.ensure_tables(self.folder.path)
             self._pack_series()
         proven = equivalence_check.compare_sample(self.folder, records)
         not_forked = "" if proven else self._not_forked
         if (
             proven
-            and done == self.folder.planned_count
+            and finished_count == self.folder.planned_count
             and (why := equivalence_check.reason_not_needed(self.folder)) is not None
         ):
             proven, not_forked = None, why
             with self._noting_full_disk():
                 equivalence_check.remove_proof(self.folder)
-        if done == self.folder.planned_count and (proven is None or proven.is_complete):
+        if finished_count == self.folder.planned_count and (proven is None or proven.is_complete):
             with self._noting_full_disk():
                 self._close_segments(finished=True)
         outcomes = Counter[str]()
@@ -235,57 +235,59 @@ class Session:
             outcomes[progress_label(status, outcome)] += count
         seals = seals_of(self.folder)
         if seals.seal:
-            keep_end(self.folder, Ended(outcomes=outcomes, proof=proven, seals=seals))
+            remember_finished_run(
+                self.folder, FinishedRunOutcome(outcomes=outcomes, proof=proven, seals=seals)
+            )
         return Summary(
             planned=self.folder.planned_count,
-            done=done,
-            ran=done - self._done_before,
+            done=finished_count,
+            ran=finished_count - self._finished_count_before,
             outcomes=outcomes,
-            harness_errors=(*sorted(wrong.items()), *(proven.errors if proven else ())),
+            harness_errors=(*sorted(harness_errors.items()), *(proven.errors if proven else ())),
             problem=self.problem,
             interrupted=self.interrupted,
-            results=built,
+            results=results_path,
             proof=proven,
             seals=seals,
             not_forked=not_forked,
-            elapsed_s=time.monotonic() - self._began,
+            elapsed_s=time.monotonic() - self._start_s,
         )
 
     def _undo_writes_of_mutants(self) -> None:
         """Restore the digests of the run folder, and set aside lines that no worker wrote."""
         run = self.folder.path
-        if self._ledger is None or wait_for_workers(run):
+        if self._ledger_at_start is None or wait_for_workers(run):
             return
         with self._noting_full_disk():
             changed = []
-            if not file_digests.is_ledger_unchanged(run, self._ledger):
-                file_digests.save_ledger(run, self._ledger)
+            if not file_digests.is_ledger_unchanged(run, self._ledger_at_start):
+                file_digests.save_ledger(run, self._ledger_at_start)
                 changed.append(file_digests.FILE)
-            changed += self.written.set_others_aside(run)
+            changed += self.written.set_unreported_aside(run)
             if changed and not self.problem:
                 self.problem = (
                     f"{run}: a mutant, or another program, changed {', '.join(changed)}; run the same "
                     "command again to repeat what is missing"
                 )
 
-    def _finish_again(self, known: Ended) -> Summary:
-        built = None
+    def _finish_finished_run(self, outcome: FinishedRunOutcome) -> Summary:
+        results_path = None
         with self._noting_full_disk():
-            built = table_building.ensure_tables(self.folder.path)
+            results_path = table_building.ensure_tables(self.folder.path)
             self._pack_series()
         return Summary(
             planned=self.folder.planned_count,
             done=self.folder.planned_count,
             ran=0,
-            outcomes=known.outcomes,
+            outcomes=outcome.outcomes,
             harness_errors=(),
             problem=self.problem,
             interrupted=self.interrupted,
-            results=built,
-            proof=known.proof,
-            seals=known.seals,
-            not_forked="" if known.proof else self._not_forked,
-            elapsed_s=time.monotonic() - self._began,
+            results=results_path,
+            proof=outcome.proof,
+            seals=outcome.seals,
+            not_forked="" if outcome.proof else self._not_forked,
+            elapsed_s=time.monotonic() - self._start_s,
         )
 
     @contextmanager
@@ -319,7 +321,7 @@ def open_session(
     engine: str | None = None,
     reviewed: bool = False,
     accept_versions: bool = False,
-    notify: Notify | None = None,
+    notify: ProgressCallback | None = None,
 ) -> Iterator[Session]:
     """Lock the run folder `out`, freeze the plan if needed, and yield the session.
 
@@ -331,7 +333,7 @@ def open_session(
         if notify and not RunFolder.exists(out):
             notify(Progress(stage="plan"))
         try:
-            folder = open_frozen(workspace, campaign, out, choices, reviewed=reviewed)
+            folder = open_frozen_run(workspace, campaign, out, choices, reviewed=reviewed)
         except MutatorError:
             if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is worth keeping
                 shutil.rmtree(out, ignore_errors=True)
@@ -339,8 +341,8 @@ def open_session(
         file_digests.close_segments(folder.path)
         remove_anything_at(folder.scratch_folder)
         folders = ("plan", "report", "series", "patches")
-        written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in folders))
-        for path in chain(*written):
+        candidates = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in folders))
+        for path in chain(*candidates):
             if is_half_written(path.name) and path.is_file():
                 path.unlink()
         try:

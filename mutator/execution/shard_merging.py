@@ -34,11 +34,11 @@ from mutator.store.series_folder import FOLDER as SERIES
 from mutator.store.series_packing import pack_series
 from mutator.store.work_stretches import Stretch, version_differences
 
-_MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
-_REMEDY = "give the folder of each shard of one plan exactly once"
+_UNFINISHED_MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
+_SHARDS_REMEDY = "give the folder of each shard of one plan exactly once"
 
 
-def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -> Path:
+def merge_shards(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -> Path:
     """Merge the run folders `shards` into the new or empty folder `out`; return the path of its results.csv.
 
     Raises MutatorError for a shard that is missing, duplicate, unfinished, in use, or of another plan; unless
@@ -54,43 +54,43 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
             remedy="choose another `out`",
         )
     if not shards:
-        raise MutatorError("no run folder", argument="shards", remedy=_REMEDY)
-    folders = [_opened(path) for path in shards]
-    _check_plans(folders)
-    _check_numbers(folders)
+        raise MutatorError("no run folder", argument="shards", remedy=_SHARDS_REMEDY)
+    folders = [_open_shard(path) for path in shards]
+    _check_same_plan(folders)
+    _check_shard_numbers(folders)
     with ExitStack() as stack:
         for folder in folders:
             stack.enter_context(owning_run_folder(folder.path, patience_s=0.0))
-            _check_complete(folder)
-        stretches = list(_stretches(folders, accept=accept_versions))
-        _check_goldens(folders)
-        _make_empty(out)
+            _check_shard_finished(folder)
+        stretches = list(_merged_stretches(folders, accept_versions=accept_versions))
+        _check_same_goldens(folders)
+        _make_empty_folder(out)
         stack.enter_context(owning_run_folder(out))
         try:
             with raising_disk_full(out):
-                path_below(out, f"{_MARK}{os.getpid()}").touch()
-                _copy(folders, out, stretches)
+                path_below(out, f"{_UNFINISHED_MARK}{os.getpid()}").touch()
+                _copy_shards(folders, out, stretches)
             return table_building.build_tables(out)
         except BaseException:
             cleaning.delete_unfinished_run(out)
             raise
 
 
-def _make_empty(out: Path) -> None:
+def _make_empty_folder(out: Path) -> None:
     """Make the folder to merge into. Delete files that a killed merge left there."""
     if out.is_dir():
         check_contents(out.resolve())
-    if any(out.glob(f"{_MARK}*")):
+    if any(out.glob(f"{_UNFINISHED_MARK}*")):
         with owning_run_folder(out, patience_s=0.0):
             cleaning.delete_unfinished_run(out)
     make_run_folder(out)
 
 
-def _opened(path: Path) -> RunFolder:
+def _open_shard(path: Path) -> RunFolder:
     return RunFolder.open(path)
 
 
-def _check_plans(folders: Sequence[RunFolder]) -> None:
+def _check_same_plan(folders: Sequence[RunFolder]) -> None:
     first = folders[0]
     for folder in folders[1:]:
         for key, _, _ in folder.head.differences(first.head):
@@ -99,69 +99,78 @@ def _check_plans(folders: Sequence[RunFolder]) -> None:
                     f"made from a different {key.rstrip('s')} than {first.path}",
                     where=folder.path,
                     expected="shards of one plan, with the same target, templates and scenarios",
-                    remedy=_REMEDY,
+                    remedy=_SHARDS_REMEDY,
                 )
-        one, other = (without_keys(shard.head.as_json(), UNSEALED_KEYS[HEAD]) for shard in (first, folder))
-        if differ := [key for key in {**one, **other} if one.get(key) != other.get(key)]:
+        first_content, content = (
+            without_keys(shard.head.as_json(), UNSEALED_KEYS[HEAD]) for shard in (first, folder)
+        )
+        if differ := [
+            key for key in {**first_content, **content} if first_content.get(key) != content.get(key)
+        ]:
             raise MutatorError(
                 f"'{differ[0]}' differs from {first.path / HEAD}",
                 where=folder.path / HEAD,
                 expected="shards that were planned with the same library and the same version of mutator",
-                remedy=_REMEDY,
+                remedy=_SHARDS_REMEDY,
             )
 
 
-def _check_numbers(folders: Sequence[RunFolder]) -> None:
-    held: dict[int, RunFolder] = {}
-    of: int | None = None
+def _check_shard_numbers(folders: Sequence[RunFolder]) -> None:
+    folders_by_number: dict[int, RunFolder] = {}
+    shard_count: int | None = None
     for folder in folders:
         shard = folder.shard
         if shard is None:
             raise MutatorError(
-                "a whole run, not a shard", where=folder.path, expected="the run of a shard", remedy=_REMEDY
+                "a whole run, not a shard",
+                where=folder.path,
+                expected="the run of a shard",
+                remedy=_SHARDS_REMEDY,
             )
-        of = of or shard.shard_count
-        if shard.shard_count != of:
+        shard_count = shard_count or shard.shard_count
+        if shard.shard_count != shard_count:
             raise MutatorError(
                 f"shard {shard.number}/{shard.shard_count}",
                 where=folder.path,
-                expected=f"one of {of} shards, like {folders[0].path}",
-                remedy=_REMEDY,
+                expected=f"one of {shard_count} shards, like {folders[0].path}",
+                remedy=_SHARDS_REMEDY,
             )
-        if shard.number in held:
+        if shard.number in folders_by_number:
             raise MutatorError(
-                f"shard {shard.number}/{of} is given twice",
+                f"shard {shard.number}/{shard_count} is given twice",
                 where=folder.path,
-                expected=f"a different shard from {held[shard.number].path}",
-                remedy=_REMEDY,
+                expected=f"a different shard from {folders_by_number[shard.number].path}",
+                remedy=_SHARDS_REMEDY,
             )
-        held[shard.number] = folder
-    missing = [f"{k}/{of}" for k in range(1, (of or 0) + 1) if k not in held]
+        folders_by_number[shard.number] = folder
+    missing = [f"{k}/{shard_count}" for k in range(1, (shard_count or 0) + 1) if k not in folders_by_number]
     if missing:
-        raise MutatorError(f"no folder for shard {', '.join(missing)}", expected="all shards", remedy=_REMEDY)
-
-
-def _check_complete(folder: RunFolder) -> None:
-    records = folder.records()
-    done = sum(one.is_final for one in endings_of(records))
-    if done < folder.planned_count:
         raise MutatorError(
-            f"unfinished: {done} of {folder.planned_count} experiments are done",
+            f"no folder for shard {', '.join(missing)}", expected="all shards", remedy=_SHARDS_REMEDY
+        )
+
+
+def _check_shard_finished(folder: RunFolder) -> None:
+    records = folder.records()
+    finished_count = sum(ending.is_final for ending in endings_of(records))
+    if finished_count < folder.planned_count:
+        raise MutatorError(
+            f"unfinished: {finished_count} of {folder.planned_count} experiments are done",
             where=folder.path,
             expected="a finished shard",
             remedy="resume it with the command that started it",
         )
     equivalence_check.compare_sample(folder, records)
-    if left := len(equivalence_check.remaining_sample(folder)):
+    if remaining_count := len(equivalence_check.remaining_sample(folder)):
         raise MutatorError(
-            f"unfinished: its proof has {counted(left, 'experiment')} left to run",
+            f"unfinished: its proof has {counted(remaining_count, 'experiment')} left to run",
             where=folder.path,
             expected="a finished shard",
             remedy="resume it with the command that started it",
         )
 
 
-def _check_goldens(folders: Sequence[RunFolder]) -> None:
+def _check_same_goldens(folders: Sequence[RunFolder]) -> None:
     first = read_json(folders[0].path / CHECKS, CHECKS_SCHEMA)["goldens"]
     for folder in folders[1:]:
         goldens = read_json(folder.path / CHECKS, CHECKS_SCHEMA)["goldens"]
@@ -174,34 +183,36 @@ def _check_goldens(folders: Sequence[RunFolder]) -> None:
             )
 
 
-def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretch]:
-    """Yield the stretches of all shards. Unless `accept`, all must have the versions of the first shard."""
+def _merged_stretches(folders: Sequence[RunFolder], *, accept_versions: bool) -> Iterator[Stretch]:
+    """Yield all stretches. Unless `accept_versions`, all must have the versions of the first shard."""
     first = folders[0]
     for folder in folders:
         ends = zip(first.stretches[-1:], folder.stretches[-1:], strict=False)
-        found = [
-            text for one, other in ends for text in version_differences(one, other.python, other.packages)
+        differing_versions = [
+            text
+            for first_stretch, stretch in ends
+            for text in version_differences(first_stretch, stretch.python, stretch.packages)
         ]
-        if found and not accept:
-            raise version_error(folder.path, f"unlike {first.path}, this shard used", found)
+        if differing_versions and not accept_versions:
+            raise version_error(folder.path, f"unlike {first.path}, this shard used", differing_versions)
         assert folder.shard is not None
         for i, stretch in enumerate(folder.stretches):
             yield replace(
                 stretch,
                 records=f"{stretch.records}-shard{folder.shard.number}",
-                accepted=(*stretch.accepted, *(() if i else found)),
+                accepted=(*stretch.accepted, *(() if i else differing_versions)),
             )
 
 
-def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Stretch]) -> None:
+def _copy_shards(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Stretch]) -> None:
     """Copy all content. The head is written last, so that an unfinished copy is not a run folder."""
     first = folders[0]
     ledger = file_digests.settled_ledger(first.path)
     reviewed = all((folder.path / REVIEWED).exists() for folder in folders)
     files = {
-        name: one
-        for name, one in ledger.files.items()
-        if one.lines is None and name != HEAD and (reviewed or name != REVIEWED)
+        name: file_digest
+        for name, file_digest in ledger.files.items()
+        if file_digest.lines is None and name != HEAD and (reviewed or name != REVIEWED)
     }
     for name in files:
         place = path_below(out, name)
@@ -224,10 +235,10 @@ def _copy_patches(folder: RunFolder, out: Path) -> None:
     assert folder.shard is not None
     writer = PatchWriter(out, f"0001-shard{folder.shard.number}")
     for record in endings_of(folder.records()):
-        name, known = record.experiment_id, record.patch
-        for problem in integrity.patch_problems(folder.patches, name, known):
+        name, patch_digest = record.experiment_id, record.patch
+        for problem in integrity.patch_problems(folder.patches, name, patch_digest):
             raise problem
-        if known and (data := folder.patches.read(name)) is not None:
+        if patch_digest and (data := folder.patches.read(name)) is not None:
             writer.append(name, data)
     writer.close()
 

@@ -15,7 +15,7 @@ from mutator.campaigns.run_provenance import check_sources
 from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
-from mutator.execution.experiment_runner import Finished, Goldens, Runner
+from mutator.execution.experiment_runner import ExperimentRunner, FinishedExperiment, LoadedGoldens
 from mutator.model import Experiment, Limits, Record, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.store import plan_file
@@ -26,7 +26,7 @@ from mutator.workspace import Workspace
 
 
 @dataclass(frozen=True, kw_only=True)
-class Single:
+class SingleRun:
     """An experiment run alone. `golden` and `faulty` are output folders, for `load_trace`."""
 
     experiment: Experiment
@@ -45,23 +45,23 @@ def run_single(
     *,
     limits: Limits | None = None,
     golden: Path | None = None,
-) -> Single:
+) -> SingleRun:
     """Run an experiment; write golden/ (unless given), faulty/ and mutant.patch into the folder `out`.
 
     faulty/ is empty if the mutant could not be built. Raises CheckFailed if the golden run fails.
     """
-    with _engine(manifest, out, limits or Limits()) as engine:
-        reference = golden or _run_golden(workspace, engine, experiment, out / "golden")
-        goldens = Goldens(manifest, lambda experiment: reference)
-        runner = Runner(manifest, workspace.fault_models(), engine, goldens, workspace.scenario)
-        (finished,) = _kept(runner.run([experiment]), out)
-    return Single(
+    with _engine_in_folder(manifest, out, limits or Limits()) as engine:
+        reference = golden or _run_golden_on_engine(workspace, engine, experiment, out / "golden")
+        goldens = LoadedGoldens(manifest, lambda experiment: reference)
+        runner = ExperimentRunner(manifest, workspace.fault_models(), engine, goldens, workspace.scenario)
+        (finished,) = _storing_output(runner.run([experiment]), out)
+    return SingleRun(
         experiment=experiment,
         mutant=finished.mutant,
         record=finished.record,
         golden=reference,
         faulty=out / "faulty",
-        log=finished.log,
+        log=finished.log_tail,
     )
 
 
@@ -72,45 +72,45 @@ def run_golden(
 
     Raises CheckFailed if the run fails.
     """
-    with _engine(manifest, out, limits) as engine:
-        return _run_golden(workspace, engine, experiment, out / "golden")
+    with _engine_in_folder(manifest, out, limits) as engine:
+        return _run_golden_on_engine(workspace, engine, experiment, out / "golden")
 
 
-def rerun(
+def rerun_experiment(
     workspace: Workspace, run: Path, experiment_id: str, *, out: Path | None = None
-) -> tuple[Single, bool]:
+) -> tuple[SingleRun, bool]:
     """Rerun a planned experiment, with output in the folder `out` (default: traces/<id>/ of the run folder).
 
     The second value is True if the record equals the campaign's, or if the campaign has none yet.
     """
     folder = RunFolder.open(run)
-    manifest = manifest_of(workspace, folder)
-    wanted = folder.experiment_id_from(experiment_id)
-    experiment = next(e for e in plan_file.load_experiments(folder.path) if e.id == wanted)
+    manifest = manifest_of_unchanged_target(workspace, folder)
+    full_id = folder.experiment_id_from(experiment_id)
+    experiment = next(e for e in plan_file.load_experiments(folder.path) if e.id == full_id)
     golden = folder.golden_folder_of(experiment)
     single = run_single(
         workspace,
         manifest,
         experiment,
-        out or folder.kept_traces_folder(wanted),
+        out or folder.kept_traces_folder(full_id),
         limits=folder.limits,
         golden=golden if golden.is_dir() else None,
     )
-    return single, is_same(folder, folder.records().get(wanted), single.record)
+    return single, is_same_record(folder, folder.records().get(full_id), single.record)
 
 
-def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
+def is_same_record(folder: RunFolder, stored: Record | None, rerun_record: Record) -> bool:
     """Return whether a rerun's record equals the campaign's; True if the campaign has none yet.
 
     Raises MutatorError if the patch of the campaign's record is damaged.
     """
-    if known is None:
+    if stored is None:
         return True
-    folder.read_patch(known.experiment_id, known)
-    return known == found
+    folder.read_patch(stored.experiment_id, stored)
+    return stored == rerun_record
 
 
-def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
+def manifest_of_unchanged_target(workspace: Workspace, folder: RunFolder) -> TargetManifest:
     """Return the target of a run; MutatorError if its sources have changed since the run."""
     manifest = workspace.manifest(folder.head.target)
     now = RunInputs.from_workspace(workspace, manifest, folder.scenarios).digest_by_source()
@@ -119,7 +119,7 @@ def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
 
 
 @contextmanager
-def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[ReferenceEngine]:
+def _engine_in_folder(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[ReferenceEngine]:
     """Yield an engine that works in `out`. Its scratch folder is deleted afterwards."""
     check_requirements(manifest)
     make_folder(out)
@@ -134,40 +134,42 @@ def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[Ref
             remove_folder(work)
 
 
-def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Experiment, place: Path) -> Path:
+def _run_golden_on_engine(
+    workspace: Workspace, engine: ReferenceEngine, experiment: Experiment, destination: Path
+) -> Path:
     job = Job(
         name="golden",
         scenario=workspace.scenario(experiment.scenario),
         seed=experiment.seed,
         changes=experiment.changes,
     )
-    execution = engine.execute(job, path_below(engine.work, job.name))
+    execution = engine.execute(job, path_below(engine.work_folder, job.name))
     if execution.status is not Status.OK:
         raise CheckFailed(
             f"the run without any fault ended as {execution.status.value}: {execution.detail}",
             where=job.scenario,
             remedy="correct the target or the scenario first",
         )
-    _replace(execution.out, place)
-    return place
+    _replace_folder(execution.out, destination)
+    return destination
 
 
-def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
-    for finished in runs:
-        left = finished.out
-        if left is None or not left.is_dir():  # a run can delete it
-            left = out / "work" / "nothing"
-            left.mkdir()
-        _replace(left, out / "faulty")
+def _storing_output(finished_runs: Iterator[FinishedExperiment], out: Path) -> Iterator[FinishedExperiment]:
+    for finished in finished_runs:
+        output = finished.output_folder
+        if output is None or not output.is_dir():  # a run can delete it
+            output = out / "work" / "nothing"
+            output.mkdir()
+        _replace_folder(output, out / "faulty")
         if finished.mutant is not None:
             write_atomic(out / "mutant.patch", finished.mutant.patch_bytes)
         yield finished
 
 
-def _replace(new: Path, place: Path) -> None:
+def _replace_folder(new: Path, destination: Path) -> None:
     """Replace a folder that another process might be reading."""
     aside = Path(mkdtemp(dir=new.parent))
-    if os.path.lexists(place):
-        place.rename(path_below(aside, place.name))
-    new.rename(place)
+    if os.path.lexists(destination):
+        destination.rename(path_below(aside, destination.name))
+    new.rename(destination)
     remove_folder(aside)

@@ -6,7 +6,7 @@ from random import SystemRandom
 from mutator._common.confined_files import path_below
 from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
-from mutator.execution.single_run import manifest_of, run_single
+from mutator.execution.single_run import manifest_of_unchanged_target, run_single
 from mutator.model import Status
 from mutator.preflight import equivalence_check
 from mutator.store import plan_file
@@ -14,7 +14,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 
-def drawn(folder: RunFolder, count: int) -> list[str]:
+def draw_experiments(folder: RunFolder, count: int) -> list[str]:
     """Draw the ids of `count` experiments that have a result, or of all if there are fewer.
 
     The draw has no seed, so nobody can predict it.
@@ -24,9 +24,9 @@ def drawn(folder: RunFolder, count: int) -> list[str]:
     return SystemRandom().sample(ids, min(count, len(ids)))
 
 
-def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) -> Iterator[MutatorError]:
+def rerun_and_compare(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) -> Iterator[MutatorError]:
     """Rerun these experiments, and yield an error for each whose record differs."""
-    manifest, records = manifest_of(workspace, folder), folder.records()
+    manifest, records = manifest_of_unchanged_target(workspace, folder), folder.records()
     experiments = {experiment.id: experiment for experiment in plan_file.load_experiments(folder.path)}
     with ScratchFolder("mutator-verify-") as scratch:
         for name in ids:
@@ -40,10 +40,10 @@ def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) ->
                 limits=folder.limits,
                 golden=golden if golden.is_dir() else None,
             )
-            known, found = records[name], single.record
-            if known != found:
+            stored, rerun_record = records[name], single.record
+            if stored != rerun_record:
                 yield MutatorError(
-                    f"{name} rerun: {equivalence_check.describe_difference(found, known)}",
+                    f"{name} rerun: {equivalence_check.describe_difference(rerun_record, stored)}",
                     where=folder.path,
                     expected="the record of the campaign",
                 )

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from mutator.engines.in_target import process_guard
 
-_LOOK_S = 1.0
-_STOPPED = "T"
+_CHECK_INTERVAL_S = 1.0
+_STOPPED_STATE = "T"
 
 
-class Continuing:
+class WorkerContinuer:
     """A thread that tells stopped child processes of this process that they were stopped, and continues them.
 
     Stopping all processes of a terminal (Ctrl-Z) also stops this thread, so `fg` tells nobody.
@@ -21,29 +21,29 @@ class Continuing:
 
     def __init__(self) -> None:
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._thread = threading.Thread(target=self._continue_stopped_children, daemon=True)
         self._thread.start()
 
     def end(self) -> None:
         self._ended.set()
         self._thread.join()
 
-    def _look(self) -> None:
-        while not self._ended.wait(_LOOK_S):
+    def _continue_stopped_children(self) -> None:
+        while not self._ended.wait(_CHECK_INTERVAL_S):
             for pid in _stopped_children():
                 with suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGUSR1)
                     os.kill(pid, signal.SIGCONT)
 
 
-def on_stop(act: Callable[[], None]) -> None:
-    """Call `act` when this process was stopped and another one's `Continuing` has continued it."""
-    signal.signal(signal.SIGUSR1, lambda number, frame: act())
+def on_stop(callback: Callable[[], None]) -> None:
+    """Call `callback` when this process was stopped and another one's `WorkerContinuer` has continued it."""
+    signal.signal(signal.SIGUSR1, lambda number, frame: callback())
 
 
 def _stopped_children() -> Iterator[int]:
-    for pid in process_guard.children(os.getpid()):
+    for pid in process_guard.child_pids(os.getpid()):
         with suppress(OSError):
             state = Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()[0]
-            if state == _STOPPED:
+            if state == _STOPPED_STATE:
                 yield pid

@@ -15,11 +15,16 @@ from mutator.campaigns.chunks import PendingChunk
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
 from mutator.engines.engine_choice import make_engine
-from mutator.engines.engine_jobs import FAST, Engine, Setting
+from mutator.engines.engine_jobs import MODES_TO_PROVE, Engine, EngineArguments
 from mutator.engines.in_target import process_guard
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.execution.experiment_runner import Finished, Goldens, Runner, without_outcome
-from mutator.execution.written_files import Sums
+from mutator.execution.experiment_runner import (
+    ExperimentRunner,
+    FinishedExperiment,
+    LoadedGoldens,
+    record_without_outcome,
+)
+from mutator.execution.written_files import FileDigests
 from mutator.model import Experiment, Status
 from mutator.preflight import equivalence_check
 from mutator.preflight.equivalence_check import SampledExperiment
@@ -30,63 +35,65 @@ from mutator.store.run_writer import RunWriter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Assignment:
+class WorkerAssignment:
     """The role of a worker.
 
-    `name` makes its file names in the run folder unique. `parent` is the process that the worker must not
-    outlive (None: the worker is the command itself). `goldens` has the digest of each golden run, and
-    `secret` authenticates files that workers share; neither is in a file.
+    `worker_name` makes its file names in the run folder unique. `parent_pid` is the process that the worker
+    must not outlive (None: the worker is the command itself). `golden_digests` has the digest of each golden
+    run, and `secret` authenticates files that workers share; neither is in a file.
     """
 
-    run: Path
-    name: str
+    run_folder: Path
+    worker_name: str
     engine: str
-    goldens: Mapping[str, str]
+    golden_digests: Mapping[str, str]
     secret: bytes
-    parent: int | None = None
+    parent_pid: int | None = None
 
 
 class Worker:
     """Runs chunks of a run folder and appends their results. Reads the plan chunk by chunk."""
 
-    def __init__(self, inputs: RunInputs, assignment: Assignment) -> None:
+    def __init__(self, inputs: RunInputs, assignment: WorkerAssignment) -> None:
         self.was_stopped = False  # a signal handler sets it
-        self.folder = RunFolder.open(assignment.run)
+        self.folder = RunFolder.open(assignment.run_folder)
         check_sources(self.folder.path, self.folder.head.sources, inputs.digest_by_source())
         with raising_disk_full(self.folder.scratch_folder):
             self.folder.scratch_folder.mkdir(exist_ok=True)
         self._inputs, self._manifest, self._assignment = inputs, inputs.manifest, assignment
         self._runner = self._make_runner(
-            self._engine(assignment.engine), with_series=bool(self.folder.series_budget_mb)
+            self._make_engine(assignment.engine), with_series=bool(self.folder.series_budget_mb)
         )
-        self._seed: int | None = None  # the seed being run
-        self._prover: Runner | None = None
+        self._current_seed: int | None = None  # the seed being run
+        self._prover: ExperimentRunner | None = None
         self._needs_proof: bool | None = None  # None: not known yet
-        self._planned: Mapping[str, Experiment] = {}
+        self._planned_experiments: Mapping[str, Experiment] = {}
         self._faults = plan_file.load_faults(self.folder.path)
-        self._writer = RunWriter(self.folder, assignment.name)  # last: nothing is written if the rest fails
+        self._writer = RunWriter(
+            self.folder, assignment.worker_name
+        )  # last: nothing is written if the rest fails
 
     def run(self, pending: PendingChunk) -> list[tuple[str, str]]:
         """Run the rest of a chunk; return (experiment id, detail) of each harness error."""
         experiments = plan_file.load_chunk(
             self.folder.path, self.folder.head.chunks[pending.chunk_index], self._faults
         )
-        self._make_room(experiments[0].seed)
+        self._delete_old_images(experiments[0].seed)
         errors = []
         for ended in self._runner.run([experiments[place] for place in pending.places]):
-            finished = self._blamed(ended)
-            self._keep(finished)
-            if finished.mode in FAST:
+            finished = self._without_outcome_if_stopped(ended)
+            self._store_finished(finished)
+            if finished.mode in MODES_TO_PROVE:
                 self._needs_proof = True
             if finished.record.status is Status.HARNESS_ERROR:
                 errors.append((finished.experiment.id, finished.record.detail))
         return errors
 
-    def _make_room(self, seed: int) -> None:
+    def _delete_old_images(self, seed: int) -> None:
         """Delete images of earlier seeds, which would fill the disk."""
-        if len(self.folder.seeds) > 1 and seed != self._seed:
+        if len(self.folder.seeds) > 1 and seed != self._current_seed:
             shared_cache.prune_target(self._manifest.cache_name)
-        self._seed = seed
+        self._current_seed = seed
 
     def prove(self, sample: SampledExperiment) -> list[tuple[str, str]]:
         """Run an experiment of the proof's sample on the reference engine; return harness errors as `run`
@@ -100,18 +107,18 @@ class Worker:
         if not self._needs_proof:
             return []
         if self._prover is None:
-            self._prover = self._make_runner(self._independent_engine())
-            self._planned = PlannedExperiments(self.folder.path)
+            self._prover = self._make_runner(self._make_independent_engine())
+            self._planned_experiments = PlannedExperiments(self.folder.path)
         errors = []
-        for ended in self._prover.run([self._planned[sample.id]]):
-            finished = self._blamed(ended)
+        for ended in self._prover.run([self._planned_experiments[sample.id]]):
+            finished = self._without_outcome_if_stopped(ended)
             self._writer.append_proof(finished.record)
             if finished.record.status is Status.HARNESS_ERROR:
                 errors.append((finished.experiment.id, finished.record.detail))
         return errors
 
     @property
-    def written(self) -> Sums:
+    def file_digests(self) -> FileDigests:
         """The digests of the files whose lines count."""
         return self._writer.sha256_by_file
 
@@ -119,19 +126,20 @@ class Worker:
         self._runner.engine.close()
         self._writer.close()
 
-    def _make_runner(self, engine: Engine, *, with_series: bool = False) -> Runner:
+    def _make_runner(self, engine: Engine, *, with_series: bool = False) -> ExperimentRunner:
         folder = self.folder
         several = len(folder.seeds) > 1
-        goldens = Goldens(
+        goldens = LoadedGoldens(
             self._manifest,
             folder.golden_folder_of,
             several_seeds=several,
             digests={
-                path_below(folder.path / "golden", key): one for key, one in self._assignment.goldens.items()
+                path_below(folder.path / "golden", key): golden_digest
+                for key, golden_digest in self._assignment.golden_digests.items()
             },
         )
         inputs = self._inputs
-        return Runner(
+        return ExperimentRunner(
             self._manifest,
             inputs.fault_models,
             engine,
@@ -140,40 +148,44 @@ class Worker:
             with_series=with_series,
         )
 
-    def _engine(self, name: str) -> Engine:
+    def _make_engine(self, name: str) -> Engine:
         folder = self.folder
-        setting = Setting(
+        setting = EngineArguments(
             manifest=self._manifest,
             models=self._inputs.fault_models,
-            work=folder.scratch_folder,
+            work_folder=folder.scratch_folder,
             limits=folder.limits,
-            parent=self._assignment.parent,
+            parent_pid=self._assignment.parent_pid,
             secret=self._assignment.secret,
         )
         return make_engine(name, setting)
 
-    def _independent_engine(self) -> Engine:
+    def _make_independent_engine(self) -> Engine:
         folder = self.folder
         return ReferenceEngine(
-            self._manifest, folder.scratch_folder, folder.limits, self._assignment.parent, independent=True
+            self._manifest,
+            folder.scratch_folder,
+            folder.limits,
+            self._assignment.parent_pid,
+            independent=True,
         )
 
-    def _blamed(self, finished: Finished) -> Finished:
+    def _without_outcome_if_stopped(self, finished: FinishedExperiment) -> FinishedExperiment:
         """Return the experiment; one that ran when this worker was stopped has no outcome."""
         if not self.was_stopped:
             return finished
         self.was_stopped = False
-        made, why = finished.record, "its worker was stopped while it ran"
-        bare = without_outcome(made.experiment_id, Status.HARNESS_ERROR, why)
-        return replace(finished, record=replace(bare, tree=made.tree, patch=made.patch), series=None)
+        record, why = finished.record, "its worker was stopped while it ran"
+        bare = record_without_outcome(record.experiment_id, Status.HARNESS_ERROR, why)
+        return replace(finished, record=replace(bare, tree=record.tree, patch=record.patch), series=None)
 
-    def _keep(self, finished: Finished) -> None:
+    def _store_finished(self, finished: FinishedExperiment) -> None:
         patch = None if finished.mutant is None else finished.mutant.patch_bytes
-        timing = timing_of(finished, self._assignment.name)
+        timing = timing_of(finished, self._assignment.worker_name)
         self._writer.append(finished.record, timing, patch, finished.series)
 
 
-def timing_of(finished: Finished, worker: str) -> dict[str, Any]:
+def timing_of(finished: FinishedExperiment, worker: str) -> dict[str, Any]:
     return {
         "experiment_id": finished.experiment.id,
         "cpu_s": finished.cpu_s,
@@ -181,19 +193,19 @@ def timing_of(finished: Finished, worker: str) -> dict[str, Any]:
         "host": socket.gethostname(),
         "worker": worker,
         "engine": finished.mode,
-        "why": finished.why,
+        "why": finished.fallback_reason,
     }
 
 
-def dying_python(parent: int) -> list[str]:
-    """Return the beginning of a Python command line whose process dies with `parent`, even while starting.
+def python_dying_with(parent_pid: int) -> list[str]:
+    """Return the beginning of a Python command line whose process dies with its parent, even while starting.
 
     It imports nothing from its working folder.
     """
-    return [sys.executable, "-I", "-S", process_guard.__file__, str(parent), sys.executable, "-P"]
+    return [sys.executable, "-I", "-S", process_guard.__file__, str(parent_pid), sys.executable, "-P"]
 
 
-def bind_to_parent(parent: int) -> None:
-    """End this process when `parent` ends, and ignore Ctrl-C, which `parent` handles."""
+def bind_to_parent(parent_pid: int) -> None:
+    """End this process when `parent_pid` ends, and ignore Ctrl-C, which the parent handles."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    process_guard.die_with_parent(parent)
+    process_guard.die_with_parent(parent_pid)

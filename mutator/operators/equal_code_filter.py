@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from mutator.engines.code_swap import essence
+from mutator.engines.code_swap import behaviour_key
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.expressions import Expression
 from mutator.mutants.standalone_functions import compile_standalone
@@ -62,4 +62,4 @@ def mutated_function(file: ParsedFile, function: range, mutation: Mutation) -> l
 
 def _comparable_code(file: ParsedFile, lines: Iterable[bytes]) -> object:
     code = compile_standalone(list(lines), file.encoding)
-    return code and essence(code)
+    return code and behaviour_key(code)

@@ -57,7 +57,7 @@ def _measure(engine: ReferenceEngine, golden_run: GoldenRunInputs, folder: Path)
         scenario=golden_run.scenario,
         seed=golden_run.seed,
         changes=golden_run.changes,
-        lines=True,
+        note_executed_lines=True,
     )
     execution = engine.execute(job, folder)
     if execution.status is not Status.OK:
@@ -68,7 +68,7 @@ def _measure(engine: ReferenceEngine, golden_run: GoldenRunInputs, folder: Path)
             expected="a fault-free run that succeeds",
             remedy="run `mutator check --drive`",
         )
-    return {file: frozenset(lines) for file, lines in execution.lines.items()}
+    return {file: frozenset(lines) for file, lines in execution.executed_lines.items()}
 
 
 def _cache_key(manifest: TargetManifest, golden_run: GoldenRunInputs) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import dropwhile
 
-from mutator.engines.engine_jobs import Execution, Raised, Stack
+from mutator.engines.engine_jobs import JobResult, RaisedException, TargetStack
 from mutator.model import RunError, Status
 from mutator.mutants.injected_lines import Tag, changed_value_positions, tag_of
 from mutator.mutants.probe import is_probe_path
@@ -49,19 +49,19 @@ class _ChangedFiles:
 
 
 def status_by_cause(
-    execution: Execution, changed_files: Mapping[str, bytes], raising_ids: Collection[str]
+    execution: JobResult, changed_files: Mapping[str, bytes], raising_ids: Collection[str]
 ) -> tuple[Status, str]:
     """Return the status and detail of a mutant's run. `changed_files` are those of the mutant.
 
     `raising_ids` has the ids of injections whose fault models raise exceptions on purpose.
     """
-    status, detail, raised = execution.status, execution.detail, execution.raised
+    status, detail, raised = execution.status, execution.detail, execution.exception
     if status not in (Status.CRASHED, Status.TIMEOUT):
         return status, detail
     cause = _exception_cause(raised, _ChangedFiles(changed_files)) if raised else None
-    if (cause and not cause.tag) or (raised and execution.probe is None):
+    if (cause and not cause.tag) or (raised and execution.probe_report is None):
         return Status.HARNESS_ERROR, f"the probe failed: {detail}"
-    if not execution.active:
+    if not execution.was_fault_active:
         return Status.HARNESS_ERROR, f"{detail}, before the fault was active"
     if cause and cause.tag and not any(name in raising_ids for name in cause.injection_ids):
         code = cause.tag.code.decode("utf-8", "replace").strip()
@@ -69,11 +69,11 @@ def status_by_cause(
     return status, detail
 
 
-def run_error(raised: Raised | None) -> RunError | None:
-    return RunError(kind=raised.kind, message=raised.message, place=raised.place) if raised else None
+def run_error(raised: RaisedException | None) -> RunError | None:
+    return RunError(kind=raised.kind, message=raised.message, place=raised.file_and_line) if raised else None
 
 
-def _exception_cause(raised: Raised, files: _ChangedFiles) -> _ExceptionCause | None:
+def _exception_cause(raised: RaisedException, files: _ChangedFiles) -> _ExceptionCause | None:
     innermost, *others = raised.stacks
     if raised.kind == RecursionError.__name__:  # any call can be the one that exceeds the limit
         innermost = tuple(
@@ -83,7 +83,7 @@ def _exception_cause(raised: Raised, files: _ChangedFiles) -> _ExceptionCause | 
     return min(causes, key=lambda source: source.tag is not None, default=None)  # prefer the probe
 
 
-def _cause_on_stack(stack: Stack, files: _ChangedFiles) -> _ExceptionCause | None:
+def _cause_on_stack(stack: TargetStack, files: _ChangedFiles) -> _ExceptionCause | None:
     """Return the innermost injected line or probe call on the stack; None if it has neither.
 
     If a helper function of the probe fails on a value, the line that called it is the cause. If the probe

@@ -7,7 +7,7 @@ import pandas as pd
 
 from mutator._common.message_text import counted
 from mutator.errors import MutatorError
-from mutator.execution.run_traces import Traces
+from mutator.execution.run_traces import RunTraces
 from mutator.figures.drawings import Drawing
 from mutator.figures.run_plot import marks_of
 from mutator.outcomes.series_sampling import MOST_SAMPLES_PER_S
@@ -32,7 +32,7 @@ def build_example_drawings(
     `frame` comes from `statistics.results_frame.load_usable_results`. Traces come from stored series, so
     nothing is rerun.
     """
-    traces = Traces(workspace, folder) if workspace else None
+    traces = RunTraces(workspace, folder) if workspace else None
     drawings = []
     for figure in figures:
         try:
@@ -56,7 +56,7 @@ def candidate_rows(frame: pd.DataFrame, figure: ActionFigure) -> pd.DataFrame:
     return matches.sort_values([figure.order_column, "experiment_id"], ascending=[False, True])
 
 
-def _build_drawing(frame: pd.DataFrame, traces: Traces | None, figure: ActionFigure) -> Drawing:
+def _build_drawing(frame: pd.DataFrame, traces: RunTraces | None, figure: ActionFigure) -> Drawing:
     rows = candidate_rows(frame, figure)
     if rows.empty:
         return _empty_drawing(figure, "no experiment of this run matches the query")
@@ -70,7 +70,7 @@ def _build_drawing(frame: pd.DataFrame, traces: Traces | None, figure: ActionFig
     examined = rows.head(MOST_EXAMINED).to_dict("records")
     for rank, row in enumerate(examined, start=1):
         record = traces.record(row["experiment_id"])
-        golden, faulty = traces.sampled(record.experiment_id)
+        golden, faulty = traces.sampled_traces_of(record.experiment_id)
         step_s = max(manifest.step_s, 1.0 / MOST_SAMPLES_PER_S)
         pair = RunPair.of(golden, faulty, record, manifest.time_channel, step_s, figure.hazard)
         steps = figure.find_steps(pair)

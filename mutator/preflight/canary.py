@@ -37,9 +37,9 @@ def build_job(workspace: Workspace, manifest: TargetManifest, experiment: Experi
         scenario=workspace.scenario(experiment.scenario),
         seed=experiment.seed,
         changes=experiment.changes,
-        files=mutant.files,
-        mutant=mutant.id,
-        injections=mutant.injection_ids,
+        changed_files=mutant.files,
+        mutant_id=mutant.id,
+        injection_ids=mutant.injection_ids,
     )
 
 

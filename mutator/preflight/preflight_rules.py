@@ -7,7 +7,7 @@ from pathlib import Path
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
 from mutator._common.hashing import digest
-from mutator.engines.engine_jobs import Execution
+from mutator.engines.engine_jobs import JobResult
 from mutator.errors import BadOutput
 from mutator.model import Status
 from mutator.mutants.probe import was_triggered
@@ -32,11 +32,11 @@ class CheckRun:
     modules: tuple[str, ...] = ()
 
 
-def read_check_run(manifest: TargetManifest, execution: Execution) -> CheckRun:
+def read_check_run(manifest: TargetManifest, execution: JobResult) -> CheckRun:
     if execution.status is not Status.OK:
-        log = execution.log.strip()
+        log = execution.log_tail.strip()
         # the last printed line explains why a run was killed; an exception has its own message
-        last = f" ({log.splitlines()[-1]})" if log and execution.raised is None else ""
+        last = f" ({log.splitlines()[-1]})" if log and execution.exception is None else ""
         return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
     try:
         _, judged = load_judged_run(manifest, execution.out)
@@ -48,9 +48,9 @@ def read_check_run(manifest: TargetManifest, execution: Execution) -> CheckRun:
         trace_digest=golden_comparison.trace_digest(manifest, execution.out),
         alerts=judged.alerts,
         hazards=judged.hazards,
-        has_triggered=was_triggered(execution.probe),
+        has_triggered=was_triggered(execution.probe_report),
         cpu_s=execution.cpu_s,
-        modules=execution.modules,
+        modules=execution.third_party_modules,
     )
 
 

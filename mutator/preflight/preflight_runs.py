@@ -101,7 +101,11 @@ class CheckRunner:
             }
             name = key.key
             jobs[NULL_MUTANT, key] = Job(
-                name=f"n-{name}", files=null.files, mutant=null.id, observe=True, **common
+                name=f"n-{name}",
+                changed_files=null.files,
+                mutant_id=null.id,
+                keep_observations=True,
+                **common,
             )
             jobs[GOLDEN, key] = Job(name=f"a-{name}", **common)
             jobs[GOLDEN_AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
@@ -109,7 +113,7 @@ class CheckRunner:
         return dict(sorted(jobs.items(), key=lambda entry: entry[0][0] != NULL_MUTANT))
 
     def _run_job(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
-        scratch = path_below(engine.work, job.name)
+        scratch = path_below(engine.work_folder, job.name)
         try:
             execution = engine.execute(job, scratch)
             run = read_check_run(self.manifest, execution)
@@ -117,7 +121,7 @@ class CheckRunner:
                 shared_cache.prune_target(self.manifest.cache_name)
             if name[0] == NULL_MUTANT:
                 unreached_triggers.save_observations(
-                    self.pending_folder, name[1].key, execution.watched.get("seen", ())
+                    self.pending_folder, name[1].key, execution.watch_report.get("seen", ())
                 )
             if name[0] == GOLDEN and not run.problem:
                 golden_folder = path_below(self.pending_folder / "golden", name[1].key)

@@ -111,8 +111,9 @@ def render_clusters_page(workspace: Workspace) -> str:
         f"The first key is `schema: {cluster_files.SCHEMA}`. {_STRICT_YAML_LINKS}\n",
         *model_sections("cluster-file.md", cluster_files.ClusterModel),
         "The run sets these options itself and rejects them in a file: "
-        f"{', '.join(f'`{name}`' for name in cluster_files.RESERVED)}.\n`security` must be `true` or left "
-        "out. `processes` must equal `cores`, because each worker has one thread.\n",
+        f"{', '.join(f'`{name}`' for name in cluster_files.RESERVED_OPTIONS)}.\n"
+        "`security` must be `true` or left out. `processes` must equal `cores`, because each worker has one "
+        "thread.\n",
     )
 
 

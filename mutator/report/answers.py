@@ -6,7 +6,7 @@ import pandas as pd
 
 from mutator._common.message_text import counted
 from mutator.engines.engine_jobs import RunMode
-from mutator.execution.progress_text import duration
+from mutator.execution.progress_text import describe_duration
 from mutator.report.answer_parts import (
     FIRST,
     LATE,
@@ -158,14 +158,17 @@ def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
     cpu = frame["experiment_id"].map(timings.set_index("experiment_id")["cpu_s"]).astype(float)
     total, ran = float(cpu.sum()), int((cpu > 0).sum())
     workers = timings["worker"].nunique()
-    says = f"The experiments took {duration(total)} of CPU time on {counted(workers, 'worker')}: "
+    says = f"The experiments took {describe_duration(total)} of CPU time on {counted(workers, 'worker')}: "
     says += f"{share(ran, len(frame), 'experiments')} {were(ran)} simulated{_undriven(frame, cpu, timings)}."
     if ran:
         says += f" Median {cpu[cpu > 0].median():.2f} s, longest {cpu.max():.2f} s."
     says += " Checks, golden runs and the equivalence check are not timed."
     costs = cpu.groupby(frame["kind"]).sum().sort_values(ascending=False, kind="stable")
     lines = [
-        (kind_link(str(kind)), Part(float(s), total, f"{duration(float(s))} ({100 * s / total:.0f} %)"))
+        (
+            kind_link(str(kind)),
+            Part(float(s), total, f"{describe_duration(float(s))} ({100 * s / total:.0f} %)"),
+        )
         for kind, s in costs.head(TYPES).items()
         if s > 0
     ]

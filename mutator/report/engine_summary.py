@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mutator._common.table_rendering import TextTable
-from mutator.engines.engine_choice import WORTH_IT
+from mutator.engines.engine_choice import MIN_EXPERIMENTS_TO_FORK
 from mutator.engines.engine_jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.model import Record
@@ -74,8 +74,8 @@ def _proof(folder: RunFolder, records: Mapping[str, Record]) -> tuple[str, str, 
         return said, f"FAILED: {err.got}", True
     if found is None:
         said = "All experiments ran on the reference engine, so no equivalence check is needed."
-        if folder.head.experiments < WORTH_IT:
-            said += f" Forking pays off only with {WORTH_IT} or more experiments."
+        if folder.head.experiments < MIN_EXPERIMENTS_TO_FORK:
+            said += f" Forking pays off only with {MIN_EXPERIMENTS_TO_FORK} or more experiments."
         return said, "none needed", False
     same = f"{found.same} of {found.sampled} same"
     if not found.is_complete:

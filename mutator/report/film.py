@@ -14,9 +14,9 @@ from mutator._common.confined_files import open_below, path_below
 from mutator._common.files import ScratchFolder, make_folder, writing_temporary_path
 from mutator.engines import bytecode
 from mutator.engines.sandbox import Sandbox
-from mutator.engines.target_processes import environment
+from mutator.engines.target_processes import run_environment
 from mutator.errors import MutatorError
-from mutator.execution.single_run import is_same, manifest_of, run_golden, run_single
+from mutator.execution.single_run import is_same_record, manifest_of_unchanged_target, run_golden, run_single
 from mutator.figures.run_plot import marks_of
 from mutator.model import Experiment, Record
 from mutator.store.run_folder import RunFolder
@@ -49,7 +49,7 @@ class Filming:
         """Prepare to film. Raise MutatorError if the target cannot be filmed or has changed since the
         run.
         """
-        manifest = manifest_of(workspace, folder)
+        manifest = manifest_of_unchanged_target(workspace, folder)
         return cls(workspace, folder, manifest, manifest.filming())
 
     def golden(self, experiment: Experiment, out: Path) -> Path:
@@ -93,7 +93,7 @@ class Filming:
             }
             for shot in shots:
                 _show(self.target, scratch, places, shot)
-        return is_same(self.folder, known, record)
+        return is_same_record(self.folder, known, record)
 
 
 def hazards_in_words(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:
@@ -131,7 +131,7 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
     tree = manifest.root
     if manifest.overlay is not None:
         tree = folder / "tree"
-        bytecode.put(manifest.tree.files, tree)
+        bytecode.replace_files(manifest.tree.files, tree)
     out, made = shot.out.absolute(), path_below(folder / "shown", shot.out.name)
     here = {**places, "out": str(made), "t": str(shot.t)}
     for place in (out, made):
@@ -139,13 +139,13 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
     arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
     command = [sys.executable, "-P", "-s", "-m", film.module, *filled(arguments, here)]
     films = (Path(places["golden"]), Path(places["faulty"]))
-    if sandbox := Sandbox.of(manifest, folder, [*films, tree]):
-        command = sandbox.command(command)
+    if sandbox := Sandbox.of_target(manifest, folder, [*films, tree]):
+        command = sandbox.wrap_command(command)
         sandbox.close()
     done = subprocess.run(
         command,
         cwd=made.parent,
-        env={**environment(0, folder, manifest.env), "PYTHONPATH": str(tree)},
+        env={**run_environment(0, folder, manifest.env), "PYTHONPATH": str(tree)},
         capture_output=True,
         text=True,
         check=False,

@@ -4,7 +4,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from mutator.errors import MutatorError
-from mutator.execution.run_traces import Traces
+from mutator.execution.run_traces import RunTraces
 from mutator.outcomes.series_sampling import write_sampled_series
 from mutator.results.table_columns import deviation_column_by_channel
 from mutator.store.run_folder import RunFolder
@@ -26,8 +26,10 @@ def series_facts(folder: RunFolder) -> dict[str, Any]:
 
 def sample_kept_traces(folder: RunFolder, workspace: "Workspace") -> None:
     """Write the missing or damaged series of experiments whose traces are kept."""
-    traces, series = Traces(workspace, folder), SeriesFolder(folder.path)
+    traces, series = RunTraces(workspace, folder), SeriesFolder(folder.path)
     for name in sorted(path.name for path in (folder.path / "traces").glob("*")):
         with suppress(MutatorError, KeyError):  # for example, the sources changed after the run
-            if not series.is_readable(name, traces.record(name)) and traces.is_kept(name):
-                write_sampled_series(folder.path, traces.manifest, *traces.of(name), traces.record(name))
+            if not series.is_readable(name, traces.record(name)) and traces.is_stored(name):
+                write_sampled_series(
+                    folder.path, traces.manifest, *traces.traces_of(name), traces.record(name)
+                )

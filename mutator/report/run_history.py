@@ -13,7 +13,7 @@ from mutator._common.files import write_atomic
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
 from mutator.errors import MutatorError
-from mutator.execution.progress_text import duration
+from mutator.execution.progress_text import describe_duration
 from mutator.model import Outcome
 from mutator.report.panel import FOLDER, rendered
 from mutator.results.result_rows import ResultRow
@@ -127,7 +127,7 @@ def _cells(run: PastRun) -> list[str]:
         f"{len(hazards)} of {run.activated} activated",
         told if run.folder.severity_scale and hazards else "-",
         f"{silent} of {len(hazards)}" if run.folder.has_alerts else "-",
-        duration(run.cpu_s),
+        describe_duration(run.cpu_s),
     ]
 
 

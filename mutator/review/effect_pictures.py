@@ -230,10 +230,15 @@ def _images_of_run(
     probe = stub.replace('json.loads("{}")', f"json.loads({json.dumps(probe_request)!r})")
     files = {**mutant.files, probe_path(manifest.package): probe.encode()}
     job = Job(
-        name=folder.name, scenario=scenario, seed=0, changes=first.changes, files=files, mutant=mutant.id
+        name=folder.name,
+        scenario=scenario,
+        seed=0,
+        changes=first.changes,
+        changed_files=files,
+        mutant_id=mutant.id,
     )
     execution = engine.execute(job, folder)
-    file = execution.out / picture_probe.FILE
+    file = execution.out / picture_probe.PICTURES_FILE
     if not file.is_file():
         ended = execution.status is Status.OK
         raise MutatorError(

@@ -16,7 +16,7 @@ PATIENCE_S = 20.0  # a command's time to clean up workers, scratch folders and h
 def main() -> int:
     """Run the command; return its exit code, or 128 plus the signal that ended it."""
     caller = int(sys.argv[1])
-    ended = process_guard.fork(caller, patience_s=PATIENCE_S)
+    ended = process_guard.fork_guarded(caller, patience_s=PATIENCE_S)
     if ended is None:
         os.close(caller)
         os.execv(sys.executable, [sys.executable, "-P", "-m", "mutator", *sys.argv[2:]])

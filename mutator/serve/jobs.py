@@ -17,7 +17,7 @@ from typing import IO, Any
 
 from mutator._common.progress_events import EVENTS_FD_VARIABLE
 from mutator.errors import Absent, JobEnded, MutatorError
-from mutator.execution.progress_text import endings
+from mutator.execution.progress_text import describe_outcomes
 from mutator.serve.job_events import Event, EventReader, Link, Phase
 from mutator.serve.job_requests import TRIES, Work
 from mutator.serve.responses import without_places
@@ -87,7 +87,7 @@ class Job:
             self.links[event.kind] = event.path
         elif isinstance(event, Phase):
             count = f" {event.done}/{event.total}" if event.total else ""
-            parts = (_line(f"{event.phase}{count}"), endings(Counter(event.outcomes)))
+            parts = (_line(f"{event.phase}{count}"), describe_outcomes(Counter(event.outcomes)))
             self.message = ", ".join(filter(None, parts))
             self.progress = min(1.0, event.done / event.total) if event.total else None
         elif event.event == "result":

@@ -89,7 +89,7 @@ def test_processes_that_dask_starts_get_a_safe_path(monkeypatch: pytest.MonkeyPa
     for before in (None, "0"):
         if before is not None:
             monkeypatch.setenv("PYTHONSAFEPATH", before)
-        with dask_connections.own_scheduler():
+        with dask_connections.applying_scheduler_settings():
             assert os.environ["PYTHONSAFEPATH"] == "1"
         assert os.environ.get("PYTHONSAFEPATH") == before
 
@@ -98,9 +98,9 @@ def test_processes_that_dask_starts_get_a_safe_path(monkeypatch: pytest.MonkeyPa
 def no_bwrap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     (tmp_path / "bin").mkdir()
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
-    sandbox.shortcoming.cache_clear()
+    sandbox.reason_not_available.cache_clear()
     yield
-    sandbox.shortcoming.cache_clear()
+    sandbox.reason_not_available.cache_clear()
 
 
 TRY = ("try", "sensor/lane", "--scenario", "A", "--trigger", "1.0")
@@ -126,7 +126,9 @@ def test_doctor_says_whether_there_is_a_sandbox(cli: Cli, root: Path, no_bwrap: 
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(bool(sandbox.shortcoming()), reason=f"no sandbox: {sandbox.shortcoming()}")
+@pytest.mark.skipif(
+    bool(sandbox.reason_not_available()), reason=f"no sandbox: {sandbox.reason_not_available()}"
+)
 def test_every_way_to_run_in_a_sandbox_gives_the_results_of_one_without(cli: Cli, root: Path) -> None:
     """The target's code looks for this process. In a sandbox, it does not find it."""
     looking = f"import os\nOUTSIDE = os.path.exists('/proc/{os.getpid()}')\n"
@@ -195,7 +197,9 @@ def test_pytest_without_a_sandbox_runs_nothing(root: Path, tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(bool(sandbox.shortcoming()), reason=f"no sandbox: {sandbox.shortcoming()}")
+@pytest.mark.skipif(
+    bool(sandbox.reason_not_available()), reason=f"no sandbox: {sandbox.reason_not_available()}"
+)
 def test_pytest_runs_a_campaign_in_a_sandbox(root: Path, tmp_path: Path) -> None:
     calls = tmp_path / "calls"
     text = f'echo "$@" >> {calls}; exec {shutil.which("bwrap")} "$@"'

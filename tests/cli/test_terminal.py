@@ -12,7 +12,7 @@ import pytest
 from mutator._common.message_text import wrap_text
 from mutator.cli.console import Terminal
 from mutator.cli.progress_display import campaign_progress
-from mutator.execution.progress_text import duration
+from mutator.execution.progress_text import describe_duration
 from mutator.mutants.readable_patches import readable_patch
 from mutator.store.run_progress import Progress
 
@@ -89,7 +89,7 @@ def test_a_log_shows_lines_of_progress(capsys: pytest.CaptureFixture[str]) -> No
     [(0.4, "0 s"), (59.4, "59 s"), (59.6, "1 min 00 s"), (3599, "59 min 59 s"), (7500, "2 h 05 min")],
 )
 def test_durations_are_put_into_words(seconds: float, words: str) -> None:
-    assert duration(seconds) == words
+    assert describe_duration(seconds) == words
 
 
 def test_a_diff_for_readers_leaves_out_new_files() -> None:

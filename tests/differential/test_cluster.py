@@ -14,7 +14,7 @@ from mutator.campaigns import run_environment
 from mutator.errors import MutatorWarning
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.cluster import bundle
-from mutator.execution.distribution import distributor
+from mutator.execution.distribution import choose_distributor
 from mutator.execution.session import Summary
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -59,7 +59,7 @@ def machines(tmp_path: Path) -> Iterator[Machines]:
 
 
 def on(machines: Machines, toy: Workspace, out: Path, **more: object) -> Summary:
-    deals = distributor(str(machines.file))
+    deals = choose_distributor(str(machines.file))
     return run_campaign(toy, "small", out, engine="fork", distributor=deals, **more)  # type: ignore[arg-type]
 
 
@@ -177,7 +177,7 @@ def test_workers_killed_at_random_change_no_byte(
     thread = threading.Thread(target=strike)
     thread.start()
     try:
-        deals = distributor(str(machines.file))
+        deals = choose_distributor(str(machines.file))
         summary = run_campaign(toy, "toy", tmp_path / "run", engine="fork", distributor=deals)
     finally:
         ended.set()
@@ -224,7 +224,7 @@ def test_other_workers_do_the_work_of_a_refused_one(
     machines.add("odd", PYTHONPATH=str(tmp_path / "site"))
     with pytest.warns(MutatorWarning, match=rf"worker odd at .*gets no work: {why}"):
         summary = run_campaign(
-            toy, "toy", tmp_path / "run", engine="fork", distributor=distributor(str(machines.file))
+            toy, "toy", tmp_path / "run", engine="fork", distributor=choose_distributor(str(machines.file))
         )
     assert (summary.exit_code, summary.problem) == (0, "")
     assert (results(tmp_path / "run"), summary.seal) == whole_toy
@@ -246,14 +246,14 @@ def test_a_campaign_resumes_with_a_new_scheduler(
 
     thread = threading.Thread(target=kill)
     thread.start()
-    summary = run_campaign(toy, "toy", out, engine="fork", distributor=distributor(str(machines.file)))
+    summary = run_campaign(toy, "toy", out, engine="fork", distributor=choose_distributor(str(machines.file)))
     thread.join()
     assert summary.exit_code == 3
     assert "no longer answers" in summary.problem
     assert 0 < summary.done < summary.planned
     machines.start_scheduler()
     machines.add("beta")
-    again = run_campaign(toy, "toy", out, engine="fork", distributor=distributor(str(machines.file)))
+    again = run_campaign(toy, "toy", out, engine="fork", distributor=choose_distributor(str(machines.file)))
     assert (again.exit_code, again.done, again.ran) == (0, summary.planned, summary.planned - summary.done)
     assert (results(out), again.seal) == whole_toy
 
@@ -268,7 +268,9 @@ def test_shipped_campaigns_give_the_same_bytes_on_three_workers(
     assert here.exit_code == 0
     for name in ("alpha", "beta", "gamma"):
         machines.add(name)
-    there = run_campaign(shipped, campaign, tmp_path / "there", distributor=distributor(str(machines.file)))
+    there = run_campaign(
+        shipped, campaign, tmp_path / "there", distributor=choose_distributor(str(machines.file))
+    )
     assert (there.exit_code, there.problem) == (0, "")
     assert results(tmp_path / "there") == results(tmp_path / "here")
     assert there.seal == here.seal

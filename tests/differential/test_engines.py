@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from mutator.engines.engine_choice import make_engine
-from mutator.engines.engine_jobs import Engine, Execution, Job, RunMode, Setting
+from mutator.engines.engine_jobs import Engine, EngineArguments, Job, JobResult, RunMode
 from mutator.engines.engine_kinds import ENGINES
 from mutator.model import (
     Anchor,
@@ -117,7 +117,7 @@ class Engines:
             work.mkdir()
             self.made[name] = make_engine(
                 name,
-                Setting(manifest=self.manifest, models=self.models, work=work, limits=limits),
+                EngineArguments(manifest=self.manifest, models=self.models, work_folder=work, limits=limits),
             )
         self._goldens: dict[str, Path] = {}
 
@@ -138,21 +138,21 @@ class Engines:
             name="job",
             scenario=self.toy.scenario(scenario),
             seed=7,
-            files=built.files,
-            mutant=built.id,
+            changed_files=built.files,
+            mutant_id=built.id,
             probe=built.probe,
-            injections=built.injection_ids,
-            golden=self.golden(scenario),
+            injection_ids=built.injection_ids,
+            golden_folder=self.golden(scenario),
         )
 
-    def run(self, name: str, job: Job) -> tuple[Execution, dict[str, bytes]]:
+    def run(self, name: str, job: Job) -> tuple[JobResult, dict[str, bytes]]:
         ((_, execution),) = [
-            (job, replace(done, log=done.log)) for job, done in self._kept(self.made[name], [job])
+            (job, replace(done, log_tail=done.log_tail)) for job, done in self._kept(self.made[name], [job])
         ]
         files = {path.name: path.read_bytes() for path in execution.out.iterdir()}
         return execution, files
 
-    def _kept(self, engine: Engine, jobs: Sequence[Job]) -> Iterator[tuple[Job, Execution]]:
+    def _kept(self, engine: Engine, jobs: Sequence[Job]) -> Iterator[tuple[Job, JobResult]]:
         for job, execution in engine.run(jobs):
             kept = self.folder / "kept"
             shutil.rmtree(kept, ignore_errors=True)
@@ -185,7 +185,7 @@ def fault_at(place: FaultLocation, model: str, params: dict[str, Value]) -> Faul
     return Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
 
 
-def check_same(three: Engines, job: Job, how: RunMode | None = None) -> Execution:
+def check_same(three: Engines, job: Job, how: RunMode | None = None) -> JobResult:
     """Check that status, messages, probe report and files equal the reference engine's. Return the fork
     engine's execution."""
     expected, files = three.run("reference", job)
@@ -193,20 +193,22 @@ def check_same(three: Engines, job: Job, how: RunMode | None = None) -> Executio
         execution, found = three.run(name, job)
         assert (execution.status, execution.detail) == (expected.status, expected.detail)
         if expected.status is Status.OK:
-            assert execution.probe is not None
-            assert expected.probe is not None
-            never = all(not told["count"] for told in expected.probe["injections"].values())
-            assert never if execution.mode is RunMode.GOLDEN else execution.probe == expected.probe
+            assert execution.probe_report is not None
+            assert expected.probe_report is not None
+            never = all(not told["count"] for told in expected.probe_report["injections"].values())
+            assert (
+                never if execution.mode is RunMode.GOLDEN else execution.probe_report == expected.probe_report
+            )
             assert found == files
     if how is not None:
-        assert (execution.mode, execution.why) == (how, "")
+        assert (execution.mode, execution.fallback_reason) == (how, "")
     return execution
 
 
 @pytest.mark.parametrize("model", ["offset", "omission", "image_effect", "reordering", "slow_call"])
 def test_a_fault_in_a_context_is_forked(three: Engines, model: str) -> None:
     execution = check_same(three, three.job(fault(*MODELS[model]), TRIGGERS["in a context"]), RunMode.FORK)
-    assert execution.start > 20
+    assert execution.fork_step > 20
 
 
 @pytest.mark.slow
@@ -258,7 +260,7 @@ def test_the_reference_engine_reruns_a_crash(three: Engines) -> None:
     execution, _ = three.run("fork", job)
     assert (execution.status, execution.mode) == (Status.CRASHED, RunMode.REFERENCE)
     assert execution.detail == "IndexError: list index out of range (toycar/sensing.py:14)"
-    assert execution.why.startswith("ended as crashed: IndexError")
+    assert execution.fallback_reason.startswith("ended as crashed: IndexError")
     execution, _ = three.run("fork", three.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"]))
     assert (execution.mode, execution.status) == (RunMode.FORK, Status.OK)
 

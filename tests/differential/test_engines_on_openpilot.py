@@ -8,10 +8,10 @@ import pytest
 
 from mutator.campaigns.plan import build_plan
 from mutator.engines.engine_choice import make_engine
-from mutator.engines.engine_jobs import Job, Setting
+from mutator.engines.engine_jobs import EngineArguments, Job
 from mutator.engines.engine_kinds import ENGINES
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.execution.experiment_runner import Goldens, Runner
+from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens
 from mutator.model import Record
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import GoldenRun
@@ -33,16 +33,16 @@ def test_the_engines_give_the_same_records(tmp_path: Path, campaign: str, limit:
     for one in plan.goldens():
         job = Job(name=one.key, scenario=clone.scenario(one.scenario), seed=plan.seed, changes=one.changes)
         outputs[one.key] = reference.execute(job, tmp_path / one.key).out
-    goldens = Goldens(manifest, lambda e: outputs[GoldenRun.for_experiment(e, several_seeds=False).key])
+    goldens = LoadedGoldens(manifest, lambda e: outputs[GoldenRun.for_experiment(e, several_seeds=False).key])
     found: dict[str, dict[str, Record]] = {}
     for name in ENGINES:
         work = tmp_path / name
         work.mkdir()
-        setting = Setting(manifest=manifest, models=models, work=work, limits=limits)
+        setting = EngineArguments(manifest=manifest, models=models, work_folder=work, limits=limits)
         engine = make_engine(name, setting)
-        done = list(Runner(manifest, models, engine, goldens, clone.scenario).run(plan.experiments))
+        done = list(ExperimentRunner(manifest, models, engine, goldens, clone.scenario).run(plan.experiments))
         engine.close()
         found[name] = {finished.experiment.id: finished.record for finished in done}
-        assert Counter(finished.why for finished in done) == {"": len(plan.experiments)}
+        assert Counter(finished.fallback_reason for finished in done) == {"": len(plan.experiments)}
     assert found["fork"] == found["reference"]
     assert found["warm"] == found["reference"]

@@ -7,10 +7,10 @@ import pytest
 
 from mutator._common.hashing import digest
 from mutator.engines.engine_choice import make_engine
-from mutator.engines.engine_jobs import Engine, Job, Setting
+from mutator.engines.engine_jobs import Engine, EngineArguments, Job
 from mutator.engines.engine_kinds import ENGINES
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.execution.experiment_runner import Goldens, Runner
+from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens
 from mutator.model import (
     Anchor,
     AnchorKind,
@@ -227,7 +227,9 @@ class Blamed:
         for name in ENGINES:
             work = folder / name
             work.mkdir()
-            setting = Setting(manifest=self.manifest, models=self.models, work=work, limits=limits)
+            setting = EngineArguments(
+                manifest=self.manifest, models=self.models, work_folder=work, limits=limits
+            )
             self.engines[name] = make_engine(name, setting)
 
     def golden(self, experiment: Experiment) -> Path:
@@ -248,8 +250,10 @@ class Blamed:
         )
 
     def run(self, engine: str, experiments: Sequence[Experiment]) -> list[Record]:
-        goldens = Goldens(self.manifest, self.golden)
-        runner = Runner(self.manifest, self.models, self.engines[engine], goldens, self.toy.scenario)
+        goldens = LoadedGoldens(self.manifest, self.golden)
+        runner = ExperimentRunner(
+            self.manifest, self.models, self.engines[engine], goldens, self.toy.scenario
+        )
         return [finished.record for finished in runner.run(experiments)]
 
     def record(self, fault: Fault, trigger: Trigger = FROM_2_S, scenario: str = "A") -> Record:

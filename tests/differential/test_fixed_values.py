@@ -99,9 +99,9 @@ def fault(*locations: FaultLocation) -> Fault:
 def test_engines_agree_on_a_mutant_that_sets_all_values(three: Engines) -> None:
     job = three.job(fault(*PLACES.values()), TRIGGERS["off and on"])
     execution = check_same(three, job, RunMode.FORK)
-    assert execution.probe is not None
-    steps = execution.probe["triggered"]["steps"]
-    assert [told["count"] for told in execution.probe["injections"].values()] == [steps] * 4
+    assert execution.probe_report is not None
+    steps = execution.probe_report["triggered"]["steps"]
+    assert [told["count"] for told in execution.probe_report["injections"].values()] == [steps] * 4
     assert 0 < steps < 400
 
 

@@ -50,9 +50,9 @@ def fault(*injections: Injection) -> Fault:
 
 def test_engines_agree_on_a_mutant_with_all_limits(three: Engines) -> None:
     execution = check_same(three, three.job(fault(*INJECTIONS), TRIGGERS["for 1 s"]), RunMode.FORK)
-    assert execution.probe is not None
-    counts = [told["count"] for told in execution.probe["injections"].values()]
-    assert execution.probe["triggered"]["steps"] == 20
+    assert execution.probe_report is not None
+    counts = [told["count"] for told in execution.probe_report["injections"].values()]
+    assert execution.probe_report["triggered"]["steps"] == 20
     assert counts[:2] == [1, 6]
     assert 0 < counts[2] <= 10
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines.engine_jobs import Execution, RunMode
+from mutator.engines.engine_jobs import JobResult, RunMode
 from mutator.engines.engine_kinds import ENGINES
 from mutator.model import Limits, Status
 from mutator.workspace import Workspace
 
 from .test_engines import LIMITS, MODELS, TRIGGERS, Engines, fault
 
-Misbehave = Callable[..., dict[str, tuple[Execution, dict[str, bytes]]]]
+Misbehave = Callable[..., dict[str, tuple[JobResult, dict[str, bytes]]]]
 RESULTS = {"log.npz", "said.json"}
 MEET_TROUBLE = """        self.rows.append("""
 TROUBLE = """        if self.sensor.reading[0] > 60.0:
@@ -45,7 +45,7 @@ def misbehave(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Itera
 
     def run(
         trouble: str, head: str = "", limits: Limits = LIMITS
-    ) -> dict[str, tuple[Execution, dict[str, bytes]]]:
+    ) -> dict[str, tuple[JobResult, dict[str, bytes]]]:
         made.append(with_trouble(copy_toycar(tmp_path), tmp_path, trouble, head, limits))
         job = made[0].job(*ACTIVE)
         return {name: made[0].run(name, job) for name in ENGINES}

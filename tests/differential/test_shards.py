@@ -17,7 +17,7 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.execution import shard_merging
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
-from mutator.execution.shard_merging import merge
+from mutator.execution.shard_merging import merge_shards
 from mutator.results import table_building
 from mutator.store import approvals
 from mutator.store.patch_files import PatchFolder
@@ -55,7 +55,7 @@ def change_head(run: Path, **values: object) -> None:
 
 
 def test_merged_shards_equal_the_single_run(runs: Runs, tmp_path: Path) -> None:
-    merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
+    merge_shards([runs["2/2"], runs["1/2"]], tmp_path / "out")
     for name in DERIVED:
         assert (tmp_path / "out" / name).read_bytes() == (runs["whole"] / name).read_bytes()
     merged, whole = (
@@ -84,12 +84,12 @@ def test_a_killed_merge_loses_no_series(runs: Runs, tmp_path: Path, monkeypatch:
         return table_building.build_tables(run)
 
     monkeypatch.setattr(shard_merging, "table_building", SimpleNamespace(build_tables=build))
-    merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
+    merge_shards([runs["1/2"], runs["2/2"]], tmp_path / "out")
     assert seen == [3]
 
 
 def test_merged_shards_have_the_seal_of_the_single_run(runs: Runs, tmp_path: Path) -> None:
-    merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
+    merge_shards([runs["2/2"], runs["1/2"]], tmp_path / "out")
     seals = [seals_of(RunFolder.open(path)).seal for path in (runs["whole"], tmp_path / "out", runs["1/2"])]
     assert seals[0] is not None and seals[0] == seals[1] != seals[2]
 
@@ -97,7 +97,7 @@ def test_merged_shards_have_the_seal_of_the_single_run(runs: Runs, tmp_path: Pat
 def test_the_whole_plan_decides_the_engine_of_a_shard(
     runs: Runs, toy: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine_choice, "WORTH_IT", RunFolder.open(runs["whole"]).planned_count)
+    monkeypatch.setattr(engine_choice, "MIN_EXPERIMENTS_TO_FORK", RunFolder.open(runs["whole"]).planned_count)
     assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
 
@@ -105,10 +105,10 @@ def test_an_approval_is_merged_if_every_shard_has_it(copies: Runs, tmp_path: Pat
     said = {"schema": approvals.SCHEMA, "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane Doe"}]}
     shards = [copies["1/2"], copies["2/2"]]
     approvals.write_approvals(shards[0], said)
-    merge(shards, tmp_path / "half")
+    merge_shards(shards, tmp_path / "half")
     assert approvals.approval_summary(tmp_path / "half") == ""
     approvals.write_approvals(shards[1], said)
-    merge(shards, tmp_path / "out")
+    merge_shards(shards, tmp_path / "out")
     assert approvals.approval_summary(tmp_path / "out") == "1 group approved by Jane Doe (1)"
 
 
@@ -127,7 +127,7 @@ def test_a_shard_resumes_without_its_option(copies: Runs, toy: Workspace) -> Non
 
 
 def test_nothing_is_left_to_run_in_a_merged_folder(runs: Runs, toy: Workspace, tmp_path: Path) -> None:
-    merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
+    merge_shards([runs["1/2"], runs["2/2"]], tmp_path / "out")
     summary = run_campaign(toy, "small", tmp_path / "out")
     assert (summary.exit_code, summary.ran, summary.done) == (0, 0, 12)
 
@@ -144,7 +144,7 @@ def test_missing_duplicate_and_whole_shards_are_refused(
     runs: Runs, tmp_path: Path, given: tuple[str, ...], told: str
 ) -> None:
     with pytest.raises(MutatorError, match=told):
-        merge([runs[name] for name in given], tmp_path / "out")
+        merge_shards([runs[name] for name in given], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -161,11 +161,11 @@ def test_shards_of_other_plans_or_sources_are_refused(
         change_head(two, **head | change)
         reseal(two)
         with pytest.raises(MutatorError, match=told) as caught:
-            merge([copies["1/2"], two], tmp_path / "out")
+            merge_shards([copies["1/2"], two], tmp_path / "out")
         assert str(two) in str(caught.value)
     third = freeze_plan(build_plan(toy, "small", Choices(shard="2/3")), tmp_path / "third", toy).path
     with pytest.raises(MutatorError, match=f"{third}: shard 2/3; expected one of 2 shards"):
-        merge([copies["1/2"], third], tmp_path / "out")
+        merge_shards([copies["1/2"], third], tmp_path / "out")
 
 
 def test_an_unfinished_or_foreign_shard_is_refused(copies: Runs, tmp_path: Path, reseal: Reseal) -> None:
@@ -175,13 +175,13 @@ def test_an_unfinished_or_foreign_shard_is_refused(copies: Runs, tmp_path: Path,
     path.write_bytes(b"".join(lines[:-1]))
     reseal(one, finished=False)
     with pytest.raises(MutatorError, match=f"unfinished: {len(lines) - 2} of {len(lines) - 1}"):
-        merge([one, two], tmp_path / "out")
+        merge_shards([one, two], tmp_path / "out")
     path.write_bytes(b"".join(lines))
     reseal(one, finished=True)
     shutil.copy(path, two / "records" / "0009-main.jsonl")
     reseal(two)
     with pytest.raises(MutatorError, match=r"0009-main\.jsonl:2: a record of .*, which is not planned"):
-        merge([one, two], tmp_path / "out")
+        merge_shards([one, two], tmp_path / "out")
 
 
 def test_shards_with_different_golden_runs_are_refused(copies: Runs, tmp_path: Path, reseal: Reseal) -> None:
@@ -190,7 +190,7 @@ def test_shards_with_different_golden_runs_are_refused(copies: Runs, tmp_path: P
     path.write_text(json.dumps(checks | {"goldens": {"A": "0" * 64}}))
     reseal(copies["2/2"])
     with pytest.raises(CheckFailed, match="golden run A"):
-        merge([copies["1/2"], copies["2/2"]], tmp_path / "out")
+        merge_shards([copies["1/2"], copies["2/2"]], tmp_path / "out")
 
 
 @pytest.mark.parametrize("broken", ["1/2", "2/2"])
@@ -206,18 +206,18 @@ def test_a_shard_with_a_failed_equivalence_check_is_refused(
     path.write_text("\n".join([head, json.dumps(wrong), *rest, ""]))
     reseal(copies[broken])
     with pytest.raises(CheckFailed, match=f"experiment {wrong['experiment_id']} differs on") as caught:
-        merge([copies["1/2"], copies["2/2"]], tmp_path / "out")
+        merge_shards([copies["1/2"], copies["2/2"]], tmp_path / "out")
     assert str(copies[broken]) in str(caught.value)
     assert not (tmp_path / "out").exists()
     path.write_text("\n".join([head, first, *rest, ""]))
     reseal(copies[broken])
-    assert merge([copies["1/2"], copies["2/2"]], tmp_path / "out").is_file()
+    assert merge_shards([copies["1/2"], copies["2/2"]], tmp_path / "out").is_file()
 
 
 def test_shards_are_not_merged_into_a_folder_with_a_run(runs: Runs, tmp_path: Path) -> None:
     before = (runs["whole"] / "results.csv").read_bytes()
     with pytest.raises(MutatorError, match="holds a run"):
-        merge([runs["1/2"], runs["2/2"]], runs["whole"])
+        merge_shards([runs["1/2"], runs["2/2"]], runs["whole"])
     assert (runs["whole"] / "results.csv").read_bytes() == before
 
 
@@ -227,11 +227,11 @@ def test_the_same_command_completes_a_killed_merge(runs: Runs, tmp_path: Path) -
         (out / name).parent.mkdir(parents=True, exist_ok=True)
         (out / name).touch()
     with pytest.raises(MutatorError, match=r"not empty \(thesis\.tex\)"):
-        merge(shards, out)
+        merge_shards(shards, out)
     (out / "thesis.tex").unlink()
     (out / ".run.json.1").touch()
     (out / "records").mkdir()
-    merge(shards, out)
+    merge_shards(shards, out)
     assert seals_of(RunFolder.open(out)).seal == seals_of(RunFolder.open(runs["whole"])).seal
     assert not list(out.glob(".*"))
 
@@ -241,9 +241,9 @@ def test_a_failed_merge_leaves_nothing_and_can_be_repeated(
 ) -> None:
     with monkeypatch.context() as patch, pytest.raises(RuntimeError):
         patch.setattr("mutator.results.table_building.build_tables", fail)
-        merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
+        merge_shards([runs["1/2"], runs["2/2"]], tmp_path / "out")
     assert not (tmp_path / "out").exists()
-    assert merge([runs["1/2"], runs["2/2"]], tmp_path / "out").is_file()
+    assert merge_shards([runs["1/2"], runs["2/2"]], tmp_path / "out").is_file()
 
 
 def fail(run: Path) -> Path:
@@ -268,7 +268,7 @@ def test_merged_shards_of_the_shipped_controller_equal_its_single_run(tmp_path: 
 
     one, two = ran("one", 1), ran("two", 2)
     shards = [ran(f"shard{k}", 2, f"{k}/3") for k in (1, 2, 3)]
-    merge(shards, tmp_path / "merged")
+    merge_shards(shards, tmp_path / "merged")
     assert len((one / "results.csv").read_text().splitlines()) == 1 + 40
     assert sum(RunFolder.open(shard).planned_count for shard in shards) == 40
     for name in DERIVED:

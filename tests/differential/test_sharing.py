@@ -18,10 +18,10 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.cluster import bundle
-from mutator.execution.cluster.bundle import Bundle, read_inputs
+from mutator.execution.cluster.bundle import Bundle, load_run_inputs
 from mutator.execution.cluster.piece_process import PieceRunner
-from mutator.execution.cluster.piece_queue import Board
-from mutator.execution.cluster.unpacked_bundle import Site
+from mutator.execution.cluster.piece_queue import PieceQueue
+from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.preflight.preflight_checks import run_checks
 from mutator.store import plan_file
 from mutator.store.records import record_as_json
@@ -120,15 +120,15 @@ def test_one_experiment_of_a_shared_run_can_run_on_a_cluster(runs: tuple[Path, P
     toy = Workspace(
         library=runs[0].parent / "toy" / "fault_library", templates=runs[0].parent / "toy" / "templates"
     )
-    bundle.lay_out(Bundle.of(toy, folder, "reference").data, tmp_path)
+    bundle.unpack_bundle(Bundle.pack_for_run(toy, folder, "reference").data, tmp_path)
     chunk = next(one for one in pending_chunks_of(folder, {}) if {"A", "C"} == set(_scenarios(folder, one)))
     left = replace(chunk, places=(_scenarios(folder, chunk).index("C"),))
-    piece = Board(folder, [left], ()).take("w")
-    assert piece is not None and piece.golden == "A+alone"
-    site = Site(tmp_path)
-    runner = PieceRunner(site, read_inputs(site), "w", os.getpid())
-    [record] = runner.run(piece, lambda name: None).records
-    [name] = piece.ids
+    piece = PieceQueue(folder, [left], ()).take_piece("w")
+    assert piece is not None and piece.golden_key == "A+alone"
+    site = UnpackedBundle(tmp_path)
+    runner = PieceRunner(site, load_run_inputs(site), "w", os.getpid())
+    [record] = runner.run_piece(piece, lambda name: None).records
+    [name] = piece.experiment_ids
     assert record == canonical_json(record_as_json(folder.records()[name])).encode()
 
 

@@ -13,12 +13,12 @@ import pytest
 
 import mutator
 from mutator.campaigns.chunks import PendingChunk
-from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Summary
-from mutator.execution.single_run import rerun, run_single
+from mutator.execution.single_run import rerun_experiment, run_single
 from mutator.execution.worker import Worker
 from mutator.model import Status
 from mutator.store import plan_file
@@ -139,7 +139,7 @@ def test_a_stored_patch_produces_the_mutant(toy: Workspace, finished: Path, tmp_
     subprocess.run(
         ["patch", "-p1", "-s", "-d", str(tree)], input=PatchFolder(finished).read(name), check=True
     )
-    single, same = rerun(toy, finished, name)
+    single, same = rerun_experiment(toy, finished, name)
     assert same
     assert (tree / "toycar" / "_fi.py").is_file()
     assert single.mutant is not None
@@ -151,7 +151,7 @@ def test_rerun_gives_the_same_record_and_a_trace(
     toy: Workspace, finished: Path, reseal: Callable[[Path], None]
 ) -> None:
     for row in rows_of(finished)[:3]:
-        single, same = rerun(toy, finished, row["experiment_id"][:8])
+        single, same = rerun_experiment(toy, finished, row["experiment_id"][:8])
         assert same
         assert single.faulty == finished / "traces" / row["experiment_id"] / "faulty"
         assert (single.faulty / "log.npz").is_file()
@@ -160,7 +160,7 @@ def test_rerun_gives_the_same_record_and_a_trace(
     for path in (finished / "records").iterdir():
         path.write_text(path.read_text().replace('"outcome":"', '"outcome":"masked","x":"'))
     reseal(finished)
-    assert not rerun(toy, finished, single.experiment.id)[1]
+    assert not rerun_experiment(toy, finished, single.experiment.id)[1]
 
 
 def test_one_experiment_can_run_without_a_campaign(toy: Workspace, finished: Path, tmp_path: Path) -> None:
@@ -184,12 +184,12 @@ def test_experiments_with_harness_errors_are_rerun(
 ) -> None:
     execute, hit = ReferenceEngine.execute, []
 
-    def flaky(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
+    def flaky(self: ReferenceEngine, job: Job, folder: Path) -> JobResult:
         done = execute(self, job, folder)
-        if job.mutant and len(job.name) == 16 and len(hit) < 2:
+        if job.mutant_id and len(job.name) == 16 and len(hit) < 2:
             hit.append(job.name)
             fields = {name: getattr(done, name) for name in ("out", "probe", "cpu_s", "wall_s")}
-            return Execution(status=Status.HARNESS_ERROR, detail="killed from outside by SIGKILL", **fields)
+            return JobResult(status=Status.HARNESS_ERROR, detail="killed from outside by SIGKILL", **fields)
         return done
 
     monkeypatch.setattr(ReferenceEngine, "execute", flaky)
@@ -278,7 +278,7 @@ def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):
         run_campaign(toy, "small", finished)
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):
-        rerun(toy, finished, rows_of(finished)[0]["experiment_id"])
+        rerun_experiment(toy, finished, rows_of(finished)[0]["experiment_id"])
 
 
 FULL_DISK = """

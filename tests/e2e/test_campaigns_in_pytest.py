@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from mutator.campaigns.chunks import PendingChunk
-from mutator.execution.pytest_session import Controller, configure
+from mutator.execution.pytest_session import CampaignController, register_controller
 from mutator.execution.written_files import WrittenFiles
 from mutator.workspace import Workspace
 
@@ -95,7 +95,7 @@ def test_loadfile_distributes_chunks_over_all_workers(tmp_path: Path, given: str
     registered: list[object] = []
     manager = SimpleNamespace(get_plugins=lambda: (), register=registered.append)
     config: Any = SimpleNamespace(option=SimpleNamespace(dist=given), pluginmanager=manager)
-    configure(config, "small", tmp_path, reviewed=False, accept_versions=False, sandbox=False)
+    register_controller(config, "small", tmp_path, reviewed=False, accept_versions=False, sandbox=False)
     assert config.option.dist == used
     assert len(registered) == 1
 
@@ -128,6 +128,6 @@ def test_collecting_50000_experiments_is_fast(toy: Workspace, tmp_path: Path) ->
     words = ["--campaign", "x", "--campaign-out", str(tmp_path), "--collect-only", "-qq", "--noconftest"]
     alone = ["-c", os.devnull, "-p", "no:cacheprovider", "--disable-plugin-autoload", "-p", "mutator"]
     counting = Counting()
-    pytest.main([*words, *alone], plugins=[Controller(begun), counting])
+    pytest.main([*words, *alone], plugins=[CampaignController(begun), counting])
     assert counting.items == 2500
     assert counting.seconds < 5.0

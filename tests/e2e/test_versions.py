@@ -14,19 +14,19 @@ from mutator import load_run
 from mutator._common import shared_cache
 from mutator.campaigns import run_environment
 from mutator.cli.app import main
-from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
-from mutator.execution.worker import Assignment, Worker
+from mutator.execution.worker import Worker, WorkerAssignment
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
 Cli = Callable[..., tuple[int, str, str]]
-Execute = Callable[[ReferenceEngine, Job, Path], Execution]
+Execute = Callable[[ReferenceEngine, Job, Path], JobResult]
 PYTHONS = "CPython 3.11.7, here CPython 3.12.1"
 
 
@@ -34,18 +34,18 @@ class OnePiece:
     """A distributor that stops after one piece of work."""
 
     def run(self, session: Session) -> None:
-        name = session.worker_name("mine")
-        assignment = Assignment(
-            run=session.folder.path,
-            name=name,
+        name = session.new_worker_name("mine")
+        assignment = WorkerAssignment(
+            run_folder=session.folder.path,
+            worker_name=name,
             engine=session.engine,
-            goldens=session.golden_digests,
+            golden_digests=session.golden_digests,
             secret=session.secret,
         )
         worker = Worker(session.inputs, assignment)
         worker.run(session.pending[0])
         worker.close()
-        session.written.report(worker.written)
+        session.written.add_report(worker.file_digests)
         session.problem = "interrupted"
 
 
@@ -81,8 +81,8 @@ def executed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names: list[str] = []
     execute = ReferenceEngine.execute
 
-    def noted(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
-        if job.mutant is None:
+    def noted(self: ReferenceEngine, job: Job, folder: Path) -> JobResult:
+        if job.mutant_id is None:
             names.append(job.name)
         return execute(self, job, folder)
 
@@ -93,7 +93,7 @@ def executed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def other_digits(execute: Execute) -> Execute:
     """Simulate a machine that computes differently: append a space to an output file of the target."""
 
-    def run(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
+    def run(self: ReferenceEngine, job: Job, folder: Path) -> JobResult:
         done = execute(self, job, folder)
         with (done.out / "said.json").open("a") as file:
             file.write(" ")

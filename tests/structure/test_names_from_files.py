@@ -34,7 +34,7 @@ ALLOWED = {  # joins of names that no file contains
     "campaigns/git_clone.py: folder / shallow": "printed by git, and only read",
     "campaigns/git_clone.py: folder / excluded": "printed by git, and only read",
     "campaigns/git_clone.py: folder / within": "names from os.scandir",
-    "execution/cluster/piece_process.py: site.place / f'work-{os.getpid()}'": "a process id",
+    "execution/cluster/piece_process.py: bundle.folder / f'work-{os.getpid()}'": "a process id",
     "faults/injected_imports.py: root / path": "only shown",
     "mutants/anchors.py: root / path": "only shown",
     "mutants/constant_imports.py: tree.root / path": "only shown",

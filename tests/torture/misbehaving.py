@@ -11,7 +11,7 @@ from pathlib import Path
 
 from mutator._common.files import is_half_written, remove_folder
 from mutator._common.table_rendering import TextTable
-from mutator.engines.engine_kinds import OFFERED, REFERENCE
+from mutator.engines.engine_kinds import OFFERED_ENGINES, REFERENCE
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK
 from mutator.model import Status
 from mutator.workspace import Workspace
@@ -192,7 +192,9 @@ class Misbehaving:
 
     def _draw(self, seed: int) -> Drawn:
         chance = random.Random(seed)
-        engine = list(OFFERED)[-1 - seed % len(OFFERED)]  # a few tries cover every engine, fork first
+        engine = list(OFFERED_ENGINES)[
+            -1 - seed % len(OFFERED_ENGINES)
+        ]  # a few tries cover every engine, fork first
         workers, method = (chance.choice(some) for some in (WORKERS, METHODS))
         names = chance.sample(sorted(self.misdeeds), chance.randint(1, MOST))
         return Drawn(engine=engine, workers=workers, method=method, names=tuple(names))
@@ -296,9 +298,10 @@ class Misbehaving:
     def table(self) -> str:
         names = sorted({name for name, _ in self.verdicts})
         rows = [
-            (name, *(", ".join(sorted(self.verdicts[name, one])) or "-" for one in OFFERED)) for name in names
+            (name, *(", ".join(sorted(self.verdicts[name, one])) or "-" for one in OFFERED_ENGINES))
+            for name in names
         ]
         return (
             "verdicts of misdeeds\n"
-            + TextTable(heads=("misdeed", *OFFERED), rows=rows, right_aligned=()).as_text()
+            + TextTable(heads=("misdeed", *OFFERED_ENGINES), rows=rows, right_aligned=()).as_text()
         )

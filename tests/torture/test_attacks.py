@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common.files import remove_folder
-from mutator.engines.engine_kinds import OFFERED, REFERENCE
+from mutator.engines.engine_kinds import OFFERED_ENGINES, REFERENCE
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK
 from mutator.model import Status
 from mutator.workspace import Workspace
@@ -78,7 +78,7 @@ def attacks(toy: Workspace, tmp_path: Path) -> Iterator[Attacks]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", OFFERED)
+@pytest.mark.parametrize("engine", OFFERED_ENGINES)
 @pytest.mark.parametrize("names", GROUPS, ids=lambda names: names[0].replace(" ", "-"))
 def test_attacks_change_no_row_of_others(attacks: Attacks, engine: str, names: list[str]) -> None:
     assert [*attacks.problems(engine, names)] == []

@@ -14,7 +14,7 @@ import pytest
 
 import mutator
 from mutator.errors import MutatorError
-from mutator.execution.cluster.bundle import Bundle, lay_out
+from mutator.execution.cluster.bundle import Bundle, unpack_bundle
 from mutator.execution.session import open_session
 from mutator.serve.application import Site, build_application
 from mutator.serve.served_runs import Runs
@@ -163,9 +163,9 @@ def packed(world: World) -> tuple[int, str]:
             engine="reference",
         ) as session:
             session.prepare()
-            data = Bundle.of(world.workspace, session.folder, "reference").data
+            data = Bundle.pack_for_run(world.workspace, session.folder, "reference").data
         (world.out / "place").mkdir()
-        lay_out(data, world.out / "place")
+        unpack_bundle(data, world.out / "place")
     except MutatorError as error:
         return error.exit_code, str(error)
     return 0, ""

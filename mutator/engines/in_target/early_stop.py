@@ -5,36 +5,36 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 
-def drive(run: Any, source: str | None) -> bool:
+def drive_run(run: Any, stop_source: str | None) -> bool:
     """Execute the steps of a run; return whether it was stopped early.
 
-    `source` defines a function that decides after each step whether to stop; None: run to the end.
+    `stop_source` defines a function that decides after each step whether to stop; None: run to the end.
     """
-    if source is None:
+    if stop_source is None:
         while not run.done:
             run.step()
         return False
-    over = compiled(source)
+    should_stop = compile_stop_condition(stop_source)
     recorded = run.recorded  # if it is missing, fail here, before the fault is active
     while not run.done:
         run.step()
-        if over(recorded()):
+        if should_stop(recorded()):
             return not run.done
     return False
 
 
-def compiled(source: str) -> Callable[[Mapping[str, float]], bool]:
-    names = {"abs": abs, "min": least, "max": greatest, "float": float}
-    space: dict[str, Any] = {"__builtins__": names, "math": math}
-    exec(source, space)
-    over: Callable[[Mapping[str, float]], bool] = space["over"]
-    return over
+def compile_stop_condition(source: str) -> Callable[[Mapping[str, float]], bool]:
+    names = {"abs": abs, "min": min_or_nan, "max": max_or_nan, "float": float}
+    namespace: dict[str, Any] = {"__builtins__": names, "math": math}
+    exec(source, namespace)
+    should_stop: Callable[[Mapping[str, float]], bool] = namespace["over"]
+    return should_stop
 
 
-def least(*values: float) -> float:
+def min_or_nan(*values: float) -> float:
     """Return the smallest number; NaN if any is NaN, as in a trace. Python's `min` depends on the order."""
     return math.nan if any(map(math.isnan, values)) else min(values)
 
 
-def greatest(*values: float) -> float:
+def max_or_nan(*values: float) -> float:
     return math.nan if any(map(math.isnan, values)) else max(values)

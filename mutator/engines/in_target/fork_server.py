@@ -29,225 +29,241 @@ assert _spec and _spec.loader
 run_once: Any = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(run_once)
 process_guard = run_once.process_guard
-mutant_installation, thread_names = run_once.beside("mutant_installation"), run_once.beside("thread_names")
-early_stop = run_once.beside("early_stop")
+mutant_installation, thread_names = (
+    run_once.load_neighbour("mutant_installation"),
+    run_once.load_neighbour("thread_names"),
+)
+early_stop = run_once.load_neighbour("early_stop")
 
 
-def main(connection: int, start_file: str) -> int:
-    if process_guard.fork(connection) is not None:
+def main(connection_fd: int, start_file: str) -> int:
+    if process_guard.fork_guarded(connection_fd) is not None:
         return 0
     try:
-        serve_first(connection, marshal.loads(Path(start_file).read_bytes()))
+        serve_as_first_process(connection_fd, marshal.loads(Path(start_file).read_bytes()))
     finally:
         os._exit(0)  # skip exit handlers, which belong to the server, not to the target's runs
 
 
-def serve_first(connection: int, start: dict[str, Any]) -> None:
-    os.chdir(start["home"])
-    sys.path.insert(0, start["tree"])
-    sys.meta_path.insert(0, run_once.Harness)
-    sys.argv = [start["module"]]
-    server = Process(start, socket.socket(fileno=connection))
+def serve_as_first_process(connection_fd: int, start_message: dict[str, Any]) -> None:
+    os.chdir(start_message["home"])
+    sys.path.insert(0, start_message["tree"])
+    sys.meta_path.insert(0, run_once.HarnessFinder)
+    sys.argv = [start_message["module"]]
+    server = ForkingProcess(start_message, socket.socket(fileno=connection_fd))
     try:
-        module = importlib.import_module(start["module"])
-        server.begin = operator.attrgetter(start["stepwise"])(module)
+        module = importlib.import_module(start_message["module"])
+        server.begin_run = operator.attrgetter(start_message["stepwise"])(module)
     except BaseException as err:
-        server.send({"failed": run_once.describe(err, start["tree"], None)})
+        server.send_reply({"failed": run_once.describe_failure(err, start_message["tree"], None)})
         return
     gc.collect()
-    server.send({"threads": thread_names.others(), "group": os.getpgrp()})
-    server.serve()
+    server.send_reply({"threads": thread_names.other_thread_names(), "group": os.getpgrp()})
+    server.serve_requests()
 
 
-class Abandoned(Exception):
+class NoLongerNeeded(Exception):
     """The process is no longer needed."""
 
 
-class Process:
-    """A waiting process. `run` is its golden run, stopped before `step`; None before any run."""
+class ForkingProcess:
+    """A waiting process. `golden_run` is its golden run, stopped before `step`; None before any run."""
 
-    def __init__(self, start: dict[str, Any], connection: socket.socket) -> None:
-        self.start = start
+    def __init__(self, start_message: dict[str, Any], connection: socket.socket) -> None:
+        self.start_message = start_message
         self.connection = connection
-        self.places = run_once.places(start["tree"])
-        self.stamp = run_once.stamp(self.places)
-        self.outside: list[str] = []  # files outside the tree from which the target's packages were imported
-        self.begin: Any = None
-        self.run: Any = None
+        self.tree_paths = run_once.list_tree_paths(start_message["tree"])
+        self.first_tree_stamp = run_once.change_stamp(self.tree_paths)
+        self.files_outside_tree: list[
+            str
+        ] = []  # files outside the tree from which the target's packages were imported
+        self.begin_run: Any = None
+        self.golden_run: Any = None
         self.step = 0
 
-    def send(self, reply: dict[str, Any], handle: int | None = None) -> None:
+    def send_reply(self, reply: dict[str, Any], handle: int | None = None) -> None:
         data = marshal.dumps(reply)
         more = [] if handle is None else [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [handle]))]
         self.connection.sendmsg([struct.pack("<I", len(data))], more)
         self.connection.sendall(data)
 
-    def serve(self) -> None:
-        answers: dict[str, Callable[..., dict[str, Any] | None]] = {
-            "branch": self.branch,
-            "advance": self.advance,
-            "load": self.load,
-            "mutant": self.mutant,
+    def serve_requests(self) -> None:
+        methods_by_request: dict[str, Callable[..., dict[str, Any] | None]] = {
+            "branch": self.fork_waiting_process,
+            "advance": self.advance_to_step,
+            "load": self.load_modules,
+            "mutant": self.fork_mutant,
         }
-        with suppress(Abandoned):
+        with suppress(NoLongerNeeded):
             while True:
-                request = self.receive()
-                reap()
-                reply = answers[request.pop("do")](**request)
+                request = self.receive_request()
+                reap_ended_children()
+                reply = methods_by_request[request.pop("do")](**request)
                 if reply is not None:
-                    self.send(reply)
+                    self.send_reply(reply)
 
-    def receive(self) -> Any:
-        return marshal.loads(self.read(struct.unpack("<I", self.read(4))[0]))
+    def receive_request(self) -> Any:
+        return marshal.loads(self.read_bytes(struct.unpack("<I", self.read_bytes(4))[0]))
 
-    def read(self, count: int) -> bytes:
+    def read_bytes(self, byte_count: int) -> bytes:
         data = b""
-        while len(data) < count:
+        while len(data) < byte_count:
             try:
-                part = self.connection.recv(count - len(data))
+                part = self.connection.recv(byte_count - len(data))
             except ConnectionError:
-                raise Abandoned from None
+                raise NoLongerNeeded from None
             if not part:
-                raise Abandoned
+                raise NoLongerNeeded
             data += part
         return data
 
-    def branch(self, step: int, args: list[str] | None = None) -> None:
+    def fork_waiting_process(self, step: int, args: list[str] | None = None) -> None:
         """Fork a process that waits before `step` of this golden run, or of a new one with the arguments
         `args`.
 
         The reply carries the new process's socket.
         """
-        ours, theirs = socket.socketpair()
-        get_ready()
+        child_socket, harness_socket = socket.socketpair()
+        prepare_to_fork()
         if not os.fork():
             try:
-                theirs.close()
+                harness_socket.close()
                 self.connection.close()
-                self.connection = ours
-                self.go_on(step, args)
+                self.connection = child_socket
+                self.wait_in_branch(step, args)
             finally:
                 os._exit(0)
-        ours.close()
-        self.send({"threads": thread_names.others()}, theirs.fileno())
-        theirs.close()
+        child_socket.close()
+        self.send_reply({"threads": thread_names.other_thread_names()}, harness_socket.fileno())
+        harness_socket.close()
 
-    def go_on(self, step: int, args: list[str] | None) -> None:
+    def wait_in_branch(self, step: int, args: list[str] | None) -> None:
         try:
             if args is not None:
-                sys.argv = [self.start["module"], *args]
-                self.run = self.begin(args)
-            reply = self.advance(step)
+                sys.argv = [self.start_message["module"], *args]
+                self.golden_run = self.begin_run(args)
+            reply = self.advance_to_step(step)
         except BaseException as err:
-            reply = {"failed": run_once.describe(err, self.start["tree"], None)}
-        self.send(reply)
-        self.serve()
+            reply = {"failed": run_once.describe_failure(err, self.start_message["tree"], None)}
+        self.send_reply(reply)
+        self.serve_requests()
 
-    def advance(self, step: int) -> dict[str, Any]:
-        while self.step < step and not self.run.done:
-            self.run.step()
+    def advance_to_step(self, step: int) -> dict[str, Any]:
+        while self.step < step and not self.golden_run.done:
+            self.golden_run.step()
             self.step += 1
         gc.freeze()
         return {"step": self.step}
 
-    def load(self, modules: list[str]) -> dict[str, Any]:
+    def load_modules(self, modules: list[str]) -> dict[str, Any]:
         """Import modules that mutants will need. The mutant's own import reports failures."""
         for name in modules:
             with suppress(Exception):
                 importlib.import_module(name)
-        self.outside = self.elsewhere(sys.modules)
+        self.files_outside_tree = self.files_imported_elsewhere(sys.modules)
         gc.freeze()
-        return {"threads": thread_names.others()}
+        return {"threads": thread_names.other_thread_names()}
 
-    def mutant(self, job: bytes, home: str, wall_s: float, disk_mb: int) -> dict[str, Any]:
+    def fork_mutant(self, job: bytes, home: str, wall_s: float, disk_mb: int) -> dict[str, Any]:
         """Fork and guard a child that continues as a mutant; return how it ended.
 
         Only the child unmarshals the job, because memory that this process writes to must be copied after
         each fork.
         """
-        if others := thread_names.others():
+        if others := thread_names.other_thread_names():
             return {"threads": others}
-        space = process_guard.Space(home, disk_mb)
-        get_ready()
-        ended = process_guard.fork(self.connection.fileno(), wall_s=wall_s, space=space)
-        if ended is None:
-            self.become(marshal.loads(job))
-        if ended["stopped"] == process_guard.ABANDONED:
-            raise Abandoned
-        return {**ended, "threads": [], "touched": self.touched()}
+        space_limit = process_guard.SpaceLimit(home, disk_mb)
+        prepare_to_fork()
+        ending = process_guard.fork_guarded(self.connection.fileno(), wall_s=wall_s, space_limit=space_limit)
+        if ending is None:
+            self.become_mutant(marshal.loads(job))
+        if ending["stopped"] == process_guard.ABANDONED:
+            raise NoLongerNeeded
+        return {**ending, "threads": [], "touched": self.was_tree_changed()}
 
-    def become(self, job: dict[str, Any]) -> NoReturn:
+    def become_mutant(self, job: dict[str, Any]) -> NoReturn:
         """In a new child: continue the run to its end as a mutant, and report."""
         self.connection.close()
         log = os.open(job["log"], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
         os.dup2(log, 1)
         os.dup2(log, 2)
         os.close(log)
-        self.use_folder(job["home"])
+        self.use_temporary_folder(job["home"])
         run_once.limit_resources(job)
         os.chdir(job["out"])
-        report = self.finish(job)
-        report["outside"] = self.outside + self.elsewhere(run_once.imported_since(job["probe_name"]))
-        report["threads"] = thread_names.others()
+        report = self.run_mutant_to_end(job)
+        report["outside"] = self.files_outside_tree + self.files_imported_elsewhere(
+            run_once.modules_imported_since(job["probe_name"])
+        )
+        report["threads"] = thread_names.other_thread_names()
         Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
         if not report["threads"]:  # with other threads, the result is not used
-            end()
+            end_like_interpreter()
         os._exit(0)
 
-    def use_folder(self, home: str) -> None:
+    def use_temporary_folder(self, home: str) -> None:
         """Make `home` the folder for temporary files, even if `tempfile` has already chosen the server's."""
         os.environ["TMPDIR"] = home
         tempfile: Any = sys.modules.get("tempfile")
-        if tempfile is not None and tempfile.tempdir == self.start["home"]:
+        if tempfile is not None and tempfile.tempdir == self.start_message["home"]:
             tempfile.tempdir = home
 
-    def elsewhere(self, names: Iterable[str]) -> Any:
-        return run_once.imported_elsewhere(self.start["packages"], self.start["tree"], names)
+    def files_imported_elsewhere(self, names: Iterable[str]) -> Any:
+        return run_once.files_imported_elsewhere(
+            self.start_message["packages"], self.start_message["tree"], names
+        )
 
-    def touched(self) -> bool:
+    def was_tree_changed(self) -> bool:
         try:
-            return bool(run_once.stamp(self.places) != self.stamp)
+            return bool(run_once.change_stamp(self.tree_paths) != self.first_tree_stamp)
         except OSError:
             return True
 
-    def finish(self, job: dict[str, Any]) -> dict[str, Any]:
+    def run_mutant_to_end(self, job: dict[str, Any]) -> dict[str, Any]:
         report: dict[str, Any] = {"ended": "ok", "error": None, "disk_full": False, "probe": None}
         watch = job["watch"]
-        probe, known = None, set() if watch is None else set(sys.modules)
+        probe, modules_before = None, set() if watch is None else set(sys.modules)
         try:
-            probe = mutant_installation.install(job["probe_name"], job["probe"])
+            probe = mutant_installation.install_probe(job["probe_name"], job["probe"])
             mutant_installation.swap_code(job["functions"], probe)
-            mutant_installation.run_settings(job["settings"], probe)
+            mutant_installation.run_value_setters(job["settings"], probe)
             probe.limit(job["steps"])
-            run_once.note_activation(probe, job["inactive"])
+            run_once.delete_marker_on_activation(probe, job["inactive"])
             # give the probe the state that it would have if it had observed from the start
             holder, state = job["probe_state"]
             for name, value in state.items():
                 setattr(getattr(probe, holder), name, value)
-            seen = None if watch is None else mutant_installation.keep_observations(probe, holder, watch)
-            run = self.begin(job["args"]) if self.run is None else self.run
-            if seen is not None:
-                report |= {"seen": seen, "before": mutant_installation.observations_before_steps(run, seen)}
-            report["stopped"] = early_stop.drive(run, job["stop"])
+            observations = (
+                None if watch is None else mutant_installation.keep_observations(probe, holder, watch)
+            )
+            run = self.begin_run(job["args"]) if self.golden_run is None else self.golden_run
+            if observations is not None:
+                report |= {
+                    "seen": observations,
+                    "before": mutant_installation.run_counting_observations(run, observations),
+                }
+            report["stopped"] = early_stop.drive_run(run, job["stop"])
             run.write(Path(job["out"]))
-            if seen is not None:
-                report["libraries"] = run_once.libraries(known, self.start["packages"])
+            if observations is not None:
+                report["libraries"] = run_once.new_modules_outside_packages(
+                    modules_before, self.start_message["packages"]
+                )
         except mutant_installation.SwapRefused as why:
             report |= {"ended": "swap refused", "why": str(why)}
         except BaseException as err:
-            report |= run_once.describe(err, self.start["tree"], job["probe_name"])
+            report |= run_once.describe_failure(err, self.start_message["tree"], job["probe_name"])
         if probe is not None:
-            report |= run_once.asked(probe, self.start["tree"], job["probe_name"])
+            report |= run_once.collect_probe_report(probe, self.start_message["tree"], job["probe_name"])
         return report
 
 
-def get_ready() -> None:
+def prepare_to_fork() -> None:
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     gc.freeze()
 
 
-def end() -> None:
+def end_like_interpreter() -> None:
     """Do what an interpreter does at exit, except freeing its memory, which takes longer than many runs.
 
     That is: end the threads of `threading`, call `atexit` handlers, and flush open files.
@@ -255,15 +271,15 @@ def end() -> None:
     if "threading" in sys.modules:
         sys.modules["threading"]._shutdown()
     atexit._run_exitfuncs()
-    for thing in gc.get_objects():  # only new ones, because those from before the fork are frozen
-        if isinstance(thing, io.IOBase):
+    for tracked_object in gc.get_objects():  # only new ones, because those from before the fork are frozen
+        if isinstance(tracked_object, io.IOBase):
             with suppress(Exception):
-                thing.flush()
+                tracked_object.flush()
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
 
 
-def reap() -> None:
+def reap_ended_children() -> None:
     with suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass

@@ -10,39 +10,41 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 # attributes that lead to the function of a method, property or wrapper
-_INSIDE = ("__func__", "fget", "fset", "fdel", "func", "__wrapped__")
-_OWN_REFERENCES = 3  # references to a code object: from its function, a local, an argument
+_WRAPPING_ATTRIBUTES = ("__func__", "fget", "fset", "fdel", "func", "__wrapped__")
+_EXPECTED_REFERENCE_COUNT = 3  # references to a code object: from its function, a local, an argument
 
 
 class SwapRefused(Exception):
     """The loaded program is not the one for which the swap was made."""
 
 
-def install(name: str, parts: Sequence[types.CodeType]) -> Any:
+def install_probe(name: str, code_parts: Sequence[types.CodeType]) -> Any:
     """Load the probe module `name` from the parts of its code, as an import would."""
-    package, _, own = name.rpartition(".")
+    package, _, last_name = name.rpartition(".")
     module = types.ModuleType(name)
-    module.__file__, module.__package__ = parts[0].co_filename, package
+    module.__file__, module.__package__ = code_parts[0].co_filename, package
     sys.modules[name] = module
-    for code in parts:
+    for code in code_parts:
         exec(code, vars(module))
     if package:
-        setattr(sys.modules[package], own, module)
+        setattr(sys.modules[package], last_name, module)
     return module
 
 
 def swap_code(functions: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
     """Replace the code of all functions (module, path, old code, new code), or of none."""
     name = probe.__name__.rpartition(".")[2]
-    found = [(live_function(module, path, old), new) for module, path, old, new in functions]
-    for function, new in found:
+    new_code_by_function = [
+        (find_live_function(module, path, old), new) for module, path, old, new in functions
+    ]
+    for function, new in new_code_by_function:
         function.__code__ = new
         function.__globals__[name] = probe
 
 
-def run_settings(settings: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
+def run_value_setters(value_setters: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
     name = probe.__name__.rpartition(".")[2]
-    for module, code in settings:
+    for module, code in value_setters:
         if module not in sys.modules:
             raise SwapRefused(f"{module} is not loaded")
         names = vars(sys.modules[module])
@@ -50,60 +52,60 @@ def run_settings(settings: Sequence[Sequence[Any]], probe: types.ModuleType) -> 
         exec(code, names)
 
 
-def live_function(module: str, path: Sequence[str], code: types.CodeType) -> types.FunctionType:
-    """Return the only function at `path` with this code. SwapRefused if it is missing or running."""
-    where = ".".join((module, *path))
+def find_live_function(module: str, name_path: Sequence[str], code: types.CodeType) -> types.FunctionType:
+    """Return the only function at `name_path` with this code. SwapRefused if it is missing or running."""
+    where = ".".join((module, *name_path))
     if module not in sys.modules:
         raise SwapRefused(f"{module} is not loaded")
     holder: Any = sys.modules[module]
-    for name in path[:-1]:
-        holder = vars(holder).get(_mangled(holder, name))
+    for name in name_path[:-1]:
+        holder = vars(holder).get(_mangled_name(holder, name))
         if not isinstance(holder, type):
             raise SwapRefused(f"{where} is not found")
-    named = vars(holder).get(_mangled(holder, path[-1]))
-    found = {id(f): f for f in _functions(named) if f.__code__ == code}
-    if len(found) != 1:
+    named = vars(holder).get(_mangled_name(holder, name_path[-1]))
+    matches = {id(f): f for f in _functions_inside(named) if f.__code__ == code}
+    if len(matches) != 1:
         raise SwapRefused(f"{where} is not found")
-    (live,) = found.values()
-    own = live.__code__
-    if sys.getrefcount(own) > _OWN_REFERENCES:
+    (live,) = matches.values()
+    live_code = live.__code__
+    if sys.getrefcount(live_code) > _EXPECTED_REFERENCE_COUNT:
         raise SwapRefused(f"{where} is running, or exists more than once")
     return live
 
 
-def _functions(named: Any) -> Iterator[types.FunctionType]:
+def _functions_inside(named: Any) -> Iterator[types.FunctionType]:
     if isinstance(named, types.FunctionType):
         yield named
     if named is not None and not isinstance(named, type):
-        for name in _INSIDE:
-            yield from _functions(getattr(named, name, None))
+        for name in _WRAPPING_ATTRIBUTES:
+            yield from _functions_inside(getattr(named, name, None))
 
 
-def _mangled(holder: Any, name: str) -> str:
+def _mangled_name(holder: Any, name: str) -> str:
     private = isinstance(holder, type) and name.startswith("__") and not name.endswith("__")
     return f"_{holder.__name__.lstrip('_')}{name}" if private else name
 
 
-def keep_observations(probe: Any, holder: str, names: Sequence[str]) -> list[tuple[float, ...]]:
+def keep_observations(probe: Any, state_holder: str, names: Sequence[str]) -> list[tuple[float, ...]]:
     """Make the probe keep its observations in the returned list: each has the time and the values of `names`.
 
-    `holder` is the name of the object in which the probe keeps the time.
+    `state_holder` is the name of the object in which the probe keeps the time.
     """
     observe = probe.observe
-    seen: list[tuple[float, ...]] = []
+    observations: list[tuple[float, ...]] = []
 
     def observe_and_keep(**values: Any) -> None:
         observe(**values)
-        seen.append((getattr(probe, holder).t, *(float(values[name]) for name in names)))
+        observations.append((getattr(probe, state_holder).t, *(float(values[name]) for name in names)))
 
     probe.observe = observe_and_keep
-    return seen
+    return observations
 
 
-def observations_before_steps(run: Any, seen: list[Any]) -> list[int]:
-    """Run to the end; return the number of observations in `seen` before each step."""
-    before = []
+def run_counting_observations(run: Any, observations: list[Any]) -> list[int]:
+    """Run to the end; return the number of `observations` before each step."""
+    counts = []
     while not run.done:
-        before.append(len(seen))
+        counts.append(len(observations))
         run.step()
-    return before
+    return counts

@@ -14,24 +14,26 @@ from typing import Any
 
 import numpy as np
 
-ASKED: dict[str, Any] = json.loads("{}")  # file, picture, effects; filled in by `review.effect_pictures`
-FILE = "pictures.npz"
+PICTURE_REQUEST: dict[str, Any] = json.loads(
+    "{}"
+)  # file, picture, effects; filled in by `review.effect_pictures`
+PICTURES_FILE = "pictures.npz"
 
-_folder = Path.cwd()
-_left = 0  # how many more observations the run can make
-_drawn = False
+_output_folder = Path.cwd()
+_remaining_observations = 0  # how many more observations the run can make
+_has_drawn = False
 
 
 def limit(max_steps: int) -> None:
-    global _left
-    _left = max_steps
+    global _remaining_observations
+    _remaining_observations = max_steps
 
 
 def observe(**values: float) -> None:
     """Count a step; end the run when the pictures are drawn, or after too many steps."""
-    global _left
-    _left -= 1
-    if _drawn or _left < 0:
+    global _remaining_observations
+    _remaining_observations -= 1
+    if _has_drawn or _remaining_observations < 0:
         raise SystemExit
 
 
@@ -49,47 +51,56 @@ def every(fi: str, number: int) -> bool:
 
 def active(fi: str) -> bool:
     """Draw the pictures at the first call, and end the run."""
-    global _drawn
-    if not _drawn:
+    global _has_drawn
+    if not _has_drawn:
         frame: FrameType | None = sys._getframe()
-        while frame is not None and not frame.f_code.co_filename.endswith(ASKED["file"]):
+        while frame is not None and not frame.f_code.co_filename.endswith(PICTURE_REQUEST["file"]):
             frame = frame.f_back
         if frame is not None:
-            _draw({**frame.f_globals, **frame.f_locals})
-            _drawn = True
+            _draw_pictures({**frame.f_globals, **frame.f_locals})
+            _has_drawn = True
             raise SystemExit
     return False
 
 
-def _draw(names: dict[str, Any]) -> None:
-    before = _picture(names)
+def _draw_pictures(names: dict[str, Any]) -> None:
+    before = _evaluate_picture(names)
     after = []
-    for lines in ASKED["effects"]:
-        own = {**names, "_fi": SimpleNamespace(on=on, call=call, every=every, active=_yes, kept=_made)}
-        exec("\n".join(lines), own)
-        after.append(_picture(own))
+    for lines in PICTURE_REQUEST["effects"]:
+        effect_names = {
+            **names,
+            "_fi": SimpleNamespace(on=on, call=call, every=every, active=_always_active, kept=_make_anew),
+        }
+        exec("\n".join(lines), effect_names)
+        after.append(_evaluate_picture(effect_names))
         exec(
-            f"{ASKED['picture']} = _before", {**own, "_before": before.copy()}
+            f"{PICTURE_REQUEST['picture']} = _before", {**effect_names, "_before": before.copy()}
         )  # the picture can be an attribute
-    np.savez(_folder / FILE, before=before, **{f"after_{i}": one for i, one in enumerate(after)})
+    np.savez(
+        _output_folder / PICTURES_FILE,
+        before=before,
+        **{f"after_{i}": picture for i, picture in enumerate(after)},
+    )
 
 
-def _picture(names: dict[str, Any]) -> Any:
-    picture = eval(ASKED["picture"], names)
+def _evaluate_picture(names: dict[str, Any]) -> Any:
+    picture = eval(PICTURE_REQUEST["picture"], names)
     shape = tuple(getattr(picture, "shape", ()))
     kind = str(getattr(picture, "dtype", type(picture).__name__))
     if kind != "uint8" or len(shape) not in (2, 3) or shape[2:] not in ((), (3,)):
-        raise TypeError(f"{ASKED['picture']} is {kind} of shape {shape}, not a grey or RGB picture of bytes")
+        raise TypeError(
+            f"{PICTURE_REQUEST['picture']} is {kind} of shape {shape}, not a grey or RGB picture of bytes"
+        )
     return np.array(picture)
 
 
-def _yes(fi: str) -> bool:
+def _always_active(fi: str) -> bool:
     return True
 
 
-def _made(fi: str, make: Callable[[], Any]) -> Any:
+def _make_anew(fi: str, make: Callable[[], Any]) -> Any:
     return make()
 
 
 def report() -> dict[str, Any]:
-    return {"mutant": ASKED["mutant"], "triggered": None, "injections": {}}
+    return {"mutant": PICTURE_REQUEST["mutant"], "triggered": None, "injections": {}}

@@ -21,14 +21,19 @@ WALL, DISK, ABANDONED = "wall", "disk", "abandoned"  # reasons for stopping a pr
 HARD_CPU_EXTRA_S = 2  # delay until a process that ignores SIGXCPU is killed
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
-_MINDED = signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}
-_LOOK_S = 0.2  # interval between two checks of the space used
-_LOOK_SHARE = 20  # the checks take at most 1/_LOOK_SHARE of the time
-_BLOCK = 512  # bytes; the unit of st_blocks
+_SIGNALS_TO_RESTORE = signal.valid_signals() - {
+    signal.SIGKILL,
+    signal.SIGSTOP,
+    signal.SIGPIPE,
+    signal.SIGXFSZ,
+}
+_SPACE_CHECK_INTERVAL_S = 0.2  # interval between two checks of the space used
+_SPACE_CHECK_TIME_DIVISOR = 20  # the checks take at most 1/_LOOK_SHARE of the time
+_BLOCK_BYTES = 512  # bytes; the unit of st_blocks
 _libc = ctypes.CDLL(None)
 
 
-class Space:
+class SpaceLimit:
     """A limit on how much the folder `home` can grow: `disk_mb` MiB.
 
     The folder is held open, because a run can rename it and put a link to a large one in its place.
@@ -37,46 +42,50 @@ class Space:
     def __init__(self, home: str, disk_mb: int) -> None:
         self._handle = os.open(home, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
         self._home = f"/proc/self/fd/{self._handle}"
-        self._most = used(self._home) + (disk_mb << 20)
+        self._most_bytes = disk_usage_bytes(self._home) + (disk_mb << 20)
 
     def is_used_up(self) -> bool:
-        return used(self._home) >= self._most
+        return disk_usage_bytes(self._home) >= self._most_bytes
 
     def close(self) -> None:
         os.close(self._handle)
 
 
-def fork(
-    caller: int, *, wall_s: float = math.inf, space: Space | None = None, patience_s: float = 0.0
+def fork_guarded(
+    caller_fd: int,
+    *,
+    wall_s: float = math.inf,
+    space_limit: SpaceLimit | None = None,
+    patience_s: float = 0.0,
 ) -> dict[str, Any] | None:
     """Fork. Return None in the child, which leads its own session and dies with its parent.
 
-    The parent waits until the child ends, a limit stops it, or the other end of `caller` (a pipe or socket)
-    is closed. The parent then kills everything that the child left running. If the caller closes its end, the
-    child has `patience_s` to end by itself. The parent returns `code` (negative for a signal), `cpu_s`,
-    `wall_s`, and `stopped`: WALL, DISK, ABANDONED or "".
+    The parent waits until the child ends, a limit stops it, or the other end of `caller_fd` (a pipe or
+    socket) is closed. The parent then kills everything that the child left running. If the caller closes its
+    end, the child has `patience_s` to end by itself. The parent returns `code` (negative for a signal),
+    `cpu_s`, `wall_s`, and `stopped`: WALL, DISK, ABANDONED or "".
     """
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     began, parent, pid = time.monotonic(), os.getpid(), os.fork()
     if not pid:
-        if space is not None:
-            space.close()
+        if space_limit is not None:
+            space_limit.close()
         os.setsid()
-        _mind_signals()
+        _restore_default_signals()
         die_with_parent(parent)
         return None
     try:
-        stopped = _wait(pid, caller, began + wall_s, space)
+        stopped = _wait_for_child(pid, caller_fd, began + wall_s, space_limit)
         if stopped == ABANDONED and patience_s:
-            _ask_to_end(pid, patience_s)
+            _terminate_child(pid, patience_s)
     finally:
         os.kill(pid, signal.SIGKILL)
         _, code, usage = os.wait4(pid, 0)
-        _end_what_is_left()
-    if not stopped and space is not None and space.is_used_up():
+        _kill_leftover_processes()
+    if not stopped and space_limit is not None and space_limit.is_used_up():
         stopped = DISK
-    if space is not None:
-        space.close()
+    if space_limit is not None:
+        space_limit.close()
     return {
         "code": os.waitstatus_to_exitcode(code),
         "cpu_s": usage.ru_utime + usage.ru_stime,
@@ -85,29 +94,29 @@ def fork(
     }
 
 
-def _mind_signals() -> None:
+def _restore_default_signals() -> None:
     """Restore the default signal handling, which shells change for background processes."""
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
-    for number in _MINDED:
+    for number in _SIGNALS_TO_RESTORE:
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
 
 
-def die_with_parent(parent: int) -> None:
-    """Make the kernel kill this process when `parent` dies. Exit now if `parent` is no longer the parent."""
+def die_with_parent(parent_pid: int) -> None:
+    """Make the kernel kill this process when its parent dies. Exit now if `parent_pid` is no longer that."""
     _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
+    if os.getppid() != parent_pid:
         os._exit(1)
 
 
-def used(folder: str) -> int:
+def disk_usage_bytes(folder: str) -> int:
     """Return the bytes that a folder's readable content takes on the disk."""
     total, folders = 0, [folder]
     while folders:
         with suppress(OSError), os.scandir(folders.pop()) as entries:
             for entry in entries:
                 with suppress(OSError):
-                    total += entry.stat(follow_symlinks=False).st_blocks * _BLOCK
+                    total += entry.stat(follow_symlinks=False).st_blocks * _BLOCK_BYTES
                     if entry.is_dir(follow_symlinks=False):
                         folders.append(entry.path)
     return total
@@ -117,29 +126,29 @@ def _prctl(option: int, value: int) -> None:
     _libc.prctl(option, value, 0, 0, 0)
 
 
-def _wait(pid: int, caller: int, deadline: float, space: Space | None) -> str:
+def _wait_for_child(pid: int, caller_fd: int, deadline: float, space_limit: SpaceLimit | None) -> str:
     """Wait until the child ends, without reaping it, or must be stopped; return the reason to stop it."""
-    handle, pause = os.pidfd_open(pid), _LOOK_S
+    handle, pause = os.pidfd_open(pid), _SPACE_CHECK_INTERVAL_S
     poll = select.poll()
     poll.register(handle, select.POLLIN)
-    poll.register(caller, 0)
+    poll.register(caller_fd, 0)
     try:
         while True:
-            left = deadline - time.monotonic()
-            ready = {fd for fd, _ in poll.poll(max(0.0, min(left, pause)) * 1000)}
+            remaining_s = deadline - time.monotonic()
+            ready = {fd for fd, _ in poll.poll(max(0.0, min(remaining_s, pause)) * 1000)}
             if ready:
-                return ABANDONED if caller in ready else ""
-            if left <= 0:
+                return ABANDONED if caller_fd in ready else ""
+            if remaining_s <= 0:
                 return WALL
             began = time.monotonic()
-            if space is not None and space.is_used_up():
+            if space_limit is not None and space_limit.is_used_up():
                 return DISK
-            pause = max(_LOOK_S, (time.monotonic() - began) * _LOOK_SHARE)
+            pause = max(_SPACE_CHECK_INTERVAL_S, (time.monotonic() - began) * _SPACE_CHECK_TIME_DIVISOR)
     finally:
         os.close(handle)
 
 
-def _ask_to_end(pid: int, patience_s: float) -> None:
+def _terminate_child(pid: int, patience_s: float) -> None:
     os.kill(pid, signal.SIGTERM)
     handle = os.pidfd_open(pid)
     try:
@@ -148,36 +157,38 @@ def _ask_to_end(pid: int, patience_s: float) -> None:
         os.close(handle)
 
 
-def _end_what_is_left() -> None:
+def _kill_leftover_processes() -> None:
     """Kill and reap children in other sessions, with all their descendants."""
     session, spared = os.getsid(0), set[int]()  # spared: processes of root, which cannot be killed
-    while left := [pid for pid in children(os.getpid()) if os.getsid(pid) != session and pid not in spared]:
-        for pid in _with_descendants(left):
+    while leftover_pids := [
+        pid for pid in child_pids(os.getpid()) if os.getsid(pid) != session and pid not in spared
+    ]:
+        for pid in _pids_with_descendants(leftover_pids):
             try:
                 os.kill(pid, signal.SIGKILL)
             except ProcessLookupError:
                 continue
             except PermissionError:
                 spared.add(pid)
-        for pid in set(left) - spared:
+        for pid in set(leftover_pids) - spared:
             os.waitpid(pid, 0)
 
 
-def _with_descendants(pids: Iterable[int]) -> list[int]:
-    found = list(pids)
-    for pid in found:
-        found += children(pid)
-    return found
+def _pids_with_descendants(pids: Iterable[int]) -> list[int]:
+    all_pids = list(pids)
+    for pid in all_pids:
+        all_pids += child_pids(pid)
+    return all_pids
 
 
-def children(pid: int) -> list[int]:
+def child_pids(pid: int) -> list[int]:
     """Return the children of `pid`, including dead ones that are not reaped."""
-    found: list[int] = []
+    pids: list[int] = []
     with suppress(OSError), os.scandir(f"/proc/{pid}/task") as threads:  # the process can end meanwhile
         for thread in threads:
             with io.FileIO(f"{thread.path}/children") as file:
-                found += map(int, file.read().split())
-    return found
+                pids += map(int, file.read().split())
+    return pids
 
 
 if __name__ == "__main__":

@@ -23,12 +23,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
-_LONGEST = 2000  # maximum length of a stored exception message, in characters
-_MOST_ERRORS = 50  # maximum number of stored exceptions: the one raised, its causes and those that it groups
+_NO_SPACE_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
+_MOST_MESSAGE_CHARACTERS = 2000  # maximum length of a stored exception message, in characters
+_MOST_STORED_EXCEPTIONS = (
+    50  # maximum number of stored exceptions: the one raised, its causes and those that it groups
+)
 
 
-def beside(name: str) -> Any:
+def load_neighbour(name: str) -> Any:
     """Load a module from this file's folder, which is not on sys.path."""
     spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
     assert spec and spec.loader
@@ -37,79 +39,83 @@ def beside(name: str) -> Any:
     return module
 
 
-process_guard = beside("process_guard")
+process_guard = load_neighbour("process_guard")
 
 
-class Harness:
+class HarnessFinder:
     """Import hook that finds `mutator`, which the target's glue imports, next to this file.
 
     Other installed versions are ignored.
     """
 
-    package = Path(__file__).resolve().parents[2]
+    package_folder = Path(__file__).resolve().parents[2]
 
     @classmethod
     def find_spec(cls, name: str, path: Any = None, target: Any = None) -> Any:
-        if name != cls.package.name:
+        if name != cls.package_folder.name:
             return None
         return importlib.util.spec_from_file_location(
-            name, cls.package / "__init__.py", submodule_search_locations=[str(cls.package)]
+            name, cls.package_folder / "__init__.py", submodule_search_locations=[str(cls.package_folder)]
         )
 
 
-def main(job_file: str, connection: int) -> int:
+def main(job_file: str, connection_fd: int) -> int:
     job = json.loads(Path(job_file).read_text(encoding="utf-8"))
-    space = process_guard.Space(job["home"], job["disk_mb"])
-    ended = process_guard.fork(connection, wall_s=job["wall_s"], space=space)
-    if ended is None:
-        os.close(connection)
-        run(job)
+    space_limit = process_guard.SpaceLimit(job["home"], job["disk_mb"])
+    ending = process_guard.fork_guarded(connection_fd, wall_s=job["wall_s"], space_limit=space_limit)
+    if ending is None:
+        os.close(connection_fd)
+        run_job(job)
     else:
-        ended["cpu_s"] += time.process_time()  # includes the interpreter's start
+        ending["cpu_s"] += time.process_time()  # includes the interpreter's start
         with suppress(BrokenPipeError):
-            os.write(connection, json.dumps(ended).encode())
+            os.write(connection_fd, json.dumps(ending).encode())
         os._exit(0)
     return 0
 
 
-def run(job: dict[str, Any]) -> None:
+def run_job(job: dict[str, Any]) -> None:
     limit_resources(job)
     os.chdir(job["out"])
     sys.path.insert(0, job["tree"])
-    sys.meta_path.insert(0, Harness)
+    sys.meta_path.insert(0, HarnessFinder)
     report: dict[str, Any] = {"schema": "child/1", "ended": "ok", "error": None, "disk_full": False}
     probe = None
-    known = set(sys.modules)
-    watcher = beside("nondeterminism_watch").Watcher(job["tree"]) if job["watch"] else None
-    lines = beside("executed_lines").Lines(job["tree"], *job["lines"]) if job["lines"] else None
-    seen: list[Any] = []
+    modules_before = set(sys.modules)
+    watcher = (
+        load_neighbour("nondeterminism_watch").NondeterminismWatcher(job["tree"]) if job["watch"] else None
+    )
+    line_recorder = (
+        load_neighbour("executed_lines").LineRecorder(job["tree"], *job["lines"]) if job["lines"] else None
+    )
+    observations: list[Any] = []
     try:
         if watcher:
             watcher.begin()
-        if lines:
-            lines.begin()
+        if line_recorder:
+            line_recorder.begin()
         if job["probe"]:
             probe = importlib.import_module(job["probe"])
             probe.limit(job["steps"])
-            note_activation(probe, job["inactive"])
+            delete_marker_on_activation(probe, job["inactive"])
         if probe and job["observe"]:
-            seen = beside("mutant_installation").keep_observations(probe, *job["observe"])
+            observations = load_neighbour("mutant_installation").keep_observations(probe, *job["observe"])
         if probe and watcher:
-            watcher.look_for_threads(probe, seen)
+            watcher.watch_threads(probe, observations)
         if job["stop"] is None:
             run_module(job["module"], job["args"])
         else:
-            report["stopped"] = run_until(job)
+            report["stopped"] = run_to_terminal_hazard(job)
     except BaseException as err:
-        report |= describe(err, job["tree"], job["probe"])
+        report |= describe_failure(err, job["tree"], job["probe"])
     if job["observe"]:
-        report["watched"] = {**(watcher.found() if watcher else {}), "seen": seen}
-    if lines:
-        report["lines"] = lines.found()
-    report |= asked(probe, job["tree"], job["probe"]) if probe else {"probe": None}
-    report["outside"] = imported_elsewhere(job["packages"], job["tree"], sys.modules)
-    report["modules"] = third_party(known, job["packages"])
-    report["files"] = tree_files(job["tree"])
+        report["watched"] = {**(watcher.as_json() if watcher else {}), "seen": observations}
+    if line_recorder:
+        report["lines"] = line_recorder.stop_and_collect()
+    report |= collect_probe_report(probe, job["tree"], job["probe"]) if probe else {"probe": None}
+    report["outside"] = files_imported_elsewhere(job["packages"], job["tree"], sys.modules)
+    report["modules"] = third_party_modules(modules_before, job["packages"])
+    report["files"] = tree_file_digests(job["tree"])
     Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
 
 
@@ -131,18 +137,18 @@ def run_module(module: str, args: list[str]) -> None:
             raise
 
 
-def run_until(job: dict[str, Any]) -> bool:
+def run_to_terminal_hazard(job: dict[str, Any]) -> bool:
     """Run and write the results; return whether a terminal hazard stopped the run."""
     sys.argv = [job["module"], *job["args"]]
     begin = operator.attrgetter(job["stepwise"])(importlib.import_module(job["module"]))
     stepped = begin(job["args"])
-    stopped: bool = beside("early_stop").drive(stepped, job["stop"])
+    stopped: bool = load_neighbour("early_stop").drive_run(stepped, job["stop"])
     stepped.write(Path(job["out"]))
     return stopped
 
 
-def note_activation(probe: Any, inactive: str) -> None:
-    """Delete the file `inactive` at the first activation, which is then known even if the run crashes."""
+def delete_marker_on_activation(probe: Any, inactive_marker: str) -> None:
+    """Delete `inactive_marker` at the first activation, which is then known even if the run crashes."""
     active = probe.active
 
     def first_active(fi: str) -> Any:
@@ -150,95 +156,101 @@ def note_activation(probe: Any, inactive: str) -> None:
         if acts:
             probe.active = active
             with suppress(OSError):
-                Path(inactive).unlink()
+                Path(inactive_marker).unlink()
         return acts
 
     probe.active = first_active
 
 
-def asked(probe: Any, tree: str, name: str) -> dict[str, Any]:
-    """Return the report of the probe `name`. If the probe fails, its error becomes the run's ending."""
+def collect_probe_report(probe: Any, tree: str, probe_name: str) -> dict[str, Any]:
+    """Return the report of the probe `probe_name`. If the probe fails, its error becomes the run's ending."""
     try:
-        said = probe.report()
+        report = probe.report()
     except BaseException as err:
-        return {"probe": None, **describe(err, tree, name)}
+        return {"probe": None, **describe_failure(err, tree, probe_name)}
     try:
-        json.dumps(said)
+        json.dumps(report)
     except Exception:
-        said = "what JSON cannot tell"  # the run has overwritten the probe's data
-    return {"probe": said}
+        report = "what JSON cannot tell"  # the run has overwritten the probe's data
+    return {"probe": report}
 
 
-def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]:
-    """Describe reproducibly how a run failed. `probe` is the name of the probe's module."""
+def describe_failure(err: BaseException, tree: str, probe_name: str | None) -> dict[str, Any]:
+    """Describe reproducibly how a run failed. `probe_name` is the name of the probe's module."""
     kind = type(err)
-    if probe and (kind.__module__, kind.__name__) == (probe, "StepLimit"):
+    if probe_name and (kind.__module__, kind.__name__) == (probe_name, "StepLimit"):
         return {"ended": "steps"}
-    message = text(err.code if isinstance(err, SystemExit) else err)[:_LONGEST]
-    errors = origins(err)
-    error = {"kind": kind.__name__, "message": message, "stacks": [passed(one, tree) for one in errors]}
-    return {"ended": "error", "error": error, "disk_full": any(map(of_full_disk, errors))}
+    message = text_of(err.code if isinstance(err, SystemExit) else err)[:_MOST_MESSAGE_CHARACTERS]
+    errors = exception_chain(err)
+    error = {
+        "kind": kind.__name__,
+        "message": message,
+        "stacks": [tree_stack(error, tree) for error in errors],
+    }
+    return {"ended": "error", "error": error, "disk_full": any(map(is_full_disk_error, errors))}
 
 
-def text(thing: object) -> str:
+def text_of(value: object) -> str:
     """Convert an object to text, even if its own conversion fails."""
     try:
-        return str(thing)
+        return str(value)
     except BaseException as why:
         return f"its text cannot be told ({type(why).__name__})"
 
 
-def of_full_disk(err: BaseException) -> bool:
+def is_full_disk_error(err: BaseException) -> bool:
     """Return whether an error reports a full disk or quota, even if a library raised it."""
-    return getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in text(err) for n in _NO_SPACE)
+    return getattr(err, "errno", None) in _NO_SPACE_ERRNOS or any(
+        os.strerror(n) in text_of(err) for n in _NO_SPACE_ERRNOS
+    )
 
 
-def origins(err: BaseException) -> list[BaseException]:
+def exception_chain(err: BaseException) -> list[BaseException]:
     """Return the exception, its causes, and the exceptions that it groups, without duplicates."""
-    found: dict[int, BaseException] = {}
+    errors_by_id: dict[int, BaseException] = {}
     todo: list[BaseException | None] = [err]
-    while todo and len(found) < _MOST_ERRORS:
-        one = todo.pop()
-        if one is not None and id(one) not in found:
-            found[id(one)] = one
-            inner = one.exceptions if isinstance(one, BaseExceptionGroup) else ()
-            todo += [*inner, one.__context__, one.__cause__]
-    return list(found.values())
+    while todo and len(errors_by_id) < _MOST_STORED_EXCEPTIONS:
+        error = todo.pop()
+        if error is not None and id(error) not in errors_by_id:
+            errors_by_id[id(error)] = error
+            inner = error.exceptions if isinstance(error, BaseExceptionGroup) else ()
+            todo += [*inner, error.__context__, error.__cause__]
+    return list(errors_by_id.values())
 
 
-def passed(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
+def tree_stack(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
     """Return where the exception passed through the tree: file, line and column, innermost first."""
-    places = []
+    frames = []
     trace = err.__traceback__
     while trace is not None:
         file = trace.tb_frame.f_code.co_filename
         if file.startswith(tree + os.sep):
-            places.append((os.path.relpath(file, tree), trace.tb_lineno or 0, column(trace)))
+            frames.append((os.path.relpath(file, tree), trace.tb_lineno or 0, failing_column(trace)))
         trace = trace.tb_next
-    kept: dict[tuple[str, int], tuple[str, int, int]] = {}
-    for place in reversed(places):
-        kept.setdefault(place[:2], place)
-    return list(kept.values())
+    innermost_by_line: dict[tuple[str, int], tuple[str, int, int]] = {}
+    for frame in reversed(frames):
+        innermost_by_line.setdefault(frame[:2], frame)
+    return list(innermost_by_line.values())
 
 
-def column(trace: types.TracebackType) -> int:
+def failing_column(trace: types.TracebackType) -> int:
     """Return the byte at which the failing or called expression starts in its line; -1 if unknown."""
     positions = trace.tb_frame.f_code.co_positions()
     *_, begins, _ = next(itertools.islice(positions, trace.tb_lasti // 2, None), (None,) * 4)
     return -1 if begins is None else begins
 
 
-def imported_elsewhere(packages: Iterable[str], tree: str, names: Iterable[str]) -> list[str]:
+def files_imported_elsewhere(packages: Iterable[str], tree: str, module_names: Iterable[str]) -> list[str]:
     """Return the files outside the tree from which these modules of the packages were imported."""
-    found = []
-    for name in sorted(name for name in names if name.partition(".")[0] in packages):
+    files = []
+    for name in sorted(name for name in module_names if name.partition(".")[0] in packages):
         file = getattr(sys.modules[name], "__file__", None)
         if file and not file.startswith(tree + os.sep):
-            found.append(file)
-    return found
+            files.append(file)
+    return files
 
 
-def imported_since(name: str) -> list[str]:
+def modules_imported_since(name: str) -> list[str]:
     names = []
     for newer in reversed(sys.modules):
         names.append(newer)
@@ -247,17 +259,28 @@ def imported_since(name: str) -> list[str]:
     return names
 
 
-def libraries(known: set[str], packages: Iterable[str]) -> list[str]:
-    return [name for name in sys.modules if name not in known and name.partition(".")[0] not in packages]
+def new_modules_outside_packages(modules_before: set[str], packages: Iterable[str]) -> list[str]:
+    return [
+        name for name in sys.modules if name not in modules_before and name.partition(".")[0] not in packages
+    ]
 
 
-def third_party(known: set[str], packages: Iterable[str]) -> list[str]:
-    """Return the third-party top-level modules imported since the `known` ones or mapped into memory."""
-    own = {*sys.stdlib_module_names, Harness.package.name, *packages, *known}
-    return sorted({name.partition(".")[0] for name in (*libraries(known, packages), *mapped())} - own)
+def third_party_modules(modules_before: set[str], packages: Iterable[str]) -> list[str]:
+    """Return the third-party top-level modules imported after `modules_before`, or mapped into memory."""
+    excluded = {*sys.stdlib_module_names, HarnessFinder.package_folder.name, *packages, *modules_before}
+    return sorted(
+        {
+            name.partition(".")[0]
+            for name in (
+                *new_modules_outside_packages(modules_before, packages),
+                *modules_mapped_into_memory(),
+            )
+        }
+        - excluded
+    )
 
 
-def mapped() -> Iterator[str]:
+def modules_mapped_into_memory() -> Iterator[str]:
     """Yield the names, relative to module folders, of files mapped into memory.
 
     These include libraries that are used without an import of their package.
@@ -270,7 +293,7 @@ def mapped() -> Iterator[str]:
                 yield path.removeprefix(folder).split("/")[0]
 
 
-def tree_files(tree: str) -> dict[str, str]:
+def tree_file_digests(tree: str) -> dict[str, str]:
     files = {}
     for folder, _, names in os.walk(tree):
         if Path(folder).name != "__pycache__":
@@ -280,16 +303,16 @@ def tree_files(tree: str) -> dict[str, str]:
     return files
 
 
-def places(tree: str) -> list[str]:
+def list_tree_paths(tree: str) -> list[str]:
     """List every folder and file in the tree."""
     return [f"{folder}/{name}" for folder, _, files in os.walk(tree) for name in ("", *files)]
 
 
-def stamp(places: list[str]) -> list[tuple[int, int]]:
+def change_stamp(paths: list[str]) -> list[tuple[int, int]]:
     """Return a value that changes when a file or folder is written to, added or removed, even if its size
     and times are put back, because only the kernel sets ctime.
     """
-    states = map(os.stat, places)
+    states = map(os.stat, paths)
     return [(state.st_ctime_ns, state.st_ino) for state in states]
 
 

@@ -23,8 +23,8 @@ from mutator._common.hashing import as_json_types
 from mutator._common.version import VERSION
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError, Outside
-from mutator.execution.cluster.parcel import pack, unpack
-from mutator.execution.cluster.unpacked_bundle import META, SCHEMA, Site
+from mutator.execution.cluster.parcel import pack_parcel, unpack_parcel
+from mutator.execution.cluster.unpacked_bundle import BUNDLE_SCHEMA, META_FILE, UnpackedBundle
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FILES
 from mutator.results.table_columns import check_column_names
@@ -35,9 +35,9 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
 from mutator.workspace import Workspace
 
-MOST_BYTES = 2_000_000_000
-_FOLDERS = ("manifest", "target", "overlay", "templates", "scenarios")
-_ROOT = "{root}/"
+MOST_BUNDLE_BYTES = 2_000_000_000
+_BUNDLE_FOLDERS = ("manifest", "target", "overlay", "templates", "scenarios")
+_ROOT_PREFIX = "{root}/"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,67 +46,71 @@ class Bundle:
     digest: str
 
     @classmethod
-    def of(cls, workspace: Workspace, folder: RunFolder, engine: str) -> "Bundle":
+    def pack_for_run(cls, workspace: Workspace, folder: RunFolder, engine: str) -> "Bundle":
         """Pack what workers need for a run that has passed its checks.
 
         MutatorError for a file outside the folders of library and target, and for too many bytes.
         """
-        parts = dict(_parts(workspace, folder, engine))
-        _check(parts, workspace.library)
-        data = pack(parts)
+        parts = dict(_bundle_parts(workspace, folder, engine))
+        _check_names_and_size(parts, workspace.library)
+        data = pack_parcel(parts)
         return cls(data, sha256(data).hexdigest())
 
 
-def _check(parts: Mapping[str, bytes], where: Path) -> None:
+def _check_names_and_size(parts: Mapping[str, bytes], where: Path) -> None:
     """Raise MutatorError unless the parts can be written into a bundle's folders, on any file system."""
-    seen: dict[str, str] = {}
+    names_by_lowercase: dict[str, str] = {}
     for name in parts:
         folder = check_name(name, where).partition("/")[0]
-        if name != META and (folder == name or folder not in _FOLDERS):
-            raise Outside(f"the name {name!a}", where=where, expected=f"a name in {', '.join(_FOLDERS)}")
-        if other := seen.get(name.casefold()):
+        if name != META_FILE and (folder == name or folder not in _BUNDLE_FOLDERS):
+            raise Outside(
+                f"the name {name!a}", where=where, expected=f"a name in {', '.join(_BUNDLE_FOLDERS)}"
+            )
+        if other := names_by_lowercase.get(name.casefold()):
             raise MutatorError(
                 f"{other} and {name}",
                 where=where,
                 expected="names that differ in more than upper and lower case, on any worker's disk",
                 remedy="rename one of them",
             )
-        seen[name.casefold()] = name
+        names_by_lowercase[name.casefold()] = name
     _check_size(sum(map(len, parts.values())), where)
 
 
 def _check_size(size: int, where: Path) -> None:
-    if size > MOST_BYTES:
+    if size > MOST_BUNDLE_BYTES:
         raise MutatorError(
             f"{size / 1e9:.1f} GB for each worker of the cluster",
             where=where,
-            expected=f"at most {MOST_BYTES / 1e9:.0f} GB of tree, templates and scenarios",
+            expected=f"at most {MOST_BUNDLE_BYTES / 1e9:.0f} GB of tree, templates and scenarios",
             remedy="put large files where all workers can read them, and give their path in `entry.args`",
         )
 
 
-def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tuple[str, bytes]]:
+def _bundle_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tuple[str, bytes]]:
     head = folder.head
     manifest = workspace.manifest(head.target)
     digests = read_json(folder.path / CHECKS, CHECKS_SCHEMA)["goldens"]
     meta = {
-        "schema": SCHEMA,
+        "schema": BUNDLE_SCHEMA,
         "mutator": VERSION,
         "engine": engine,
         "limits": as_json_types(head.limits),
         "seed": head.seed,
         "series": bool(folder.series_budget_mb),
         "several_seeds": len(folder.seeds) > 1,
-        "goldens": [{"golden": one.to_stored(), "digest": digests[one.key]} for one in folder.golden_runs],
+        "goldens": [
+            {"golden": golden.to_stored(), "digest": digests[golden.key]} for golden in folder.golden_runs
+        ],
         "manifest": manifest.path.name,
         "sandbox": workspace.sandbox,
     }
-    yield META, json.dumps(meta).encode()
+    yield META_FILE, json.dumps(meta).encode()
     yield f"manifest/{manifest.path.name}", read_bounded(manifest.path)
     tree = manifest.tree
     for path, data in tree.files.items():
         yield f"{'overlay' if path in tree.overlaid else 'target'}/{path}", data
-    for file in _read_in_root(manifest):
+    for file in _files_named_by_arguments(manifest):
         name = file.relative_to(manifest.root).as_posix()
         if name not in tree.files:
             _check_size(file.stat().st_size, file)
@@ -118,41 +122,42 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
         yield f"scenarios/{name}.yaml", read_bounded(workspace.scenario(name))
 
 
-def _read_in_root(manifest: TargetManifest) -> Iterator[Path]:
+def _files_named_by_arguments(manifest: TargetManifest) -> Iterator[Path]:
     """Yield the files that a run's arguments name, or that are in folders that they name."""
     for i, word in enumerate(manifest.entry_args):
-        if word.startswith(_ROOT):
+        if word.startswith(_ROOT_PREFIX):
             with manifest.source.locating_errors(("entry", "args", i)):
-                name = check_name(word.removeprefix(_ROOT).removesuffix("/"), manifest.path)
+                name = check_name(word.removeprefix(_ROOT_PREFIX).removesuffix("/"), manifest.path)
                 place = check_inside(manifest.root, path_below(manifest.root, name))
                 files = files_inside(manifest.root, name, "*")
             yield from (path for path in (place, *files) if path.is_file())
 
 
-def lay_out(data: bytes, place: Path) -> None:
-    """Write the files of a bundle into the new folder `place`; MutatorError if a bundle cannot have them."""
-    parts = unpack(data)
-    _check(parts, place)
-    with raising_disk_full(place):
+def unpack_bundle(data: bytes, folder: Path) -> None:
+    """Write the files of a bundle into the new `folder`; MutatorError if a bundle cannot have them."""
+    parts = unpack_parcel(data)
+    _check_names_and_size(parts, folder)
+    with raising_disk_full(folder):
         for name, content in parts.items():
-            path = path_below(place, name)  # a new folder has no links
+            path = path_below(folder, name)  # a new folder has no links
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
 
 
-def read_inputs(site: Site) -> RunInputs:
+def load_run_inputs(bundle: UnpackedBundle) -> RunInputs:
     """Read the YAML of an unpacked bundle. The target's root is in the bundle."""
-    overlay = site.place / "overlay"
+    overlay = bundle.folder / "overlay"
     manifest = load_manifest(
-        path_below(site.place / "manifest", site.meta["manifest"]),
-        site.place / "target",
+        path_below(bundle.folder / "manifest", bundle.meta["manifest"]),
+        bundle.folder / "target",
         overlay if overlay.is_dir() else None,
     )
     check_column_names(manifest)
     return RunInputs(
-        manifest=replace(manifest, sandbox=site.meta["sandbox"]),
-        fault_models=load_fault_models(site.place / "templates"),
+        manifest=replace(manifest, sandbox=bundle.meta["sandbox"]),
+        fault_models=load_fault_models(bundle.folder / "templates"),
         scenario_files={
-            golden.scenario: site.scenario(golden.scenario) for golden, _ in site.goldens.values()
+            golden.scenario: bundle.scenario_path(golden.scenario)
+            for golden, _ in bundle.goldens_by_key.values()
         },
     )

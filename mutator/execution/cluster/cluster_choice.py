@@ -1,7 +1,7 @@
 """Parse `WHERE` of `--cluster WHERE`, and open a Dask client for it.
 
-`WHERE` is a scheduler's address, the file that a scheduler wrote, `local:N`, or a cluster file. `parse` does
-not import Dask.
+`WHERE` is a scheduler's address, the file that a scheduler wrote, `local:N`, or a cluster file.
+`parse_cluster_choice` does not import Dask.
 """
 
 import json
@@ -15,23 +15,23 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from mutator._common.bounded_reading import MOST_JSON_BYTES, read_bounded
 from mutator.errors import MutatorError
-from mutator.execution.cluster.cluster_files import load_cluster
+from mutator.execution.cluster.cluster_files import load_cluster_file
 from mutator.execution.cluster.dask_connections import (
+    applying_scheduler_settings,
     checked_address,
-    connected,
-    importing,
-    is_closed,
-    own_scheduler,
-    refused,
+    connected_client,
+    is_closed_to_others,
+    open_network_error,
+    requiring_extra,
 )
 
 if TYPE_CHECKING:
     from distributed import Client
 
-_LOCAL = re.compile(r"local:(\d{1,4})")
+_LOCAL_PATTERN = re.compile(r"local:(\d{1,4})")
 
 
-class Where(Protocol):
+class ClusterChoice(Protocol):
     """A usable cluster. `open` returns an asynchronous Dask client and needs a running event loop.
 
     On exit, `open` ends what it started; an existing scheduler keeps running. Raises MutatorError if the
@@ -42,17 +42,17 @@ class Where(Protocol):
     def open(self, *, insecure: bool) -> AbstractAsyncContextManager["Client"]: ...
 
 
-def parse(text: str) -> Where:
+def parse_cluster_choice(text: str) -> ClusterChoice:
     """Parse `WHERE`; MutatorError for an invalid text or file."""
     if "://" in text:
-        return Scheduler(address=checked_address(text))
-    if match := _LOCAL.fullmatch(text):
-        return Local(workers=_counted(int(match[1])))
+        return RunningScheduler(address=checked_address(text))
+    if match := _LOCAL_PATTERN.fullmatch(text):
+        return NewLocalCluster(worker_count=_checked_worker_count(int(match[1])))
     suffix = Path(text).suffix.lower()
     if suffix == ".json":
-        return _scheduler_file(Path(text))
+        return _load_scheduler_file(Path(text))
     if suffix in (".yaml", ".yml"):
-        return load_cluster(Path(text))
+        return load_cluster_file(Path(text))
     raise MutatorError(
         f"'{text}'",
         argument="cluster",
@@ -61,13 +61,13 @@ def parse(text: str) -> Where:
     )
 
 
-def _counted(workers: int) -> int:
-    if workers:
-        return workers
+def _checked_worker_count(worker_count: int) -> int:
+    if worker_count:
+        return worker_count
     raise MutatorError("local:0", argument="cluster", expected="at least one worker", remedy="write local:2")
 
 
-def _scheduler_file(path: Path) -> "Scheduler":
+def _load_scheduler_file(path: Path) -> "RunningScheduler":
     remedy = "start `dask scheduler --scheduler-file FILE` first, then give FILE"
     try:
         content = json.loads(read_bounded(path, MOST_JSON_BYTES))
@@ -78,45 +78,47 @@ def _scheduler_file(path: Path) -> "Scheduler":
         raise MutatorError(
             "not a scheduler file", where=path, expected="JSON with an address", remedy=remedy
         ) from None
-    return Scheduler(address=checked_address(str(address), where=path), file=path)
+    return RunningScheduler(address=checked_address(str(address), where=path), address_file=path)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scheduler:
-    """A running scheduler. `file` is the file from which its address was read."""
+class RunningScheduler:
+    """A running scheduler. `address_file` is the file from which its address was read."""
 
     address: str
-    file: Path | None = None
+    address_file: Path | None = None
 
     @asynccontextmanager
     async def open(self, *, insecure: bool) -> AsyncIterator["Client"]:
-        if not insecure and not is_closed(self.address):
-            raise refused(self.address, where=self.file)
-        with importing("cluster"):
+        if not insecure and not is_closed_to_others(self.address):
+            raise open_network_error(self.address, where=self.address_file)
+        with requiring_extra("cluster"):
             import distributed  # noqa: F401
-        async with connected(self.address, where=self.file) as client:
+        async with connected_client(self.address, where=self.address_file) as client:
             listens = str(client.scheduler_info()["address"])
-            if not insecure and not is_closed(listens):
-                raise refused(f"{self.address} (a scheduler that listens at {listens})", where=self.file)
+            if not insecure and not is_closed_to_others(listens):
+                raise open_network_error(
+                    f"{self.address} (a scheduler that listens at {listens})", where=self.address_file
+                )
             yield client
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Local:
+class NewLocalCluster:
     """Single-threaded worker processes on this machine, with their own scheduler."""
 
-    workers: int
+    worker_count: int
 
     @asynccontextmanager
     async def open(self, *, insecure: bool) -> AsyncIterator["Client"]:
-        with importing("cluster"):
+        with requiring_extra("cluster"):
             from distributed import LocalCluster
         with (
             tempfile.TemporaryDirectory(prefix="mutator-workers-", ignore_cleanup_errors=True) as folder,
-            own_scheduler(),
+            applying_scheduler_settings(),
         ):
             cluster: Any = LocalCluster(
-                n_workers=self.workers,
+                n_workers=self.worker_count,
                 threads_per_worker=1,
                 host="127.0.0.1",
                 dashboard_address="127.0.0.1:0",
@@ -125,7 +127,7 @@ class Local:
             )
             try:
                 await cluster
-                async with connected(cluster) as client:
+                async with connected_client(cluster) as client:
                     yield client
             finally:
                 await cluster.close()

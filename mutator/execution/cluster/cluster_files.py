@@ -20,13 +20,13 @@ from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.execution.cluster.dask_connections import (
-    certificates,
-    connected,
-    importing,
-    is_closed,
+    applying_scheduler_settings,
+    connected_client,
+    is_closed_to_others,
     is_loopback,
-    own_scheduler,
-    refused,
+    load_tls_certificates,
+    open_network_error,
+    requiring_extra,
 )
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 SCHEMA = "cluster/1"
 KUBERNETES = "kubernetes"
-_CLASSES = {
+_CLUSTER_CLASSES = {
     "slurm": ("dask_jobqueue", "SLURMCluster"),
     "pbs": ("dask_jobqueue", "PBSCluster"),
     "sge": ("dask_jobqueue", "SGECluster"),
@@ -42,7 +42,7 @@ _CLASSES = {
     KUBERNETES: ("dask_kubernetes.operator", "KubeCluster"),
 }
 # Options that a file must not set: those set by this module, and those that name Python objects.
-RESERVED = (
+RESERVED_OPTIONS = (
     "asynchronous",
     "config_name",
     "job_cls",
@@ -51,8 +51,17 @@ RESERVED = (
     "scheduler_cls",
     "shutdown_on_close",
 )
-_NO_OPTIONS = {"self", "args", "kwargs", "base_class_kwargs", "job_kwargs", "scheduler", "name", *RESERVED}
-_RENEWED_EVERY = "5s"  # how often jobs that reached their time limit are replaced
+_FORBIDDEN_OPTIONS = {
+    "self",
+    "args",
+    "kwargs",
+    "base_class_kwargs",
+    "job_kwargs",
+    "scheduler",
+    "name",
+    *RESERVED_OPTIONS,
+}
+_JOB_RENEWAL_INTERVAL = "5s"  # how often jobs that reached their time limit are replaced
 
 
 class ClusterModel(StrictModel, title="A cluster file"):
@@ -82,47 +91,47 @@ class ClusterFile:
     async def open(self, *, insecure: bool) -> AsyncIterator["Client"]:
         """Start the cluster. On exit, end it and all its jobs or pods."""
         if not insecure:
-            self._check_closed()
-        cluster_class = _class(self.model.kind)
+            self._check_network_is_closed()
+        cluster_class = _cluster_class(self.model.kind)
         self._check_options(cluster_class)
         problems: list[Exception] = []
-        with self._blamed():
-            options = self._options()
+        with self._reporting_errors():
+            options = self._cluster_arguments()
         if self.model.kind != KUBERNETES:
-            options["job_cls"] = _noting(cluster_class.job_cls, problems)
-        with own_scheduler():
-            with self._blamed():
+            options["job_cls"] = _job_class_noting_errors(cluster_class.job_cls, problems)
+        with applying_scheduler_settings():
+            with self._reporting_errors():
                 cluster = cluster_class(asynchronous=True, n_workers=0, **options)
             try:
-                await self._started(cluster, insecure, problems)
+                await self._start_cluster(cluster, insecure, problems)
             except BaseException:
                 with suppress(Exception):  # the cause is already known
                     await cluster.close()
-                _delete_keys(cluster)
+                _delete_key_files(cluster)
                 raise
             try:
-                async with connected(cluster, where=self.source.path) as client:
+                async with connected_client(cluster, where=self.source.path) as client:
                     yield client
             finally:
                 await cluster.close()
-                _delete_keys(cluster)
+                _delete_key_files(cluster)
 
-    async def _started(self, cluster: Any, insecure: bool, problems: list[Exception]) -> None:
+    async def _start_cluster(self, cluster: Any, insecure: bool, problems: list[Exception]) -> None:
         """Start the scheduler and submit the jobs. `problems` collects the errors of failed submissions."""
-        with self._blamed():
+        with self._reporting_errors():
             await cluster
-        if not insecure and not is_closed(cluster.scheduler_address):
-            raise refused(cluster.scheduler_address, where=self.source.path)
+        if not insecure and not is_closed_to_others(cluster.scheduler_address):
+            raise open_network_error(cluster.scheduler_address, where=self.source.path)
         workers = self.model.workers
-        with self._blamed():
+        with self._reporting_errors():
             await cluster.scale(workers)
             await cluster
             if problems:
                 raise problems[0]
         if self.model.kind != KUBERNETES:  # on Kubernetes, the operator does this
-            cluster.adapt(minimum=workers, maximum=workers, interval=_RENEWED_EVERY)
+            cluster.adapt(minimum=workers, maximum=workers, interval=_JOB_RENEWAL_INTERVAL)
 
-    def _check_closed(self) -> None:
+    def _check_network_is_closed(self) -> None:
         """Raise MutatorError if the options show that others could reach the scheduler."""
         options = self.model.options
         scheduler = options.get("scheduler_options")
@@ -134,14 +143,14 @@ class ClusterFile:
             if tls or (is_loopback(str(scheduler["host"])) if "host" in scheduler else on_loopback):
                 return
             what = "the network of the cluster's scheduler"
-        raise refused(what, where=self.source.path, line=self.source.line_of(("options",)))
+        raise open_network_error(what, where=self.source.path, line=self.source.line_of(("options",)))
 
     def _check_options(self, cluster_class: type) -> None:
-        known = set(_parameters(cluster_class)) - _NO_OPTIONS
+        allowed = set(_parameter_names(cluster_class)) - _FORBIDDEN_OPTIONS
         for name, value in self.model.options.items():
-            if name not in known:
-                close = difflib.get_close_matches(name, sorted(known), n=1)
-                raise self._error(
+            if name not in allowed:
+                close = difflib.get_close_matches(name, sorted(allowed), n=1)
+                raise self._error_at(
                     ("options", name),
                     f"option '{name}'",
                     expected=f"an option of {cluster_class.__name__}",
@@ -149,17 +158,19 @@ class ClusterFile:
                 )
             if name == "security" and value is not True:
                 remedy = "write `security: true`, or `protocol: tls://` for Dask's configured certificates"
-                raise self._error(("options", name), f"security: {value!r}", expected="true", remedy=remedy)
+                raise self._error_at(
+                    ("options", name), f"security: {value!r}", expected="true", remedy=remedy
+                )
         processes = self.model.options.get("processes", self.model.options.get("cores"))
         if processes != self.model.options.get("cores"):
-            raise self._error(
+            raise self._error_at(
                 ("options", "processes"),
                 f"processes: {processes}, cores: {self.model.options.get('cores')}",
                 expected="one process per core, because a worker has one thread",
                 remedy="remove `processes`",
             )
 
-    def _options(self) -> dict[str, Any]:
+    def _cluster_arguments(self) -> dict[str, Any]:
         """Return the arguments of the class: one thread per worker, and a dashboard only for this machine."""
         options = dict(self.model.options)
         if self.model.kind == KUBERNETES:
@@ -177,34 +188,34 @@ class ClusterFile:
         scheduler = options.get("scheduler_options") or {}
         options["scheduler_options"] = {"dashboard_address": "127.0.0.1:0"} | scheduler
         if "security" not in options and str(options.get("protocol")).startswith("tls"):
-            options["security"] = certificates()
+            options["security"] = load_tls_certificates()
         return options
 
     @contextmanager
-    def _blamed(self) -> Iterator[None]:
+    def _reporting_errors(self) -> Iterator[None]:
         """Turn the class's errors about options, and the queueing system's about jobs, into MutatorError."""
         try:
             yield
         except FileNotFoundError as error:
-            raise self._error(
+            raise self._error_at(
                 ("kind",), str(error), remedy="submit from a machine that has this command"
             ) from None
         except (ImportError, TypeError, ValueError, RuntimeError, OSError) as error:
-            remedy = f"correct the options (see the documentation of {_CLASSES[self.model.kind][1]})"
+            remedy = f"correct the options (see the documentation of {_CLUSTER_CLASSES[self.model.kind][1]})"
             if self.model.kind == KUBERNETES:
                 remedy += ", and check that kubectl works here"
-            raise self._error(("options",), " ".join(str(error).split()), remedy=remedy) from None
+            raise self._error_at(("options",), " ".join(str(error).split()), remedy=remedy) from None
 
-    def _error(self, keys: tuple[str, ...], got: str, **more: str) -> MutatorError:
+    def _error_at(self, keys: tuple[str, ...], got: str, **more: str) -> MutatorError:
         return self.source.error(keys, got, **more)
 
 
-def load_cluster(path: Path) -> ClusterFile:
+def load_cluster_file(path: Path) -> ClusterFile:
     model, source = load_yaml_model(path, ClusterModel, SCHEMA)
     return ClusterFile(model=model, source=source)
 
 
-def _noting(job_class: Any, problems: list[Exception]) -> type:
+def _job_class_noting_errors(job_class: Any, problems: list[Exception]) -> type:
     """Make a job class that adds errors of failed submissions to `problems`; Dask only logs them."""
     from distributed import Status
 
@@ -219,27 +230,27 @@ def _noting(job_class: Any, problems: list[Exception]) -> type:
     return Noting
 
 
-def _delete_keys(cluster: Any) -> None:
+def _delete_key_files(cluster: Any) -> None:
     """Delete the files of `security: true`. Dask would delete them only on garbage collection."""
     for key in ("ca_file", "cert", "key"):
         if file := getattr(cluster, f"_job_{key}", None):
             file.close()
 
 
-def _class(kind: str) -> Any:
+def _cluster_class(kind: str) -> Any:
     """Return the class that starts clusters of this kind; MutatorError if its extra is not installed."""
-    module, name = _CLASSES[kind]
+    module, name = _CLUSTER_CLASSES[kind]
     original = signal.signal
     try:
         # importing dask_jobqueue sets a Ctrl-C handler, which fails in a thread
         signal.signal = lambda *_: None
-        with importing(KUBERNETES if kind == KUBERNETES else "cluster"):
+        with requiring_extra(KUBERNETES if kind == KUBERNETES else "cluster"):
             return getattr(importlib.import_module(module), name)
     finally:
         signal.signal = original
 
 
-def _parameters(cluster_class: type) -> Iterator[str]:
+def _parameter_names(cluster_class: type) -> Iterator[str]:
     for part in (*cluster_class.__mro__, *getattr(cluster_class, "job_cls", object).__mro__):
         if part.__module__.startswith(("dask_jobqueue", "dask_kubernetes")) and "__init__" in vars(part):
             yield from inspect.signature(part).parameters

@@ -10,80 +10,86 @@ from mutator._common.message_text import counted
 from mutator._common.version import VERSION
 from mutator.store.work_stretches import Stretch, version_differences
 
-_RECENT = 20  # finished pieces used to measure a worker's rate
+_MOST_RECENT_PIECES = 20  # finished pieces used to measure a worker's rate
 
 
 @dataclass
-class _Member:
+class _AdmittedWorker:
     """An admitted worker: its machine, and the time and number of experiments for each of its last pieces."""
 
     host: str
-    finished: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_RECENT))
+    finished_pieces: deque[tuple[float, int]] = field(
+        default_factory=lambda: deque(maxlen=_MOST_RECENT_PIECES)
+    )
 
 
 class Crew:
     """The workers of a run, present and refused. `now` returns the time in seconds."""
 
     def __init__(self, stretch: Stretch, *, accept: bool, now: Callable[[], float] = time.monotonic) -> None:
-        self._stretch, self._accept, self._now = stretch, accept, now
-        self._present: dict[str, _Member] = {}
-        self.refused: dict[str, str] = {}
+        self._stretch, self._accept_versions, self._now = stretch, accept, now
+        self._admitted_workers: dict[str, _AdmittedWorker] = {}
+        self.refusal_reasons: dict[str, str] = {}
 
     @property
     def packages(self) -> list[str]:
         """The packages whose versions must equal those of the stretch."""
         return sorted(self._stretch.packages)
 
-    def let_in(self, name: str, facts: Mapping[str, Any]) -> None:
-        self._present[name] = _Member(str(facts["host"]))
+    def admit_worker(self, name: str, facts: Mapping[str, Any]) -> None:
+        self._admitted_workers[name] = _AdmittedWorker(str(facts["host"]))
 
-    def leave(self, name: str) -> None:
-        self._present.pop(name, None)
+    def remove_worker(self, name: str) -> None:
+        self._admitted_workers.pop(name, None)
 
-    def refuse(self, name: str, why: str) -> None:
-        self.refused[name] = why
+    def refuse_worker(self, name: str, reason: str) -> None:
+        self.refusal_reasons[name] = reason
 
-    def objection(self, facts: Mapping[str, Any]) -> str:
+    def reason_to_refuse(self, facts: Mapping[str, Any]) -> str:
         """Return why a worker is refused; empty if it is admitted.
 
         The same reasons would prevent resuming the run on the worker's machine.
         """
         if facts["mutator"] != VERSION:
             return f"mutator {facts['mutator']}, here {VERSION}"
-        found = version_differences(self._stretch, facts["python"], facts["packages"])
-        return "" if self._accept else "; ".join(text.replace(", here", ", there") for text in found)
+        differing_versions = version_differences(self._stretch, facts["python"], facts["packages"])
+        return (
+            ""
+            if self._accept_versions
+            else "; ".join(text.replace(", here", ", there") for text in differing_versions)
+        )
 
-    def finished(self, name: str, count: int) -> None:
-        if name in self._present:
-            self._present[name].finished.append((self._now(), count))
+    def note_finished_piece(self, name: str, experiment_count: int) -> None:
+        if name in self._admitted_workers:
+            self._admitted_workers[name].finished_pieces.append((self._now(), experiment_count))
 
-    def told(self) -> str:
+    def describe_workers(self) -> str:
         """Return a summary: `3 workers on alpha (2.4 a second), beta (0.9 a second)`."""
         hosts: dict[str, list[float | None]] = {}
-        for member in self._present.values():
-            hosts.setdefault(member.host, []).append(self._per_s(member))
-        text = counted(len(self._present), "worker")
+        for member in self._admitted_workers.values():
+            hosts.setdefault(member.host, []).append(self._experiments_per_s(member))
+        text = counted(len(self._admitted_workers), "worker")
         if hosts:
-            text += f" on {', '.join(_told(host, rates) for host, rates in sorted(hosts.items()))}"
-        return f"{text}; {len(self.refused)} refused" if self.refused else text
+            text += f" on {', '.join(_describe_host(host, rates) for host, rates in sorted(hosts.items()))}"
+        return f"{text}; {len(self.refusal_reasons)} refused" if self.refusal_reasons else text
 
-    def _per_s(self, member: _Member) -> float | None:
-        if len(member.finished) < 2:
+    def _experiments_per_s(self, member: _AdmittedWorker) -> float | None:
+        if len(member.finished_pieces) < 2:
             return None
-        (began, first), *_ = member.finished
+        (began, first), *_ = member.finished_pieces
         elapsed = self._now() - began
-        return (sum(count for _, count in member.finished) - first) / elapsed if elapsed > 0 else None
+        return (sum(count for _, count in member.finished_pieces) - first) / elapsed if elapsed > 0 else None
 
 
-def describe(name: str, facts: Mapping[str, Any]) -> str:
+def describe_worker(name: str, facts: Mapping[str, Any]) -> str:
     """Describe a worker: its name and, if known, its machine, processor and versions."""
     if not facts:
         return name
     parts = (facts["host"], facts["cpu"] or facts["platform"], facts["python"], f"mutator {facts['mutator']}")
-    blas = (f"{one['library']} {one['version']} ({one['kernel']})" for one in facts["blas"])
+    blas = (f"{library['library']} {library['version']} ({library['kernel']})" for library in facts["blas"])
     return f"{name} ({', '.join((*parts, *blas))})"
 
 
-def _told(host: str, rates: Iterable[float | None]) -> str:
-    known = [rate for rate in rates if rate is not None]
-    return f"{host} ({sum(known):.1f} a second)" if known else host
+def _describe_host(host: str, rates: Iterable[float | None]) -> str:
+    known_rates = [rate for rate in rates if rate is not None]
+    return f"{host} ({sum(known_rates):.1f} a second)" if known_rates else host

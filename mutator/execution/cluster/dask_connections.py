@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from distributed import Client, Security
     from distributed.deploy.cluster import Cluster
 
-CONNECT_S = 10.0  # wait before giving up on a silent scheduler
-_ADDRESS = re.compile(
+CONNECT_TIMEOUT_S = 10.0  # wait before giving up on a silent scheduler
+_ADDRESS_PATTERN = re.compile(
     r"(?P<protocol>tcp|tls)://(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/@\[\]]+):(?P<port>\d{1,5})/?"
 )
-_TO_CLOSE = (
+_REMEDY_FOR_OPEN_NETWORK = (
     "anyone who can reach a Dask scheduler can run code on its workers: use tls:// "
     "(see docs/how-to/run-on-many-machines.md), or give `insecure_network` if nobody else is on "
     "the network"
@@ -32,8 +32,8 @@ def checked_address(address: str, *, where: Path | None = None) -> str:
 
     `where` is the file from which the address was read.
     """
-    found = _ADDRESS.fullmatch(address)
-    if found and 0 < int(found["port"]) < 2**16:
+    match = _ADDRESS_PATTERN.fullmatch(address)
+    if match and 0 < int(match["port"]) < 2**16:
         return address
     raise MutatorError(
         f"address '{address}'",
@@ -43,13 +43,13 @@ def checked_address(address: str, *, where: Path | None = None) -> str:
     )
 
 
-def is_closed(address: str) -> bool:
+def is_closed_to_others(address: str) -> bool:
     """Return whether TLS, or an address on this machine, prevents others from connecting or eavesdropping.
 
     Host names except `localhost` are not looked up.
     """
-    found = _ADDRESS.fullmatch(address)
-    return found is not None and (found["protocol"] == "tls" or is_loopback(found["host"]))
+    match = _ADDRESS_PATTERN.fullmatch(address)
+    return match is not None and (match["protocol"] == "tls" or is_loopback(match["host"]))
 
 
 def is_loopback(host: str) -> bool:
@@ -59,19 +59,19 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def refused(what: str, *, where: Path | None = None, line: int | None = None) -> MutatorError:
+def open_network_error(network: str, *, where: Path | None = None, line: int | None = None) -> MutatorError:
     """Make the error for a network on which others can reach the scheduler."""
     return MutatorError(
-        f"{what} is neither encrypted nor on the loopback interface",
+        f"{network} is neither encrypted nor on the loopback interface",
         where=where,
         line=line,
         argument="cluster",
-        remedy=_TO_CLOSE,
+        remedy=_REMEDY_FOR_OPEN_NETWORK,
     )
 
 
 @contextmanager
-def importing(extra: str) -> Iterator[None]:
+def requiring_extra(extra: str) -> Iterator[None]:
     """Turn the error of a missing package into one that names its extra."""
     try:
         yield
@@ -84,7 +84,7 @@ def importing(extra: str) -> Iterator[None]:
 
 
 @contextmanager
-def own_scheduler() -> Iterator[None]:
+def applying_scheduler_settings() -> Iterator[None]:
     """Apply Dask settings for a scheduler in this process.
 
     A frozen worker is noticed within a minute. Dask does not profile its threads, which saves CPU time. The
@@ -110,7 +110,7 @@ def own_scheduler() -> Iterator[None]:
             os.environ["PYTHONSAFEPATH"] = before
 
 
-def certificates() -> "Security":
+def load_tls_certificates() -> "Security":
     """Return the TLS settings of Dask's configuration (`distributed.comm.tls`); MutatorError if unusable."""
     from distributed import Security
 
@@ -129,18 +129,33 @@ def certificates() -> "Security":
 
 
 @asynccontextmanager
-async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncIterator["Client"]:
+async def connected_client(
+    scheduler_or_cluster: "str | Cluster", *, where: Path | None = None
+) -> AsyncIterator["Client"]:
     """Connect an asynchronous client to a scheduler or cluster; MutatorError after a time limit."""
     from distributed import Client
 
-    address = to if isinstance(to, str) else to.scheduler_address
-    security = certificates() if isinstance(to, str) and to.startswith("tls://") else None
+    address = (
+        scheduler_or_cluster
+        if isinstance(scheduler_or_cluster, str)
+        else scheduler_or_cluster.scheduler_address
+    )
+    security = (
+        load_tls_certificates()
+        if isinstance(scheduler_or_cluster, str) and scheduler_or_cluster.startswith("tls://")
+        else None
+    )
     client = Client(
-        to, asynchronous=True, set_as_default=False, timeout=CONNECT_S, security=security, name="mutator"
+        scheduler_or_cluster,
+        asynchronous=True,
+        set_as_default=False,
+        timeout=CONNECT_TIMEOUT_S,
+        security=security,
+        name="mutator",
     )
     try:
         try:
-            async with asyncio.timeout(CONNECT_S + 2):
+            async with asyncio.timeout(CONNECT_TIMEOUT_S + 2):
                 await client
         except (
             OSError,
@@ -148,7 +163,7 @@ async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncI
             ssl.SSLError,
         ) as error:  # Dask's own connection errors are OSErrors
             raise MutatorError(
-                f"no Dask scheduler answers at {address}{await _reason(address, error)}",
+                f"no Dask scheduler answers at {address}{await _describe_failed_connection(address, error)}",
                 where=where,
                 argument="cluster",
                 remedy="start one (`dask scheduler`), or check address, firewall and certificates",
@@ -158,7 +173,7 @@ async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncI
         await client.close()
 
 
-async def _reason(address: str, error: BaseException) -> str:
+async def _describe_failed_connection(address: str, error: BaseException) -> str:
     """Return the reason for a failed connection from the innermost error.
 
     If that error says nothing, because Dask's last attempt was cut short, make one more attempt.
@@ -167,10 +182,10 @@ async def _reason(address: str, error: BaseException) -> str:
         error = error.__cause__
     if str(error):
         return f" ({error})"
-    if found := _ADDRESS.fullmatch(address):
+    if match := _ADDRESS_PATTERN.fullmatch(address):
         try:
             async with asyncio.timeout(5.0):
-                _, writer = await asyncio.open_connection(found["host"].strip("[]"), int(found["port"]))
+                _, writer = await asyncio.open_connection(match["host"].strip("[]"), int(match["port"]))
                 writer.close()
         except OSError as tried:
             return f" ({os.strerror(tried.errno)})" if tried.errno else ""

@@ -14,43 +14,47 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.campaigns import run_environment
-from mutator.execution.cluster.unpacked_bundle import Site
+from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.preflight.preflight_rules import output_digest_of
 from mutator.store.run_folder import GoldenRun
 from mutator.targets.manifest import TargetManifest
 
-_SOURCES = ("manifest", "target", "overlay")  # folders of a bundle
+_SOURCE_FOLDERS = ("manifest", "target", "overlay")  # folders of a bundle
 
 
-class DrivenGoldens:
+class GoldenRunCache:
     """The cached golden runs of a site."""
 
-    def __init__(self, site: Site, manifest: TargetManifest) -> None:
-        self._site, self._manifest = site, manifest
-        files = sorted(path for name in _SOURCES for path in (site.place / name).rglob("*") if path.is_file())
-        self._common = [
+    def __init__(self, bundle: UnpackedBundle, manifest: TargetManifest) -> None:
+        self._bundle, self._manifest = bundle, manifest
+        files = sorted(
+            path for name in _SOURCE_FOLDERS for path in (bundle.folder / name).rglob("*") if path.is_file()
+        )
+        self._common_key_parts = [
             VERSION,
-            [[path.relative_to(site.place).as_posix(), digest(read_bounded(path))] for path in files],
-            site.meta["limits"],
+            [[path.relative_to(bundle.folder).as_posix(), digest(read_bounded(path))] for path in files],
+            bundle.meta["limits"],
             run_environment.everything_outside_sources(),
             platform.node(),
         ]
 
-    def fetch(self, golden: GoldenRun, known: str, to: Path) -> bool:
-        """Copy the golden run with the digest `known` to `to`; return False if it is not cached."""
+    def copy_golden(self, golden: GoldenRun, expected_digest: str, destination: Path) -> bool:
+        """Copy a golden run to `destination`; return False if none with `expected_digest` is cached."""
         with suppress(OSError):
-            cached_folders.copy_from_cache(self._entry(golden), to)
-            if output_digest_of(self._manifest, to) == known:
+            cached_folders.copy_from_cache(self._entry_folder(golden), destination)
+            if output_digest_of(self._manifest, destination) == expected_digest:
                 return True
-        shutil.rmtree(to, ignore_errors=True)
+        shutil.rmtree(destination, ignore_errors=True)
         return False
 
-    def keep(self, golden: GoldenRun, out: Path) -> None:
-        """Cache the golden run in the folder `out`, if the cache is writable."""
-        cached_folders.store_in_cache(self._entry(golden), lambda made: shutil.copytree(out, made))
+    def store_golden(self, golden: GoldenRun, output_folder: Path) -> None:
+        """Cache the golden run in the folder `output_folder`, if the cache is writable."""
+        cached_folders.store_in_cache(
+            self._entry_folder(golden), lambda destination: shutil.copytree(output_folder, destination)
+        )
 
-    def _entry(self, golden: GoldenRun) -> Path:
-        scenario = digest(read_bounded(self._site.scenario(golden.scenario)))
-        seed = self._site.meta["seed"] if golden.seed is None else golden.seed
-        content = [*self._common, scenario, seed, list(golden.changes)]
+    def _entry_folder(self, golden: GoldenRun) -> Path:
+        scenario = digest(read_bounded(self._bundle.scenario_path(golden.scenario)))
+        seed = self._bundle.meta["seed"] if golden.seed is None else golden.seed
+        content = [*self._common_key_parts, scenario, seed, list(golden.changes)]
         return shared_cache.goldens_folder() / digest(content)

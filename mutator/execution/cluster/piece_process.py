@@ -26,13 +26,13 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import group_by_run
 from mutator.engines import sandbox
 from mutator.engines.engine_choice import make_engine
-from mutator.engines.engine_jobs import FAST, Job, Setting
+from mutator.engines.engine_jobs import MODES_TO_PROVE, EngineArguments, Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import DiskFull, GoldenRunsDiffer, MutatorError, Shortage
-from mutator.execution.cluster.golden_cache import DrivenGoldens
-from mutator.execution.cluster.pieces import Ending, Kind, Piece, Result
-from mutator.execution.cluster.unpacked_bundle import Site
-from mutator.execution.experiment_runner import Finished, Goldens, Runner
+from mutator.execution.cluster.golden_cache import GoldenRunCache
+from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceKind, PieceResult
+from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
+from mutator.execution.experiment_runner import ExperimentRunner, FinishedExperiment, LoadedGoldens
 from mutator.execution.worker import timing_of
 from mutator.model import Experiment
 from mutator.preflight.preflight_rules import read_check_run
@@ -47,164 +47,180 @@ from mutator.targets.required_packages import check_requirements
 class PieceRunner:
     """Runs pieces in an unpacked bundle, and packs the results."""
 
-    def __init__(self, site: Site, inputs: RunInputs, name: str, parent: int) -> None:
-        self._site, self._name, self._parent = site, name, parent
+    def __init__(self, bundle: UnpackedBundle, inputs: RunInputs, worker_name: str, parent_pid: int) -> None:
+        self._bundle, self._worker_name, self._parent_pid = bundle, worker_name, parent_pid
         self._manifest, self._models = inputs.manifest, inputs.fault_models
         check_requirements(inputs.manifest)
         if inputs.manifest.sandbox:
-            sandbox.check()
-        self.place = site.place
-        self._work = site.place / f"work-{os.getpid()}"
-        self._work.mkdir()
-        self._goldens = self._work / "golden"
-        self._driven = DrivenGoldens(site, inputs.manifest)
-        self._alike: set[str] = set()  # golden runs that equal the campaign's
-        self._runners: dict[Kind, Runner] = {}
+            sandbox.check_sandbox_available()
+        self.folder = bundle.folder
+        self._work_folder = bundle.folder / f"work-{os.getpid()}"
+        self._work_folder.mkdir()
+        self._goldens_folder = self._work_folder / "golden"
+        self._golden_cache = GoldenRunCache(bundle, inputs.manifest)
+        self._matching_goldens: set[str] = set()  # golden runs that equal the campaign's
+        self._runners_by_kind: dict[PieceKind, ExperimentRunner] = {}
 
-    def run(self, piece: Piece, tell: Callable[[str], None]) -> Result:
-        """Run a piece. Calls `tell` with the id of each finished experiment.
+    def run_piece(self, piece: Piece, report_finished: Callable[[str], None]) -> PieceResult:
+        """Run a piece. Calls `report_finished` with the id of each finished experiment.
 
         Raises GoldenRunsDiffer if a golden run made here differs from the campaign's.
         """
         began = time.monotonic()
-        experiments = piece.experiments()
+        experiments = piece.parse_experiments()
         # a shared run is compared with the golden run of its first experiment
         for same in group_by_run(self._manifest, experiments):
-            if (key := self._golden_of(same[0]).key) not in self._alike:
-                self._have_golden(key)
-        runner = self._runner(piece.kind)
-        finished: list[Finished] = []
-        for one in runner.run(experiments):
-            finished.append(one)
-            tell(one.experiment.id)
-        made = _made(finished, self._name, proof=piece.kind is Kind.PROVE)
-        return replace(made, number=piece.number, seconds=time.monotonic() - began)
+            if (key := self._golden_of(same[0]).key) not in self._matching_goldens:
+                self._ensure_golden(key)
+        runner = self._runner_of_kind(piece.kind)
+        finished: list[FinishedExperiment] = []
+        for ended in runner.run(experiments):
+            finished.append(ended)
+            report_finished(ended.experiment.id)
+        result = _build_result(finished, self._worker_name, is_proof=piece.kind is PieceKind.PROVE)
+        return replace(result, number=piece.number, seconds=time.monotonic() - began)
 
     def close(self) -> None:
-        for runner in self._runners.values():
+        for runner in self._runners_by_kind.values():
             runner.engine.close()
 
-    def _runner(self, kind: Kind) -> Runner:
-        if kind not in self._runners:
-            site = self._site
-            if kind is Kind.PROVE:
+    def _runner_of_kind(self, kind: PieceKind) -> ExperimentRunner:
+        if kind not in self._runners_by_kind:
+            bundle = self._bundle
+            if kind is PieceKind.PROVE:
                 engine = ReferenceEngine(
-                    self._manifest, self._work, site.limits, self._parent, independent=True
+                    self._manifest, self._work_folder, bundle.limits, self._parent_pid, independent=True
                 )
             else:
-                setting = Setting(
+                setting = EngineArguments(
                     manifest=self._manifest,
                     models=self._models,
-                    work=self._work,
-                    limits=site.limits,
-                    parent=self._parent,
+                    work_folder=self._work_folder,
+                    limits=bundle.limits,
+                    parent_pid=self._parent_pid,
                 )
-                engine = make_engine(site.meta["engine"], setting)  # type: ignore[assignment]
-            goldens = Goldens(
+                engine = make_engine(bundle.meta["engine"], setting)  # type: ignore[assignment]
+            goldens = LoadedGoldens(
                 self._manifest,
-                lambda experiment: path_below(self._goldens, self._golden_of(experiment).key),
-                several_seeds=site.meta["several_seeds"],
-                digests={path_below(self._goldens, key): known for key, (_, known) in site.goldens.items()},
+                lambda experiment: path_below(self._goldens_folder, self._golden_of(experiment).key),
+                several_seeds=bundle.meta["several_seeds"],
+                digests={
+                    path_below(self._goldens_folder, key): golden_digest
+                    for key, (_, golden_digest) in bundle.goldens_by_key.items()
+                },
             )
-            with_series = kind is Kind.RUN and site.meta["series"]
-            self._runners[kind] = Runner(
-                self._manifest, self._models, engine, goldens, site.scenario, with_series=with_series
+            with_series = kind is PieceKind.RUN and bundle.meta["series"]
+            self._runners_by_kind[kind] = ExperimentRunner(
+                self._manifest, self._models, engine, goldens, bundle.scenario_path, with_series=with_series
             )
-        return self._runners[kind]
+        return self._runners_by_kind[kind]
 
-    def _have_golden(self, key: str) -> None:
+    def _ensure_golden(self, key: str) -> None:
         """Make a golden run or copy it from the cache; GoldenRunsDiffer if it differs from the campaign's."""
-        golden, known = self._site.goldens[key]
-        place = path_below(self._goldens, key)
-        self._goldens.mkdir(exist_ok=True)
-        if not self._driven.fetch(golden, known, place):
-            self._drive_golden(golden, known, place)
-            self._driven.keep(golden, place)
-        self._alike.add(key)
+        golden, expected_digest = self._bundle.goldens_by_key[key]
+        folder = path_below(self._goldens_folder, key)
+        self._goldens_folder.mkdir(exist_ok=True)
+        if not self._golden_cache.copy_golden(golden, expected_digest, folder):
+            self._make_golden(golden, expected_digest, folder)
+            self._golden_cache.store_golden(golden, folder)
+        self._matching_goldens.add(key)
 
-    def _drive_golden(self, golden: GoldenRun, known: str, place: Path) -> None:
-        site = self._site
-        engine = ReferenceEngine(self._manifest, self._work, site.limits, self._parent)
+    def _make_golden(self, golden: GoldenRun, expected_digest: str, destination: Path) -> None:
+        bundle = self._bundle
+        engine = ReferenceEngine(self._manifest, self._work_folder, bundle.limits, self._parent_pid)
         job = Job(
-            name=f"golden-{len(self._alike)}",
-            scenario=site.scenario(golden.scenario),
-            seed=site.meta["seed"] if golden.seed is None else golden.seed,
+            name=f"golden-{len(self._matching_goldens)}",
+            scenario=bundle.scenario_path(golden.scenario),
+            seed=bundle.meta["seed"] if golden.seed is None else golden.seed,
             changes=golden.changes,
         )
         for _, execution in engine.run([job]):
-            found = read_check_run(self._manifest, execution)
-            if found.problem or found.output_digest != known:
-                came = found.problem or f"has the digest {found.output_digest[:16]} here, not {known[:16]}"
-                raise GoldenRunsDiffer(f"golden run {golden.key} {came}")
-            execution.out.rename(place)
+            examined = read_check_run(self._manifest, execution)
+            if examined.problem or examined.output_digest != expected_digest:
+                problem = (
+                    examined.problem
+                    or f"has the digest {examined.output_digest[:16]} here, not {expected_digest[:16]}"
+                )
+                raise GoldenRunsDiffer(f"golden run {golden.key} {problem}")
+            execution.out.rename(destination)
             if golden.seed is not None:  # the images of a hundred seeds would fill the disk
                 shared_cache.prune_target(self._manifest.cache_name)
 
     def _golden_of(self, experiment: Experiment) -> GoldenRun:
-        return GoldenRun.for_experiment(experiment, several_seeds=self._site.meta["several_seeds"])
+        return GoldenRun.for_experiment(experiment, several_seeds=self._bundle.meta["several_seeds"])
 
 
-def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
-    records = tuple(canonical_json(record_as_json(one.record)).encode() for one in finished)
-    if proof:
-        return Result(number=0, ending=Ending.DONE, records=records)
-    patches = [(one.experiment.id, one.mutant.patch_bytes) for one in finished if one.mutant is not None]
-    series = [(one.experiment.id, one.series) for one in finished if one.series is not None]
-    return Result(
+def _build_result(finished: list[FinishedExperiment], worker_name: str, *, is_proof: bool) -> PieceResult:
+    records = tuple(canonical_json(record_as_json(ended.record)).encode() for ended in finished)
+    if is_proof:
+        return PieceResult(number=0, ending=PieceEnding.FINISHED, records=records)
+    patches = [
+        (ended.experiment.id, ended.mutant.patch_bytes) for ended in finished if ended.mutant is not None
+    ]
+    series = [(ended.experiment.id, ended.series) for ended in finished if ended.series is not None]
+    return PieceResult(
         number=0,
-        ending=Ending.DONE,
-        forked=any(one.mode in FAST for one in finished),
+        ending=PieceEnding.FINISHED,
+        forked=any(ended.mode in MODES_TO_PROVE for ended in finished),
         records=records,
-        timings=tuple(canonical_json(timing_of(one, name)).encode() for one in finished),
+        timings=tuple(canonical_json(timing_of(ended, worker_name)).encode() for ended in finished),
         patches=pack_patches(patches),
-        series=b"".join(block_bytes(*series_block(experiment, one)) for experiment, one in series),
-        series_of=tuple(sorted({one.golden_key for _, one in series})),
+        series=b"".join(block_bytes(*series_block(experiment, ended)) for experiment, ended in series),
+        series_of=tuple(sorted({ended.golden_key for _, ended in series})),
     )
 
 
-def _result(runner: PieceRunner, piece: Piece, tell: Callable[[str], None]) -> Result:
+def _run_catching_errors(
+    runner: PieceRunner, piece: Piece, report_finished: Callable[[str], None]
+) -> PieceResult:
     try:
-        with raising_disk_full(runner.place):
-            return runner.run(piece, tell)
+        with raising_disk_full(runner.folder):
+            return runner.run_piece(piece, report_finished)
     except GoldenRunsDiffer as err:
-        return Result(number=piece.number, ending=Ending.UNLIKE, text=str(err))
+        return PieceResult(number=piece.number, ending=PieceEnding.GOLDEN_DIFFERS, text=str(err))
     except Exception as err:
-        known = err if isinstance(err, MutatorError) else find_shortage(err)
-        short = isinstance(known, DiskFull | Shortage)
-        text = str(known) if known else "".join(traceback.format_exception(err)).rstrip()
-        return Result(number=piece.number, ending=Ending.UNFIT if short else Ending.FAILED, text=text)
+        reported_error = err if isinstance(err, MutatorError) else find_shortage(err)
+        lacks_resources = isinstance(reported_error, DiskFull | Shortage)
+        text = str(reported_error) if reported_error else "".join(traceback.format_exception(err)).rstrip()
+        return PieceResult(
+            number=piece.number,
+            ending=PieceEnding.WORKER_UNFIT if lacks_resources else PieceEnding.HARNESS_FAILED,
+            text=text,
+        )
 
 
-def _serve(connection: Connection, runner: PieceRunner) -> None:
+def _serve_pieces(connection: Connection, runner: PieceRunner) -> None:
     try:
         with suppress(EOFError):
             while True:
-                piece = Piece.of(connection.recv_bytes())
-                connection.send(_result(runner, piece, connection.send).packed())
+                piece = Piece.from_bytes(connection.recv_bytes())
+                connection.send(_run_catching_errors(runner, piece, connection.send).to_bytes())
     finally:
         runner.close()
 
 
-def _refuse(connection: Connection, err: Exception) -> None:
+def _refuse_first_piece(connection: Connection, err: Exception) -> None:
     """Answer the first piece with the reason why this process cannot run anything."""
     with suppress(EOFError):
-        piece = Piece.of(connection.recv_bytes())
+        piece = Piece.from_bytes(connection.recv_bytes())
         text = str(err if isinstance(err, MutatorError) else find_shortage(err) or repr(err))
-        connection.send(Result(number=piece.number, ending=Ending.UNFIT, text=text).packed())
+        connection.send(
+            PieceResult(number=piece.number, ending=PieceEnding.WORKER_UNFIT, text=text).to_bytes()
+        )
 
 
 def main() -> int:
-    connection, site, name = Connection(int(sys.argv[1])), Site(Path(sys.argv[3])), sys.argv[4]
+    connection, bundle, name = Connection(int(sys.argv[1])), UnpackedBundle(Path(sys.argv[3])), sys.argv[4]
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the host handles these signals
     try:
-        with raising_disk_full(site.place):
+        with raising_disk_full(bundle.folder):
             with os.fdopen(int(sys.argv[2]), "rb") as file:
                 inputs = RunInputs.from_bytes(file.read())
-            runner = PieceRunner(site, inputs, name, os.getppid())
+            runner = PieceRunner(bundle, inputs, name, os.getppid())
     except Exception as err:
-        _refuse(connection, err)
+        _refuse_first_piece(connection, err)
         return 1
-    _serve(connection, runner)
+    _serve_pieces(connection, runner)
     return 0
 
 

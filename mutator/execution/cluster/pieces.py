@@ -6,74 +6,80 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from mutator.execution.cluster.parcel import pack, unpack
+from mutator.execution.cluster.parcel import pack_parcel, unpack_parcel
 from mutator.model import Experiment
 from mutator.store.plan_lines import parse_experiment, parse_fault
 
 
-class Kind(StrEnum):
+class PieceKind(StrEnum):
     """What to do with the experiments of a piece."""
 
     RUN = "run"
     PROVE = "prove"  # run them on the reference engine for the proof
 
 
-class Ending(StrEnum):
+class PieceEnding(StrEnum):
     """How a piece of work ended."""
 
-    DONE = "done"
-    UNLIKE = "unlike"  # the worker's golden run differs from the campaign's
-    UNFIT = "unfit"  # the worker lacks disk space, memory, another resource, or a requirement of the target
-    DIED = "died"  # the process that ran the piece ended
-    FAILED = "failed"  # a defect of the harness
+    FINISHED = "done"
+    GOLDEN_DIFFERS = "unlike"  # the worker's golden run differs from the campaign's
+    # the worker lacks disk space, memory, another resource, or a requirement of the target
+    WORKER_UNFIT = "unfit"
+    PROCESS_DIED = "died"  # the process that ran the piece ended
+    HARNESS_FAILED = "failed"  # a defect of the harness
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Piece:
-    """Experiments for one worker, usually compared with the golden run `golden`.
+    """Experiments for one worker, usually compared with one golden run.
 
-    `lines` are plan lines by experiment id, in plan order. `faults` are the plan lines of their faults.
+    `plan_lines` are by experiment id, in plan order. `fault_lines` are the plan lines of their faults.
     Experiments that share a run stay in one piece.
     """
 
     number: int
-    kind: Kind
-    golden: str
-    lines: Mapping[str, bytes]
-    faults: tuple[bytes, ...]
-    runs: int = 1  # several experiments can share a run
-    died_at: tuple[str, ...] = ()  # workers that this piece killed
+    kind: PieceKind
+    golden_key: str
+    plan_lines: Mapping[str, bytes]
+    fault_lines: tuple[bytes, ...]
+    run_count: int = 1  # several experiments can share a run
+    killed_workers: tuple[str, ...] = ()  # workers that this piece killed
 
     @property
-    def ids(self) -> tuple[str, ...]:
-        return tuple(self.lines)
+    def experiment_ids(self) -> tuple[str, ...]:
+        return tuple(self.plan_lines)
 
-    def packed(self) -> bytes:
-        head = {"number": self.number, "kind": self.kind, "golden": self.golden, "ids": self.ids}
-        parts = {"head": json.dumps(head).encode(), "plan": b"\n".join(self.lines.values())}
-        return pack(parts | {"faults": b"\n".join(self.faults)})
+    def to_bytes(self) -> bytes:
+        head = {
+            "number": self.number,
+            "kind": self.kind,
+            "golden": self.golden_key,
+            "ids": self.experiment_ids,
+        }
+        parts = {"head": json.dumps(head).encode(), "plan": b"\n".join(self.plan_lines.values())}
+        return pack_parcel(parts | {"faults": b"\n".join(self.fault_lines)})
 
     @classmethod
-    def of(cls, data: bytes) -> "Piece":
+    def from_bytes(cls, data: bytes) -> "Piece":
         """Unpack a piece; MutatorError if it is damaged."""
-        parts = unpack(data)
+        parts = unpack_parcel(data)
         head = json.loads(parts["head"])
         return cls(
             number=head["number"],
-            kind=Kind(head["kind"]),
-            golden=head["golden"],
-            lines=dict(zip(head["ids"], parts["plan"].split(b"\n"), strict=True)),
-            faults=tuple(parts["faults"].split(b"\n")),
+            kind=PieceKind(head["kind"]),
+            golden_key=head["golden"],
+            plan_lines=dict(zip(head["ids"], parts["plan"].split(b"\n"), strict=True)),
+            fault_lines=tuple(parts["faults"].split(b"\n")),
         )
 
-    def experiments(self) -> tuple[Experiment, ...]:
+    def parse_experiments(self) -> tuple[Experiment, ...]:
         """Parse the piece's experiments; MutatorError if a line does not match its id."""
-        faults = {fault.id: fault for fault in map(parse_fault, self.faults)}
-        return tuple(parse_experiment(line, faults) for line in self.lines.values())
+        faults = {fault.id: fault for fault in map(parse_fault, self.fault_lines)}
+        return tuple(parse_experiment(line, faults) for line in self.plan_lines.values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
+class PieceResult:
     """The result of a piece.
 
     If the piece is not done, `text` says why, and `at` is the experiment that was running.
@@ -82,7 +88,7 @@ class Result:
     """
 
     number: int
-    ending: Ending
+    ending: PieceEnding
     text: str = ""
     at: str = ""
     seconds: float = 0.0
@@ -95,18 +101,20 @@ class Result:
 
     _HEAD = ("number", "ending", "text", "at", "seconds", "forked", "series_of")
 
-    def packed(self) -> bytes:
+    def to_bytes(self) -> bytes:
         head = {name: getattr(self, name) for name in self._HEAD}
         parts = {"head": json.dumps(head).encode(), "patches": self.patches, "series": self.series}
-        return pack(parts | {"records": _joined(self.records), "timings": _joined(self.timings)})
+        return pack_parcel(
+            parts | {"records": _join_lines(self.records), "timings": _join_lines(self.timings)}
+        )
 
     @classmethod
-    def of(cls, data: bytes) -> "Result":
+    def from_bytes(cls, data: bytes) -> "PieceResult":
         """Unpack a result; MutatorError if it is damaged."""
-        parts = unpack(data)
+        parts = unpack_parcel(data)
         head: dict[str, Any] = json.loads(parts["head"])
         return cls(
-            **head | {"ending": Ending(head["ending"]), "series_of": tuple(head["series_of"])},
+            **head | {"ending": PieceEnding(head["ending"]), "series_of": tuple(head["series_of"])},
             patches=parts["patches"],
             series=parts["series"],
             records=tuple(parts["records"].splitlines()),
@@ -114,5 +122,5 @@ class Result:
         )
 
 
-def _joined(lines: Iterable[bytes]) -> bytes:
+def _join_lines(lines: Iterable[bytes]) -> bytes:
     return b"\n".join(lines)

@@ -11,24 +11,24 @@ from mutator.errors import MutatorError
 from mutator.model import Limits
 from mutator.store.run_folder import GoldenRun
 
-SCHEMA = "bundle/1"
-META = "meta.json"
+BUNDLE_SCHEMA = "bundle/1"
+META_FILE = "meta.json"
 
 
 @dataclass(frozen=True)
-class Site:
-    """A bundle unpacked in the folder `place`."""
+class UnpackedBundle:
+    """A bundle unpacked in `folder`."""
 
-    place: Path
+    folder: Path
 
     @cached_property
     def meta(self) -> dict[str, Any]:
         """The content of meta.json; MutatorError if it is not what `Bundle.of` writes."""
-        path = self.place / META
-        meta = read_json(path, SCHEMA)
+        path = self.folder / META_FILE
+        meta = read_json(path, BUNDLE_SCHEMA)
         try:
             check_name(meta["manifest"], path, folders=False)
-            goldens = [(GoldenRun.from_stored(one["golden"]), one["digest"]) for one in meta["goldens"]]
+            goldens = [(GoldenRun.from_stored(entry["golden"]), entry["digest"]) for entry in meta["goldens"]]
             for golden, _ in goldens:
                 check_name(golden.key, path)
             if Limits(**meta["limits"]) and meta.keys() >= {"engine", "seed", "series", "several_seeds"}:
@@ -41,11 +41,13 @@ class Site:
     def limits(self) -> Limits:
         return Limits(**self.meta["limits"])
 
-    def scenario(self, name: str) -> Path:
-        return path_below(self.place / "scenarios", f"{name}.yaml")
+    def scenario_path(self, name: str) -> Path:
+        return path_below(self.folder / "scenarios", f"{name}.yaml")
 
     @cached_property
-    def goldens(self) -> dict[str, tuple[GoldenRun, str]]:
+    def goldens_by_key(self) -> dict[str, tuple[GoldenRun, str]]:
         """The golden runs with their digests, by name."""
-        told = [(GoldenRun.from_stored(one["golden"]), one["digest"]) for one in self.meta["goldens"]]
-        return {golden.key: (golden, digest) for golden, digest in told}
+        digests_by_golden = [
+            (GoldenRun.from_stored(entry["golden"]), entry["digest"]) for entry in self.meta["goldens"]
+        ]
+        return {golden.key: (golden, digest) for golden, digest in digests_by_golden}

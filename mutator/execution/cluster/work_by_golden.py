@@ -12,54 +12,60 @@ from mutator.store import plan_file
 from mutator.store.plan_lines import id_on_line, parse_experiment, parse_fault, values_behind_id
 from mutator.store.run_folder import RunFolder
 
-_OF_A_RUN = ("fault", "trigger", "seed")  # equal for experiments that share a run
+_FIELDS_OF_SHARED_RUN = ("fault", "trigger", "seed")  # equal for experiments that share a run
 
-Run = dict[str, bytes]  # plan lines of the experiments that share one run, by experiment id
-Faults = Mapping[str, bytes]  # lines of the plan's faults by id
+RunLines = dict[str, bytes]  # plan lines of the experiments that share one run, by experiment id
+FaultLines = Mapping[str, bytes]  # lines of the plan's faults by id
 
 
 @dataclass
-class Group:
+class GoldenRunGroup:
     """The remaining experiments that have the same golden run."""
 
-    golden: str
-    runs: Iterator[Run]
-    left: int  # experiments not yet put into a piece
-    again: deque[Piece] = field(default_factory=deque)  # returned pieces
+    golden_key: str
+    uncut_runs: Iterator[RunLines]
+    uncut_experiment_count: int  # experiments not yet put into a piece
+    returned_pieces: deque[Piece] = field(default_factory=deque)  # returned pieces
 
     @property
-    def waiting(self) -> int:
-        return self.left + sum(len(piece.lines) for piece in self.again)
+    def waiting_experiment_count(self) -> int:
+        return self.uncut_experiment_count + sum(len(piece.plan_lines) for piece in self.returned_pieces)
 
 
-def groups_of(folder: RunFolder, pending: Sequence[PendingChunk], faults: Faults) -> dict[str, Group]:
+def group_by_golden(
+    folder: RunFolder, pending: Sequence[PendingChunk], faults: FaultLines
+) -> dict[str, GoldenRunGroup]:
     """Return the pending work by golden run. All experiments of a chunk have the same golden run."""
     chunks: dict[str, list[PendingChunk]] = {}
-    for one in pending:
-        first = next(iter(plan_file.read_chunk_lines(folder.path, folder.head.chunks[one.chunk_index])))
-        chunks.setdefault(golden_of(folder, first, faults), []).append(one)
+    for chunk_work in pending:
+        first = next(
+            iter(plan_file.read_chunk_lines(folder.path, folder.head.chunks[chunk_work.chunk_index]))
+        )
+        chunks.setdefault(golden_key_of(folder, first, faults), []).append(chunk_work)
     return {
-        golden: Group(golden, _runs_of(folder, ours), sum(len(one.places) for one in ours))
-        for golden, ours in chunks.items()
+        golden: GoldenRunGroup(
+            golden, _list_runs(folder, chunk_works), sum(len(chunk_work.places) for chunk_work in chunk_works)
+        )
+        for golden, chunk_works in chunks.items()
     }
 
 
-def _runs_of(folder: RunFolder, pending: Sequence[PendingChunk]) -> Iterator[Run]:
-    for one in pending:
-        lines = list(plan_file.read_chunk_lines(folder.path, folder.head.chunks[one.chunk_index]))
-        for _, same in groupby((lines[place] for place in one.places), key=_what_runs):
+def _list_runs(folder: RunFolder, pending: Sequence[PendingChunk]) -> Iterator[RunLines]:
+    for chunk_work in pending:
+        lines = list(plan_file.read_chunk_lines(folder.path, folder.head.chunks[chunk_work.chunk_index]))
+        for _, same in groupby((lines[place] for place in chunk_work.places), key=_shared_run_key):
             yield {id_on_line(line): line for line in same}
 
 
-def _what_runs(line: bytes) -> list[Any]:
+def _shared_run_key(line: bytes) -> list[Any]:
     data = values_behind_id(line)
-    return [data[name] for name in _OF_A_RUN]
+    return [data[name] for name in _FIELDS_OF_SHARED_RUN]
 
 
-def golden_of(folder: RunFolder, line: bytes, faults: Faults) -> str:
+def golden_key_of(folder: RunFolder, line: bytes, faults: FaultLines) -> str:
     fault = parse_fault(faults[values_behind_id(line)["fault"]])
     return folder.golden_run_of(parse_experiment(line, {fault.id: fault})).key
 
 
-def faults_of(lines: Run, faults: Faults) -> tuple[bytes, ...]:
+def fault_lines_of(lines: RunLines, faults: FaultLines) -> tuple[bytes, ...]:
     return tuple(dict.fromkeys(faults[values_behind_id(line)["fault"]] for line in lines.values()))

@@ -18,72 +18,77 @@ from mutator._common.typed_json import from_json_types
 from mutator.errors import DiskFull, MutatorError, SchedulerGone, WorkerCutOff, WorkerRefused
 from mutator.execution.cluster import worker_tasks
 from mutator.execution.cluster.bundle import Bundle
-from mutator.execution.cluster.crew import Crew, describe
-from mutator.execution.cluster.piece_queue import Board
-from mutator.execution.cluster.pieces import Ending, Piece, Result
-from mutator.execution.cluster.result_intake import Intake
-from mutator.execution.cluster.worker_calls import answer, call, submit
+from mutator.execution.cluster.crew import Crew, describe_worker
+from mutator.execution.cluster.piece_queue import PieceQueue
+from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceResult
+from mutator.execution.cluster.result_intake import ResultIntake
+from mutator.execution.cluster.worker_calls import await_answer, call_on_worker, submit_to_worker
 from mutator.execution.session import Session
 from mutator.preflight import equivalence_check
 from mutator.store.work_stretches import Machine
 
-_LOOK_S = 0.5  # between two checks of the present workers
-_ALONE_S = 60.0  # time without any worker after which the command gives up
-_AHEAD = 2  # pieces per thread of a worker: one waits while the other runs
-_FAILURES = 3  # consecutive failures after which a worker gets no more work
-_PAUSE_S = 0.1  # pause before an idle worker asks again
-_PART_S = 5.0  # time for workers to drop the run
-_PATIENCE_S = 30.0  # time for the scheduler to answer
+_WORKER_CHECK_INTERVAL_S = 0.5  # between two checks of the present workers
+_WORKERLESS_TIMEOUT_S = 60.0  # time without any worker after which the command gives up
+_PIECES_PER_SLOT = 2  # pieces per thread of a worker: one waits while the other runs
+_MOST_FAILURES_IN_A_ROW = 3  # consecutive failures after which a worker gets no more work
+_IDLE_PAUSE_S = 0.1  # pause before an idle worker asks again
+_LEAVE_TIMEOUT_S = 5.0  # time for workers to drop the run
+_SCHEDULER_TIMEOUT_S = 30.0  # time for the scheduler to answer
 
 
 @dataclass
-class _Tended:
+class _PresentWorker:
     """A present worker and its pieces, oldest first."""
 
     name: str
     address: str
     slots: int
-    lease: "Future[None] | None" = None  # the task `attend`
-    task: "asyncio.Task[None] | None" = None
-    has: dict[int, Piece] = field(default_factory=dict)
-    is_cut: bool = False  # the scheduler dropped its tasks, so it must be admitted again
-    failures: int = 0  # since the worker's last finished piece
-    ailment: str = ""  # reason for the last failure
-    facts: Mapping[str, Any] = field(default_factory=dict)  # empty once they are in run.json
+    attendance: "Future[None] | None" = None  # the task `attend`
+    serving_task: "asyncio.Task[None] | None" = None
+    pieces_by_number: dict[int, Piece] = field(default_factory=dict)
+    was_cut_off: bool = False  # the scheduler dropped its tasks, so it must be admitted again
+    failures_in_a_row: int = 0  # since the worker's last finished piece
+    last_failure: str = ""  # reason for the last failure
+    unwritten_facts: Mapping[str, Any] = field(default_factory=dict)  # empty once they are in run.json
 
 
-class Deal:
+class WorkDispatcher:
     """Distributes the work of a session to the workers of a scheduler.
 
-    `remark` is called with messages for the user. `queued` is how many workers are expected; None if unknown.
+    `remark` is called with messages for the user. `expected_workers` is a number; None if unknown.
     """
 
     def __init__(
-        self, session: Session, client: Client, remark: Callable[[str], None], *, queued: int | None
+        self, session: Session, client: Client, remark: Callable[[str], None], *, expected_workers: int | None
     ) -> None:
-        self._session, self._client, self._remark, self._queued = session, client, remark, queued
+        self._session, self._client, self._remark, self._expected_workers = (
+            session,
+            client,
+            remark,
+            expected_workers,
+        )
         folder = session.folder
-        self._bundle = Bundle.of(session.workspace, folder, session.engine)
-        self._board = Board(folder, session.pending, session.proof)
-        self._intake = Intake(folder, session.manifest, session.worker_name("cluster"))
+        self._bundle = Bundle.pack_for_run(session.workspace, folder, session.engine)
+        self._queue = PieceQueue(folder, session.pending, session.proof)
+        self._intake = ResultIntake(folder, session.manifest, session.new_worker_name("cluster"))
         self._crew = Crew(folder.stretches[-1], accept=session.accept_versions)
-        self._run = f"mutator-{uuid.uuid4().hex}"
-        self._tended: dict[str, _Tended] = {}
-        self._changed = asyncio.Event()  # set when idle workers might find work
-        self._writing = asyncio.Lock()
-        self._writes: set[asyncio.Task[None]] = set()
-        self._forked = False
+        self._run_id = f"mutator-{uuid.uuid4().hex}"
+        self._workers_by_key: dict[str, _PresentWorker] = {}
+        self._queue_changed = asyncio.Event()  # set when idle workers might find work
+        self._write_lock = asyncio.Lock()
+        self._pending_writes: set[asyncio.Task[None]] = set()
+        self._is_proof_need_settled = False
         self._alone_since = time.monotonic()
 
     async def run(self) -> None:
         try:
-            while not (self._board.is_empty and not self._writes) and not self._session.problem:
-                await self._meet()
-                self._drop_needless_proof()
-                self._session.working = self._told()
+            while not (self._queue.is_empty and not self._pending_writes) and not self._session.problem:
+                await self._update_workers()
+                self._drop_unneeded_proof()
+                self._session.workers_note = self._describe_workers()
                 with suppress(TimeoutError):
-                    await asyncio.wait_for(self._changed.wait(), _LOOK_S)
-                self._changed.clear()
+                    await asyncio.wait_for(self._queue_changed.wait(), _WORKER_CHECK_INTERVAL_S)
+                self._queue_changed.clear()
         except SchedulerGone:
             self._session.problem = (
                 f"the scheduler at {self._address} no longer answers, but finished work is stored; "
@@ -92,191 +97,235 @@ class Deal:
         except DiskFull as err:
             self._session.problem = str(err)
         finally:
-            tasks = [one.task for one in self._tended.values() if one.task is not None]
+            tasks = [
+                worker.serving_task
+                for worker in self._workers_by_key.values()
+                if worker.serving_task is not None
+            ]
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            await self._part()
-            self._session.working = ""
-            await asyncio.gather(*self._writes, return_exceptions=True)
-            self._session.written.report(self._intake.close())
+            await self._dismiss_workers()
+            self._session.workers_note = ""
+            await asyncio.gather(*self._pending_writes, return_exceptions=True)
+            self._session.written.add_report(self._intake.close())
 
-    async def _part(self) -> None:
+    async def _dismiss_workers(self) -> None:
         """Tell the workers to drop the run. Workers that do not answer drop it once the client is gone."""
-        present = [one for one in self._tended.values() if one.lease is not None]
-        parting = [call(self._client, one.address, worker_tasks.leave, self._run) for one in present]
+        present = [worker for worker in self._workers_by_key.values() if worker.attendance is not None]
+        calls = [
+            call_on_worker(self._client, worker.address, worker_tasks.leave_run, self._run_id)
+            for worker in present
+        ]
         with suppress(TimeoutError):
-            async with asyncio.timeout(_PART_S):
-                await asyncio.gather(*parting, return_exceptions=True)
-        for one in present:
-            if one.lease is not None:
-                one.lease.release()
+            async with asyncio.timeout(_LEAVE_TIMEOUT_S):
+                await asyncio.gather(*calls, return_exceptions=True)
+        for worker in present:
+            if worker.attendance is not None:
+                worker.attendance.release()
 
     @property
     def _address(self) -> str:
         return str(self._client.scheduler.address) if self._client.scheduler else "its address"
 
-    def _told(self) -> str:
+    def _describe_workers(self) -> str:
         link = self._client.dashboard_link
-        return self._crew.told() + (f"; {link}" if link else "")
+        return self._crew.describe_workers() + (f"; {link}" if link else "")
 
-    async def _meet(self) -> None:
+    async def _update_workers(self) -> None:
         try:
-            async with asyncio.timeout(_PATIENCE_S):
+            async with asyncio.timeout(_SCHEDULER_TIMEOUT_S):
                 scheduler = self._client.scheduler
-                known = await scheduler.identity(n_workers=-1) if scheduler is not None else None
+                identity = await scheduler.identity(n_workers=-1) if scheduler is not None else None
         except (OSError, TimeoutError):
-            known = None
-        if known is None:
+            identity = None
+        if identity is None:
             raise SchedulerGone
-        there = {f"{address} {one['id']}": one for address, one in known["workers"].items()}
-        for key in [key for key, one in self._tended.items() if key not in there or one.is_cut]:
-            await self._mourn(self._tended.pop(key))
-        for key in there.keys() - self._tended.keys():
-            address, told = key.partition(" ")[0], there[key]
-            name = str(told["name"])
+        info_by_key = {f"{address} {info['id']}": info for address, info in identity["workers"].items()}
+        for key in [
+            key
+            for key, worker in self._workers_by_key.items()
+            if key not in info_by_key or worker.was_cut_off
+        ]:
+            await self._handle_lost_worker(self._workers_by_key.pop(key))
+        for key in info_by_key.keys() - self._workers_by_key.keys():
+            address, worker_info = key.partition(" ")[0], info_by_key[key]
+            name = str(worker_info["name"])
             name = name if name == address else f"{name} at {address}"
-            one = _Tended(name, address, int(told["nthreads"]))
-            one.task = asyncio.create_task(self._tend(one))
-            self._tended[key] = one
-        for one in self._tended.values():
-            if one.task is not None and one.task.done():
-                one.task.result()  # raises the error that ended the task
-        self._check_left()
+            worker = _PresentWorker(name, address, int(worker_info["nthreads"]))
+            worker.serving_task = asyncio.create_task(self._admit_and_employ(worker))
+            self._workers_by_key[key] = worker
+        for worker in self._workers_by_key.values():
+            if worker.serving_task is not None and worker.serving_task.done():
+                worker.serving_task.result()  # raises the error that ended the task
+        self._check_workers_remain()
 
-    async def _mourn(self, one: _Tended) -> None:
+    async def _handle_lost_worker(self, worker: _PresentWorker) -> None:
         """Handle a lost worker. A piece that it was running might be the cause; a waiting piece cannot be."""
-        assert one.task is not None
-        one.task.cancel()
-        await asyncio.gather(one.task, return_exceptions=True)
-        for place, piece in enumerate(one.has.values()):
-            if place < one.slots:
-                lost = Result(number=piece.number, ending=Ending.DIED, text=f"worker {one.name} was lost")
-                await self._died(piece, one, lost)
+        assert worker.serving_task is not None
+        worker.serving_task.cancel()
+        await asyncio.gather(worker.serving_task, return_exceptions=True)
+        for place, piece in enumerate(worker.pieces_by_number.values()):
+            if place < worker.slots:
+                lost = PieceResult(
+                    number=piece.number,
+                    ending=PieceEnding.PROCESS_DIED,
+                    text=f"worker {worker.name} was lost",
+                )
+                await self._handle_death(piece, worker, lost)
             else:
-                self._board.give_back(piece, one.name)
+                self._queue.give_back_piece(piece, worker.name)
 
-    def _check_left(self) -> None:
-        if any(one.task is not None and not one.task.done() for one in self._tended.values()):
+    def _check_workers_remain(self) -> None:
+        if any(
+            worker.serving_task is not None and not worker.serving_task.done()
+            for worker in self._workers_by_key.values()
+        ):
             self._alone_since = time.monotonic()
-        elif len(self._tended) >= (self._queued or 1):
-            reasons = "; ".join(dict.fromkeys(self._crew.refused.values()))
+        elif len(self._workers_by_key) >= (self._expected_workers or 1):
+            reasons = "; ".join(dict.fromkeys(self._crew.refusal_reasons.values()))
             self._session.problem = f"no worker is left to do the work: {reasons}"
-        elif self._queued is None and time.monotonic() - self._alone_since > _ALONE_S:
+        elif self._expected_workers is None and time.monotonic() - self._alone_since > _WORKERLESS_TIMEOUT_S:
             self._session.problem = (
-                f"no worker at {self._address} for {_ALONE_S:.0f} s; start workers (`dask worker`), then run "
-                "the same command"
+                f"no worker at {self._address} for {_WORKERLESS_TIMEOUT_S:.0f} s; start workers "
+                "(`dask worker`), then run the same command"
             )
 
-    def _drop_needless_proof(self) -> None:
-        if self._board.ran_all and self._session.proof and not self._forked:
-            self._forked = True  # so that this is computed only once
+    def _drop_unneeded_proof(self) -> None:
+        if self._queue.has_run_all and self._session.proof and not self._is_proof_need_settled:
+            self._is_proof_need_settled = True  # so that this is computed only once
             if equivalence_check.reason_not_needed(self._session.folder) is not None:
-                self._board.drop_proof()
+                self._queue.drop_proof_pieces()
 
-    async def _tend(self, one: _Tended) -> None:
+    async def _admit_and_employ(self, worker: _PresentWorker) -> None:
         """Admit a worker, and give it work while it is present."""
         facts: Mapping[str, Any] = {}
         try:
-            facts = await call(self._client, one.address, worker_tasks.facts, tuple(self._crew.packages))
-            if why := self._crew.objection(facts):
+            facts = await call_on_worker(
+                self._client, worker.address, worker_tasks.machine_facts, tuple(self._crew.packages)
+            )
+            if why := self._crew.reason_to_refuse(facts):
                 raise WorkerRefused(why)
             data, digest = self._bundle.data, self._bundle.digest
-            await call(self._client, one.address, worker_tasks.deliver, self._run, one.name, data, digest)
-            one.lease = submit(self._client, one.address, worker_tasks.attend, self._run)
-            self._crew.let_in(one.name, facts)
-            self._board.join(one.name, one.slots)
-            one.facts = facts
-            await self._employ(one, one.lease)
+            await call_on_worker(
+                self._client,
+                worker.address,
+                worker_tasks.deliver_bundle,
+                self._run_id,
+                worker.name,
+                data,
+                digest,
+            )
+            worker.attendance = submit_to_worker(
+                self._client, worker.address, worker_tasks.attend_run, self._run_id
+            )
+            self._crew.admit_worker(worker.name, facts)
+            self._queue.add_worker(worker.name, worker.slots)
+            worker.unwritten_facts = facts
+            await self._employ_while_attending(worker, worker.attendance)
         except WorkerRefused as why:
-            for piece in one.has.values():
-                self._board.give_back(piece, one.name)
-            one.has.clear()
-            one.is_cut = isinstance(why, WorkerCutOff)
-            if not one.is_cut:
-                self._crew.refuse(one.name, str(why))
-                self._remark(f"worker {describe(one.name, facts)} gets no work: {why}")
+            for piece in worker.pieces_by_number.values():
+                self._queue.give_back_piece(piece, worker.name)
+            worker.pieces_by_number.clear()
+            worker.was_cut_off = isinstance(why, WorkerCutOff)
+            if not worker.was_cut_off:
+                self._crew.refuse_worker(worker.name, str(why))
+                self._remark(f"worker {describe_worker(worker.name, facts)} gets no work: {why}")
         finally:
-            self._crew.leave(one.name)
-            self._board.leave(one.name)
-            self._changed.set()
+            self._crew.remove_worker(worker.name)
+            self._queue.forget_worker(worker.name)
+            self._queue_changed.set()
 
-    async def _employ(self, one: _Tended, lease: "Future[None]") -> None:
+    async def _employ_while_attending(self, worker: _PresentWorker, attendance: "Future[None]") -> None:
         """Give a worker pieces until this task is cancelled, or the worker leaves the run."""
 
         async def watch() -> None:
-            await answer(lease)
+            await await_answer(attendance)
             raise WorkerRefused("it left the run")
 
         try:
             async with asyncio.TaskGroup() as group:
                 group.create_task(watch())
-                for _ in range(one.slots * _AHEAD):
-                    group.create_task(self._serve(one))
-        except* WorkerRefused as found:
-            raise found.exceptions[0] from None
-        except* MutatorError as found:
-            raise found.exceptions[0] from None
+                for _ in range(worker.slots * _PIECES_PER_SLOT):
+                    group.create_task(self._send_pieces(worker))
+        except* WorkerRefused as errors:
+            raise errors.exceptions[0] from None
+        except* MutatorError as errors:
+            raise errors.exceptions[0] from None
 
-    async def _serve(self, one: _Tended) -> None:
+    async def _send_pieces(self, worker: _PresentWorker) -> None:
         while True:
-            if one.failures >= _FAILURES:
-                raise WorkerRefused(one.ailment)
-            piece = self._board.take(one.name, ahead=len(one.has) >= one.slots)
+            if worker.failures_in_a_row >= _MOST_FAILURES_IN_A_ROW:
+                raise WorkerRefused(worker.last_failure)
+            piece = self._queue.take_piece(worker.name, ahead=len(worker.pieces_by_number) >= worker.slots)
             if piece is None:
-                await asyncio.sleep(_PAUSE_S)
+                await asyncio.sleep(_IDLE_PAUSE_S)
                 continue
-            one.has[piece.number] = piece
-            data = await call(self._client, one.address, worker_tasks.work, self._run, piece.packed())
-            del one.has[piece.number]
-            await self._take(one, piece, _read(data, piece))
+            worker.pieces_by_number[piece.number] = piece
+            data = await call_on_worker(
+                self._client, worker.address, worker_tasks.run_piece, self._run_id, piece.to_bytes()
+            )
+            del worker.pieces_by_number[piece.number]
+            await self._handle_result(worker, piece, _unpack_result(data, piece))
 
-    async def _take(self, one: _Tended, piece: Piece, result: Result) -> None:
-        if result.ending is Ending.DONE:
-            one.failures = 0
-            if self._board.done(piece, one.name, result.seconds):
-                await self._done(piece, one, result)
-            self._changed.set()
+    async def _handle_result(self, worker: _PresentWorker, piece: Piece, result: PieceResult) -> None:
+        if result.ending is PieceEnding.FINISHED:
+            worker.failures_in_a_row = 0
+            if self._queue.finish_piece(piece, worker.name, result.seconds):
+                await self._store_result(piece, worker, result)
+            self._queue_changed.set()
             return
-        one.ailment = result.text
-        if result.ending in (Ending.DIED, Ending.FAILED):
-            await self._died(piece, one, result)
+        worker.last_failure = result.text
+        if result.ending in (PieceEnding.PROCESS_DIED, PieceEnding.HARNESS_FAILED):
+            await self._handle_death(piece, worker, result)
             return
-        self._board.give_back(piece, one.name)
-        one.failures += 1
-        if result.ending is Ending.UNLIKE:
+        self._queue.give_back_piece(piece, worker.name)
+        worker.failures_in_a_row += 1
+        if result.ending is PieceEnding.GOLDEN_DIFFERS:
             raise WorkerRefused(result.text)
 
-    async def _done(self, piece: Piece, one: _Tended, result: Result) -> None:
-        if one.facts:  # before its first results are written, run.json must name the worker
-            self._session.note_machine(from_json_types(Machine, {"worker": one.name, **one.facts}))
-            one.facts = {}
-        for other in self._tended.values():  # the piece ran here, so it did not cause the failures elsewhere
-            other.failures += other.name in piece.died_at and other is not one
-        self._forked |= result.forked
-        self._crew.finished(one.name, len(piece.lines))
-        await self._write(self._intake.take, piece, result)
+    async def _store_result(self, piece: Piece, worker: _PresentWorker, result: PieceResult) -> None:
+        if worker.unwritten_facts:  # before its first results are written, run.json must name the worker
+            self._session.note_machine(
+                from_json_types(Machine, {"worker": worker.name, **worker.unwritten_facts})
+            )
+            worker.unwritten_facts = {}
+        for (
+            other
+        ) in self._workers_by_key.values():  # the piece ran here, so it did not cause the failures elsewhere
+            other.failures_in_a_row += other.name in piece.killed_workers and other is not worker
+        self._is_proof_need_settled |= result.forked
+        self._crew.note_finished_piece(worker.name, len(piece.plan_lines))
+        await self._write_in_turn(self._intake.append_result, piece, result)
 
-    async def _died(self, piece: Piece, one: _Tended, result: Result) -> None:
-        if (given_up := self._board.died(piece, one.name, result.at)) is not None:
-            what = "takes down what runs it, and did so" if result.ending is Ending.DIED else "failed"
-            await self._write(self._intake.give_up, given_up, f"{what} twice: {result.text}")
+    async def _handle_death(self, piece: Piece, worker: _PresentWorker, result: PieceResult) -> None:
+        if (hopeless := self._queue.note_death(piece, worker.name, result.at)) is not None:
+            what = (
+                "takes down what runs it, and did so"
+                if result.ending is PieceEnding.PROCESS_DIED
+                else "failed"
+            )
+            await self._write_in_turn(
+                self._intake.append_harness_errors, hopeless, f"{what} twice: {result.text}"
+            )
 
-    async def _write(self, function: Callable[[Piece, Any], None], piece: Piece, what: Any) -> None:
+    async def _write_in_turn(
+        self, function: Callable[[Piece, Any], None], piece: Piece, argument: Any
+    ) -> None:
         """Write into the run folder, one write at a time. Cancellation does not interrupt a write."""
 
         async def in_turn() -> None:
-            async with self._writing:
-                await asyncio.to_thread(function, piece, what)
+            async with self._write_lock:
+                await asyncio.to_thread(function, piece, argument)
 
         write = asyncio.create_task(in_turn())
-        self._writes.add(write)
-        write.add_done_callback(self._writes.discard)
+        self._pending_writes.add(write)
+        write.add_done_callback(self._pending_writes.discard)
         await asyncio.shield(write)
 
 
-def _read(data: bytes, piece: Piece) -> Result:
+def _unpack_result(data: bytes, piece: Piece) -> PieceResult:
     try:
-        return Result.of(data)
+        return PieceResult.from_bytes(data)
     except MutatorError as err:
-        return Result(number=piece.number, ending=Ending.UNFIT, text=str(err))
+        return PieceResult(number=piece.number, ending=PieceEnding.WORKER_UNFIT, text=str(err))

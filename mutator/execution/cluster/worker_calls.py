@@ -15,7 +15,9 @@ from mutator.errors import MutatorError, WorkerCutOff, WorkerRefused
 _T = TypeVar("_T")
 
 
-def submit(client: Client, address: str, function: Callable[..., _T], *arguments: Any) -> "Future[_T]":
+def submit_to_worker(
+    client: Client, address: str, function: Callable[..., _T], *arguments: Any
+) -> "Future[_T]":
     """Submit a function to the worker at this address, and to no other."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Sending large graph")  # a bundle is sent to each worker only once
@@ -30,15 +32,15 @@ def submit(client: Client, address: str, function: Callable[..., _T], *arguments
         )
 
 
-async def call(client: Client, address: str, function: Callable[..., _T], *arguments: Any) -> _T:
-    future = submit(client, address, function, *arguments)
+async def call_on_worker(client: Client, address: str, function: Callable[..., _T], *arguments: Any) -> _T:
+    future = submit_to_worker(client, address, function, *arguments)
     try:
-        return await answer(future)
+        return await await_answer(future)
     finally:
         future.release()
 
 
-async def answer(future: "Future[_T]") -> _T:
+async def await_answer(future: "Future[_T]") -> _T:
     """Return the result of a task. WorkerRefused if it raises, WorkerCutOff if the scheduler dropped it.
 
     If the worker is dead, this never returns.

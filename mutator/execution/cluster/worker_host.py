@@ -23,60 +23,64 @@ from mutator._common.files import raising_disk_full, remove_folder
 from mutator._common.resource_shortages import find_shortage
 from mutator.errors import MutatorError, PieceNotWanted
 from mutator.execution.cluster import bundle
-from mutator.execution.cluster.pieces import Ending, Piece, Result
-from mutator.execution.cluster.unpacked_bundle import Site
-from mutator.execution.worker import dying_python
+from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceResult
+from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
+from mutator.execution.worker import python_dying_with
 
-_LOOK_S = 0.25  # between two checks that the work is still wanted
-_END_S = 5.0
-_START_S = 60.0  # time for a process to begin its first piece
-_CHILD = "mutator.execution.cluster.piece_process"
+_CHECK_INTERVAL_S = 0.25  # between two checks that the work is still wanted
+_LEAVE_TIMEOUT_S = 5.0
+_START_TIMEOUT_S = 60.0  # time for a process to begin its first piece
+_PIECE_PROCESS_MODULE = "mutator.execution.cluster.piece_process"
 
-Wanted = Callable[[], bool]
+WantedCheck = Callable[[], bool]
 
 
 @dataclass
-class _Child:
+class _PieceProcess:
     """A process that runs pieces one after another."""
 
     process: subprocess.Popen[bytes]
     connection: Connection
 
-    def run(self, data: bytes, piece: Piece, patience_s: float, wanted: Wanted) -> Result:
+    def run_piece(self, data: bytes, piece: Piece, patience_s: float, is_wanted: WantedCheck) -> PieceResult:
         """Run a piece. Raises PieceNotWanted if it is no longer wanted; the process is then unusable."""
-        finished: set[str] = set()
+        finished_ids: set[str] = set()
         try:
-            result = self._answer(data, patience_s, wanted, finished)
+            result = self._receive_result(data, patience_s, is_wanted, finished_ids)
         except TimeoutError:
             text = f"a worker's process gave no sign of life for {patience_s:.0f} s"
-            result = Result(number=piece.number, ending=Ending.DIED, text=text)
+            result = PieceResult(number=piece.number, ending=PieceEnding.PROCESS_DIED, text=text)
         except (EOFError, OSError):
-            text = f"a worker's process {self._end()}"
-            result = Result(number=piece.number, ending=Ending.DIED, text=text)
-        return replace(result, at=next((name for name in piece.ids if name not in finished), ""))
+            text = f"a worker's process {self._describe_end()}"
+            result = PieceResult(number=piece.number, ending=PieceEnding.PROCESS_DIED, text=text)
+        return replace(
+            result, at=next((name for name in piece.experiment_ids if name not in finished_ids), "")
+        )
 
-    def _answer(self, data: bytes, patience_s: float, wanted: Wanted, finished: set[str]) -> Result:
-        """Return the result of a piece; add finished ids to `finished`. TimeoutError after `patience_s`."""
+    def _receive_result(
+        self, data: bytes, patience_s: float, is_wanted: WantedCheck, finished_ids: set[str]
+    ) -> PieceResult:
+        """Return the result of a piece; add to `finished_ids`. TimeoutError after `patience_s`."""
         self.connection.send_bytes(data)
         since = time.monotonic()
         while time.monotonic() - since < patience_s:
-            if not wanted():
+            if not is_wanted():
                 raise PieceNotWanted
-            if self.connection.poll(_LOOK_S):
-                said = self.connection.recv()
-                if isinstance(said, bytes):
-                    return Result.of(said)
-                finished.add(said)
+            if self.connection.poll(_CHECK_INTERVAL_S):
+                message = self.connection.recv()
+                if isinstance(message, bytes):
+                    return PieceResult.from_bytes(message)
+                finished_ids.add(message)
                 since = time.monotonic()
         raise TimeoutError
 
-    def end(self) -> None:
+    def kill(self) -> None:
         """Kill the process. Everything that it started dies with it."""
         self.connection.close()
         self.process.kill()
         self.process.wait()
 
-    def _end(self) -> str:
+    def _describe_end(self) -> str:
         with suppress(subprocess.TimeoutExpired):
             code = self.process.wait(5.0)
             return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"left with status {code}"
@@ -84,114 +88,124 @@ class _Child:
 
 
 @dataclass
-class Host:
-    """A worker's part in one run. `name` is the worker's name in the timings of its experiments."""
+class WorkerHost:
+    """A worker's part in one run. `worker_name` is the worker's name in the timings of its experiments."""
 
     folder: Path
-    name: str
+    worker_name: str
     patience_s: float
-    _idle: list[_Child] = field(default_factory=list)
-    _orders: "queue.Queue[queue.Queue[_Child | Exception]]" = field(default_factory=queue.Queue)
+    _idle_processes: list[_PieceProcess] = field(default_factory=list)
+    _process_requests: "queue.Queue[queue.Queue[_PieceProcess | Exception]]" = field(
+        default_factory=queue.Queue
+    )
     _lock: threading.Lock = field(default_factory=threading.Lock)
-    _ended: bool = False  # if set, no process is started or reused
-    _leaving: bool = False
-    _inputs: bytes = b""  # what each process gets
-    _gone: threading.Event = field(default_factory=threading.Event)
+    _has_ended: bool = False  # if set, no process is started or reused
+    _is_leaving: bool = False
+    _packed_inputs: bytes = b""  # what each process gets
+    _folder_deleted: threading.Event = field(default_factory=threading.Event)
 
     @classmethod
-    def lay_out(cls, data: bytes, place: str, name: str) -> "Host":
-        """Make a host for the bundle `data` in a new folder in `place`; MutatorError for a damaged bundle."""
-        with raising_disk_full(Path(place)):
-            Path(place).mkdir(parents=True, exist_ok=True)
-            folder = Path(tempfile.mkdtemp(prefix="mutator-", dir=place)).resolve()
+    def unpack_in(cls, data: bytes, parent_folder: str, worker_name: str) -> "WorkerHost":
+        """Make a host for the bundle `data` in a new folder; MutatorError for a damaged bundle."""
+        with raising_disk_full(Path(parent_folder)):
+            Path(parent_folder).mkdir(parents=True, exist_ok=True)
+            folder = Path(tempfile.mkdtemp(prefix="mutator-", dir=parent_folder)).resolve()
         try:
-            bundle.lay_out(data, folder)
-            patience_s = 2.0 * Site(folder).limits.wall_s + _START_S
+            bundle.unpack_bundle(data, folder)
+            patience_s = 2.0 * UnpackedBundle(folder).limits.wall_s + _START_TIMEOUT_S
         except BaseException:
             remove_folder(folder)
             raise
-        return cls(folder, name, patience_s)
+        return cls(folder, worker_name, patience_s)
 
-    def attend(self, wanted: Wanted) -> None:
+    def start_processes_on_request(self, is_wanted: WantedCheck) -> None:
         """Start processes on request until the host is no longer wanted, then end all of them."""
         try:
-            while wanted() and not self._leaving:
+            while is_wanted() and not self._is_leaving:
                 with suppress(queue.Empty):
-                    answer = self._orders.get(timeout=_LOOK_S)
+                    answer = self._process_requests.get(timeout=_CHECK_INTERVAL_S)
                     try:
-                        answer.put(self._started())
+                        answer.put(self._start_process())
                     except Exception as err:
                         answer.put(err)
         finally:
             with self._lock:
-                self._ended = True
-                idle, self._idle = self._idle, []
+                self._has_ended = True
+                idle, self._idle_processes = self._idle_processes, []
             for child in idle:
-                child.end()
+                child.kill()
             shutil.rmtree(self.folder, ignore_errors=True)
             remove_folder(self.folder)
-            self._gone.set()
+            self._folder_deleted.set()
 
-    def end(self) -> None:
-        self._leaving = True
-        self._gone.wait(_END_S)
+    def leave_run(self) -> None:
+        self._is_leaving = True
+        self._folder_deleted.wait(_LEAVE_TIMEOUT_S)
 
-    def run(self, data: bytes, wanted: Wanted) -> Result:
+    def run_piece(self, data: bytes, is_wanted: WantedCheck) -> PieceResult:
         """Run a piece. Raises PieceNotWanted if it is no longer wanted, MutatorError if `data` is damaged."""
-        piece = Piece.of(data)
+        piece = Piece.from_bytes(data)
         try:
-            child = self._borrowed()
+            child = self._borrow_process()
         except (OSError, MutatorError) as err:
             text = str(err if isinstance(err, MutatorError) else find_shortage(err) or err)
-            return Result(number=piece.number, ending=Ending.UNFIT, text=text)
+            return PieceResult(number=piece.number, ending=PieceEnding.WORKER_UNFIT, text=text)
         keep = False
         try:
-            result = child.run(data, piece, self.patience_s, wanted)
-            keep = result.ending in (Ending.DONE, Ending.UNLIKE)
+            result = child.run_piece(data, piece, self.patience_s, is_wanted)
+            keep = result.ending in (PieceEnding.FINISHED, PieceEnding.GOLDEN_DIFFERS)
             return result
         finally:
             with self._lock:
-                keep = keep and not self._ended
+                keep = keep and not self._has_ended
                 if keep:
-                    self._idle.append(child)
+                    self._idle_processes.append(child)
             if not keep:
-                child.end()
+                child.kill()
 
-    def _borrowed(self) -> _Child:
+    def _borrow_process(self) -> _PieceProcess:
         """Return an idle process or a new one. Raises PieceNotWanted if the host has ended."""
         with self._lock:
-            if self._idle:
-                return self._idle.pop()
-        answer: queue.Queue[_Child | Exception] = queue.Queue()
-        self._orders.put(answer)
-        while not self._ended:
+            if self._idle_processes:
+                return self._idle_processes.pop()
+        answer: queue.Queue[_PieceProcess | Exception] = queue.Queue()
+        self._process_requests.put(answer)
+        while not self._has_ended:
             with suppress(queue.Empty):
-                got = answer.get(timeout=_LOOK_S)
-                if isinstance(got, Exception):
-                    raise got
-                return got
+                process_or_error = answer.get(timeout=_CHECK_INTERVAL_S)
+                if isinstance(process_or_error, Exception):
+                    raise process_or_error
+                return process_or_error
         raise PieceNotWanted
 
-    def _started(self) -> _Child:
+    def _start_process(self) -> _PieceProcess:
         """Start a process that dies with this thread."""
-        self._inputs = self._inputs or bundle.read_inputs(Site(self.folder)).to_bytes()
-        ours, its = socket.socketpair()
+        self._packed_inputs = (
+            self._packed_inputs or bundle.load_run_inputs(UnpackedBundle(self.folder)).to_bytes()
+        )
+        host_socket, process_socket = socket.socketpair()
         try:
             with tempfile.TemporaryFile(dir=self.folder) as file:  # nameless, so no run can change it
-                file.write(self._inputs)
+                file.write(self._packed_inputs)
                 file.seek(0)
-                descriptors = [its.fileno(), file.fileno()]
-                words = ["-m", _CHILD, *map(str, descriptors), str(self.folder), self.name]
+                descriptors = [process_socket.fileno(), file.fileno()]
+                words = [
+                    "-m",
+                    _PIECE_PROCESS_MODULE,
+                    *map(str, descriptors),
+                    str(self.folder),
+                    self.worker_name,
+                ]
                 process = subprocess.Popen(
-                    [*dying_python(os.getpid()), *words],
+                    [*python_dying_with(os.getpid()), *words],
                     pass_fds=descriptors,
                     cwd=self.folder,
                     stdin=subprocess.DEVNULL,
                     start_new_session=True,  # signals from the worker's terminal are for the worker only
                 )
         except BaseException:
-            ours.close()
+            host_socket.close()
             raise
         finally:
-            its.close()
-        return _Child(process, Connection(ours.detach()))
+            process_socket.close()
+        return _PieceProcess(process, Connection(host_socket.detach()))

@@ -1,8 +1,8 @@
 """Functions that the command submits to Dask workers by reference.
 
-For each run, the task `attend` runs on every worker, outside the thread pool, for as long as the run lasts.
-When it ends, the run's processes on that worker are killed, and its files are deleted. Each piece is a
-separate task.
+For each run, the task `attend_run` runs on every worker, outside the thread pool, for as long as the run
+lasts. When it ends, the run's processes on that worker are killed, and its files are deleted. Each piece is
+a separate task.
 """
 
 import platform
@@ -20,15 +20,15 @@ from mutator._common.hashing import as_json_types
 from mutator._common.version import VERSION
 from mutator.campaigns import run_environment
 from mutator.errors import MutatorError
-from mutator.execution.cluster.worker_host import Host, Wanted
+from mutator.execution.cluster.worker_host import WantedCheck, WorkerHost
 
-_PATIENCE_S = 60.0  # how long a piece waits for the bundle of its run
+_BUNDLE_TIMEOUT_S = 60.0  # how long a piece waits for the bundle of its run
 
-_hosts: dict[str, Host] = {}  # by run
-_arrived = threading.Condition()
+_hosts_by_run: dict[str, WorkerHost] = {}  # by run
+_bundle_arrived = threading.Condition()
 
 
-def facts(packages: Iterable[str]) -> dict[str, Any]:
+def machine_facts(packages: Iterable[str]) -> dict[str, Any]:
     """Describe this worker's machine and software, including the versions of these packages."""
     return {
         "mutator": VERSION,
@@ -41,46 +41,46 @@ def facts(packages: Iterable[str]) -> dict[str, Any]:
     }
 
 
-def deliver(run: str, name: str, bundle: bytes, digest: str) -> None:
+def deliver_bundle(run: str, worker_name: str, bundle: bytes, digest: str) -> None:
     if sha256(bundle).hexdigest() != digest:
         raise MutatorError(
             "the bundle that arrived differs from the one that was sent", remedy="check the network"
         )
-    host = Host.lay_out(bundle, get_worker().local_directory, name)
-    with _arrived:
-        _hosts[run] = host
-        _arrived.notify_all()
+    host = WorkerHost.unpack_in(bundle, get_worker().local_directory, worker_name)
+    with _bundle_arrived:
+        _hosts_by_run[run] = host
+        _bundle_arrived.notify_all()
 
 
-def attend(run: str) -> None:
+def attend_run(run: str) -> None:
     """Take part in a run until the command releases this task or is gone."""
-    host, wanted = _hosts[run], _wanted()
+    host, is_wanted = _hosts_by_run[run], _current_task_check()
     secede()
     try:
-        host.attend(wanted)
+        host.start_processes_on_request(is_wanted)
     finally:
-        with _arrived:
-            if _hosts.get(run) is host:  # unless the bundle has been delivered again
-                del _hosts[run]
+        with _bundle_arrived:
+            if _hosts_by_run.get(run) is host:  # unless the bundle has been delivered again
+                del _hosts_by_run[run]
 
 
-def leave(run: str) -> None:
+def leave_run(run: str) -> None:
     """Leave a run, and wait until its processes and files on this worker are gone."""
-    if (host := _hosts.get(run)) is not None:
-        host.end()
+    if (host := _hosts_by_run.get(run)) is not None:
+        host.leave_run()
 
 
-def work(run: str, piece: bytes) -> bytes:
-    deadline = time.monotonic() + _PATIENCE_S
-    with _arrived:
-        while run not in _hosts:
-            if not _arrived.wait(deadline - time.monotonic()):
+def run_piece(run: str, piece: bytes) -> bytes:
+    deadline = time.monotonic() + _BUNDLE_TIMEOUT_S
+    with _bundle_arrived:
+        while run not in _hosts_by_run:
+            if not _bundle_arrived.wait(deadline - time.monotonic()):
                 raise MutatorError("the bundle of the run did not arrive", remedy="check the network")
-        host = _hosts[run]
-    return host.run(piece, _wanted()).packed()
+        host = _hosts_by_run[run]
+    return host.run_piece(piece, _current_task_check()).to_bytes()
 
 
-def _wanted() -> Wanted:
+def _current_task_check() -> WantedCheck:
     """Make a function that returns whether this thread's task is wanted and the worker is not closing."""
     worker: Worker = get_worker()
     key = worker.get_current_task()

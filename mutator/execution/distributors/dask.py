@@ -2,21 +2,21 @@
 
 from pkgutil import resolve_name
 
-from mutator.execution.cluster.cluster_choice import parse
-from mutator.execution.cluster.dask_connections import importing
+from mutator.execution.cluster.cluster_choice import parse_cluster_choice
+from mutator.execution.cluster.dask_connections import requiring_extra
 from mutator.execution.distribution import Distributor, DistributorKind
 
-_WORKERS = "mutator.execution.cluster.cluster_distributor:ClusterWorkers"
+_DISTRIBUTOR_CLASS = "mutator.execution.cluster.cluster_distributor:ClusterDistributor"
 
 
-def _open(where: str, insecure: bool) -> Distributor:
-    place = parse(where)
-    with importing("cluster"):  # imported only on request, because the package is optional
-        workers: Distributor = resolve_name(_WORKERS)(place, insecure=insecure)
-    return workers
+def _open_cluster(where: str, insecure: bool) -> Distributor:
+    cluster_choice = parse_cluster_choice(where)
+    with requiring_extra("cluster"):  # imported only on request, because the package is optional
+        distributor: Distributor = resolve_name(_DISTRIBUTOR_CLASS)(cluster_choice, insecure=insecure)
+    return distributor
 
 
 DISTRIBUTOR = DistributorKind(
     about="the workers of a Dask scheduler, of a cluster file, or N new ones on this machine (`local:N`)",
-    open=_open,
+    open=_open_cluster,
 )

@@ -21,7 +21,7 @@ from mutator._common.files import make_folder, write_atomic
 from mutator._common.message_text import counted
 from mutator.campaigns.filters import compile_filter
 from mutator.errors import MutatorError, MutatorWarning
-from mutator.execution.run_traces import Traces
+from mutator.execution.run_traces import RunTraces
 from mutator.exports import Export, ExportRequest
 from mutator.model import Experiment, Record
 from mutator.outcomes.golden_comparison import Trace
@@ -86,7 +86,7 @@ class Content:
     def __init__(self, folder: RunFolder, workspace: Workspace | None) -> None:
         self._folder = folder
         self._series = SeriesFolder(folder.path)
-        self._traces = None if workspace is None else Traces(workspace, folder)
+        self._traces = None if workspace is None else RunTraces(workspace, folder)
         self._records = folder.records()
 
     @cached_property
@@ -124,7 +124,7 @@ class Content:
         faulty = path_below(kept / "faulty", self._traces.manifest.trace_file)
         if not (golden.is_dir() or (kept / "golden").is_dir()) or not faulty.is_file():
             return None
-        if not self._traces.is_kept(experiment_id):
+        if not self._traces.is_stored(experiment_id):
             raise MutatorError(
                 f"the kept trace of {experiment_id} does not match its record",
                 where=faulty,
@@ -132,7 +132,7 @@ class Content:
                 remedy=f"rerun the experiment: {rerun_command(self._folder.path, experiment_id)}, "
                 f"or delete {kept}",
             )
-        return self._traces.of(experiment_id)
+        return self._traces.traces_of(experiment_id)
 
     def _of_series(self, record: Record) -> tuple[list[Topic], list[Topic]]:
         found = self._series.load_series(record.experiment_id, record)

@@ -29,7 +29,7 @@ SCHEMA_VERSION = "2.0"
 def _content(request: ExportRequest) -> bytes:
     workspace = request.workspace
     assert workspace is not None
-    manifest = single_run.manifest_of(workspace, request.folder)
+    manifest = single_run.manifest_of_unchanged_target(workspace, request.folder)
     content = report(request.folder, manifest, workspace.fault_models())
     return (json.dumps(content, ensure_ascii=False) + "\n").encode()
 

@@ -4,9 +4,9 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.fork_engine import ForkEngine
-from mutator.engines.fork_server_client import Pool
+from mutator.engines.fork_server_client import ForkServer
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest
@@ -34,7 +34,7 @@ class Fork:
             work = self.folder / "work"
             work.mkdir()
             null = build(self.manifest, self.models, None, always_trigger())
-            self._engine = ForkEngine(self.manifest, work, self.limits, null=null)
+            self._engine = ForkEngine(self.manifest, work, self.limits, null_mutant=null)
             golden = Job(name="golden", scenario=self.toy.scenario("A"), seed=7)
             self.golden = self._engine.reference.execute(golden, self.folder / "golden").out
         return self._engine
@@ -56,14 +56,14 @@ class Fork:
             name="j",
             scenario=scenario,
             seed=7,
-            files=built.files,
-            mutant=built.id,
+            changed_files=built.files,
+            mutant_id=built.id,
             probe=built.probe,
-            injections=built.injection_ids,
-            golden=self.golden,
+            injection_ids=built.injection_ids,
+            golden_folder=self.golden,
         )
 
-    def run(self, job: Job) -> Execution:
+    def run(self, job: Job) -> JobResult:
         folder = self.folder / "work" / "job"
         try:
             return self.engine.execute(job, folder)
@@ -71,8 +71,8 @@ class Fork:
             shutil.rmtree(folder, ignore_errors=True)
 
     @property
-    def pool(self) -> Pool:
-        pool = self.engine._pool
+    def pool(self) -> ForkServer:
+        pool = self.engine._server
         assert pool is not None
         return pool
 

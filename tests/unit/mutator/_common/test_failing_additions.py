@@ -9,7 +9,7 @@ import mutator
 from mutator._common.doors import DOORS, EXPORTS, OPERATORS, STUDIES
 from mutator.cli.app import main
 from mutator.errors import EXIT_WRONG_INPUT, BadAddition, Shortage
-from mutator.execution.distribution import distributor
+from mutator.execution.distribution import choose_distributor
 from mutator.report import report_builder
 from mutator.workspace import Workspace
 
@@ -100,7 +100,7 @@ def test_a_distributor_that_fails_is_named_with_its_package(toycar: Workspace, t
     with pytest.raises(
         BadAddition, match=f"rvdoors.py:7: distributor 'shut' of package rvdoors 0.3 {NO_LUCK}"
     ):
-        distributor("shut:")
+        choose_distributor("shut:")
     choices = mutator.Choices(only='fault_type == "lane"', limit=1)
     with pytest.raises(BadAddition, match=f"distributor 'late' of package rvdoors 0.3 {NO_LUCK}"):
         mutator.run("small", tmp_path / "run", choices=choices, cluster="late:", workspace=toycar)

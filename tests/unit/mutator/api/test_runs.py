@@ -19,7 +19,7 @@ import mutator
 from mutator.api import run_experiments
 from mutator.api.runs import Run
 from mutator.errors import MutatorError
-from mutator.execution.single_run import rerun, run_single
+from mutator.execution.single_run import rerun_experiment, run_single
 from mutator.model import Experiment, Outcome, Status
 from mutator.store import plan_file
 from mutator.store.checksummed_lines import LineWriter
@@ -174,7 +174,9 @@ def test_only_a_rerun_that_equals_the_record_is_kept(driven: Run) -> None:
     assert not experiment.is_drawn
     kept = SeriesFolder(driven.path).kept_path(experiment.id)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_experiments, "rerun", lambda *where, **more: (rerun(*where, **more)[0], False))
+        patch.setattr(
+            run_experiments, "rerun", lambda *where, **more: (rerun_experiment(*where, **more)[0], False)
+        )
         assert experiment.rerun(keep=True).same_as_record is False
     assert not kept.exists()
     experiment.rerun(keep=True)

@@ -13,7 +13,7 @@ from mutator.campaigns.git_clone import find_clone_state
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.run_provenance import accepted_version_differences, begin_stretch
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
-from mutator.execution.distribution import distributor, packages_of
+from mutator.execution.distribution import choose_distributor, packages_of_distributor
 from mutator.store.check_results import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.work_stretches import CloneState
@@ -77,7 +77,7 @@ def test_a_package_that_reads_the_traces_or_distributes_the_work_is_recorded(
     manifest = toycar.manifest("toycar")
     plain = begin_stretch(folder, toycar, records="0001-*", accept=False).stretches[-1]
     assert "door-examples" not in plain.packages
-    packages = packages_of(distributor("here:"))
+    packages = packages_of_distributor(choose_distributor("here:"))
     spread = begin_stretch(folder, toycar, records="0001-*", accept=False, packages=packages)
     monkeypatch.setattr(type(toycar), "manifest", lambda *_: replace(manifest, trace_file="log.jsonl"))
     reading = begin_stretch(folder, toycar, records="0001-*", accept=False)

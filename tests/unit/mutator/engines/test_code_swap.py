@@ -63,19 +63,19 @@ def test_changed_functions_are_found(changes: Changes) -> None:
     found = changes(
         ("return [value", GUARDED), ("self.speed = speed", 'if not _fi.active("abc"):\n    speed = 0.0')
     )
-    assert [(f.module, f.path) for f in found.functions] == [
+    assert [(f.module, f.name_path) for f in found.functions] == [
         ("car.car", ("Car", "__init__")),
         ("car.car", ("Car", "go")),
     ]
     go = found.functions[1]
-    assert (go.old.co_filename, go.new.co_filename) == ("/tree/car/car.py", "/tree/car/car.py")
-    assert "_fi" in go.new.co_names and "_fi" not in go.old.co_names
-    assert found.imports == ()
+    assert (go.old_code.co_filename, go.new_code.co_filename) == ("/tree/car/car.py", "/tree/car/car.py")
+    assert "_fi" in go.new_code.co_names and "_fi" not in go.old_code.co_names
+    assert found.imported_modules == ()
 
 
 def test_imports_of_injected_lines_are_listed(changes: Changes) -> None:
     lines = 'if _fi.active("abc"):\n    from car.rain import Rain\n    y = Rain(y)'
-    assert changes(("return [value", lines)).imports == ("car.rain",)
+    assert changes(("return [value", lines)).imported_modules == ("car.rain",)
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_a_guard_must_keep_the_original_statement_in_its_else_branch(kept: int, 
     manifest = SimpleNamespace(package="car", reads_itself=(), tree=tree)
     files = {"car/car.py": text.encode(), "car/_fi.py": b""}
     if swappable:
-        assert [f.path for f in plan_swap(manifest, files, PROBE, "/tree").functions] == [("Car", "go")]  # type: ignore[arg-type]
+        assert [f.name_path for f in plan_swap(manifest, files, PROBE, "/tree").functions] == [("Car", "go")]  # type: ignore[arg-type]
         return
     with pytest.raises(NotSwappable):
         plan_swap(manifest, files, PROBE, "/tree")  # type: ignore[arg-type]

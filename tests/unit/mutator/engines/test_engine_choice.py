@@ -4,7 +4,7 @@ from pkgutil import resolve_name
 
 import pytest
 
-from mutator.engines.engine_choice import check_offered, choose_engine
+from mutator.engines.engine_choice import check_engine_is_offered, choose_engine
 from mutator.engines.engine_kinds import ENGINES, FORK, REFERENCE
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
@@ -26,7 +26,7 @@ def test_the_default_engine_depends_on_the_size_of_the_campaign(toycar: Workspac
 
 @pytest.mark.parametrize("name", ["warm", "quick", ""])
 def test_users_choose_among_the_offered_engines(name: str) -> None:
-    check_offered(None)
-    check_offered(FORK)
+    check_engine_is_offered(None)
+    check_engine_is_offered(FORK)
     with pytest.raises(MutatorError, match=f"engine: engine '{name}'; expected one of reference, fork"):
-        check_offered(name)
+        check_engine_is_offered(name)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.engines.first_activation import Observed, Start, first_active
+from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
 from mutator.model import Hold, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import Probe, probe_state_after
@@ -25,8 +25,9 @@ def probe(toycar: Workspace):
 
 
 GAPS = (50.0, 40.0, 30.0, 20.0, 30.0, 40.0)
-SEEN = Observed(
-    values=tuple((0.05 * i, gap, 10.0, 10.0) for i, gap in enumerate(GAPS)), before=(0, 1, 2, 3, 4, 5)
+SEEN = GoldenObservations(
+    values=tuple((0.05 * i, gap, 10.0, 10.0) for i, gap in enumerate(GAPS)),
+    counts_before_steps=(0, 1, 2, 3, 4, 5),
 )
 
 
@@ -44,11 +45,11 @@ SEEN = Observed(
     ],
 )
 def test_a_fork_starts_at_the_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
-    start = first_active(probe(trigger), SEEN)
+    start = find_fork_point(probe(trigger), SEEN)
     assert (start.step if start else None) == step
     if start:
-        assert start.observed == step
-        assert start.t == (SEEN.values[step - 1][0] if step else None)
+        assert start.observation_count == step
+        assert start.last_time_s == (SEEN.values[step - 1][0] if step else None)
 
 
 @pytest.mark.parametrize("hold", [Hold.WHILE, Hold.TO_END])
@@ -84,7 +85,7 @@ def test_the_predicted_activation_step_agrees_with_the_probe(
         for one in values:
             module["observe"](*one)
             active.append(module["_run"].active)
-        start = first_active(code, Observed(values=values, before=tuple(range(40))))
+        start = find_fork_point(code, GoldenObservations(values=values, counts_before_steps=tuple(range(40))))
         assert (start.step if start else None) == (active.index(True) if True in active else None)
 
 
@@ -94,7 +95,7 @@ def test_the_probes_template_determines_the_precision_of_the_arming_time(probe) 
         tuple(text.replace("_TINY = 1e-9\n", f"_TINY = {tiny}\n") for text in one.shared)
         for tiny in (0.0, 0.002)
     ]
-    assert [first_active(replace(one, shared=shared), SEEN).step for shared in changed] == [4, 3]
+    assert [find_fork_point(replace(one, shared=shared), SEEN).step for shared in changed] == [4, 3]
 
 
 def test_the_two_parts_of_a_probe_equal_the_whole_probe(probe) -> None:
@@ -114,22 +115,24 @@ def test_the_two_parts_of_a_probe_equal_the_whole_probe(probe) -> None:
 
 def test_a_step_can_have_several_observations_or_none(probe) -> None:
     """The fork starts before the step in which the activating observation is made."""
-    seen = Observed(values=SEEN.values, before=(0, 1, 3, 3, 6))
-    starts = [first_active(probe(trigger_at_time(0.05 * i)), seen) for i in range(6)]
+    seen = GoldenObservations(values=SEEN.values, counts_before_steps=(0, 1, 3, 3, 6))
+    starts = [find_fork_point(probe(trigger_at_time(0.05 * i)), seen) for i in range(6)]
     assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
-    assert starts[4] == Start(step=3, observed=3, began=SEEN.values[0][0], t=SEEN.values[2][0])
+    assert starts[4] == ForkPoint(
+        step=3, observation_count=3, earliest_time_s=SEEN.values[0][0], last_time_s=SEEN.values[2][0]
+    )
 
 
 @pytest.mark.parametrize("trigger", [trigger_at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
 def test_a_probe_with_restored_state_equals_one_that_observed_the_steps(probe, trigger: Trigger) -> None:
-    start = first_active(probe(trigger), SEEN)
+    start = find_fork_point(probe(trigger), SEEN)
     saw: dict = {}
     given: dict = {}
     for module in (saw, given):
         exec(probe(trigger).text, module)
-    for values in SEEN.values[: start.observed]:
+    for values in SEEN.values[: start.observation_count]:
         saw["observe"](*values)
-    holder, state = probe_state_after(start.observed, start.began, start.t)
+    holder, state = probe_state_after(start.observation_count, start.earliest_time_s, start.last_time_s)
     for name, value in state.items():
         setattr(given[holder], name, value)
     states = [
@@ -142,7 +145,7 @@ def test_a_probe_with_restored_state_equals_one_that_observed_the_steps(probe, t
 def test_the_first_active_step_is_computed_once_per_trigger(probe) -> None:
     one, other = (probe(Trigger(name=name, condition="d_rel <= 30.0")) for name in ("one", "other"))
     assert one != other
-    assert first_active(one, SEEN) is first_active(other, SEEN)
-    assert first_active(probe(Trigger(name="one", condition="d_rel <= 20.0")), SEEN) != first_active(
+    assert find_fork_point(one, SEEN) is find_fork_point(other, SEEN)
+    assert find_fork_point(probe(Trigger(name="one", condition="d_rel <= 20.0")), SEEN) != find_fork_point(
         one, SEEN
     )

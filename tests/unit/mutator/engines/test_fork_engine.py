@@ -14,7 +14,7 @@ import pytest
 
 from mutator.engines import fork_server_client
 from mutator.engines.engine_jobs import RunMode
-from mutator.engines.first_activation import Observed
+from mutator.engines.first_activation import GoldenObservations
 from mutator.model import Status, Trigger
 from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
@@ -49,7 +49,7 @@ def test_forking_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -
 
 
 def test_a_fork_starts_just_before_its_fault_and_few_processes_wait(fork: Fork) -> None:
-    starts = [fork.run(fork.job(trigger_at_time(0.05 * step))).start for step in (40, 41, 90, 10, 100, 0)]
+    starts = [fork.run(fork.job(trigger_at_time(0.05 * step))).fork_step for step in (40, 41, 90, 10, 100, 0)]
     assert starts == [40, 41, 90, 10, 100, 0]
     for step in range(3, 100, 9):
         fork.run(fork.job(trigger_at_time(0.05 * step)))
@@ -58,11 +58,15 @@ def test_a_fork_starts_just_before_its_fault_and_few_processes_wait(fork: Fork) 
 
 def test_libraries_that_the_golden_run_imports_late_are_loaded_before_the_fork(fork: Fork) -> None:
     fork.run(fork.job(trigger_at_time(2.0)))
-    (seen,) = fork.engine._seen.values()
-    assert isinstance(seen, Observed)
-    assert "zipfile" in seen.libraries  # imported only to write the trace
-    assert not any(name.startswith("toycar") for name in seen.libraries)
-    assert all(set(seen.libraries) <= waiting.loaded for waiting in fork.pool._waiting if waiting.step)
+    (seen,) = fork.engine._observations_by_golden.values()
+    assert isinstance(seen, GoldenObservations)
+    assert "zipfile" in seen.imported_modules  # imported only to write the trace
+    assert not any(name.startswith("toycar") for name in seen.imported_modules)
+    assert all(
+        set(seen.imported_modules) <= waiting.loaded_modules
+        for waiting in fork.pool._waiting_processes
+        if waiting.step
+    )
 
 
 def test_an_experiment_that_never_triggers_gets_the_files_of_the_golden_run(fork: Fork) -> None:
@@ -148,7 +152,7 @@ def test_the_cpu_limit_of_a_fork_excludes_the_time_before_it(fork: Fork, edit: E
     )
     assert fork.run(fork.job(trigger_at_time(5.5))).mode is RunMode.FORK
     fork.pool.close()
-    fork.engine._pool, fork.engine._limits = None, replace(LIMITS, cpu_s=1)
+    fork.engine._server, fork.engine._limits = None, replace(LIMITS, cpu_s=1)
     execution = fork.run(fork.job(trigger_at_time(5.5)))
     assert (execution.mode, execution.status) == (RunMode.FORK, Status.OK)
     execution = fork.run(fork.job(trigger_at_time(0.5)))
@@ -160,7 +164,7 @@ def test_a_server_whose_first_message_was_exchanged_is_not_used(
     fork: Fork, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another run writes to the file before the server reads it, and puts it back afterwards."""
-    start, welcome = subprocess.Popen, fork_server_client.Pool._welcome
+    start, welcome = subprocess.Popen, fork_server_client.ForkServer._receive_welcome
     originals: dict[Path, bytes] = {}
 
     def forging(command: list[str], **more: object) -> object:
@@ -170,9 +174,11 @@ def test_a_server_whose_first_message_was_exchanged_is_not_used(
             path.write_bytes(marshal.dumps(marshal.loads(originals[path]) | {"packages": []}))
         return start(command, **more)  # type: ignore[call-overload]
 
-    def putting_back(pool: fork_server_client.Pool) -> None:
-        reply = pool.first.reply
-        monkeypatch.setattr(pool.first, "reply", lambda patience_s: (reply(patience_s), restore())[0])
+    def putting_back(pool: fork_server_client.ForkServer) -> None:
+        reply = pool.first_process.receive_reply
+        monkeypatch.setattr(
+            pool.first_process, "receive_reply", lambda patience_s: (reply(patience_s), restore())[0]
+        )
         welcome(pool)
 
     def restore() -> None:
@@ -180,7 +186,7 @@ def test_a_server_whose_first_message_was_exchanged_is_not_used(
             path.write_bytes(data)
 
     monkeypatch.setattr(fork_server_client.subprocess, "Popen", forging)
-    monkeypatch.setattr(fork_server_client.Pool, "_welcome", putting_back)
+    monkeypatch.setattr(fork_server_client.ForkServer, "_receive_welcome", putting_back)
     execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert execution.status is Status.HARNESS_ERROR and originals
     assert execution.detail == "the tree of the fork server is not the pristine one"

@@ -21,7 +21,7 @@ def test_a_target_with_threads_is_not_forked(fork: Fork, edit: Edit) -> None:
     )
     execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
-    assert execution.why == (
+    assert execution.fallback_reason == (
         "once it is loaded, it has 2 threads, and only one can be forked: besides the main one, 'poll'"
     )
 
@@ -32,7 +32,7 @@ def test_a_target_with_pandas_is_forked(fork: Fork, edit: Edit) -> None:
     fork.limits = replace(LIMITS, memory_mb=4096)
     edit("tree/toycar/go.py", "class Drive:", "import pandas\nimport pyarrow\n\n\nclass Drive:")
     execution = fork.run(fork.job(trigger_at_time(2.0)))
-    assert (execution.mode, execution.why) == (RunMode.FORK, "")
+    assert (execution.mode, execution.fallback_reason) == (RunMode.FORK, "")
 
 
 def test_a_target_that_cannot_be_imported_is_not_forked(fork: Fork, edit: Edit) -> None:
@@ -43,7 +43,7 @@ def test_a_target_that_cannot_be_imported_is_not_forked(fork: Fork, edit: Edit) 
     )
     execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
-    assert "cannot be loaded: ValueError: 3 (toycar/go.py:" in execution.why
+    assert "cannot be loaded: ValueError: 3 (toycar/go.py:" in execution.fallback_reason
 
 
 def test_the_stored_reason_is_printable(fork: Fork, edit: Edit) -> None:
@@ -56,8 +56,8 @@ def test_the_stored_reason_is_printable(fork: Fork, edit: Edit) -> None:
     execution = fork.run(fork.job(trigger_at_time(5.9)))
     assert (execution.status, execution.mode) == (Status.CRASHED, RunMode.REFERENCE)
     assert (
-        execution.why.startswith(r"ended as crashed: ValueError: \udcff\udcff")
-        and execution.why.isprintable()
+        execution.fallback_reason.startswith(r"ended as crashed: ValueError: \udcff\udcff")
+        and execution.fallback_reason.isprintable()
     )
 
 
@@ -70,7 +70,7 @@ def test_a_target_that_behaves_differently_step_by_step_is_not_forked(fork: Fork
     )
     execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert execution.mode is RunMode.REFERENCE
-    assert "its log.npz differs when it is driven step by step" in execution.why
+    assert "its log.npz differs when it is driven step by step" in execution.fallback_reason
 
 
 @pytest.mark.slow
@@ -84,7 +84,10 @@ def test_a_run_that_leaves_a_thread_is_repeated_by_the_reference_engine(fork: Fo
     )
     execution = fork.run(fork.job(trigger_at_time(5.9)))
     assert (execution.status, execution.mode) == (Status.TIMEOUT, RunMode.REFERENCE)
-    assert execution.why.startswith("at its end it has ") and "'Thread-1 (sleep)'" in execution.why
+    assert (
+        execution.fallback_reason.startswith("at its end it has ")
+        and "'Thread-1 (sleep)'" in execution.fallback_reason
+    )
 
 
 @pytest.mark.slow
@@ -96,7 +99,7 @@ def test_a_run_that_writes_into_its_tree_is_repeated_by_the_reference_engine(for
     )
     execution = fork.run(fork.job(trigger_at_time(5.9)))
     assert (execution.status, execution.mode) == (Status.HARNESS_ERROR, RunMode.REFERENCE)
-    assert execution.why == "it writes into its own tree"
+    assert execution.fallback_reason == "it writes into its own tree"
     assert "toycar/sensing.py in the tree that ran" in execution.detail
 
 
@@ -108,7 +111,7 @@ def test_a_fault_in_a_generator_is_not_forked(fork: Fork, edit: Edit) -> None:
     )
     execution = fork.run(fork.job(trigger_at_time(2.0), function="Sensor.walk"))
     assert (execution.status, execution.mode) == (Status.OK, RunMode.REFERENCE)
-    assert execution.why == "Sensor.walk in toycar/sensing.py may be suspended between two steps"
+    assert execution.fallback_reason == "Sensor.walk in toycar/sensing.py may be suspended between two steps"
 
 
 @pytest.mark.slow
@@ -120,7 +123,7 @@ def test_without_a_stepwise_golden_run_nothing_is_forked(fork: Fork, edit: Edit)
     )
     execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
-    assert execution.why.startswith("its golden run cannot be driven step by step: KeyError: ")
+    assert execution.fallback_reason.startswith("its golden run cannot be driven step by step: KeyError: ")
 
 
 EARLY = """
@@ -141,4 +144,4 @@ def test_a_target_that_observes_before_its_first_step_is_not_forked(fork: Fork, 
     for trigger in (always_trigger(armed_after_s=-2.0), trigger_at_time(2.0)):
         execution = fork.run(fork.job(trigger))
         assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
-        assert execution.why == "it observes before its first step"
+        assert execution.fallback_reason == "it observes before its first step"

@@ -6,7 +6,7 @@ import pytest
 
 import mutator
 from mutator.engines.engine_jobs import RunMode
-from mutator.engines.in_target.run_once import Harness
+from mutator.engines.in_target.run_once import HarnessFinder
 from mutator.model import Status
 from mutator.triggers.trigger_kinds import trigger_at_time
 
@@ -61,9 +61,9 @@ def test_both_engines_give_the_same_bytes(glued: Fork) -> None:
     job = glued.job(trigger_at_time(2.0))
     forked = glued.engine.execute(job, glued.folder / "work" / "forked")
     plain = glued.engine.reference.execute(job, glued.folder / "plain")
-    assert (forked.status, forked.mode, forked.why) == (Status.OK, RunMode.FORK, "")
+    assert (forked.status, forked.mode, forked.fallback_reason) == (Status.OK, RunMode.FORK, "")
     assert plain.status is Status.OK
-    assert plain.probe and plain.probe["triggered"]
+    assert plain.probe_report and plain.probe_report["triggered"]
     for name in ("trace.npz", "record.json"):
         assert (forked.out / name).read_bytes() == (plain.out / name).read_bytes()
 
@@ -71,11 +71,11 @@ def test_both_engines_give_the_same_bytes(glued: Fork) -> None:
 def test_a_run_imports_the_glue_of_the_harness_that_started_it(glued: Fork) -> None:
     """Otherwise, a run could import another installed version of mutator."""
     plain = glued.engine.reference.execute(glued.job(trigger_at_time(2.0)), glued.folder / "plain")
-    assert Path(plain.log.strip()) == Path(mutator.__file__)
-    assert "mutator" not in plain.modules
-    assert "numpy" in plain.modules
+    assert Path(plain.log_tail.strip()) == Path(mutator.__file__)
+    assert "mutator" not in plain.third_party_modules
+    assert "numpy" in plain.third_party_modules
 
 
 def test_the_import_hook_of_the_glue_finds_no_other_modules() -> None:
-    assert Harness.find_spec("tests") is None
-    assert Harness.find_spec("mutator.glue") is None
+    assert HarnessFinder.find_spec("tests") is None
+    assert HarnessFinder.find_spec("mutator.glue") is None

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.engines.engine_jobs import Execution
+from mutator.engines.engine_jobs import JobResult
 from mutator.model import Status
 from mutator.triggers.trigger_kinds import trigger_at_time
 
@@ -71,7 +71,7 @@ BODY = """        if world.frame == 60:
 """
 
 
-def outcome(execution: Execution) -> tuple[Status, str, tuple[str, ...]]:
+def outcome(execution: JobResult) -> tuple[Status, str, tuple[str, ...]]:
     out = execution.out
     names = sorted(path.name for path in out.iterdir()) if out.is_dir() else []
     return execution.status, execution.detail, tuple(names)

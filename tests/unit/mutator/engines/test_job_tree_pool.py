@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines.job_tree import RunTree
-from mutator.engines.job_tree_pool import BaseTree
+from mutator.engines.job_tree import JobTree
+from mutator.engines.job_tree_pool import JobTreePool
 from mutator.targets.source_tree import read_tree
 
 CODE = "__pycache__/go.pyc"
@@ -15,17 +15,17 @@ CHANGED = {"car/go.py": b"stop = 1", "car/_fi.py": b"probe = 1"}
 
 
 @pytest.fixture
-def base(tmp_path: Path) -> BaseTree:
+def base(tmp_path: Path) -> JobTreePool:
     (tmp_path / "root" / "car" / "parts").mkdir(parents=True)
     for name in ("go", "wheel", "parts/door"):
         (tmp_path / "root" / "car" / f"{name}.py").write_bytes(b"go = 0")
     (tmp_path / "root" / "car" / "data.npz").write_bytes(b"data")
-    return BaseTree(read_tree(tmp_path / "root", ["**/*"]), tmp_path)
+    return JobTreePool(read_tree(tmp_path / "root", ["**/*"]), tmp_path)
 
 
-def content(tree: RunTree) -> dict[str, bytes]:
-    paths = (path for path in tree.place.rglob("*") if path.is_file())
-    return {str(path.relative_to(tree.place)): path.read_bytes() for path in paths}
+def content(tree: JobTree) -> dict[str, bytes]:
+    paths = (path for path in tree.folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(tree.folder)): path.read_bytes() for path in paths}
 
 
 def write_and_put_back(path: Path) -> None:
@@ -59,67 +59,67 @@ CHANGES = (write_and_put_back, exchange, write_through_a_link, replace_its_folde
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("name", ["go.py", "wheel.py", "data.npz", "__pycache__/wheel.{}.pyc"])
 def test_a_change_is_noticed(
-    base: BaseTree, tmp_path: Path, change: Callable[[Path], None], name: str
+    base: JobTreePool, tmp_path: Path, change: Callable[[Path], None], name: str
 ) -> None:
-    tree = base.lay_out(tmp_path / "run" / "tree", CHANGED)
+    tree = base.lay_out_tree(tmp_path / "run" / "tree", CHANGED)
     assert not tree.first_changed()
-    (path,) = (tree.place / "car").glob(name.format("*"))
+    (path,) = (tree.folder / "car").glob(name.format("*"))
     change(path)
     assert tree.first_changed().startswith("car")
 
 
-def test_a_file_that_an_import_finds_first_is_noticed(base: BaseTree, tmp_path: Path) -> None:
+def test_a_file_that_an_import_finds_first_is_noticed(base: JobTreePool, tmp_path: Path) -> None:
     for name in (
         "json.py",
         "car/wheel.abi3.so",
         "car/__pycache__/go.cpython-311.pyc",
         "car/wheel/__init__.py",
     ):
-        tree = base.lay_out(tmp_path / "run" / "tree", CHANGED)
-        (tree.place / name).parent.mkdir(exist_ok=True)
-        (tree.place / name).write_bytes(b"")
+        tree = base.lay_out_tree(tmp_path / "run" / "tree", CHANGED)
+        (tree.folder / name).parent.mkdir(exist_ok=True)
+        (tree.folder / name).write_bytes(b"")
         assert tree.first_changed() == name
-        tree.place.rename(tmp_path / str(len(list(tmp_path.iterdir()))))
+        tree.folder.rename(tmp_path / str(len(list(tmp_path.iterdir()))))
 
 
 def test_an_unchanged_tree_is_used_again_and_has_nothing_of_an_earlier_mutant(
-    base: BaseTree, tmp_path: Path
+    base: JobTreePool, tmp_path: Path
 ) -> None:
-    tree = base.lay_out(tmp_path / "a" / "tree", CHANGED)
+    tree = base.lay_out_tree(tmp_path / "a" / "tree", CHANGED)
     first = {**content(tree)}
-    number = (tree.place / "car" / "wheel.py").stat().st_ino
-    base.take_back(tree)
-    again = base.lay_out(tmp_path / "b" / "tree", {})
-    assert (again.place / "car" / "wheel.py").stat().st_ino == number
-    assert content(again) == content(base.lay_out(tmp_path / "c" / "tree", {}))
-    new = content(base.lay_out(tmp_path / "d" / "tree", {}, new=True))
+    number = (tree.folder / "car" / "wheel.py").stat().st_ino
+    base.take_back_tree(tree)
+    again = base.lay_out_tree(tmp_path / "b" / "tree", {})
+    assert (again.folder / "car" / "wheel.py").stat().st_ino == number
+    assert content(again) == content(base.lay_out_tree(tmp_path / "c" / "tree", {}))
+    new = content(base.lay_out_tree(tmp_path / "d" / "tree", {}, new=True))
     assert new == {name: data for name, data in content(again).items() if not name.endswith(".pyc")}
     assert content(again).keys() == first.keys() - {"car/_fi.py"} | {
         name for name in content(again) if "go.cpython" in name
     }
-    base.take_back(again)
+    base.take_back_tree(again)
     base.close()
     assert not [path for path in tmp_path.iterdir() if "-tree-" in path.name]
 
 
-def test_a_tree_with_new_files_is_not_used_again(base: BaseTree, tmp_path: Path) -> None:
-    tree = base.lay_out(tmp_path / "a" / "tree", CHANGED)
-    (tree.place / "car" / "left.json").touch()
+def test_a_tree_with_new_files_is_not_used_again(base: JobTreePool, tmp_path: Path) -> None:
+    tree = base.lay_out_tree(tmp_path / "a" / "tree", CHANGED)
+    (tree.folder / "car" / "left.json").touch()
     assert not tree.first_changed()
-    base.take_back(tree)
-    assert tree.place.is_dir()
-    assert "car/left.json" not in content(base.lay_out(tmp_path / "b" / "tree", CHANGED))
+    base.take_back_tree(tree)
+    assert tree.folder.is_dir()
+    assert "car/left.json" not in content(base.lay_out_tree(tmp_path / "b" / "tree", CHANGED))
 
 
 @pytest.mark.parametrize("within", ["", "car"])
 @pytest.mark.parametrize("change", [Path.touch, Path.mkdir, "link", "nothing"])
 def test_what_stands_in_the_place_of_an_unused_tree_is_not_used(
-    base: BaseTree, tmp_path: Path, within: str, change: Callable[[Path], None] | str
+    base: JobTreePool, tmp_path: Path, within: str, change: Callable[[Path], None] | str
 ) -> None:
     """A run can delete an unused tree, or put a file or a link there. Nothing is written through the link."""
-    right = content(base.lay_out(tmp_path / "right" / "tree", CHANGED))
-    tree = base.lay_out(tmp_path / "a" / "tree", CHANGED)
-    base.take_back(tree)
+    right = content(base.lay_out_tree(tmp_path / "right" / "tree", CHANGED))
+    tree = base.lay_out_tree(tmp_path / "a" / "tree", CHANGED)
+    base.take_back_tree(tree)
     (unused,) = tmp_path.glob("*-tree-*")
     (unused / within).rename(tmp_path / "aside")
     if change == "link":
@@ -127,7 +127,7 @@ def test_what_stands_in_the_place_of_an_unused_tree_is_not_used(
     elif not isinstance(change, str):
         change(unused / within)
     before = {path: path.read_bytes() for path in (tmp_path / "aside").rglob("*.py")}
-    again = base.lay_out(tmp_path / "b" / "tree", CHANGED)
+    again = base.lay_out_tree(tmp_path / "b" / "tree", CHANGED)
     assert not again.first_changed()
     assert content(again) == right
     assert before == {path: path.read_bytes() for path in (tmp_path / "aside").rglob("*.py")}

@@ -17,7 +17,7 @@ NOTED = {
     "time.strftime('%Y')": "time.strftime() reads the clock",
     "os.times()": "os.times() reads the clock",
     "Held().clock()": "time.perf_counter() reads the clock",
-    "1 / (type(datetime.now()) is datetime.like)": "datetime.datetime.now() reads the clock",
+    "1 / (type(datetime.now()) is datetime.original_class)": "datetime.datetime.now() reads the clock",
     "Held().now()": "datetime.datetime.now() reads the clock",
     "datetime.now()": "datetime.datetime.now() reads the clock",
     "random.gauss(0, 1)": "random.gauss() draws from the shared generator of random, which has no seed",
@@ -62,12 +62,12 @@ class Held:
 SCRIPT = """\
 import json, sys
 import {name} as watch
-watcher = watch.Watcher(sys.argv[1])
+watcher = watch.NondeterminismWatcher(sys.argv[1])
 watcher.begin()
 sys.path.insert(0, sys.argv[1])
 import controller
 controller.drive()
-print(json.dumps(watcher.found()["noted"]))
+print(json.dumps(watcher.as_json()["noted"]))
 """
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from mutator.engines import bytecode
-from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import DiskFull, MutatorError
 from mutator.model import Limits, Status
@@ -24,7 +24,7 @@ from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
-Run = Callable[..., Execution]
+Run = Callable[..., JobResult]
 
 
 @pytest.fixture
@@ -37,10 +37,10 @@ def run(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> Run:
     work = tmp_path / "work"
     work.mkdir()
 
-    def execute(files: Mapping[str, str] | None = None, limits: Limits = LIMITS, **job: object) -> Execution:
+    def execute(files: Mapping[str, str] | None = None, limits: Limits = LIMITS, **job: object) -> JobResult:
         engine = ReferenceEngine(manifest, work, limits)
         changed = {name: text.encode() for name, text in (files or {}).items()}
-        wanted = Job(name="job", scenario=toycar.scenario("A"), seed=1, files=changed, **job)  # type: ignore[arg-type]
+        wanted = Job(name="job", scenario=toycar.scenario("A"), seed=1, changed_files=changed, **job)  # type: ignore[arg-type]
         shutil.rmtree(work / "job", ignore_errors=True)
         return engine.execute(wanted, work / "job")
 
@@ -59,7 +59,7 @@ def test_a_mutant_of_a_file_that_runs_read_uses_no_shared_caches(
     engine = ReferenceEngine(changed, tmp_path, LIMITS)
     for read in ("toycar/sensing.py", "toycar/driver.py"):
         files = {"toycar/go.py": said.encode(), read: b""}
-        job = Job(name="job", scenario=toycar.scenario("A"), seed=1, files=files)
+        job = Job(name="job", scenario=toycar.scenario("A"), seed=1, changed_files=files)
         execution = engine.execute(job, tmp_path / Path(read).stem)
         words = json.loads((execution.out / "words.json").read_text())
         assert ("--forget" in words) is (read == "toycar/sensing.py")
@@ -70,7 +70,7 @@ def test_a_successful_run_leaves_its_trace_and_record(run: Run) -> None:
     assert (execution.status, execution.detail) == (Status.OK, "")
     assert {path.name for path in execution.out.iterdir()} == {"log.npz", "said.json"}
     assert 0.0 < execution.cpu_s < 20.0
-    assert execution.probe is None
+    assert execution.probe_report is None
 
 
 @pytest.mark.parametrize(
@@ -179,9 +179,9 @@ def test_a_run_that_changes_its_bytecode_is_repeated_without_any(run: Run, edit:
     """Nothing tells it from a run that used the bytecode of somebody else."""
     body = f"import toycar.world, os\ncode = toycar.world.__cached__\nprint(os.path.exists(code))\n{edit}"
     execution = run(entry(body))
-    assert (execution.status, execution.log.split("\n")[0]) == (Status.CRASHED, "False")
+    assert (execution.status, execution.log_tail.split("\n")[0]) == (Status.CRASHED, "False")
     execution = run(entry(body.replace(edit, f"if os.path.exists(code): {edit}")))
-    assert (execution.status, execution.log) == (Status.OK, "False\n")
+    assert (execution.status, execution.log_tail) == (Status.OK, "False\n")
     assert run().status is Status.OK
 
 
@@ -189,7 +189,7 @@ def test_a_replaced_log_or_report_is_treated_as_missing(run: Run) -> None:
     head = "import os\nos.unlink('../log')\n"
     for body in ("", "os.mkdir('../log')", "os.mkfifo('../log')"):
         execution = run(entry(head + body))
-        assert (execution.status, execution.log) == (Status.OK, "")
+        assert (execution.status, execution.log_tail) == (Status.OK, "")
     for body in ("os.mkfifo", "os.mkdir", "os.symlink('/dev/zero', '../report.json') or str"):
         execution = run(entry(f"import os\n{body}('../report.json')\nos._exit(0)"))
         assert (execution.status, execution.detail) == (Status.CRASHED, "left with status 0 without a report")
@@ -218,9 +218,9 @@ def test_unprintable_names_are_stored_as_printable_text(run: Run) -> None:
         "import os\nname = os.path.join(os.path.dirname(__file__), '\\udcff\\n')\n"
         "exec(compile('raise type(\"a\\\\n\", (Exception,), {})', name, 'exec'))"
     )
-    raised = run(entry(body)).raised
+    raised = run(entry(body)).exception
     assert raised is not None
-    assert (raised.kind, raised.place) == (r"a\n", r"toycar/\udcff\n:1")
+    assert (raised.kind, raised.file_and_line) == (r"a\n", r"toycar/\udcff\n:1")
 
 
 def test_a_run_receives_signals_that_its_parent_ignored(run: Run) -> None:
@@ -251,7 +251,7 @@ def test_stale_bytecode_is_not_run(run: Run, manifest: TargetManifest) -> None:
     body = "from toycar.world import STEP\nraise ValueError(STEP)"
     execution = run({"toycar/world.py": changed, **entry(body)})
     assert execution.detail.startswith("ValueError: 0.06")
-    cached = bytecode.with_bytecode(manifest.tree)[bytecode.bytecode_of("toycar/world.py")]
+    cached = bytecode.files_with_bytecode(manifest.tree)[bytecode.bytecode_path("toycar/world.py")]
     assert int.from_bytes(cached[4:8], "little") == 0b11, "expected a check by hash"
 
 
@@ -267,7 +267,7 @@ def test_the_users_environment_does_not_reach_a_run(run: Run, monkeypatch: pytes
 
 
 def test_the_output_of_a_run_is_kept(run: Run) -> None:
-    assert "hello" in run(entry("print('hello')")).log
+    assert "hello" in run(entry("print('hello')")).log_tail
 
 
 def test_grandchildren_end_with_the_run(run: Run, tmp_path: Path) -> None:
@@ -305,7 +305,7 @@ library, templates, folder, note = map(Path, sys.argv[1:])
 toycar = Workspace(library=library, templates=templates)
 engine = ReferenceEngine(toycar.manifest("toycar"), folder / "work", Limits())
 body = f"import os, pathlib, time; pathlib.Path({str(note)!r}).write_text(str(os.getpid())); time.sleep(60)"
-job = Job(name="x", scenario=toycar.scenario("A"), seed=1, files={"toycar/go.py": body.encode()})
+job = Job(name="x", scenario=toycar.scenario("A"), seed=1, changed_files={"toycar/go.py": body.encode()})
 engine.execute(job, folder / "work" / "x")
 """
 
@@ -384,9 +384,9 @@ def test_two_threads_can_use_one_engine(
 
 
 def test_the_report_lists_only_packages_that_the_run_imports(run: Run) -> None:
-    assert run().modules == ()
-    assert run(entry("import numpy")).modules == ("numpy",)
-    assert run(entry("import json, iniconfig.exceptions, toycar.world")).modules == ("iniconfig",)
+    assert run().third_party_modules == ()
+    assert run(entry("import numpy")).third_party_modules == ("numpy",)
+    assert run(entry("import json, iniconfig.exceptions, toycar.world")).third_party_modules == ("iniconfig",)
 
 
 def test_the_report_lists_packages_with_loaded_shared_libraries(run: Run) -> None:
@@ -395,7 +395,7 @@ def test_the_report_lists_packages_with_loaded_shared_libraries(run: Run) -> Non
         "import ctypes; from importlib.util import find_spec; from pathlib import Path\n"
         "ctypes.CDLL(str(Path(find_spec('casadi').origin).with_name('libdaqp.so')))"
     )
-    assert run(entry(code)).modules == ("casadi",)
+    assert run(entry(code)).third_party_modules == ("casadi",)
 
 
 @pytest.mark.parametrize(("limit", "name"), [("AS", "memory_mb"), ("CPU", "cpu_s"), ("FSIZE", "disk_mb")])

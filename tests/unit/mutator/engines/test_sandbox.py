@@ -11,7 +11,7 @@ import pytest
 
 from mutator._common.files import remove_folder
 from mutator.engines import sandbox
-from mutator.engines.engine_jobs import Execution, Job, RunMode
+from mutator.engines.engine_jobs import Job, JobResult, RunMode
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.sandbox import Sandbox
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
@@ -22,8 +22,10 @@ from mutator.workspace import Workspace
 from ..fork_on_toy import Edit, Fork
 
 LIMITS = Limits(cpu_s=2, wall_s=60, memory_mb=1024, steps=500, disk_mb=8)
-Run = Callable[..., Execution]
-needed = pytest.mark.skipif(bool(sandbox.shortcoming()), reason=f"no sandbox: {sandbox.shortcoming()}")
+Run = Callable[..., JobResult]
+needed = pytest.mark.skipif(
+    bool(sandbox.reason_not_available()), reason=f"no sandbox: {sandbox.reason_not_available()}"
+)
 
 REACHING = """
 import json, os, socket
@@ -67,9 +69,9 @@ def run(toycar: Workspace, tmp_path: Path) -> Iterator[Run]:
     (tmp_path / "work").mkdir()
     engine = ReferenceEngine(manifest, tmp_path / "work", LIMITS)
 
-    def execute(body: str | None = None) -> Execution:
+    def execute(body: str | None = None) -> JobResult:
         files = {} if body is None else {"toycar/go.py": body.encode()}
-        job = Job(name="job", scenario=toycar.scenario("A"), seed=1, files=files)
+        job = Job(name="job", scenario=toycar.scenario("A"), seed=1, changed_files=files)
         remove_folder(tmp_path / "work/job")
         return engine.execute(job, tmp_path / "work/job")
 
@@ -137,7 +139,9 @@ def test_runs_leave_the_bytes_of_runs_without_a_sandbox(run: Run, toycar: Worksp
     engine = ReferenceEngine(toycar.manifest("toycar"), tmp_path / "open", LIMITS)
     plain = engine.execute(Job(name="a", scenario=toycar.scenario("A"), seed=1), tmp_path / "open/a")
     boxed = run()
-    assert boxed.status is plain.status is Status.OK and boxed.modules == plain.modules
+    assert (
+        boxed.status is plain.status is Status.OK and boxed.third_party_modules == plain.third_party_modules
+    )
     assert {path.name for path in boxed.out.iterdir()} == {"log.npz", "said.json"}
     for path in plain.out.iterdir():
         assert (boxed.out / path.name).read_bytes() == path.read_bytes()
@@ -158,7 +162,7 @@ def test_a_fork_server_and_its_mutants_share_a_sandbox(toycar: Workspace, tmp_pa
     [folder] = (tmp_path / "work").glob("*-fork")
     assert [path for path in (folder / "tmp").rglob("*") if path.is_file()] == []
     [(_, second)] = boxed.engine.run([replace(job, name="k")])
-    assert first.mode is second.mode is RunMode.FORK and first.status is Status.OK, first.why
+    assert first.mode is second.mode is RunMode.FORK and first.status is Status.OK, first.fallback_reason
     boxed.close()
     assert not folder.exists()
 
@@ -169,13 +173,13 @@ def test_what_a_run_left_is_cleared_even_if_it_exchanged_folders_for_links(tmp_p
         folder.mkdir(parents=True)
     (mine / "kept").write_text("x")
     found = Sandbox(box, ())
-    found.begin()
+    found.note_first_paths()
     (box / "tmp/left/inner").mkdir(parents=True)
     (box / "shm/left").write_text("x")
     (box / "tmp/link").symlink_to(mine)
     (box / "tmp").rename(box / "moved")
     (box / "tmp").symlink_to(mine)
-    found.clear()
+    found.delete_new_paths()
     found.close()
     assert (mine / "kept").exists() and list((box / "shm").iterdir()) == []
     assert [path.name for path in (box / "moved").iterdir()] == ["mounted"]
@@ -205,7 +209,7 @@ def test_a_mutant_that_exchanges_its_folder_for_a_link_reaches_nothing(
     [(_, execution)] = boxed.engine.run([job])
     boxed.close()
     assert (execution.status, execution.mode) == (Status.OK, RunMode.REFERENCE), "it runs again elsewhere"
-    assert execution.why == "ended as crashed: left with status 0 without a report"
+    assert execution.fallback_reason == "ended as crashed: left with status 0 without a report"
     assert sorted(path.name for path in mine.rglob("*")) == ["kept", "out", "tool"]
 
 
@@ -225,7 +229,7 @@ def test_only_fault_free_runs_write_to_a_cache_of_this_target_alone(run: Run, to
 def test_the_harness_follows_no_link_that_a_run_left(run: Run, tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("secret words")
     body = f"import os\nos.remove('../log')\nos.symlink({str(tmp_path / 'mine')!r}, '../log')"
-    assert "secret" not in run(body).log
+    assert "secret" not in run(body).log_tail
 
 
 @pytest.fixture
@@ -233,9 +237,9 @@ def no_bwrap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder on PATH without `bwrap`."""
     (tmp_path / "bin").mkdir()
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
-    sandbox.shortcoming.cache_clear()
+    sandbox.reason_not_available.cache_clear()
     yield tmp_path / "bin"
-    sandbox.shortcoming.cache_clear()
+    sandbox.reason_not_available.cache_clear()
 
 
 def test_without_bubblewrap_a_sandbox_is_refused(no_bwrap: Path, toycar: Workspace) -> None:

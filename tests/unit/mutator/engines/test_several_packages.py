@@ -28,14 +28,14 @@ def several(fork: Fork, edit: Edit) -> Fork:
 
 def test_both_engines_give_the_same_bytes(several: Fork) -> None:
     job = several.job(trigger_at_time(2.0))
-    assert {path for path in job.files if path.endswith("_fi.py")} == {"_fi.py"}
-    assert b"\nimport _fi  # fi:probe\n" in b"\n" + job.files["toycar/sensing.py"]
+    assert {path for path in job.changed_files if path.endswith("_fi.py")} == {"_fi.py"}
+    assert b"\nimport _fi  # fi:probe\n" in b"\n" + job.changed_files["toycar/sensing.py"]
     forked = several.engine.execute(job, several.folder / "work" / "forked")
     plain = several.engine.reference.execute(job, several.folder / "plain")
-    assert (forked.status, forked.mode, forked.why) == (Status.OK, RunMode.FORK, "")
+    assert (forked.status, forked.mode, forked.fallback_reason) == (Status.OK, RunMode.FORK, "")
     assert plain.status is Status.OK
-    assert forked.probe == plain.probe is not None
-    assert plain.probe["triggered"]
+    assert forked.probe_report == plain.probe_report is not None
+    assert plain.probe_report["triggered"]
     for name in ("log.npz", "said.json"):
         assert (forked.out / name).read_bytes() == (plain.out / name).read_bytes()
 
@@ -51,7 +51,7 @@ def test_importing_a_target_module_from_another_folder_is_a_harness_error(
         name="elsewhere",
         scenario=several.toy.scenario("A"),
         seed=7,
-        files={"toycar/go.py": body.encode()},
+        changed_files={"toycar/go.py": body.encode()},
     )
     found = several.engine.reference.execute(job, several.folder / "elsewhere")
     assert found.status is Status.HARNESS_ERROR

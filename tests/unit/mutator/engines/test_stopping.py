@@ -13,9 +13,9 @@ from mutator._common.hashing import digest
 from mutator.campaigns.plan import build_plan
 from mutator.engines.engine_jobs import Engine, RunMode
 from mutator.engines.fork_engine import ForkEngine
-from mutator.engines.in_target.early_stop import compiled
+from mutator.engines.in_target.early_stop import compile_stop_condition
 from mutator.errors import MutatorError
-from mutator.execution.experiment_runner import Finished, Goldens, Runner
+from mutator.execution.experiment_runner import ExperimentRunner, FinishedExperiment, LoadedGoldens
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.golden_comparison import trace_until
@@ -66,12 +66,12 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
         seed=7,
         after_hazard=after,
     )
-    goldens = Goldens(manifest, lambda experiment: fork.golden)
-    runner = Runner(manifest, fork.models, engine, goldens, fork.toy.scenario)
-    finished: Finished
+    goldens = LoadedGoldens(manifest, lambda experiment: fork.golden)
+    runner = ExperimentRunner(manifest, fork.models, engine, goldens, fork.toy.scenario)
+    finished: FinishedExperiment
     (finished,) = runner.run([experiment])
     if engine is fork.engine and finished.record.status is Status.OK:
-        assert finished.mode in (RunMode.FORK, RunMode.GOLDEN), finished.why
+        assert finished.mode in (RunMode.FORK, RunMode.GOLDEN), finished.fallback_reason
     return finished.record
 
 
@@ -80,7 +80,7 @@ def test_a_stopped_run_equals_the_beginning_of_the_complete_run(stopping: Fork) 
     null = build(stopping.manifest, stopping.models, None, always_trigger())
     work = stopping.folder / "warm"
     work.mkdir()
-    warm = ForkEngine(stopping.manifest, work, stopping.limits, null=null, warm=True)
+    warm = ForkEngine(stopping.manifest, work, stopping.limits, null_mutant=null, before_first_step=True)
     engines: tuple[Engine, ...] = (fork.reference, fork, warm)
     stopped, *others = (drive(stopping, one, AfterHazard.STOP) for one in engines)
     assert others == [stopped, stopped]
@@ -170,14 +170,14 @@ def test_a_target_without_a_terminal_hazard_is_refused(stopping: Fork, edit: Edi
 )
 def test_any_terminal_condition_ends_a_run(stopping: Fork, gap: float, speed: float, over: bool) -> None:
     source = stop_source(stopping.toy.manifest("toycar"))
-    assert compiled(source)({"time": 1.0, "gap": gap, "speed": speed}) is over
+    assert compile_stop_condition(source)({"time": 1.0, "gap": gap, "speed": speed}) is over
 
 
 @pytest.mark.parametrize("terminal", ["max(d_rel, speed) <= 90", "min(speed, d_rel, t) > 40"])
 def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edit, terminal: str) -> None:
     edit(MANIFEST, "terminal: speed > 90", f"terminal: '{terminal}'")
     manifest = stopping.toy.manifest("toycar")
-    over = compiled(stop_source(manifest))
+    over = compile_stop_condition(stop_source(manifest))
     for numbers in product((math.nan, 30.0, 50.0, 100.0), repeat=3):
         t, gap, speed = ([number] for number in numbers)
         values = {"t": t, "d_rel": gap, "near": gap, "speed": speed}

@@ -7,24 +7,24 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from mutator.engines import thread_messages
-from mutator.engines.in_target.thread_names import others
+from mutator.engines.in_target.thread_names import other_thread_names
 
 
 def test_the_names_of_all_other_threads_are_found() -> None:
-    before = others()
+    before = other_thread_names()
     done = threading.Event()
     started = [threading.Thread(target=done.wait, name=name) for name in ("poll", "radar")]
     for one in started:
         one.start()
     try:
-        assert sorted([*before, "poll", "radar"]) == others()
+        assert sorted([*before, "poll", "radar"]) == other_thread_names()
     finally:
         done.set()
         for one in started:
             one.join()
     with ThreadPoolExecutor(1) as pool:
         pool.submit(int).result()
-        assert any(name.startswith("ThreadPoolExecutor") for name in others())
+        assert any(name.startswith("ThreadPoolExecutor") for name in other_thread_names())
 
 
 @pytest.mark.parametrize(
@@ -41,5 +41,5 @@ def test_the_names_of_all_other_threads_are_found() -> None:
     ],
 )
 def test_the_message_names_threads_and_remedies(names: list[str], told: str, remedy: str) -> None:
-    assert re.search(told, thread_messages.too_many(names))
-    assert remedy in thread_messages.turned_off(names)
+    assert re.search(told, thread_messages.describe_too_many_threads(names))
+    assert remedy in thread_messages.remedy_for_threads(names)

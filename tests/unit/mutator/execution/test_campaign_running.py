@@ -9,7 +9,7 @@ import pytest
 
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
-from mutator.execution.worker import Assignment, Worker
+from mutator.execution.worker import Worker, WorkerAssignment
 from mutator.workspace import Workspace
 
 WORKER = """
@@ -24,16 +24,16 @@ for piece in pending:
 for sample in proof:
     worker.prove(sample)
 worker.close()
-sys.stdout.buffer.write(pickle.dumps((worker.written, set(sys.modules))))
+sys.stdout.buffer.write(pickle.dumps((worker.file_digests, set(sys.modules))))
 """
 
 
-def assignment_of(session: Session) -> Assignment:
-    return Assignment(
-        run=session.folder.path,
-        name=session.worker_name("mine"),
+def assignment_of(session: Session) -> WorkerAssignment:
+    return WorkerAssignment(
+        run_folder=session.folder.path,
+        worker_name=session.new_worker_name("mine"),
         engine=session.engine,
-        goldens=session.golden_digests,
+        golden_digests=session.golden_digests,
         secret=session.secret,
     )
 
@@ -46,7 +46,7 @@ class InOrder:
         for sample in session.proof:
             worker.prove(sample)
         worker.close()
-        session.written.report(worker.written)
+        session.written.add_report(worker.file_digests)
 
 
 class Elsewhere:
@@ -60,7 +60,7 @@ class Elsewhere:
         command = [sys.executable, "-c", WORKER]
         done = subprocess.run(command, input=pickle.dumps(work), stdout=subprocess.PIPE, check=True)
         written, self.loaded = pickle.loads(done.stdout)
-        session.written.report(written)
+        session.written.add_report(written)
 
 
 class Idle:

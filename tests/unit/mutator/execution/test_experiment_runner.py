@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from mutator.campaigns.plan import build_plan
-from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.engine_jobs import Job, JobResult
 from mutator.errors import MutatorError
-from mutator.execution.experiment_runner import Goldens, Runner
+from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.outcomes import trace_files
 from mutator.preflight.preflight_rules import output_digest_of
@@ -32,22 +32,22 @@ class PlayedEngine:
         self.status = status
         self.outputs = outputs
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
+    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, JobResult]]:
         for job in jobs:
             self.out.mkdir(exist_ok=True)
             write(self.out, **self.outputs.get("trace", {}))
             if "said" in self.outputs:
                 (self.out / "said.json").write_text(json.dumps(self.outputs["said"]))
-            probe = {"mutant": job.mutant, "triggered": None, "injections": self.outputs.get("ran", {})}
+            probe = {"mutant": job.mutant_id, "triggered": None, "injections": self.outputs.get("ran", {})}
             yield (
                 job,
-                Execution(
+                JobResult(
                     status=self.status,
                     detail="" if self.status is Status.OK else "why",
                     out=self.out,
-                    probe=probe,
+                    probe_report=probe,
                     cpu_s=1.0,
-                    active=bool(self.outputs.get("ran")),
+                    was_fault_active=bool(self.outputs.get("ran")),
                     wall_s=2.0,
                 ),
             )
@@ -82,8 +82,8 @@ def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
     def judge(status: Status = Status.OK, **outputs: Any) -> Record:
         outputs = {"said": {"hazards": {}, "alert_events": []}, "trace": {"gas": np.zeros(20)}} | outputs
         engine = PlayedEngine(tmp_path / "faulty", status, outputs)
-        goldens = Goldens(manifest, lambda experiment: tmp_path / "golden")
-        runner = Runner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
+        goldens = LoadedGoldens(manifest, lambda experiment: tmp_path / "golden")
+        runner = ExperimentRunner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
         (finished,) = runner.run([experiment])
         assert finished.experiment == experiment
         assert finished.record.experiment_id == experiment.id
@@ -157,7 +157,7 @@ from mutator.errors import BadTrace
 from mutator.outcomes.trace_files import Importer
 
 def read(request):
-    arrays = IMPORTERS.find("npz").read(request)
+    arrays = IMPORTERS.load("npz").read(request)
     if request.path.parent.name == "faulty":
         return RESULT
     return arrays
@@ -239,8 +239,8 @@ def test_mutants_that_cannot_be_built_are_not_run(toycar: Workspace, tmp_path: P
     manifest = toycar.manifest("toycar")
     experiments: tuple[Experiment, ...] = build_plan(toycar, "hostile").experiments
     engine = PlayedEngine(tmp_path / "faulty", Status.CRASHED, {"ran": RAN})
-    goldens = Goldens(manifest, lambda experiment: tmp_path)
-    runner = Runner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
+    goldens = LoadedGoldens(manifest, lambda experiment: tmp_path)
+    runner = ExperimentRunner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
     records = {f.experiment.fault.fault_type: f.record for f in runner.run(experiments)}
     assert len(records) == len(experiments)
     assert records.pop("unsound").status is Status.INVALID_MUTANT
@@ -265,15 +265,15 @@ def test_nothing_is_compared_with_a_changed_golden_run(
     said: Outputs = {"said": {"hazards": {}, "alert_events": []}, "trace": {"gas": np.zeros(20)}, "ran": RAN}
 
     class Changing(PlayedEngine):
-        def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
+        def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, JobResult]]:
             for job, execution in super().run(jobs):
                 (place / "said.json").write_text("{}")
                 yield job, execution
 
     kind = PlayedEngine if change == "before" else Changing
     engine = kind(tmp_path / "faulty", Status.OK, said)
-    goldens = Goldens(manifest, lambda experiment: place, digests=digests)
-    runner = Runner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
+    goldens = LoadedGoldens(manifest, lambda experiment: place, digests=digests)
+    runner = ExperimentRunner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
     if change == "before":
         (place / "said.json").write_text("{ }")
     with pytest.raises(MutatorError, match="changed while it was in use"):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import Outside
-from mutator.execution.shard_merging import merge
+from mutator.execution.shard_merging import merge_shards
 from mutator.store import file_digests
 from mutator.store.file_digests import FileDigest
 from mutator.workspace import Workspace
@@ -30,7 +30,7 @@ def out(tmp_path: Path) -> Path:
 
 
 def test_a_single_shard_is_merged(shard: Path, out: Path) -> None:
-    assert merge([shard], out) == out / "results.csv"
+    assert merge_shards([shard], out) == out / "results.csv"
 
 
 @pytest.mark.parametrize("name", ["../../setup.py", "golden/../../../setup.py", "setup.py"])
@@ -45,7 +45,7 @@ def test_a_file_that_the_ledger_should_not_name_is_not_copied(shard: Path, out: 
     if mine.resolve().parent != out.resolve():
         mine.resolve().write_text("mine")
     with pytest.raises(Outside, match=r"digests\.json"):
-        merge([shard], out)
+        merge_shards([shard], out)
     assert not mine.resolve().exists() or mine.resolve().read_text() == "mine"
 
 
@@ -54,7 +54,7 @@ def test_a_shard_with_a_link_is_refused(shard: Path, out: Path, name: str) -> No
     shutil.rmtree(shard / name, ignore_errors=True)
     (shard / name).symlink_to(out.parent)
     with pytest.raises(Outside, match=f"{name}: a link"):
-        merge([shard], out)
+        merge_shards([shard], out)
     assert not out.parent.exists()
 
 
@@ -66,5 +66,5 @@ def test_nothing_is_merged_into_a_folder_with_a_link(shard: Path, out: Path, nam
     (mine / "1").write_text("mine")
     (out / name).symlink_to(mine)
     with pytest.raises(Outside, match="a link"):
-        merge([shard], out)
+        merge_shards([shard], out)
     assert [path.read_text() for path in mine.iterdir()] == ["mine"]

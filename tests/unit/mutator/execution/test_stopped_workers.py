@@ -4,7 +4,7 @@ import signal
 import subprocess
 import sys
 
-from mutator.execution.stopped_workers import Continuing
+from mutator.execution.stopped_workers import WorkerContinuer
 
 CHILD = """
 import os, signal
@@ -21,7 +21,7 @@ def test_a_stopped_child_goes_on_and_is_told() -> None:
     ) as child:
         assert child.stdout is not None
         assert child.stdout.readline() == "ready\n"
-        continuing = Continuing()
+        continuing = WorkerContinuer()
         try:
             child.send_signal(signal.SIGSTOP)
             assert child.stdout.readline() == "stopped\n"

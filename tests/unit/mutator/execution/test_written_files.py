@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import pytest
 
-from mutator.execution.pytest_session import Controller
+from mutator.execution.pytest_session import CampaignController
 from mutator.execution.written_files import WrittenFiles
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter
@@ -24,12 +24,12 @@ def write(run: Path) -> WrittenFiles:
     writer, written = LineWriter(run / NAME, {"schema": "x/1"}), WrittenFiles()
     writer.append({"a": 1})
     writer.close()
-    written.report({NAME: writer.sha256})
+    written.add_report({NAME: writer.sha256})
     return written
 
 
 def test_lines_of_a_worker_count(run: Path) -> None:
-    assert write(run).set_others_aside(run) == []
+    assert write(run).set_unreported_aside(run) == []
     assert (run / NAME).exists()
 
 
@@ -37,7 +37,7 @@ def test_lines_that_were_changed_are_set_aside(run: Path) -> None:
     written = write(run)
     lines = (run / NAME).read_bytes()
     (run / NAME).write_bytes(lines + lines)
-    assert written.set_others_aside(run) == [NAME]
+    assert written.set_unreported_aside(run) == [NAME]
     assert (run / "damaged" / NAME).read_bytes() == lines + lines
     assert file_digests.list_segments(run) == []
 
@@ -45,17 +45,17 @@ def test_lines_that_were_changed_are_set_aside(run: Path) -> None:
 def test_lines_of_nobody_are_set_aside_and_lost_lines_are_named(run: Path) -> None:
     written = write(run)
     (run / NAME).rename(run / "records" / "0001-gw7.jsonl")
-    assert written.set_others_aside(run) == ["records/0001-gw7.jsonl", NAME]
+    assert written.set_unreported_aside(run) == ["records/0001-gw7.jsonl", NAME]
 
 
 def test_lines_of_a_worker_count_until_it_reports_others(run: Path) -> None:
     """It reports nothing if it dies, or if the command is interrupted."""
     write(run)
     written = WrittenFiles()
-    written.begin("0001-gw0")
-    assert written.set_others_aside(run) == []
-    written.report({}, "0001-gw0")
-    assert written.set_others_aside(run) == [NAME]
+    written.note_worker_began("0001-gw0")
+    assert written.set_unreported_aside(run) == []
+    written.add_report({}, "0001-gw0")
+    assert written.set_unreported_aside(run) == [NAME]
 
 
 def test_lines_of_workers_count_if_the_command_is_interrupted(run: Path) -> None:
@@ -64,5 +64,5 @@ def test_lines_of_workers_count_if_the_command_is_interrupted(run: Path) -> None
     written = WrittenFiles()
     begun = SimpleNamespace(written=written, worker_input=lambda: {"session": "0001-"})
     node = SimpleNamespace(workerinput={}, gateway=SimpleNamespace(id="gw0"))
-    Controller(cast("Any", begun)).pytest_configure_node(node)
-    assert written.set_others_aside(run) == []
+    CampaignController(cast("Any", begun)).pytest_configure_node(node)
+    assert written.set_unreported_aside(run) == []

@@ -25,18 +25,19 @@ def test_lines_are_recorded_from_the_first_observation(toycar: Workspace, tmp_pa
     engine = ReferenceEngine(manifest, tmp_path, LIMITS)
     plain, noted = (
         engine.execute(
-            Job(name=name, scenario=toycar.scenario("A"), seed=7, lines=name == "noted"), tmp_path / name
+            Job(name=name, scenario=toycar.scenario("A"), seed=7, note_executed_lines=name == "noted"),
+            tmp_path / name,
         )
         for name in ("plain", "noted")
     )
     assert plain.status is noted.status is Status.OK
     assert (plain.out / "log.npz").read_bytes() == (noted.out / "log.npz").read_bytes()
-    assert not plain.lines
+    assert not plain.executed_lines
     sensing = manifest.root / "toycar" / "sensing.py"
-    lines = noted.lines["toycar/sensing.py"]
+    lines = noted.executed_lines["toycar/sensing.py"]
     assert _number(sensing, "gap = world.gap") in lines
     assert _number(sensing, "self.reading = (100.0") not in lines
-    assert "toycar/show.py" not in noted.lines
+    assert "toycar/show.py" not in noted.executed_lines
 
 
 def test_executed_lines_are_cached(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines.engine_jobs import Execution, Raised, Stack
+from mutator.engines.engine_jobs import JobResult, RaisedException, TargetStack
 from mutator.model import RunError, Status
 from mutator.outcomes.failure_cause import run_error, status_by_cause
 
@@ -23,22 +23,22 @@ ELSEWHERE, OBSERVES, PROBE = ("car/can.py", 5, 4), ("car/go.py", 1, 4), ("car/_f
 
 
 def execution(
-    *stacks: Stack,
+    *stacks: TargetStack,
     status: Status = Status.CRASHED,
     active: bool = True,
     kind: str = "ValueError",
     probe: bool = True,
-) -> Execution:
-    raised = Raised(kind=kind, message="no", stacks=stacks) if stacks else None
-    return Execution(
+) -> JobResult:
+    raised = RaisedException(kind=kind, message="no", stacks=stacks) if stacks else None
+    return JobResult(
         status=status,
-        detail=raised.text if raised else "why",
+        detail=raised.description if raised else "why",
         out=Path(),
-        probe={} if probe else None,
+        probe_report={} if probe else None,
         cpu_s=0.0,
         wall_s=0.0,
-        raised=raised,
-        active=active,
+        exception=raised,
+        was_fault_active=active,
     )
 
 
@@ -59,7 +59,7 @@ def execution(
         ((PROBE, ELSEWHERE), Status.HARNESS_ERROR),
     ],
 )
-def test_the_lines_on_the_stack_determine_the_blame(stack: Stack, status: Status) -> None:
+def test_the_lines_on_the_stack_determine_the_blame(stack: TargetStack, status: Status) -> None:
     assert status_by_cause(execution(stack), FILES, ())[0] is status
 
 
@@ -84,7 +84,9 @@ CHANGED = {
         ((("car/radar.py", 2, -1),), Status.CRASHED),
     ],
 )
-def test_the_mutant_is_blamed_only_for_the_injected_part_of_a_line(stack: Stack, status: Status) -> None:
+def test_the_mutant_is_blamed_only_for_the_injected_part_of_a_line(
+    stack: TargetStack, status: Status
+) -> None:
     assert status_by_cause(execution(stack), CHANGED, ())[0] is status
 
 
@@ -150,7 +152,7 @@ def test_an_intended_exception_is_a_crash() -> None:
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
 @pytest.mark.parametrize("stacks", [(), ((TARGET,),), ((INJECTED,),)])
-def test_a_fault_is_not_blamed_before_its_activation(status: Status, stacks: tuple[Stack, ...]) -> None:
+def test_a_fault_is_not_blamed_before_its_activation(status: Status, stacks: tuple[TargetStack, ...]) -> None:
     told = status_by_cause(execution(*stacks, status=status, active=False), FILES, ("0a1b2c3d",))
     assert told[0] is Status.HARNESS_ERROR
     assert told[1].endswith(", before the fault was active")
@@ -183,6 +185,6 @@ def test_a_missing_report_is_a_harness_error() -> None:
 
 
 def test_the_reported_position_is_the_targets_innermost_line() -> None:
-    error = run_error(execution((PROBE, INJECTED, ELSEWHERE)).raised)
+    error = run_error(execution((PROBE, INJECTED, ELSEWHERE)).exception)
     assert error == RunError(kind="ValueError", message="no", place="car/radar.py:5")
     assert run_error(None) is None

@@ -12,7 +12,7 @@ from mutator._common import cached_folders
 from mutator._common.files import json_bytes
 from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
-from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.preflight import preflight_cache
 from mutator.preflight.preflight_checks import run_checks
@@ -52,7 +52,7 @@ def only_golden_runs_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Refuse second golden runs, null mutants and the canary, which only checks that are not cached need."""
     genuine = ReferenceEngine.execute
 
-    def execute(engine: ReferenceEngine, job: Job, folder: Path) -> Execution:
+    def execute(engine: ReferenceEngine, job: Job, folder: Path) -> JobResult:
         if not job.name.startswith("a-"):
             raise RunStarted
         return genuine(engine, job, folder)

@@ -151,7 +151,7 @@ def test_complete_partial_and_missing_proofs_are_distinguished(
 def test_a_large_campaign_without_forks_has_no_note_on_its_size(
     finish: Finish, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine_summary, "WORTH_IT", 4)
+    monkeypatch.setattr(engine_summary, "MIN_EXPERIMENTS_TO_FORK", 4)
     told = summary(finish(None))
     assert told is not None
     assert told.proof.endswith("so no equivalence check is needed.")

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from mutator._common import shared_cache
-from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.review import effect_pictures
@@ -37,7 +37,7 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     made: list[str] = []
     execute = ReferenceEngine.execute
 
-    def noted(engine: ReferenceEngine, job: Job, folder: Path) -> Execution:
+    def noted(engine: ReferenceEngine, job: Job, folder: Path) -> JobResult:
         made.append(job.name)
         return execute(engine, job, folder)
 

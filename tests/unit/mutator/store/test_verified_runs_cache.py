@@ -9,7 +9,7 @@ import pytest
 from mutator._common import shared_cache
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
-from mutator.execution.finished_run_cache import ended_before
+from mutator.execution.finished_run_cache import find_finished_run
 from mutator.store import file_digests, integrity, verified_runs_cache
 from mutator.store.patch_files import PatchFolder
 from mutator.store.patch_files import rewrite_patch_file as rewrite_patches
@@ -58,7 +58,7 @@ def test_a_verified_run_is_only_compared_byte_for_byte(
 ) -> None:
     workspace, run = made
     first = run_campaign(workspace, "small", run)
-    assert ended_before(RunFolder.open(run)) is not None
+    assert find_finished_run(RunFolder.open(run)) is not None
 
     def look(*arguments: object) -> None:
         raise AssertionError("verified again")

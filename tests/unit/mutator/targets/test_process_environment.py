@@ -29,7 +29,7 @@ def test_reference_runs_and_the_fork_server_have_the_variables(fork: Fork) -> No
     (fork.toy.library.parent / "tree" / "toycar" / "__init__.py").write_text(USE)
     job = fork.job(trigger_at_time(2.0))
     forked = fork.run(job)
-    assert (forked.status, forked.mode, forked.why) == (Status.OK, RunMode.FORK, "")
+    assert (forked.status, forked.mode, forked.fallback_reason) == (Status.OK, RunMode.FORK, "")
     plain = fork.engine.reference.execute(job, fork.folder / "plain")
     assert plain.status is Status.OK, plain.detail
 

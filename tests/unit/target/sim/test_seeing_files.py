@@ -18,7 +18,7 @@ from selfdrive.sim.road_renderer import RoadRenderer
 
 from mutator._common import shared_cache
 from mutator.engines.engine_jobs import Job
-from mutator.engines.job_tree_pool import BaseTree
+from mutator.engines.job_tree_pool import JobTreePool
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Status
 from mutator.mutants.mutant_building import build
@@ -62,13 +62,13 @@ def drive(tmp_path: Path) -> Drive:
             name="job",
             scenario=workspace.scenario("S1"),
             seed=0,
-            files=made.files,
-            mutant=made.id,
-            injections=made.injection_ids,
+            changed_files=made.files,
+            mutant_id=made.id,
+            injection_ids=made.injection_ids,
         )
         execution = engine.execute(job, work / str(next(numbers)))
-        assert execution.status is Status.OK and execution.probe, execution.detail
-        return (execution.out / "record.json").read_text(), json.dumps(execution.probe["injections"])
+        assert execution.status is Status.OK and execution.probe_report, execution.detail
+        return (execution.out / "record.json").read_text(), json.dumps(execution.probe_report["injections"])
 
     return driven
 
@@ -123,7 +123,7 @@ def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
     If a header were missing, for example, the slow Python code would run.
     """
     manifest, target = Workspace.find(root=ROOT).manifest("openpilot"), ROOT / "target"
-    tree = BaseTree(manifest.tree, tmp_path).lay_out(tmp_path / "tree", {}).place
+    tree = JobTreePool(manifest.tree, tmp_path).lay_out_tree(tmp_path / "tree", {}).folder
     found = {
         source.name: (compiled.file_name(source), compiled.file_name(tree / source.relative_to(target)))
         for source in target.rglob("*.c")

@@ -11,7 +11,12 @@ from typing import Any
 
 import pytest
 
-from mutator.engines.in_target.run_once import asked, describe, imported_since, note_activation
+from mutator.engines.in_target.run_once import (
+    collect_probe_report,
+    delete_marker_on_activation,
+    describe_failure,
+    modules_imported_since,
+)
 
 TREE = "/tree"
 CODE = {
@@ -68,14 +73,14 @@ class StepLimit(RuntimeError):
 def test_modules_imported_after_a_given_module_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("early", "_fi", "late"):
         monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
-    assert imported_since("_fi") == ["late", "_fi"]
+    assert modules_imported_since("_fi") == ["late", "_fi"]
     monkeypatch.delitem(sys.modules, "early")
     monkeypatch.setitem(sys.modules, "early", types.ModuleType("early"))
-    assert imported_since("_fi") == ["early", "late", "_fi"]
+    assert modules_imported_since("_fi") == ["early", "late", "_fi"]
 
 
 def test_without_the_probe_all_modules_are_listed() -> None:
-    assert set(imported_since("never.imported")) == set(sys.modules)
+    assert set(modules_imported_since("never.imported")) == set(sys.modules)
 
 
 @pytest.fixture
@@ -89,7 +94,7 @@ def described() -> Callable[..., dict[str, Any]]:
         try:
             names["outside"](lambda: names[name](*arguments))
         except BaseException as err:
-            return describe(err, TREE, "car._fi")
+            return describe_failure(err, TREE, "car._fi")
         raise AssertionError
 
     return describe_call
@@ -145,13 +150,13 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     ],
 )
 def test_a_full_disk_is_recognized_in_errors_and_their_causes(error: Exception, is_told: bool) -> None:
-    assert describe(error, TREE, None)["disk_full"] is is_told
+    assert describe_failure(error, TREE, None)["disk_full"] is is_told
     later = ValueError("later")
     later.__cause__ = KeyError("x")
     later.__cause__.__cause__ = later
-    assert not describe(later, TREE, None)["disk_full"]
+    assert not describe_failure(later, TREE, None)["disk_full"]
     later.__cause__.__context__ = error
-    assert describe(later, TREE, None)["disk_full"] is is_told
+    assert describe_failure(later, TREE, None)["disk_full"] is is_told
 
 
 def test_a_full_disk_in_an_exception_group_is_recognized(described: Callable[..., dict[str, Any]]) -> None:
@@ -165,7 +170,7 @@ def test_the_first_activation_deletes_a_file(tmp_path: Path) -> None:
     answers = [False, False, True, False]
     original = lambda fi: answers.pop(0)  # noqa: E731
     probe = types.SimpleNamespace(active=original)
-    note_activation(probe, str(inactive))
+    delete_marker_on_activation(probe, str(inactive))
     for active, there in ((False, True), (False, True), (True, False)):
         assert probe.active("a") is active
         assert inactive.exists() is there
@@ -174,9 +179,9 @@ def test_the_first_activation_deletes_a_file(tmp_path: Path) -> None:
 
 def test_the_probes_report_is_passed_on() -> None:
     probe = types.SimpleNamespace(report=lambda: {"mutant": "m"})
-    assert asked(probe, TREE, "car._fi") == {"probe": {"mutant": "m"}}
+    assert collect_probe_report(probe, TREE, "car._fi") == {"probe": {"mutant": "m"}}
     probe.report = lambda: object()
-    assert not isinstance(asked(probe, TREE, "car._fi")["probe"], dict)
+    assert not isinstance(collect_probe_report(probe, TREE, "car._fi")["probe"], dict)
     probe.report = lambda: 1 / 0
-    told = asked(probe, TREE, "car._fi")
+    told = collect_probe_report(probe, TREE, "car._fi")
     assert (told["probe"], told["ended"], told["error"]["kind"]) == (None, "error", "ZeroDivisionError")

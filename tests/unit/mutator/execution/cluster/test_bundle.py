@@ -10,9 +10,9 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.execution.cluster import bundle
-from mutator.execution.cluster.bundle import Bundle, lay_out, read_inputs
-from mutator.execution.cluster.parcel import pack, unpack
-from mutator.execution.cluster.unpacked_bundle import Site
+from mutator.execution.cluster.bundle import Bundle, load_run_inputs, unpack_bundle
+from mutator.execution.cluster.parcel import pack_parcel, unpack_parcel
+from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.session import open_session
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
@@ -57,7 +57,7 @@ def test_a_bundle_has_the_tree_the_templates_and_what_arguments_name(prepared: P
     (root / "other.txt").write_text("not named")
     (workspace.templates / ".env").write_text("TOKEN=1")
     with_argument(workspace, "{root}/data")
-    parts = unpack(Bundle.of(workspace, folder, "reference").data)
+    parts = unpack_parcel(Bundle.pack_for_run(workspace, folder, "reference").data)
     tree = workspace.manifest("toycar").tree
     assert {name for name in parts if name.startswith("target/")} == {
         *(f"target/{name}" for name in tree.files),
@@ -90,7 +90,7 @@ def test_a_file_outside_the_root_is_not_packed(prepared: Prepared, argument: str
     (root / "data" / "more").symlink_to(notes)
     with_argument(workspace, argument)
     with pytest.raises(MutatorError, match=r"toycar\.yaml:\d+: ") as caught:
-        Bundle.of(workspace, folder, "reference")
+        Bundle.pack_for_run(workspace, folder, "reference")
     assert "secret" not in str(caught.value)
 
 
@@ -98,7 +98,7 @@ def test_a_linked_template_is_not_packed(prepared: Prepared) -> None:
     workspace, folder = prepared
     (workspace.templates / "more.py.j2").symlink_to(folder.path.parent / "notes.txt")
     with pytest.raises(MutatorError, match="a link that leads out of its folder"):
-        Bundle.of(workspace, folder, "reference")
+        Bundle.pack_for_run(workspace, folder, "reference")
 
 
 def test_two_names_that_differ_only_in_case_are_refused(prepared: Prepared) -> None:
@@ -109,7 +109,7 @@ def test_two_names_that_differ_only_in_case_are_refused(prepared: Prepared) -> N
         (root / "data" / name).write_bytes(b"1")
     with_argument(workspace, "{root}/data")
     with pytest.raises(MutatorError, match=r"target/data/Map\.npz and target/data/map\.npz"):
-        Bundle.of(workspace, folder, "reference")
+        Bundle.pack_for_run(workspace, folder, "reference")
 
 
 def test_a_huge_file_is_refused_unread(prepared: Prepared) -> None:
@@ -119,7 +119,7 @@ def test_a_huge_file_is_refused_unread(prepared: Prepared) -> None:
     os.truncate(data, 4_000_000_000_000)
     with_argument(workspace, "{root}/data")
     with pytest.raises(MutatorError, match=r"data: 4000\.0 GB for each worker .* expected at most 2 GB"):
-        Bundle.of(workspace, folder, "reference")
+        Bundle.pack_for_run(workspace, folder, "reference")
 
 
 def names_below(folder: Path) -> Iterator[str]:
@@ -150,7 +150,7 @@ def test_a_bundle_that_arrives_with_another_name_is_not_written(tmp_path: Path, 
     place = tmp_path / "work" / "place"
     place.mkdir(parents=True)
     with pytest.raises(MutatorError):
-        lay_out(pack({"meta.json": b"{}", name: b"x"}), place)
+        unpack_bundle(pack_parcel({"meta.json": b"{}", name: b"x"}), place)
     assert list(names_below(tmp_path)) == ["work", "work/place"]
 
 
@@ -160,9 +160,9 @@ def test_a_bundle_that_arrives_with_another_name_is_not_written(tmp_path: Path, 
 def test_a_bundle_that_no_command_packs_is_not_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: dict[str, bytes]
 ) -> None:
-    monkeypatch.setattr(bundle, "MOST_BYTES", 5)
+    monkeypatch.setattr(bundle, "MOST_BUNDLE_BYTES", 5)
     with pytest.raises(MutatorError):
-        lay_out(pack(parts), tmp_path)
+        unpack_bundle(pack_parcel(parts), tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -185,12 +185,12 @@ def test_a_bundle_that_no_command_packs_is_not_written(
 def test_a_description_that_names_other_files_is_refused(
     prepared: Prepared, tmp_path: Path, key: str, value: object
 ) -> None:
-    data = unpack(Bundle.of(*prepared, "reference").data)
+    data = unpack_parcel(Bundle.pack_for_run(*prepared, "reference").data)
     data["meta.json"] = json.dumps(json.loads(data["meta.json"]) | {key: value}).encode()
     place = tmp_path / "place"
     place.mkdir()
-    lay_out(pack(data), place)
+    unpack_bundle(pack_parcel(data), place)
     with pytest.raises(MutatorError, match=r"meta\.json"):
-        read_inputs(Site(place))
+        load_run_inputs(UnpackedBundle(place))
     with pytest.raises(MutatorError):
-        Site(place).scenario("../../notes")
+        UnpackedBundle(place).scenario_path("../../notes")

@@ -15,23 +15,28 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.execution.cluster import cluster_choice, dask_connections
-from mutator.execution.cluster.cluster_choice import Local, Scheduler, Where, parse
+from mutator.execution.cluster.cluster_choice import (
+    ClusterChoice,
+    NewLocalCluster,
+    RunningScheduler,
+    parse_cluster_choice,
+)
 
 from .loops import run
 
 
-async def opened(place: Where, insecure: bool = False) -> None:
+async def opened(place: ClusterChoice, insecure: bool = False) -> None:
     async with place.open(insecure=insecure):
         pass
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:8786", "tls://far.example:1", "tls://[::1]:8786"])
 def test_tcp_and_tls_addresses_are_accepted(address: str) -> None:
-    assert parse(address) == Scheduler(address=address)
+    assert parse_cluster_choice(address) == RunningScheduler(address=address)
 
 
 def test_local_is_followed_by_the_number_of_workers() -> None:
-    assert parse("local:4") == Local(workers=4)
+    assert parse_cluster_choice("local:4") == NewLocalCluster(worker_count=4)
 
 
 @pytest.mark.parametrize(
@@ -43,7 +48,7 @@ def test_local_is_followed_by_the_number_of_workers() -> None:
 )
 def test_an_invalid_value_of_where_is_refused(text: str) -> None:
     with pytest.raises(MutatorError) as caught:
-        parse(text)
+        parse_cluster_choice(text)
     assert caught.value.argument == "cluster"
     assert text in caught.value.got
     assert caught.value.expected
@@ -51,7 +56,7 @@ def test_an_invalid_value_of_where_is_refused(text: str) -> None:
 
 def test_parsing_needs_no_dask() -> None:
     code = (
-        "import sys; from mutator.execution.cluster.cluster_choice import parse; "
+        "import sys; from mutator.execution.cluster.cluster_choice import parse_cluster_choice as parse; "
         "parse('local:2'); print(*sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -62,8 +67,8 @@ def test_the_address_is_read_from_a_scheduler_file(tmp_path: Path) -> None:
     """`dask scheduler --scheduler-file` writes the file."""
     file = tmp_path / "scheduler.json"
     file.write_text(json.dumps({"type": "Scheduler", "address": "tcp://10.0.0.1:8786", "workers": {}}))
-    found = parse(str(file))
-    assert found == Scheduler(address="tcp://10.0.0.1:8786", file=file)
+    found = parse_cluster_choice(str(file))
+    assert found == RunningScheduler(address="tcp://10.0.0.1:8786", address_file=file)
     with pytest.raises(MutatorError, match=r"scheduler.json: tcp://10.0.0.1:8786 is neither"):
         run(opened(found))
 
@@ -74,10 +79,10 @@ def test_the_address_is_read_from_a_scheduler_file(tmp_path: Path) -> None:
 def test_the_error_names_an_invalid_scheduler_file(text: str, tmp_path: Path) -> None:
     file = tmp_path / "scheduler.json"
     with pytest.raises(MutatorError, match=r"scheduler.json: cannot be read"):
-        parse(str(file))
+        parse_cluster_choice(str(file))
     file.write_text(text, encoding="latin-1")
     with pytest.raises(MutatorError, match=r"scheduler.json: (not a scheduler file|address ')"):
-        parse(str(file))
+        parse_cluster_choice(str(file))
 
 
 @pytest.mark.parametrize(
@@ -96,7 +101,7 @@ def test_the_error_names_an_invalid_scheduler_file(text: str, tmp_path: Path) ->
     ],
 )
 def test_only_loopback_and_tls_addresses_are_private(address: str, closed: bool) -> None:
-    assert dask_connections.is_closed(address) is closed
+    assert dask_connections.is_closed_to_others(address) is closed
 
 
 def test_an_open_network_is_refused_before_connecting(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,7 +109,7 @@ def test_an_open_network_is_refused_before_connecting(monkeypatch: pytest.Monkey
     with pytest.raises(
         MutatorError, match=r"neither encrypted nor on the loopback.*tls://.*`insecure_network`"
     ):
-        run(opened(parse("tcp://10.0.0.1:8786")))
+        run(opened(parse_cluster_choice("tcp://10.0.0.1:8786")))
 
 
 def test_a_loopback_address_of_a_scheduler_that_listens_elsewhere_is_refused(
@@ -114,26 +119,26 @@ def test_a_loopback_address_of_a_scheduler_that_listens_elsewhere_is_refused(
     async def found(*given: Any, **more: Any) -> AsyncIterator[Any]:
         yield SimpleNamespace(scheduler_info=lambda: {"address": "tcp://10.0.0.5:8786"})
 
-    monkeypatch.setattr(cluster_choice, "connected", found)
+    monkeypatch.setattr(cluster_choice, "connected_client", found)
     with pytest.raises(MutatorError, match=r"127.0.0.1:8786 \(a scheduler that listens at tcp://10.0.0.5"):
-        run(opened(parse("tcp://127.0.0.1:8786")))
-    run(opened(parse("tcp://127.0.0.1:8786"), insecure=True))
+        run(opened(parse_cluster_choice("tcp://127.0.0.1:8786")))
+    run(opened(parse_cluster_choice("tcp://127.0.0.1:8786"), insecure=True))
 
 
 def test_without_dask_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     for text in ("local:1", "tcp://127.0.0.1:1"):
         with pytest.raises(MutatorError, match=r"distributed is not installed; pip install '.\[cluster\]'"):
-            run(opened(parse(text)))
+            run(opened(parse_cluster_choice(text)))
 
 
 def test_a_scheduler_that_does_not_answer_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dask_connections, "CONNECT_S", 2.0)
+    monkeypatch.setattr(dask_connections, "CONNECT_TIMEOUT_S", 2.0)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))  # bound but not listening
         address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(MutatorError, match=rf"no Dask scheduler answers at {address} \(.*refused"):
-            run(opened(parse(address)))
+            run(opened(parse_cluster_choice(address)))
 
 
 def test_missing_certificates_are_an_error_with_a_remedy() -> None:
@@ -142,18 +147,18 @@ def test_missing_certificates_are_an_error_with_a_remedy() -> None:
     with pytest.raises(
         MutatorError, match=r"tls:// without certificates; .*DASK_DISTRIBUTED__COMM__TLS__CA_FILE"
     ):
-        run(opened(parse("tls://127.0.0.1:1")))
+        run(opened(parse_cluster_choice("tls://127.0.0.1:1")))
     files = {"ca-file": "/no/ca.pem", "client.cert": "/no/cert.pem", "client.key": "/no/key.pem"}
     with (
         dask.config.set({f"distributed.comm.tls.{key}": file for key, file in files.items()}),
         pytest.raises(MutatorError, match="unusable TLS certificates"),
     ):
-        run(opened(parse("tls://127.0.0.1:1")))
+        run(opened(parse_cluster_choice("tls://127.0.0.1:1")))
 
 
 def test_local_workers_run_and_end() -> None:
     async def used() -> tuple[str, dict[str, int], int, str]:
-        async with parse("local:1").open(insecure=False) as client:
+        async with parse_cluster_choice("local:1").open(insecure=False) as client:
             await client.wait_for_workers(1)
             found = await client.run(lambda dask_worker: (os.getpid(), dask_worker.local_directory))
             [(pid, folder)] = found.values()

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.execution.cluster.cluster_choice import parse
+from mutator.execution.cluster.cluster_choice import parse_cluster_choice
 
 from .loops import run
 
@@ -28,7 +28,7 @@ async def opened(folder: Path, text: str, insecure: bool = False) -> str:
     """Open the cluster that a file with this text describes, and return the address of its dashboard."""
     file = folder / "some.yaml"
     file.write_text(text)
-    async with parse(str(file)).open(insecure=insecure) as client:
+    async with parse_cluster_choice(str(file)).open(insecure=insecure) as client:
         return str(client.dashboard_link)
 
 
@@ -88,8 +88,8 @@ def test_the_signal_handler_of_dask_jobqueue_is_not_installed() -> None:
     """The handler works only in the main thread."""
     code = (
         "import signal, threading\n"
-        "from mutator.execution.cluster.cluster_files import _class\n"
-        "thread = threading.Thread(target=lambda: print(_class('slurm').__name__))\n"
+        "from mutator.execution.cluster.cluster_files import _cluster_class\n"
+        "thread = threading.Thread(target=lambda: print(_cluster_class('slurm').__name__))\n"
         "thread.start(); thread.join()\n"
         "assert signal.getsignal(signal.SIGINT) is signal.default_int_handler\n"
     )

@@ -3,7 +3,7 @@
 import pytest
 
 from mutator._common.version import VERSION
-from mutator.execution.cluster.crew import Crew, describe
+from mutator.execution.cluster.crew import Crew, describe_worker
 from mutator.store.work_stretches import Stretch
 
 FACTS = {
@@ -30,32 +30,32 @@ STRETCH = Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform
     ],
 )
 def test_a_worker_with_other_versions_is_refused(change: dict[str, object], objection: str) -> None:
-    assert Crew(STRETCH, accept=False).objection(FACTS | change) == objection
+    assert Crew(STRETCH, accept=False).reason_to_refuse(FACTS | change) == objection
 
 
 def test_other_versions_can_be_accepted() -> None:
     crew = Crew(STRETCH, accept=True)
-    assert crew.objection(FACTS | {"packages": {"numpy": "1.0"}}) == ""
-    assert crew.objection(FACTS | {"mutator": "0.0.1"})
+    assert crew.reason_to_refuse(FACTS | {"packages": {"numpy": "1.0"}}) == ""
+    assert crew.reason_to_refuse(FACTS | {"mutator": "0.0.1"})
 
 
 def test_the_rate_of_each_machine_is_reported() -> None:
     now = [0.0]
     crew = Crew(STRETCH, accept=False, now=lambda: now[0])
     for name, host in (("a", "alpha"), ("b", "alpha"), ("c", "beta")):
-        crew.let_in(name, FACTS | {"host": host})
+        crew.admit_worker(name, FACTS | {"host": host})
     for _ in range(3):
         now[0] += 2.0
-        crew.finished("a", 4)
-        crew.finished("b", 2)
-    crew.refuse("d", "numpy 1.0")
-    assert crew.told() == "3 workers on alpha (3.0 a second), beta; 1 refused"
-    crew.leave("c")
-    assert crew.told().startswith("2 workers on alpha")
+        crew.note_finished_piece("a", 4)
+        crew.note_finished_piece("b", 2)
+    crew.refuse_worker("d", "numpy 1.0")
+    assert crew.describe_workers() == "3 workers on alpha (3.0 a second), beta; 1 refused"
+    crew.remove_worker("c")
+    assert crew.describe_workers().startswith("2 workers on alpha")
 
 
 def test_a_worker_is_described_by_its_machine_and_versions() -> None:
-    assert describe("w", FACTS) == (
+    assert describe_worker("w", FACTS) == (
         f"w (alpha, AMD EPYC, CPython 3.11.7, mutator {VERSION}, openblas 0.3.31 (Zen))"
     )
-    assert describe("w", {}) == "w"
+    assert describe_worker("w", {}) == "w"

@@ -6,24 +6,24 @@ from hashlib import sha256
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.execution.cluster.parcel import pack, unpack
-from mutator.execution.cluster.pieces import Ending, Result
+from mutator.execution.cluster.parcel import pack_parcel, unpack_parcel
+from mutator.execution.cluster.pieces import PieceEnding, PieceResult
 
 
 def test_parts_are_read_back_in_order() -> None:
     parts = {"a": b"", "b/c": bytes(range(256)), "line": b"x\ny"}
-    assert unpack(pack(parts)) == parts
-    assert list(unpack(pack(parts))) == list(parts)
+    assert unpack_parcel(pack_parcel(parts)) == parts
+    assert list(unpack_parcel(pack_parcel(parts))) == list(parts)
 
 
 def test_any_damage_is_detected() -> None:
-    data, draw = pack({"a": b"some bytes", "b": b"more"}), random.Random(1)
+    data, draw = pack_parcel({"a": b"some bytes", "b": b"more"}), random.Random(1)
     for _ in range(100):
         at = draw.randrange(len(data))
         changed = data[:at] + bytes([data[at] ^ 1 << draw.randrange(8)]) + data[at + 1 :]
         for wrong in (changed, data[:at], data + b"x"):
             with pytest.raises(MutatorError, match="damaged parcel"):
-                unpack(wrong)
+                unpack_parcel(wrong)
 
 
 @pytest.mark.parametrize(
@@ -44,13 +44,13 @@ def test_a_parcel_whose_head_does_not_fit_is_refused(head: bytes) -> None:
     """Its digest is right: somebody made it so."""
     body = len(head).to_bytes(4, "little") + head + b"xx"
     with pytest.raises(MutatorError, match="damaged parcel"):
-        unpack(b"FIP1" + sha256(body).digest() + body)
+        unpack_parcel(b"FIP1" + sha256(body).digest() + body)
 
 
 def test_a_result_is_read_back_unchanged() -> None:
-    result = Result(
+    result = PieceResult(
         number=7,
-        ending=Ending.DONE,
+        ending=PieceEnding.FINISHED,
         seconds=1.5,
         forked=True,
         records=(b'{"a":1}', b'{"b":"\xc3\xa4"}'),
@@ -59,4 +59,4 @@ def test_a_result_is_read_back_unchanged() -> None:
         series=b"\n\n",
         series_of=("S1", "S1+alone@2"),
     )
-    assert Result.of(result.packed()) == result
+    assert PieceResult.from_bytes(result.to_bytes()) == result

@@ -21,11 +21,11 @@ from mutator.campaigns.run_provenance import append_stretch
 from mutator.errors import MutatorWarning
 from mutator.execution.cluster import cluster_distributor
 from mutator.execution.cluster.bundle import Bundle
-from mutator.execution.cluster.cluster_distributor import ClusterWorkers
+from mutator.execution.cluster.cluster_distributor import ClusterDistributor
 from mutator.execution.cluster.crew import Crew
-from mutator.execution.cluster.pieces import Ending, Piece, Result
-from mutator.execution.cluster.result_intake import Intake
-from mutator.execution.cluster.work_dispatcher import Deal
+from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceResult
+from mutator.execution.cluster.result_intake import ResultIntake
+from mutator.execution.cluster.work_dispatcher import WorkDispatcher
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record, Status
 from mutator.store import plan_file
@@ -36,29 +36,31 @@ from mutator.workspace import Workspace
 from .loops import run
 
 FACTS = {"host": "here", "cpu": "", "platform": "", "python": "", "mutator": "", "blas": [], "packages": {}}
-Work = Callable[[Piece], Result]
+Work = Callable[[Piece], PieceResult]
 
 
-def healthy(piece: Piece) -> Result:
+def healthy(piece: Piece) -> PieceResult:
     line = {"detail": "", "hazards": [], "max_dev": [], "outcome": "masked", "status": "ok", "tree": ""}
     line |= {"activation": None, "alerts": [], "t_manifest": None, "trace_digest": ""}
-    records = [json.dumps({"experiment_id": name} | line, separators=(",", ":")) for name in piece.lines]
-    return Result(
+    records = [json.dumps({"experiment_id": name} | line, separators=(",", ":")) for name in piece.plan_lines]
+    return PieceResult(
         number=piece.number,
-        ending=Ending.DONE,
-        seconds=0.5 * piece.runs,
+        ending=PieceEnding.FINISHED,
+        seconds=0.5 * piece.run_count,
         records=tuple(text.encode() for text in records),
     )
 
 
-def sick(ending: Ending, deadly: str = "") -> Work:
+def sick(ending: PieceEnding, deadly: str = "") -> Work:
     """Make a worker on which every piece, or only a piece with the experiment `deadly`, has the given
     ending."""
 
-    def work(piece: Piece) -> Result:
-        if deadly and deadly not in piece.lines:
+    def work(piece: Piece) -> PieceResult:
+        if deadly and deadly not in piece.plan_lines:
             return healthy(piece)
-        return Result(number=piece.number, ending=ending, text="the reason", at=deadly or piece.ids[0])
+        return PieceResult(
+            number=piece.number, ending=ending, text="the reason", at=deadly or piece.experiment_ids[0]
+        )
 
     return work
 
@@ -97,7 +99,7 @@ class Workers:
     ) -> Answer:
         future = asyncio.get_running_loop().create_future()
         self._open.append(future)
-        if function.__name__ == "work":
+        if function.__name__ == "run_piece":
             name = workers[0].removeprefix("tcp://")
             self.began.append(name)
             asyncio.get_running_loop().call_later(
@@ -107,13 +109,13 @@ class Workers:
                 for one in self._open:
                     if not one.done():
                         one.set_exception(FutureCancelledError("some", "lost"))
-        elif function.__name__ != "attend":
-            future.set_result(FACTS if function.__name__ == "facts" else None)
+        elif function.__name__ != "attend_run":
+            future.set_result(FACTS if function.__name__ == "machine_facts" else None)
         return Answer(future)
 
     def _end(self, future: "asyncio.Future[Any]", name: str, piece: bytes) -> None:
         if not future.done():
-            future.set_result(self.workers[name](Piece.of(piece)).packed())
+            future.set_result(self.workers[name](Piece.from_bytes(piece)).to_bytes())
 
 
 @pytest.fixture
@@ -124,8 +126,8 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 @pytest.fixture
 def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> Any:
     """A session in which every experiment is pending, and the versions of workers are not checked."""
-    monkeypatch.setattr(Bundle, "of", lambda *given: Bundle(b"", ""))
-    monkeypatch.setattr(Crew, "objection", lambda *given: "")
+    monkeypatch.setattr(Bundle, "pack_for_run", lambda *given: Bundle(b"", ""))
+    monkeypatch.setattr(Crew, "reason_to_refuse", lambda *given: "")
     folder = append_stretch(folder, Stretch(python="", packages={}, platform=""))
     return SimpleNamespace(
         workspace=toycar,
@@ -135,12 +137,12 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
         proof=(),
         engine="fork",
         accept_versions=True,
-        worker_name=lambda name: f"0001-{name}",
+        new_worker_name=lambda name: f"0001-{name}",
         written=WrittenFiles(),
         note_machine=lambda machine: None,
         problem="",
         interrupted=False,
-        working="",
+        workers_note="",
     )
 
 
@@ -150,7 +152,7 @@ def dealt(session: Any, workers: Workers, queued: int | None = None) -> tuple[di
     async def deal() -> None:
         client: Any = workers
         async with asyncio.timeout(20.0):
-            await Deal(session, client, remarks.append, queued=queued).run()
+            await WorkDispatcher(session, client, remarks.append, expected_workers=queued).run()
 
     run(deal())
     return dict(session.folder.records()), remarks
@@ -160,8 +162,16 @@ def errors(records: dict[str, Record]) -> list[str]:
     return [name for name, one in records.items() if one.status is Status.HARNESS_ERROR]
 
 
-@pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED, Ending.UNFIT, Ending.UNLIKE])
-def test_no_experiment_is_blamed_for_a_failing_worker(session: Any, ending: Ending) -> None:
+@pytest.mark.parametrize(
+    "ending",
+    [
+        PieceEnding.PROCESS_DIED,
+        PieceEnding.HARNESS_FAILED,
+        PieceEnding.WORKER_UNFIT,
+        PieceEnding.GOLDEN_DIFFERS,
+    ],
+)
+def test_no_experiment_is_blamed_for_a_failing_worker(session: Any, ending: PieceEnding) -> None:
     workers = Workers(odd=sick(ending), alpha=healthy)
     workers.seconds["alpha"] = (
         0.2  # otherwise, it finishes everything before the other has failed often enough
@@ -171,8 +181,8 @@ def test_no_experiment_is_blamed_for_a_failing_worker(session: Any, ending: Endi
     assert [one for one in remarks if one.startswith("worker odd at ") and one.endswith("the reason")]
 
 
-@pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED])
-def test_an_experiment_that_fails_everywhere_is_a_harness_error(session: Any, ending: Ending) -> None:
+@pytest.mark.parametrize("ending", [PieceEnding.PROCESS_DIED, PieceEnding.HARNESS_FAILED])
+def test_an_experiment_that_fails_everywhere_is_a_harness_error(session: Any, ending: PieceEnding) -> None:
     deadly = list(plan_file.ids(session.folder.path))[5]
     records, remarks = dealt(session, Workers(alpha=sick(ending, deadly), beta=sick(ending, deadly)))
     assert (len(records), errors(records), session.problem, remarks) == (12, [deadly], "", [])
@@ -188,7 +198,7 @@ def test_work_is_submitted_again_after_a_lost_connection(session: Any) -> None:
 
 
 def test_work_waits_for_a_queued_worker_after_a_refusal(session: Any) -> None:
-    workers = Workers(odd=sick(Ending.UNLIKE))
+    workers = Workers(odd=sick(PieceEnding.GOLDEN_DIFFERS))
 
     async def late() -> None:
         await asyncio.sleep(1.5)
@@ -198,14 +208,14 @@ def test_work_waits_for_a_queued_worker_after_a_refusal(session: Any) -> None:
         client: Any = workers
         async with asyncio.timeout(20.0), asyncio.TaskGroup() as group:
             group.create_task(late())
-            group.create_task(Deal(session, client, lambda remark: None, queued=2).run())
+            group.create_task(WorkDispatcher(session, client, lambda remark: None, expected_workers=2).run())
 
     run(deal())
     assert (len(session.folder.records()), session.problem) == (12, "")
 
 
 def test_without_a_queue_a_refused_worker_ends_the_command(session: Any) -> None:
-    dealt(session, Workers(odd=sick(Ending.UNLIKE)))
+    dealt(session, Workers(odd=sick(PieceEnding.GOLDEN_DIFFERS)))
     assert session.problem == "no worker is left to do the work: the reason"
 
 
@@ -225,10 +235,10 @@ def test_no_experiment_is_given_up_while_results_are_written(
 
         return call
 
-    for name in ("take", "give_up"):
-        monkeypatch.setattr(Intake, name, slow(getattr(Intake, name)))
+    for name in ("append_result", "append_harness_errors"):
+        monkeypatch.setattr(ResultIntake, name, slow(getattr(ResultIntake, name)))
     deadly = next(iter(plan_file.ids(session.folder.path)))
-    work = sick(Ending.DIED, deadly)
+    work = sick(PieceEnding.PROCESS_DIED, deadly)
     records, _ = dealt(session, Workers(alpha=work, beta=work, gamma=work))
     assert errors(records) == [deadly]
     assert most == [1]
@@ -248,9 +258,9 @@ def test_an_error_in_a_remark_ends_the_work(session: Any, monkeypatch: pytest.Mo
             self._remark("something")
             await asyncio.sleep(60.0)
 
-    monkeypatch.setattr(cluster_distributor, "Deal", Remarking)
+    monkeypatch.setattr(cluster_distributor, "WorkDispatcher", Remarking)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises(MutatorWarning, match="something"):
-            ClusterWorkers(Place()).run(session)
+            ClusterDistributor(Place()).run(session)
     assert not [one for one in threading.enumerate() if one.name == "cluster" and one.is_alive()]

@@ -13,18 +13,18 @@ import pytest
 
 from mutator.errors import MutatorError, PieceNotWanted
 from mutator.execution.cluster import bundle
-from mutator.execution.cluster.bundle import Bundle, read_inputs
-from mutator.execution.cluster.golden_cache import DrivenGoldens
-from mutator.execution.cluster.piece_queue import Board
-from mutator.execution.cluster.pieces import Ending, Piece, Result
-from mutator.execution.cluster.unpacked_bundle import Site
-from mutator.execution.cluster.worker_host import Host
+from mutator.execution.cluster.bundle import Bundle, load_run_inputs
+from mutator.execution.cluster.golden_cache import GoldenRunCache
+from mutator.execution.cluster.piece_queue import PieceQueue
+from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceResult
+from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
+from mutator.execution.cluster.worker_host import WorkerHost
 from mutator.execution.session import open_session
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 
-def children(host: Host) -> list[int]:
+def children(host: WorkerHost) -> list[int]:
     """Return the ids of the processes that run the host's pieces."""
     words = str(host.folder).encode()
     found = []
@@ -38,9 +38,9 @@ def children(host: Host) -> list[int]:
 
 
 @contextmanager
-def attended(host: Host) -> Iterator[threading.Event]:
+def attended(host: WorkerHost) -> Iterator[threading.Event]:
     unwanted = threading.Event()
-    thread = threading.Thread(target=host.attend, args=(lambda: not unwanted.is_set(),))
+    thread = threading.Thread(target=host.start_processes_on_request, args=(lambda: not unwanted.is_set(),))
     thread.start()
     try:
         yield unwanted
@@ -56,59 +56,63 @@ def sent(tmp_path_factory: pytest.TempPathFactory, copy_toycar: object) -> tuple
     toy: Workspace = copy_toycar(folder)  # type: ignore[operator]
     with open_session(toy, "small", folder / "run", workers=2, choices=Choices(), engine="fork") as session:
         session.prepare()
-        board = Board(session.folder, session.pending, ())
-        board.join("w", 1)
-        piece = board.take("w")
+        board = PieceQueue(session.folder, session.pending, ())
+        board.add_worker("w", 1)
+        piece = board.take_piece("w")
         assert piece is not None
-        return Bundle.of(toy, session.folder, "fork"), piece
+        return Bundle.pack_for_run(toy, session.folder, "fork"), piece
 
 
 @pytest.fixture
-def host(sent: tuple[Bundle, Piece], tmp_path: Path) -> Host:
-    return Host.lay_out(sent[0].data, str(tmp_path / "place"), "alpha")
+def host(sent: tuple[Bundle, Piece], tmp_path: Path) -> WorkerHost:
+    return WorkerHost.unpack_in(sent[0].data, str(tmp_path / "place"), "alpha")
 
 
 def test_all_pieces_run_in_one_process_that_ends_with_the_host(
-    host: Host, sent: tuple[Bundle, Piece]
+    host: WorkerHost, sent: tuple[Bundle, Piece]
 ) -> None:
     piece = sent[1]
     with attended(host):
-        first = host.run(piece.packed(), lambda: True)
+        first = host.run_piece(piece.to_bytes(), lambda: True)
         [child] = children(host)
-        second = host.run(piece.packed(), lambda: True)
+        second = host.run_piece(piece.to_bytes(), lambda: True)
         assert children(host) == [child]
-    assert (first.ending, first.text, len(first.records)) == (Ending.DONE, "", len(piece.lines))
+    assert (first.ending, first.text, len(first.records)) == (PieceEnding.FINISHED, "", len(piece.plan_lines))
     assert second.records == first.records
-    assert first.forked and first.patches and first.series and first.series_of == (piece.golden,)
+    assert first.forked and first.patches and first.series and first.series_of == (piece.golden_key,)
     assert children(host) == [] and not host.folder.exists()
 
 
-def test_a_killed_process_is_reported_with_its_experiment(host: Host, sent: tuple[Bundle, Piece]) -> None:
+def test_a_killed_process_is_reported_with_its_experiment(
+    host: WorkerHost, sent: tuple[Bundle, Piece]
+) -> None:
     with attended(host):
         killer = threading.Thread(target=lambda: os.kill(_first(host), signal.SIGKILL))
         killer.start()
-        result = host.run(sent[1].packed(), lambda: True)
+        result = host.run_piece(sent[1].to_bytes(), lambda: True)
         killer.join()
-        assert (result.ending, result.at) == (Ending.DIED, sent[1].ids[0])
+        assert (result.ending, result.at) == (PieceEnding.PROCESS_DIED, sent[1].experiment_ids[0])
         assert "killed by SIGKILL" in result.text
-        assert host.run(sent[1].packed(), lambda: True).ending is Ending.DONE
+        assert host.run_piece(sent[1].to_bytes(), lambda: True).ending is PieceEnding.FINISHED
 
 
-def _first(host: Host) -> int:
+def _first(host: WorkerHost) -> int:
     while not (found := children(host)):
         time.sleep(0.01)
     return found[0]
 
 
-def test_if_the_process_does_not_start_no_piece_is_blamed(host: Host, sent: tuple[Bundle, Piece]) -> None:
+def test_if_the_process_does_not_start_no_piece_is_blamed(
+    host: WorkerHost, sent: tuple[Bundle, Piece]
+) -> None:
     (host.folder / "meta.json").unlink()
     with attended(host):
-        result = host.run(sent[1].packed(), lambda: True)
-    assert result.ending is Ending.UNFIT
+        result = host.run_piece(sent[1].to_bytes(), lambda: True)
+    assert result.ending is PieceEnding.WORKER_UNFIT
     assert "meta.json" in result.text
 
 
-def test_the_process_of_a_cancelled_piece_ends(host: Host, sent: tuple[Bundle, Piece]) -> None:
+def test_the_process_of_a_cancelled_piece_ends(host: WorkerHost, sent: tuple[Bundle, Piece]) -> None:
     asked: list[float] = []
 
     def wanted() -> bool:
@@ -117,16 +121,16 @@ def test_the_process_of_a_cancelled_piece_ends(host: Host, sent: tuple[Bundle, P
 
     with attended(host):
         with pytest.raises(PieceNotWanted):
-            host.run(sent[1].packed(), wanted)
+            host.run_piece(sent[1].to_bytes(), wanted)
         assert children(host) == []
 
 
-def test_damaged_data_is_refused(sent: tuple[Bundle, Piece], host: Host, tmp_path: Path) -> None:
+def test_damaged_data_is_refused(sent: tuple[Bundle, Piece], host: WorkerHost, tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="damaged parcel"):
-        Host.lay_out(sent[0].data[:-1] + b"?", str(tmp_path / "other"), "alpha")
+        WorkerHost.unpack_in(sent[0].data[:-1] + b"?", str(tmp_path / "other"), "alpha")
     assert not [*(tmp_path / "other").iterdir()]
     with pytest.raises(MutatorError, match="damaged parcel"):
-        host.run(sent[1].packed()[:-1], lambda: True)
+        host.run_piece(sent[1].to_bytes()[:-1], lambda: True)
 
 
 @pytest.fixture
@@ -135,10 +139,10 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache" / "mutator" / "goldens"
 
 
-def run_once(sent: tuple[Bundle, Piece], place: Path) -> Result:
-    host = Host.lay_out(sent[0].data, str(place), "alpha")
+def run_once(sent: tuple[Bundle, Piece], place: Path) -> PieceResult:
+    host = WorkerHost.unpack_in(sent[0].data, str(place), "alpha")
     with attended(host):
-        return host.run(sent[1].packed(), lambda: True)
+        return host.run_piece(sent[1].to_bytes(), lambda: True)
 
 
 def written(entry: Path) -> int:
@@ -162,13 +166,13 @@ def test_a_cached_golden_run_must_match_the_campaign(
     sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
 ) -> None:
     run_once(sent, tmp_path / "a")
-    bundle.lay_out(sent[0].data, tmp_path / "site")
-    site = Site(tmp_path / "site")
-    manifest = read_inputs(site).manifest
-    golden, known = site.goldens[sent[1].golden]
+    bundle.unpack_bundle(sent[0].data, tmp_path / "site")
+    site = UnpackedBundle(tmp_path / "site")
+    manifest = load_run_inputs(site).manifest
+    golden, known = site.goldens_by_key[sent[1].golden_key]
     to = tmp_path / "golden"
-    assert DrivenGoldens(site, manifest).fetch(golden, known, to) and to.is_dir()
-    assert not DrivenGoldens(site, manifest).fetch(golden, "0" * 64, to) and not to.exists()
-    source = next((site.place / "target").rglob("*.py"))
+    assert GoldenRunCache(site, manifest).copy_golden(golden, known, to) and to.is_dir()
+    assert not GoldenRunCache(site, manifest).copy_golden(golden, "0" * 64, to) and not to.exists()
+    source = next((site.folder / "target").rglob("*.py"))
     source.write_text(source.read_text() + "# another\n")
-    assert not DrivenGoldens(site, manifest).fetch(golden, known, to)
+    assert not GoldenRunCache(site, manifest).copy_golden(golden, known, to)
