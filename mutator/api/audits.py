@@ -54,8 +54,8 @@ class Audit:
             str(difference).replace(f"{self.run}/", "")
             for difference in self.differences[:MOST_LISTED_DIFFERENCES]
         ]
-        more = len(self.differences) - MOST_LISTED_DIFFERENCES
-        listed = [*difference_texts, *([f"and {more} more"] if more > 0 else [])]
+        unlisted_count = len(self.differences) - MOST_LISTED_DIFFERENCES
+        listed_lines = [*difference_texts, *([f"and {unlisted_count} more"] if unlisted_count > 0 else [])]
         facts, unsealed = (
             "\n".join(f"{name.ljust(width)}  {value}" for name, value in facts.items())
             for facts in (self.facts, self.not_sealed)
@@ -64,7 +64,7 @@ class Audit:
             facts,
             f"not sealed:\n{unsealed}",
             table.as_text(),
-            "\n".join(f"- {text}" for text in listed),
+            "\n".join(f"- {text}" for text in listed_lines),
             "\n".join(f"repaired: {text}" for text in self.repaired),
             "" if self.compared else LIMITS_NOTE,
             self._outcome,
@@ -204,15 +204,15 @@ def _open_workspace_if_any(workspace: WorkspaceLike) -> Workspace | None:
 def _rerun_check(
     folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]
 ) -> AuditCheck:
-    what = "experiments rerun on the reference engine"
+    check_name = "experiments rerun on the reference engine"
     if workspace is None:
         raise MutatorError("no library found", argument="rerun", expected="the library of the run")
     try:
         ids = draw_experiments(folder, count)
     except MutatorError as err:
-        return AuditCheck(what=what, count=0, differences=(err,))
+        return AuditCheck(what=check_name, count=0, differences=(err,))
     facts["drawn at random"] = ", ".join(ids)
-    return AuditCheck.from_problems(what, len(ids), rerun_and_compare(workspace, folder, ids))
+    return AuditCheck.from_problems(check_name, len(ids), rerun_and_compare(workspace, folder, ids))
 
 
 def _signature_check(folder: RunFolder, seals: Seals, allowed_signers: Path) -> tuple[AuditCheck, str | None]:

@@ -187,14 +187,14 @@ def write_mutants(
 
 
 def _spec_names(workspace: Workspace, names_and_globs: Iterable[str]) -> Iterator[str]:
-    for text in names_and_globs:
-        if not any(c in text for c in "*?["):
-            yield text
+    for name_or_glob in names_and_globs:
+        if not any(c in name_or_glob for c in "*?["):
+            yield name_or_glob
             continue
-        matches = fnmatch.filter([s.name for s in workspace.specs()], text)
+        matches = fnmatch.filter([s.name for s in workspace.specs()], name_or_glob)
         if not matches:
             raise MutatorError(
-                f"no spec matches {text!r}", argument="specs", remedy="see `mutator list specs`"
+                f"no spec matches {name_or_glob!r}", argument="specs", remedy="see `mutator list specs`"
             )
         yield from matches
 

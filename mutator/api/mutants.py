@@ -81,8 +81,8 @@ def build_mutant(
     MutatorError) if the mutant does not compile.
     """
     selected_target = SelectedTarget.of(workspace, target)
-    chosen = selected_target.fault(fault, value=value, seed=seed, reading=reading)
-    return build_selected(selected_target, chosen, selected_target.trigger(trigger))
+    selected_fault = selected_target.fault(fault, value=value, seed=seed, reading=reading)
+    return build_selected(selected_target, selected_fault, selected_target.trigger(trigger))
 
 
 def build_selected(selected_target: SelectedTarget, fault: Fault, trigger: Trigger) -> BuiltMutant:

@@ -191,16 +191,16 @@ def write_pictures(
     """
     opened_workspace = open_workspace(workspace)
     pictures_by_group = pictures_of_groups(opened_workspace, opened_workspace.manifest(target), groups)
-    written: PictureFiles = {}
-    values: dict[str, str] = {}
+    files_by_group: PictureFiles = {}
+    value_by_file: dict[str, str] = {}
     if pictures_by_group:
         make_folder(folder)
     for name, pictures in pictures_by_group.items():
         picture_by_level = {"before": ("", pictures.before)}
         picture_by_level |= {level.name: (level.label, level.after) for level in pictures.levels}
-        for level, (value, data) in picture_by_level.items():
+        for level, (value, picture) in picture_by_level.items():
             path = path_below(folder, f"{name}-{level}.jpg")
-            write_atomic(path, data)
-            written.setdefault(name, {})[level] = str(path)
-            values[str(path)] = value
-    return written, values
+            write_atomic(path, picture)
+            files_by_group.setdefault(name, {})[level] = str(path)
+            value_by_file[str(path)] = value
+    return files_by_group, value_by_file

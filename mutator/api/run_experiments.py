@@ -55,17 +55,21 @@ class RunExperiment(StoredExperiment):
         run, folder = self.run, self.run.folder
         temporary = None if keep else ScratchFolder("mutator-rerun-")
         out = path_below(temporary.path, self.id) if temporary else None
-        single, same = rerun_experiment(run.workspace, folder.path, self.id, out=out)
+        single, is_same = rerun_experiment(run.workspace, folder.path, self.id, out=out)
         manifest = run.selected_target.manifest
         trial = build_trial(
             single,
             manifest,
             scale=self.scale,
-            same_as_record=same if self.record else None,
+            same_as_record=is_same if self.record else None,
             temporary=temporary,
         )
-        if keep and trial.save_plot(self.plot_file) and same:  # keep a series only if it matches the record
-            golden, faulty = (load_trace(manifest, place) for place in (single.golden, single.faulty))
+        if (
+            keep and trial.save_plot(self.plot_file) and is_same
+        ):  # keep a series only if it matches the record
+            golden, faulty = (
+                load_trace(manifest, run_folder) for run_folder in (single.golden, single.faulty)
+            )
             write_sampled_series(folder.path, manifest, golden, faulty, single.record)
         return trial
 

@@ -208,9 +208,9 @@ class Run(RunContents):
         workspace = self.workspace if exporter.needs_library else None
         if exporter.uses_library:
             workspace = self._workspace_if_any()
-        place = None if out is None else Path(out)
+        out_path = None if out is None else Path(out)
         parts = Parts(failures=failures, only=only, table=ExportedTable(table))
-        return export(self.path, str(format), place, workspace=workspace, parts=parts)
+        return export(self.path, str(format), out_path, workspace=workspace, parts=parts)
 
     def check_equivalence(self) -> None:
         """Raise CheckFailed if the equivalence check of the run failed."""

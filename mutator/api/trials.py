@@ -86,9 +86,9 @@ class Trial(ExperimentResult):
 
     def _load_traces(self) -> tuple[Trace, Trace]:
         if not self.has_trace:
-            why = f": {self.record.detail}" if self.record.detail else ""
+            detail = f": {self.record.detail}" if self.record.detail else ""
             raise MutatorError(
-                f"the faulty run left no trace ({self.ending}{why})", remedy="see `.record` and `.log`"
+                f"the faulty run left no trace ({self.ending}{detail})", remedy="see `.record` and `.log`"
             )
         return load_trace(self.manifest, self.single.golden), load_trace(self.manifest, self.single.faulty)
 

@@ -19,7 +19,9 @@ def worst_results(
     `only` is a filter over the columns of the results. MutatorError for an invalid filter.
     """
     frame = Results.up_to_date(run).frame()
-    order = ranks_of_rows(frame).argsort().tolist()  # sort all rows first, because filtering keeps the order
+    row_indices = (
+        ranks_of_rows(frame).argsort().tolist()
+    )  # sort all rows first, because filtering keeps the order
     if only is not None:
         accepts = compile_filter(only, list(frame.columns))
         batches = range(0, len(frame), _ROWS_PER_BATCH)
@@ -27,5 +29,5 @@ def worst_results(
         is_match = [
             accepts({name: None if cell == "" else cell for name, cell in row.items()}) for row in rows
         ]
-        order = [row for row in order if is_match[row]]
-    return rows_of(frame.iloc[order[:limit]], plan_file.load_faults(run)), len(order)
+        row_indices = [row for row in row_indices if is_match[row]]
+    return rows_of(frame.iloc[row_indices[:limit]], plan_file.load_faults(run)), len(row_indices)

@@ -68,7 +68,9 @@ def cache(
         return
     if deleted is not None:
         terminal.say(f"deleted {counted(len(deleted), 'entry', 'entries')}, {_describe_size(deleted)}")
-    rows = [(what, len(of), _describe_size(of)) for what, of in _entries_by_kind(entries).items()]
+    rows = [
+        (kind, len(of_kind), _describe_size(of_kind)) for kind, of_kind in _entries_by_kind(entries).items()
+    ]
     rows.append(("total", len(entries), _describe_size(entries)))
     terminal.print_table(("what", "entries", "size"), rows, right=(1, 2), total=True)
     terminal.say(f"in {short_path(mutator.cache_folder())}")

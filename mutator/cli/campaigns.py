@@ -164,8 +164,8 @@ def _variants_by_reason(reason_by_variant: dict[str, str]) -> dict[str, list[str
 def _describe_cost(cost: "PlanCost") -> str:
     source = "measured in this folder" if cost.is_measured else "estimated with a default time per run"
     time, disk = describe_duration(cost.wall_s), cost.disk_bytes / 1e6
-    who = counted(cost.workers, "worker")
-    return f"{time} with {who} ({describe_duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}"
+    workers = counted(cost.workers, "worker")
+    return f"{time} with {workers} ({describe_duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}"
 
 
 RUN_EXAMPLES = """\b

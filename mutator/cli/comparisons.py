@@ -77,16 +77,16 @@ def compare(
     gates = _parse_gates(fail_on or [])
     with terminal.show_spinner("comparing"):
         run_comparison = mutator.compare(run_a, run_b, only=only)
-        written = run_comparison.write(out)
+        files = run_comparison.write(out)
     comparison, failing = run_comparison.comparison, run_comparison.findings(gates)
     if as_json:
         terminal.print_json(
             _comparison_as_json(run_comparison, failing)
-            | {"page": str(written.page), "pairs_csv": str(written.pairs)}
+            | {"page": str(files.page), "pairs_csv": str(files.pairs)}
         )
     else:
         _print_comparison(terminal, run_comparison)
-        terminal.say(f"comparison: {short_path(written.markdown)} and {short_path(written.page)}")
+        terminal.say(f"comparison: {short_path(files.markdown)} and {short_path(files.page)}")
     _fail_on_findings(terminal, comparison, gates, failing)
 
 

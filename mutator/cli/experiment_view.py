@@ -97,11 +97,11 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     terminal.print_result(f"verdict: {ending}", style=STYLE_BY_ENDING.get(ending))
     if record.detail:
         terminal.say(record.detail)
-    start = record.activation.first if record.activation else None
+    activation_s = record.activation.first if record.activation else None
     events = _list_events(record, manifest)
     if events:
         rows = [
-            (f"{t:.2f}", "" if start is None else f"{t - start:+.2f}", label)
+            (f"{t:.2f}", "" if activation_s is None else f"{t - activation_s:+.2f}", label)
             for t, label in sorted(events, key=lambda e: e[0])
         ]
         terminal.print_table(["time [s]", "from activation [s]", "what"], rows, right=(0, 1))
@@ -160,16 +160,16 @@ def print_fault_path(terminal: Terminal, experiment: StoredExperiment) -> None:
 
 def _describe_component(component: "PathComponent") -> str:
     """Return a line such as `brakes: reached at 3.50 s`; for an injected component, without a time."""
-    what = f"{component.name}: {component.state.value}"
+    state_text = f"{component.name}: {component.state.value}"
     if component.state.value == "injected":
-        return what
+        return state_text
     if component.t_by is not None:
-        return f"{what} by {component.t_by:.2f} s"
-    return what if component.t_first is None else f"{what} at {component.t_first:.2f} s"
+        return f"{state_text} by {component.t_by:.2f} s"
+    return state_text if component.t_first is None else f"{state_text} at {component.t_first:.2f} s"
 
 
 def _list_events(record: "Record", manifest: "TargetManifest | None") -> list[tuple[float, str]]:
-    hazards = {h.name: f": {h.about}" for h in manifest.rules if h.about} if manifest else {}
+    meaning_by_hazard = {h.name: f": {h.about}" for h in manifest.rules if h.about} if manifest else {}
     events: list[tuple[float, str]] = []
     if record.activation:
         times = counted(record.activation.count, "time")
@@ -178,12 +178,12 @@ def _list_events(record: "Record", manifest: "TargetManifest | None") -> list[tu
     if record.t_manifest is not None:
         events.append((record.t_manifest, "manifested: an actuator differs from the golden run"))
     events += [(t, f"alert {name}") for name, t in record.alerts]
-    events += [(t, f"hazard {name}{hazards.get(name, '')}") for name, t in record.hazards]
+    events += [(t, f"hazard {name}{meaning_by_hazard.get(name, '')}") for name, t in record.hazards]
     if (end := record.t_end) is None:
         return events
-    late = ", after the end of the drive"
+    late_note = ", after the end of the drive"
     return [
-        *((t, what + late * (t > end)) for t, what in events),
+        *((t, what + late_note * (t > end)) for t, what in events),
         (end, "end of the drive (metrics ignore later steps)"),
     ]
 
@@ -191,12 +191,12 @@ def _list_events(record: "Record", manifest: "TargetManifest | None") -> list[tu
 def print_trial(terminal: Terminal, trial: "Trial") -> None:
     """Print an experiment that `try` has just run; write its plot next to its traces."""
     with terminal.show_spinner("drawing"):
-        drawn = trial.save_plot(trial.folder / "plot.svg")
+        plot_path = trial.save_plot(trial.folder / "plot.svg")
     if terminal.as_json:
         facts = {**experiment_facts(trial.experiment), **trial.verdict, "patch": trial.patch}
         facts |= {"golden_hazards_s": dict(trial.golden_hazards)}
         terminal.print_json(
-            facts | {"traces": str(trial.single.faulty), "plot": str(drawn) if drawn else None}
+            facts | {"traces": str(trial.single.faulty), "plot": str(plot_path) if plot_path else None}
         )
         return
     print_experiment(terminal, trial.experiment, trial.patch, tried=True)
@@ -207,7 +207,7 @@ def print_trial(terminal: Terminal, trial: "Trial") -> None:
     if trial.log.strip() and trial.record.detail:
         terminal.say("last lines of the run:")
         terminal.say(trial.log.strip(), whole=True)
-    if drawn:
-        terminal.print_link("plot", drawn, f"plot: {drawn}")
+    if plot_path:
+        terminal.print_link("plot", plot_path, f"plot: {plot_path}")
     else:
         terminal.say("no plot: the run left no trace")

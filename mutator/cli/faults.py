@@ -110,12 +110,12 @@ def try_spec(
     fault, _ = middle_of_each_variant(faults)[0]
     if len(faults) > 1:
         terminal.print_note(f"{fault.label}, one of {len(faults)} faults (choose with --variant or --value)")
-    when = selected_target.trigger(trigger, armed_after)
+    built_trigger = selected_target.trigger(trigger, armed_after)
     with terminal.show_spinner(f"running {scenario}, fault-free and faulty"):
         trial = mutator.try_fault(
             fault,
             scenario,
-            when,
+            built_trigger,
             seed=seed or 0,
             target=manifest,
             workspace=selected_target.workspace,
@@ -178,10 +178,10 @@ def diff(
 
     selected_target = SelectedTarget.of(workspace, manifest)
     choice = FaultChoice(spec=what, variant=variant, value=value, seed=seed, reading=reading)
-    when = selected_target.trigger(trigger)
+    built_trigger = selected_target.trigger(trigger)
     diffs = []
     for fault, fault_count in middle_of_each_variant(selected_target.faults(choice)):
-        mutant = build_selected(selected_target, fault, when)
+        mutant = build_selected(selected_target, fault, built_trigger)
         count_note = f", one of {fault_count}" if fault_count > 1 else ""
         diffs.append((fault.label + count_note, mutant.id, mutant.patch))
     _print_diffs(terminal, diffs, whole=patch)
@@ -299,10 +299,10 @@ def generate(
     if as_json:
         terminal.print_json(index)
     terminal.say(f"{counted(len(index), 'mutant')} in {out}, listed in {out / 'index.csv'}")
-    first = out / index[0]["patch"]
+    first_patch = out / index[0]["patch"]
     root = mutants.selected_target.manifest.root
     if mutants.selected_target.manifest.overlay is None:  # otherwise a patch spans two folders
-        terminal.say(f"apply one: patch -p1 -d {short_path(root)} < {first}", whole=True)
+        terminal.say(f"apply one: patch -p1 -d {short_path(root)} < {first_patch}", whole=True)
 
 
 def _parse_operator_choice(

@@ -40,11 +40,11 @@ def _build_decision_command(action: str, about: str) -> Callable[..., None]:
         as_json: Json = False,
         workspace_options: WorkspaceOptions,
     ) -> None:
-        terminal, name = Terminal(as_json), reviewer(workspace_options, by)
+        terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
         reviewed = mutants.load(terminal, workspace_options)
         if groups_to_decide := _choose_groups(reviewed, action, groups, only, yes=yes):
             decide = reviewed.approve if action == "approve" else reviewed.reject
-            _print_decided(terminal, decide(groups_to_decide, name, remark), groups_to_decide)
+            _print_decided(terminal, decide(groups_to_decide, by_name, remark), groups_to_decide)
 
     verb.__doc__ = about
     return verb
@@ -67,9 +67,9 @@ def clear(
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Withdraw decisions; remarks and flags stay."""
-    terminal, name = Terminal(as_json), reviewer(workspace_options, by)
+    terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
     reviewed = mutants.load(terminal, workspace_options)
-    _print_decided(terminal, reviewed.clear(chosen := reviewed.find(groups), name, remark), chosen)
+    _print_decided(terminal, reviewed.clear(selected := reviewed.find(groups), by_name, remark), selected)
 
 
 @with_workspace_options
@@ -83,9 +83,9 @@ def remark(
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Add a remark to groups."""
-    terminal, name = Terminal(as_json), reviewer(workspace_options, by)
+    terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
     reviewed = mutants.load(terminal, workspace_options)
-    _print_decided(terminal, reviewed.remark(chosen := reviewed.find(groups), name, text), chosen)
+    _print_decided(terminal, reviewed.remark(selected := reviewed.find(groups), by_name, text), selected)
 
 
 def _build_flag_command(flag: bool, about: str) -> Callable[..., None]:
@@ -98,10 +98,10 @@ def _build_flag_command(flag: bool, about: str) -> Callable[..., None]:
         as_json: Json = False,
         workspace_options: WorkspaceOptions,
     ) -> None:
-        terminal, name = Terminal(as_json), reviewer(workspace_options, by)
+        terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
         reviewed = mutants.load(terminal, workspace_options)
-        chosen = reviewed.find(groups)
-        _print_decided(terminal, (reviewed.flag if flag else reviewed.unflag)(chosen, name), chosen)
+        selected = reviewed.find(groups)
+        _print_decided(terminal, (reviewed.flag if flag else reviewed.unflag)(selected, by_name), selected)
 
     verb.__doc__ = about
     return verb
@@ -128,12 +128,14 @@ def _choose_groups(
         )
     if starts:
         return reviewed.find(starts)
-    chosen = reviewed.matching(only).groups
-    if not chosen:
+    selected = reviewed.matching(only).groups
+    if not selected:
         raise MutatorError(
             f"no group matches {only}", argument="only", remedy="list the groups: `mutator review`"
         )
-    count_text = f"{counted(len(chosen), 'group')} ({review_view.describe_counts(reviewed.review, chosen)})"
+    count_text = (
+        f"{counted(len(selected), 'group')} ({review_view.describe_counts(reviewed.review, selected)})"
+    )
     if not yes:
         if not sys.stdin.isatty():
             raise MutatorError(
@@ -143,7 +145,7 @@ def _choose_groups(
             )
         if not typer.confirm(f"{verb} {count_text}?"):
             return ()
-    return chosen
+    return selected
 
 
 def _print_decided(terminal: Terminal, reviewed: "mutator.ReviewedGroups", groups: "Sequence[Group]") -> None:
@@ -152,7 +154,7 @@ def _print_decided(terminal: Terminal, reviewed: "mutator.ReviewedGroups", group
         terminal.print_json([review_view.group_as_json(review, group) for group in groups])
     for group in groups:
         state = review.state(group).value
-        words = review.describe(group) or state
-        words += ", flagged" * (review.flag(group.id) is not None)
-        terminal.say(f"{group.id} {words}", style=review_view.STYLE_BY_STATE[state])
+        description = review.describe(group) or state
+        description += ", flagged" * (review.flag(group.id) is not None)
+        terminal.say(f"{group.id} {description}", style=review_view.STYLE_BY_STATE[state])
     terminal.say(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")

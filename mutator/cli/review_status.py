@@ -48,14 +48,14 @@ def _status_as_json(reviewed: "mutator.ReviewedGroups") -> dict[str, Any]:
         "groups": len(groups),
         "states": {name: states[name] for name in review_view.STYLE_BY_STATE},
         **{
-            name: [review_view.group_as_json(review, group) for group in chosen]
-            for name, chosen in groups_by_list.items()
+            name: [review_view.group_as_json(review, group) for group in listed]
+            for name, listed in groups_by_list.items()
         },
     }
 
 
-def _print_groups(terminal: Terminal, head: str, rows: "Sequence[tuple[Group, str]]") -> None:
-    if rows:
+def _print_groups(terminal: Terminal, head: str, groups_with_notes: "Sequence[tuple[Group, str]]") -> None:
+    if groups_with_notes:
         terminal.say(f"{head}:", style="bold")
-    for group, words in rows:
-        terminal.say(f"  {group.id}  {words}: {group.label}")
+    for group, note in groups_with_notes:
+        terminal.say(f"  {group.id}  {note}: {group.label}")

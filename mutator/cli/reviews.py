@@ -121,13 +121,18 @@ def show(
     selected = reviewed.find(groups)
     for group in () if as_json else selected:
         (review_view.print_changes if changes else review_view.print_group)(terminal, reviewed.review, group)
-    written: dict[str, dict[str, str]] = {}
+    pictures_by_group: dict[str, dict[str, str]] = {}
     if pictures:
-        written = _write_pictures(terminal, workspace_options, reviewed.review.target, selected, pictures)
+        pictures_by_group = _write_pictures(
+            terminal, workspace_options, reviewed.review.target, selected, pictures
+        )
     if as_json:
         facts = [review_view.group_as_json(reviewed.review, group, whole=True) for group in selected]
         terminal.print_json(
-            [{**group_data, "pictures": written.get(str(group_data["group"]), {})} for group_data in facts]
+            [
+                {**group_data, "pictures": pictures_by_group.get(str(group_data["group"]), {})}
+                for group_data in facts
+            ]
         )
 
 
@@ -141,13 +146,15 @@ def _write_pictures(
     from mutator.api.reviews import write_pictures
 
     with terminal.show_spinner("drawing"):
-        written, values = write_pictures(groups, target, folder, workspace=workspace_options.workspace())
-    for path, value in values.items():
+        files_by_group, value_by_file = write_pictures(
+            groups, target, folder, workspace=workspace_options.workspace()
+        )
+    for path, value in value_by_file.items():
         terminal.say(short_path(Path(path)) + (f": {value}" if value else ""))
     for group in groups:
-        if group.id not in written:
+        if group.id not in files_by_group:
             terminal.print_note(f"{group.id} has no pictures: it is not an image effect in a single place")
-    return written
+    return files_by_group
 
 
 @with_workspace_options

@@ -122,14 +122,14 @@ def report(
 
 
 def _write_history(terminal: Terminal, folder: Path) -> None:
-    written = mutator.write_history(folder)
-    paths = {"markdown": str(written.markdown), "page": str(written.page)}
+    history = mutator.write_history(folder)
+    paths = {"markdown": str(history.markdown), "page": str(history.page)}
     if terminal.as_json:
-        terminal.print_json({**paths, "runs": written.runs, "left_out": list(written.left_out)})
-    for why in written.left_out:
-        terminal.say(f"left out: {why}")
-    files = f"{short_path(written.markdown)} and {short_path(written.page)}"
-    terminal.say(f"history of {counted(written.runs, 'run')}: {files}")
+        terminal.print_json({**paths, "runs": history.runs, "left_out": list(history.left_out)})
+    for reason in history.left_out:
+        terminal.say(f"left out: {reason}")
+    files = f"{short_path(history.markdown)} and {short_path(history.page)}"
+    terminal.say(f"history of {counted(history.runs, 'run')}: {files}")
 
 
 def workspace_if_any(workspace_options: WorkspaceOptions) -> "Workspace | None":

@@ -69,13 +69,13 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
 
     The interval resamples whole faults (location and value).
     """
-    chosen = _select_runs(runs, of)
+    selected_runs = _select_runs(runs, of)
     guided_share, random_share = (
-        _measure_share(chosen, f'method == "{method}"', "is_hazard")
+        _measure_share(selected_runs, f'method == "{method}"', "is_hazard")
         for method in (guided_against_random.GUIDED, guided_against_random.RANDOM)
     )
     interval = guided_against_random.resampled_rate_difference(
-        chosen,
+        selected_runs,
         "injected",  # `chosen` has only the runs to count
     )
     faults = counted(interval.fault_count, "fault")
@@ -143,8 +143,8 @@ def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
     """Return the mean of `end - start` in s over the runs in `of` that have both (Student's t interval)."""
     from scipy.stats import ttest_1samp  # type: ignore[import-untyped]
 
-    chosen = _select_runs(runs, of)
-    times_s = (chosen[end] - chosen[start]).dropna()
+    selected_runs = _select_runs(runs, of)
+    times_s = (selected_runs[end] - selected_runs[start]).dropna()
     if len(times_s) < 2 or times_s.nunique() < 2:  # a single value says nothing about the spread
         return Estimate(
             value=math.nan, low=math.nan, high=math.nan, n=len(times_s), text=f"- (N {len(times_s)})"
@@ -159,12 +159,14 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
     Times are censored at the end of the run (column `t_end`, simulated seconds). The median is infinite if
     most alerts are not followed by a hazard.
     """
-    chosen = _select_runs(runs, of)
-    if chosen["t_end"].isna().any():
+    selected_runs = _select_runs(runs, of)
+    if selected_runs["t_end"].isna().any():
         nan = math.nan
         return Estimate(value=nan, low=nan, high=nan, n=0, text="- (the ends of the runs are not known)")
-    ends = {str(scenario): float(group["t_end"].iloc[0]) for scenario, group in chosen.groupby("scenario")}
-    reaction = event_times.reaction_times(chosen, ends, 0.0)
+    ends = {
+        str(scenario): float(group["t_end"].iloc[0]) for scenario, group in selected_runs.groupby("scenario")
+    }
+    reaction = event_times.reaction_times(selected_runs, ends, 0.0)
     median, low, high = reaction.median, reaction.median_low, reaction.median_high
     if reaction.runs_alerted_first and math.isnan(low):  # the curve stays above one half or jumps past it
         median = math.inf if math.isnan(median) else median
@@ -204,18 +206,18 @@ def _select_runs(runs: pd.DataFrame, query: str) -> pd.DataFrame:
 
 
 def _measure_share(runs: pd.DataFrame, of: str, part: str) -> Share:
-    words = {*re.findall(r"\w+", f"{of} {part}")}  # selecting rows is slow with all columns
-    chosen = _select_runs(runs[[name for name in runs.columns if name in words]], of)
-    return wilson(len(_select_runs(chosen, part)), len(chosen))
+    query_words = {*re.findall(r"\w+", f"{of} {part}")}  # selecting rows is slow with all columns
+    selected_runs = _select_runs(runs[[name for name in runs.columns if name in query_words]], of)
+    return wilson(len(_select_runs(selected_runs, part)), len(selected_runs))
 
 
 def _describe_difference(
     difference: float, low: float, high: float, first: Share, second: Share, extra: str = ""
 ) -> str:
-    both = f"{_describe_share(first)} against {_describe_share(second)}"
+    shares_text = f"{_describe_share(first)} against {_describe_share(second)}"
     if math.isnan(difference):
-        return both
-    return f"{100 * difference:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f}{extra}): {both}"
+        return shares_text
+    return f"{100 * difference:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f}{extra}): {shares_text}"
 
 
 def _describe_share(share: Share) -> str:

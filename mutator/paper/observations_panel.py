@@ -70,8 +70,8 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
     if len(missing) == len(fault_types):
         return None
     ends = run.ends() or {}
-    words = re.findall(r"\w+", read_bounded(file, MOST_YAML_BYTES).decode())
-    frame = select_columns(run.frame, *words)  # the queries use only columns that the file names
+    file_words = re.findall(r"\w+", read_bounded(file, MOST_YAML_BYTES).decode())
+    frame = select_columns(run.frame, *file_words)  # the queries use only columns that the file names
     frame = frame.assign(t_end=frame["scenario"].map(ends))
     judged = observations.judge_observations(file, frame, list(_mixture_gaps(run, missing)))
     coverage = _describe_coverage(run, len(fault_types), missing)

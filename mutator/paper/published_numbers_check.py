@@ -85,7 +85,7 @@ def _unequal_sums(
     """Yield differences between the sums of both tables, which count the same experiments."""
 
     def total_of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
-        return sum_tallies(tally for (how, _), tally in counts.items() if how == method)
+        return sum_tallies(tally for (tally_method, _), tally in counts.items() if tally_method == method)
 
     for method in _METHODS:
         by_fault_type, by_scenario = (

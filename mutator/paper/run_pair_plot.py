@@ -39,21 +39,23 @@ def plot_run_pair(
     """Draw the panels of `figure_spec` that both runs have. In its action channels, shade `steps`."""
     units = {channel.name: channel.unit for channel in (*manifest.compared, *manifest.plotted)}
     panels = [(c, meaning) for c, meaning in figure_spec.panels if c in pair.golden and c in pair.faulty]
-    first = max(float(pair.times_s[0]), pair.start_s - SHOWN_BEFORE_S)
-    last = min(float(pair.times_s[-1]), pair.end_s + SHOWN_AFTER_S)
+    first_s = max(float(pair.times_s[0]), pair.start_s - SHOWN_BEFORE_S)
+    last_s = min(float(pair.times_s[-1]), pair.end_s + SHOWN_AFTER_S)
     figure, axes = style.blank(1.1 + 1.35 * len(panels), len(panels), 1)
-    is_visible = (pair.times_s >= first) & (pair.times_s <= last)
+    is_visible = (pair.times_s >= first_s) & (pair.times_s <= last_s)
     for axis, (channel, what) in zip(axes, panels, strict=True):
         _plot_channel(axis, pair, channel, is_visible)
         axis.set_ylabel(f"{what} [{units.get(channel) or '-'}]", fontsize=style.TEXT)
-        axis.set_xlim(first, last)
+        axis.set_xlim(first_s, last_s)
         if channel in figure_spec.action_channels:
             _shade_steps(axis, pair.times_s, steps)
         low, high = axis.get_ylim()
         axis.set_ylim(low, max(high, low + MIN_AXIS_RANGE))
         axis.tick_params(labelbottom=axis is axes[-1])
     axes[-1].set_xlabel("time [s]", fontsize=style.TEXT)
-    _draw_marks(axes, [mark for mark in without_later_alerts(marks) if first <= mark.t <= last], last - first)
+    _draw_marks(
+        axes, [mark for mark in without_later_alerts(marks) if first_s <= mark.t <= last_s], last_s - first_s
+    )
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=2, fontsize=style.SMALL, frameon=False)
     figure.align_ylabels(axes)

@@ -45,15 +45,15 @@ class RunPair:
     ) -> "RunPair":
         """Return the pair of an experiment with an activated fault, up to `hazard` or the end of the run."""
         steps = min(len(golden[time_channel]), len(faulty[time_channel]))
-        t = faulty[time_channel][:steps]
+        times_s = faulty[time_channel][:steps]
         assert record.activation is not None  # the query finds only activated faults
         return cls(
-            times_s=t,
+            times_s=times_s,
             golden={name: values[:steps] for name, values in golden.items()},
             faulty={name: values[:steps] for name, values in faulty.items()},
             step_s=step_s,
             start_s=record.activation.first,
-            end_s=dict(record.hazards)[hazard] if hazard else float(t[-1]),
+            end_s=dict(record.hazards)[hazard] if hazard else float(times_s[-1]),
             alert_s=record.alerts[0][1] if record.alerts else None,
         )
 
@@ -105,8 +105,8 @@ def build_wrong_time_finder(channel: str) -> StepFinder:
 
     def find_steps(pair: RunPair) -> StepFlags | None:
         golden, faulty = pair.steps_applied(channel)
-        wrong = faulty & ~golden
-        return wrong if pair.duration_s(wrong) >= MIN_WRONG_S else None
+        only_faulty = faulty & ~golden
+        return only_faulty if pair.duration_s(only_faulty) >= MIN_WRONG_S else None
 
     return find_steps
 

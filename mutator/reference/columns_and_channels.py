@@ -106,7 +106,7 @@ def _target_section(manifest: TargetManifest) -> Iterator[str]:
         )
         yield ""
     yield f"Alerts: {', '.join(manifest.alerts) or 'none'}.\n"
-    changes = [(f"`{name}`", f"`{' '.join(words)}`") for name, words in manifest.changes.items()]
+    changes = [(f"`{name}`", f"`{' '.join(arguments)}`") for name, arguments in manifest.changes.items()]
     yield TextTable(heads=("change of the scenario", "arguments it adds"), rows=changes).as_markdown(
         escape=False
     )
@@ -120,11 +120,11 @@ def _channel_row(channel: Channel) -> tuple[str, ...]:
 
 
 def _hazard_row(hazard: Hazard) -> tuple[str, ...]:
-    when = f"`{hazard.when or hazard.stl}`" if not hazard.recorded else "as recorded"
+    condition = f"`{hazard.when or hazard.stl}`" if not hazard.recorded else "as recorded"
     if hazard.for_s:
-        when += f" for {hazard.for_s:g} s"
+        condition += f" for {hazard.for_s:g} s"
     ends = {"": "no", "True": "yes"}.get(hazard.terminal, f"`{hazard.terminal}`")
-    return hazard.name, when, ends, hazard.about or "-"
+    return hazard.name, condition, ends, hazard.about or "-"
 
 
 def _metric_row(metric: Metric) -> tuple[str, ...]:

@@ -84,9 +84,9 @@ def schema_by_model(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
 
     Each schema has the class's title, its docstring in one line, and descriptions of its properties.
     """
-    whole = model.model_json_schema(by_alias=True)
-    parts = {model.__name__: whole} | whole.pop("$defs", {})
-    return {short_name(name): _with_descriptions(part) for name, part in parts.items()}
+    file_schema = model.model_json_schema(by_alias=True)
+    schemas = {model.__name__: file_schema} | file_schema.pop("$defs", {})
+    return {short_name(name): _with_descriptions(part) for name, part in schemas.items()}
 
 
 def short_name(name: str) -> str:
@@ -126,22 +126,22 @@ def _without_generated_texts(value: Any) -> Any:
 
 
 def build_editor_schema(file_format: YamlFormat, models: FaultModels) -> dict[str, Any]:
-    parts = schema_by_model(file_format.model)
-    if "Injection" in parts:
-        _add_fault_models(parts["Injection"], models)
-    if "Variant" in parts:  # another library can declare other readings
-        parts["Variant"]["additionalProperties"] = {"$ref": "#/definitions/Reading"}
-    for part in parts.values():
+    schemas = schema_by_model(file_format.model)
+    if "Injection" in schemas:
+        _add_fault_models(schemas["Injection"], models)
+    if "Variant" in schemas:  # another library can declare other readings
+        schemas["Variant"]["additionalProperties"] = {"$ref": "#/definitions/Reading"}
+    for part in schemas.values():
         part.pop("title", None)
         part.pop("description", None)
         for value in part.get("properties", {}).values():
             value["description"] = _MARKDOWN_LINK_PATTERN.sub(r"\1", value["description"])
-    whole = parts.pop(short_name(file_format.model.__name__))
+    file_schema = schemas.pop(short_name(file_format.model.__name__))
     key = {"const": file_format.schema, "description": "The format of this file and its version."}
-    whole["properties"] = {"schema": key} | whole["properties"]
-    whole["required"] = ["schema", *whole["required"]]
+    file_schema["properties"] = {"schema": key} | file_schema["properties"]
+    file_schema["required"] = ["schema", *file_schema["required"]]
     head = {"$schema": SCHEMA_DRAFT, "title": file_format.schema}
-    return head | whole | ({"definitions": parts} if parts else {})
+    return head | file_schema | ({"definitions": schemas} if schemas else {})
 
 
 def _add_fault_models(injection: dict[str, Any], models: FaultModels) -> None:

@@ -67,9 +67,9 @@ def stated_licence(name: str) -> str | None:
     classifiers = [
         c.split(" :: ")[1:] for c in stated.get_all("Classifier", []) if c.startswith("License :: ")
     ]
-    named = [words[-1] for words in classifiers if words != ["OSI Approved"]]
+    classifier_names = [words[-1] for words in classifiers if words != ["OSI Approved"]]
     texts = [text.strip().partition("\n")[0] for text in stated.get_all("License", [])]
-    return ", ".join(expressions or named or texts or ["none stated"])
+    return ", ".join(expressions or classifier_names or texts or ["none stated"])
 
 
 def _licence_of(name: str, listed: Mapping[str, str]) -> str:

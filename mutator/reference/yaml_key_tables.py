@@ -35,13 +35,13 @@ def model_sections(page: str, *models: type[StrictModel], below: int = 1) -> Ite
     Headings are one level below `below`; with several `models`, those of their parts are two levels below it.
     Models that other pages describe are only linked.
     """
-    parts: dict[str, dict[str, Any]] = {}
+    schema_by_name: dict[str, dict[str, Any]] = {}
     for model in models:
         schemas = schema_by_model(model)
-        parts |= {name: schemas[name] for name in order_models(schemas)}
+        schema_by_name |= {name: schemas[name] for name in order_models(schemas)}
     file_models = {next(iter(schema_by_model(model))) for model in models}
-    tables = _KeyTables(page, parts)
-    for name, part in parts.items():
+    tables = _KeyTables(page, schema_by_name)
+    for name, part in schema_by_name.items():
         if "enum" in part or _PAGE_BY_SHARED_MODEL.get(name, page) != page:
             continue
         is_deeper = len(models) > 1 and name not in file_models
