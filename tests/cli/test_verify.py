@@ -198,7 +198,7 @@ def curves_of_golden(name: str) -> tuple[bytes, bytes]:
     )
     assert found is not None
     golden, faulty = found
-    return encode_series(golden), encode_series(replace(golden, about=faulty.facts), golden)
+    return encode_series(golden), encode_series(replace(golden, facts=faulty.facts), golden)
 
 
 def deviating() -> str:
@@ -261,7 +261,7 @@ def test_a_rerun_s_golden_curves_must_be_those_of_the_golden_run(cli: Cli, seale
     found = there.load_series(name, RunFolder.open_unverified(Path("run")).records()[name])
     assert found is not None
     golden, faulty = (
-        replace(one, rows=[row + np.float32(1e-3) for row in one.channel_values]) for one in found
+        replace(one, channel_values=[row + np.float32(1e-3) for row in one.channel_values]) for one in found
     )
     write_kept_series(there.kept_path(name), encode_series(golden), encode_series(faulty, golden))
     audit = cli("verify", "run")
