@@ -56,6 +56,7 @@ __all__ = sorted([*_MODULE_BY_NAME, "__version__"])
 def __getattr__(name: str) -> Any:
     if name not in _MODULE_BY_NAME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    # so that Python does not ask again
     value = globals()[name] = getattr(import_module(_MODULE_BY_NAME[name]), name)
     return value
 

@@ -23,7 +23,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.work_stretches import describe_stretches, package_versions
 from mutator.workspace import Workspace
 
-MOST_LISTED_DIFFERENCES = 20  # differences listed in the text of an audit
+MOST_LISTED_DIFFERENCES = 20  # in the text of an audit, to fit on a screen; `differences` has all
 LIMITS_NOTE = (
     "These checks find damage and contradictions. That nobody wrote other results with matching digests "
     "shows only an expected seal (--expect)."
@@ -116,14 +116,14 @@ def verify(
     check_whole_number("rerun", rerun)
     for name, value in (("expect", expect), ("expect_review", expect_review)):
         _check_digest(name, value)
-    folder = RunFolder.open_unverified(Path(run))
+    folder = RunFolder.open_unverified(Path(run))  # the checks must see what opening would refuse
     opened_workspace = _open_workspace_if_any(workspace)
     checks = run_audit_checks(folder, opened_workspace)
     facts = _run_facts(folder)
     if rerun:
         checks.append(_rerun_check(folder, opened_workspace, rerun, facts))
     seals = _seals_if_undamaged(folder, checks)
-    facts |= {"seal": "none"} | seals.digest_by_name()
+    facts |= {"seal": "none"} | seals.digest_by_name()  # an unfinished run has none, and says so
     if expect is not None:
         facts["expected"] = expect
         checks.append(_expected_digest_check(folder, seals, expect))
@@ -142,6 +142,7 @@ def verify(
             )
         )
     damaged = any(check.differences for check in checks)
+    # `repair` writes nothing into an undamaged folder
     repaired = put_aside(folder, opened_workspace) if repair and damaged else []
     return Audit(
         run=folder.path,
@@ -165,6 +166,7 @@ def seal(run: str | Path, *, sign: str | Path | None = None) -> Seals:
     folder = RunFolder.open(Path(run))
     if sign is None:
         return seals_of(folder)
+    # what a running command writes would outdate the signature
     with owning_run_folder(folder.path, patience_s=0.0):
         seals = seals_of(folder)
         write_signature(folder, seals, Path(sign))
@@ -174,7 +176,7 @@ def seal(run: str | Path, *, sign: str | Path | None = None) -> Seals:
 def _check_digest(argument: str, value: str | None) -> None:
     if value is not None:
         check_type(argument, value, str, "a digest")
-        if not re.fullmatch(r"[0-9a-f]{64}", value):
+        if not re.fullmatch(r"[0-9a-f]{64}", value):  # a mistyped digest must not cost a whole audit
             raise MutatorError(f"'{value}'", argument=argument, expected="a digest: 64 hex digits")
 
 
@@ -196,7 +198,7 @@ def _open_workspace_if_any(workspace: WorkspaceLike) -> Workspace | None:
     try:
         return open_workspace(workspace)
     except MutatorError:
-        if workspace is not None:
+        if workspace is not None:  # a library that was named must exist; one that was only sought need not
             raise
         return None
 
@@ -229,7 +231,7 @@ def _seals_if_undamaged(folder: RunFolder, checks: list[AuditCheck]) -> Seals:
     except (MutatorError, OSError):
         if not any(check.differences for check in checks):
             raise
-        return Seals()
+        return Seals()  # a damaged run has no digests; its differences say why
 
 
 def _run_facts(folder: RunFolder) -> dict[str, str]:

@@ -121,6 +121,7 @@ def _pairs_frame(pairs: Sequence[ExperimentPair]) -> "pd.DataFrame":
 
     frame = pd.DataFrame([comparison_files.pair_cells(pair) for pair in pairs])
     times = [name for name in frame.columns if name.startswith("t_")]
+    # otherwise, a column of missing times would have the type object
     return frame.astype(dict.fromkeys(times, float))
 
 

@@ -44,6 +44,7 @@ class TraceFrames:
     def difference(self) -> "pd.DataFrame":
         """Faulty minus golden, at the times that both runs have."""
         times = self.golden.index.intersection(self.faulty.index)
+        # floats, because flags cannot be subtracted
         return self.faulty.loc[times].astype(float) - self.golden.loc[times].astype(float)
 
 
@@ -62,7 +63,7 @@ class ExperimentResult(ABC):
         facts = experiment_facts(self.experiment) | (self.verdict if self.record else {"status": "not run"})
         texts = {
             name: ", ".join(f"{k} {v if isinstance(v, str) else f'{v:.4g}'}" for k, v in value.items())
-            or None
+            or None  # which `facts_html` leaves out
             for name, value in facts.items()
             if isinstance(value, dict)
         }
@@ -211,6 +212,7 @@ def verdict_facts(record: Record, scale: Scale | None) -> dict[str, Any]:
         "fault_tolerant_time_s": fault_tolerant_time(record),
         "manifest_to_hazard_s": manifestation_to_hazard_time(record),
         "largest_difference": dict(record.max_dev),
+        # the other order would undo the limit: `dev` replaces values of the whole run
         "difference_in_drive": dict(record.max_dev) | dict(record.dev),
         "drive_ended_s": record.t_end,
         "metrics": dict(record.metrics),

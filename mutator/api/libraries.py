@@ -67,7 +67,7 @@ def find_places(
     opened_workspace = open_workspace(workspace)
     manifest = opened_workspace.manifest(opened_workspace.target_name(target))
     path, _, function = where.partition("::")
-    check_file(manifest, path)
+    check_file(manifest, path)  # a forbidden file must not even be read
     return places_of(parsed_file(manifest.tree, path), opened_workspace.fault_models(), function or None)
 
 

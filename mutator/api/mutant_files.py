@@ -163,7 +163,7 @@ def write_mutants(
     `out` must be new or empty. `step` is called after each pair.
     """
     make_folder(out)
-    if any(out.iterdir()):
+    if any(out.iterdir()):  # older patches could be taken for these
         raise MutatorError(
             "not empty",
             where=out,
@@ -175,12 +175,12 @@ def write_mutants(
     index: dict[str, dict[str, str]] = {}
     for fault, trigger in pairs:
         mutant = build_selected(selected_target, fault, trigger)
-        if mutant.id not in index:
+        if mutant.id not in index:  # experiments of a campaign share mutants, e.g. in several scenarios
             index[mutant.id] = _write_mutant(mutant, out, trees=trees)
         step()
     rows = list(index.values())
     with (out / "index.csv").open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, INDEX_COLUMNS, lineterminator="\n")
+        table = csv.DictWriter(file, INDEX_COLUMNS, lineterminator="\n")  # the default would be \r\n
         table.writeheader()
         table.writerows(rows)
     return rows
@@ -202,6 +202,7 @@ def _spec_names(workspace: Workspace, names_and_globs: Iterable[str]) -> Iterato
 def _write_mutant(built_mutant: BuiltMutant, out: Path, *, trees: bool) -> dict[str, str]:
     mutant, fault, trigger = built_mutant.mutant, built_mutant.fault, built_mutant.trigger
     patch = Path("patches") / f"{mutant.id}.patch"
+    # a source can have another encoding than UTF-8
     (path_below(out, patch.as_posix())).write_bytes(mutant.patch_bytes)
     tree = Path("trees") / mutant.id
     if trees:

@@ -52,7 +52,7 @@ class BuiltMutant:
         """Write the whole mutated source tree into a new or empty folder, and return the folder."""
         out = Path(folder)
         make_folder(out)
-        if any(out.iterdir()):
+        if any(out.iterdir()):  # files of another tree would become part of this one
             raise MutatorError(
                 "not empty", where=out, expected="a new or empty folder", remedy="choose another folder"
             )

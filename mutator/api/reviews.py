@@ -70,7 +70,7 @@ class ReviewedGroups:
         group_by_id: dict[str, Group] = {}
         for start in starts:
             matches = [group for group in self.groups if group.id.startswith(start)]
-            if len(matches) != 1 or not start:
+            if len(matches) != 1 or not start:  # every id starts with an empty text
                 raise MutatorError(
                     f"several ids ({len(matches)}) start with '{start}'"
                     if matches
@@ -114,6 +114,7 @@ class ReviewedGroups:
         self, groups: Sequence[Group], kind: ReviewActionKind, by: str, text: str = ""
     ) -> "ReviewedGroups":
         actions = [ReviewAction(group=group, kind=kind, by=by, text=text) for group in groups]
+        # a decision that somebody else has stored since is not overwritten
         revision_by_group = {group.id: self.review.revision(group.id) for group in groups}
         return replace(
             self, review=record_actions(self.workspace, self.review.target, actions, revision_by_group)
@@ -149,7 +150,7 @@ def load_review(
     review = load_decisions(opened_workspace, manifest.name)
     value_by_option = {"--campaign": campaign, "--reading": reading, "--manifest": target}
     options = [word for name, value in value_by_option.items() if value for word in (name, value)]
-    options += ["--seed", str(seed)] if seed is not None else []
+    options += ["--seed", str(seed)] if seed is not None else []  # 0 is a seed
     options += [word for spec in specs for word in ("--spec", spec)]
     return ReviewedGroups(
         workspace=opened_workspace,
@@ -194,7 +195,7 @@ def write_pictures(
     files_by_group: PictureFiles = {}
     value_by_file: dict[str, str] = {}
     if pictures_by_group:
-        make_folder(folder)
+        make_folder(folder)  # only if there is a picture to put into it
     for name, pictures in pictures_by_group.items():
         picture_by_level = {"before": ("", pictures.before)}
         picture_by_level |= {level.name: (level.label, level.after) for level in pictures.levels}

@@ -35,7 +35,7 @@ class RunExperiment(StoredExperiment):
         """
         if exact:
             trial = self.rerun(keep=True)
-            if trial.same_as_record is False:
+            if trial.same_as_record is False:  # None: there is no record to compare with
                 raise MutatorError(
                     f"the rerun of {self.id} differs from the campaign's record", where=self.run.path
                 )

@@ -61,7 +61,7 @@ def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions
     `accept_versions`, if their versions of Python or packages differ. CheckFailed if their golden runs
     differ.
     """
-    if isinstance(shards, str | Path):
+    if isinstance(shards, str | Path):  # a likely mistake; a text would be read letter by letter
         raise MutatorError(repr(str(shards)), argument="shards", expected="a list of run folders")
     merge_shards([Path(shard) for shard in shards], Path(out), accept_versions=accept_versions)
     return load_run(out)
@@ -150,11 +150,13 @@ class Run(RunContents):
         """
         scenario_variants = [e.changes for e in self.experiments.values() if e.scenario == scenario]
         if changes is None and scenario_variants:
+            # of equally frequent ones, the first of the plan
             changes = max(dict.fromkeys(scenario_variants), key=scenario_variants.count)
         seeds = self.folder.seeds
         if seed is not None and seed not in seeds:
             raise MutatorError(f"seed {seed}", argument="seed", expected=describe_seeds(seeds))
         selected_seed = seeds[0] if seed is None else seed
+        # a run with one seed stores its golden runs without it
         golden_run = GoldenRun(scenario, changes or (), selected_seed if len(seeds) > 1 else None)
         folder = self.folder.golden_folder(*golden_run)
         if not folder.is_dir():
@@ -233,5 +235,5 @@ class Run(RunContents):
 def alerts_note_if_any(run: Run) -> str:
     try:
         return run.alerts_note()
-    except (MutatorError, KeyError):
+    except (MutatorError, KeyError):  # a note is not worth an error
         return ""

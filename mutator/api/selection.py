@@ -142,7 +142,7 @@ def find_trigger(
         for row in table.rows
         if text in (row.id, f"{table.name}/{row.id}")
     ]
-    if len(matches) > 1:
+    if len(matches) > 1:  # tables can use the same id for a row
         qualified_names = ", ".join(f"{table.name}/{row}" for table, row in matches)
         raise MutatorError(
             f"context '{text}' is in {len(matches)} tables",
@@ -198,6 +198,7 @@ def _with_value(spec: FaultSpec, variant: Variant, value: float) -> Variant:
             argument="value",
             remedy="leave `value` out",
         )
+    # as YAML would give it: 40, not 40.0, in the id and in the injected line
     exact_value = int(value) if float(value).is_integer() else value
     draw = dataclasses.replace(variant.draw, kind="list", ranges=(), values=(exact_value,))
     return dataclasses.replace(variant, draw=draw)

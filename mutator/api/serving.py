@@ -27,6 +27,7 @@ def serve_runs(
     """
     roots = tuple(map(Path, runs)) or (RUNS_FOLDER,)
     for root in roots:
+        # runs/ appears with the first campaign, which can be started in the browser
         if not root.is_dir() and root != RUNS_FOLDER:
             raise MutatorError("no such folder", where=root, expected="a run folder, or a folder of them")
     site = Site(workspace=open_workspace(workspace), runs=Runs(roots), at_once=most_parallel_jobs)

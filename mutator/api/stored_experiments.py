@@ -112,7 +112,7 @@ class StoredExperiment(ExperimentResult):
         """The whole patch, including the probe."""
         stored_patch = self.run.folder.read_patch(self.id, self.record)
         if stored_patch is not None:
-            return stored_patch.decode("utf-8", "surrogateescape")
+            return stored_patch.decode("utf-8", "surrogateescape")  # a source can have another encoding
         return build_selected(self.run.selected_target, self.fault, self.experiment.trigger).patch
 
     @property

@@ -34,7 +34,7 @@ class Trial(ExperimentResult):
     scale: Scale | None = None  #: the severity scale; None for a target without one
     #: whether the record equals the campaign's; None: the campaign has none
     same_as_record: bool | None = None
-    _temporary: ScratchFolder | None = field(default=None)
+    _temporary: ScratchFolder | None = field(default=None)  # deletes the folder together with this object
 
     @property
     def patch(self) -> str:
@@ -127,6 +127,7 @@ def try_fault(
     )
     temporary = ScratchFolder("mutator-try-") if out is None else None
     out_folder = temporary.path if temporary else Path(out or "")
+    # a link must not lead the output elsewhere
     folder = check_inside(out_folder, path_below(out_folder, experiment.id))
     check_only_plain_files(folder)
     single = run_single(selected_target.workspace, selected_target.manifest, experiment, folder)

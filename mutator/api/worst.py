@@ -8,7 +8,7 @@ from mutator.results.result_rows import ResultRow, cells_by_row, rows_of
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
 
-_ROWS_PER_BATCH = 10_000  # rows filtered at a time
+_ROWS_PER_BATCH = 10_000  # to filter; as dictionaries, all rows of a large run would fill the memory
 
 
 def worst_results(
@@ -27,7 +27,9 @@ def worst_results(
         batches = range(0, len(frame), _ROWS_PER_BATCH)
         rows = (row for first in batches for row in cells_by_row(frame.iloc[first : first + _ROWS_PER_BATCH]))
         is_match = [
-            accepts({name: None if cell == "" else cell for name, cell in row.items()}) for row in rows
+            # filters know None; an empty cell is a text
+            accepts({name: None if cell == "" else cell for name, cell in row.items()})
+            for row in rows
         ]
         row_indices = [row for row in row_indices if is_match[row]]
     return rows_of(frame.iloc[row_indices[:limit]], plan_file.load_faults(run)), len(row_indices)

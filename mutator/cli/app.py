@@ -47,7 +47,7 @@ from mutator.errors import (
     MutatorWarning,
 )
 
-EXIT_INTERRUPTED = 130
+EXIT_INTERRUPTED = 130  # 128 + SIGINT, as in a shell
 EXIT_CODES = {
     EXIT_OK: "success",
     EXIT_CHECK_FAILED: "a check failed",
@@ -55,6 +55,7 @@ EXIT_CODES = {
     EXIT_HARNESS_ERRORS: "harness errors or unfinished experiments",
     EXIT_INTERRUPTED: "interrupted",
 }
+# another folder helps; any other OSError is a defect
 _PERMISSION_ERRORS = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 SUBCOMMAND_GROUPS = (
@@ -93,7 +94,7 @@ class GroupedSubcommands(TyperGroup):
 app = typer.Typer(
     cls=GroupedSubcommands,
     rich_markup_mode=None,
-    pretty_exceptions_enable=False,
+    pretty_exceptions_enable=False,  # `_report_defect` shows tracebacks
     epilog=EXAMPLES,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
@@ -178,7 +179,7 @@ def _open_streams() -> None:
             if file != number:
                 os.dup2(file, number)
                 os.close(file)
-            os.set_inheritable(number, True)
+            os.set_inheritable(number, True)  # child processes need open streams as well
             setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
 
 
@@ -214,7 +215,7 @@ def _run_command_line(argv: Sequence[str]) -> int:
     except (typer.Abort, KeyboardInterrupt) as e:
         _print_error(str(e) or "interrupted")
         return EXIT_INTERRUPTED
-    except BrokenPipeError:
+    except BrokenPipeError:  # no defect: `main` ends quietly
         raise
     except Exception as e:
         if (machine_error := _machine_error(e)) is None:
@@ -257,7 +258,7 @@ def _warnings_in_one_line() -> Iterator[None]:
             else:
                 show_other_warning(message, category, *place, **more)
 
-        warnings.simplefilter("always", MutatorWarning)
+        warnings.simplefilter("always", MutatorWarning)  # by default, Python shows a repeated warning once
         warnings.showwarning = show
         yield
 
@@ -265,6 +266,7 @@ def _warnings_in_one_line() -> Iterator[None]:
 def _report_usage_error(error: typer.TyperException) -> int:
     ctx = getattr(error, "ctx", None)
     remedy = f"see `{ctx.command_path} --help`" if ctx else "see `mutator --help`"
+    # a prefix that Pydantic adds
     message = error.format_message().rstrip(".").replace("Value error, ", "")
     if message:
         show_error(MutatorError(message, remedy=remedy))

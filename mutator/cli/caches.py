@@ -15,6 +15,7 @@ from mutator.errors import MutatorError
 if TYPE_CHECKING:
     from mutator._common.shared_cache import CacheEntry
 
+# powers of 1,000, as disks are measured
 _BYTES_BY_UNIT = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
 
@@ -53,7 +54,7 @@ def cache(
     if path + clear + (max_size is not None) > 1:
         raise MutatorError("--path, --max and --clear together", expected="one of them")
     if path:
-        typer.echo(mutator.cache_folder())
+        typer.echo(mutator.cache_folder())  # nothing else, for `$(mutator cache --path)`
         return
     terminal = Terminal(as_json)
     deleted = mutator.clear_caches() if clear else None

@@ -101,6 +101,7 @@ def plan(
     if as_json:
         _print_plan_as_json(terminal, folder, new_plan, cost, reason_by_variant)
     _print_plan(terminal, new_plan, cost, reason_by_variant)
+    # enough to compare by eye; run.json has all digits
     terminal.say(f"plan: {short_path(folder / 'plan.csv')} (digest {new_plan.digest[:16]})")
     command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
     terminal.say(f"run it: {shlex.join(command)}", whole=True)
@@ -244,6 +245,7 @@ def run(
                 progress=notify,
                 workspace=workspace,
             )
+            # resuming an unfinished run can change the worst experiments
             if stills and finished_run.summary and finished_run.summary.exit_code == 0:
                 _take_stills(terminal, finished_run, notify, workers)
             report = _write_report(out, finished_run, notify)
@@ -261,7 +263,7 @@ def _take_stills(terminal: Terminal, run: "Run", notify: "ProgressCallback", wor
 
 
 def _write_report(out: Path, run: "Run", notify: "ProgressCallback") -> "WrittenReport | None":
-    if not (run.summary and run.summary.results):
+    if not (run.summary and run.summary.results):  # no table: the disk was full
         return None
     notify(mutator.Progress(stage="report"))
     try:
@@ -306,7 +308,7 @@ def _print_summary(
         terminal.say(
             f"harness errors: {len(summary.harness_errors)} (not in rates; the same command retries them)"
         )
-        for name, detail in summary.harness_errors[:5]:
+        for name, detail in summary.harness_errors[:5]:  # often the same error; --json has all
             terminal.say(f"  {name}: {detail}", style="red")
     if summary.problem:
         terminal.print_error(summary.problem)

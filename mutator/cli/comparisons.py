@@ -109,7 +109,7 @@ def _print_comparison(terminal: Terminal, run_comparison: "mutator.RunComparison
         terminal.say(run_comparison.files_text)
         terminal.say()
     for sheet in comparison.sheets:
-        if sheet.name.endswith("_by_fault_type"):
+        if sheet.name.endswith("_by_fault_type"):  # too long for a terminal
             continue
         terminal.say(sheet.title, style="bold")
         heads, lines = list(sheet.heads), sheet.table().rows
@@ -152,7 +152,7 @@ def _fail_on_findings(
         terminal.print_error(f"{finding.gate.value}: {finding.description} [{finding.experiment_id}]")
     if unlisted := failing[MOST_LISTED_FINDINGS:]:
         terminal.print_error(f"and {len(unlisted)} more")
-    if failing:
+    if failing:  # outweighs missing results
         raise typer.Exit(EXIT_CHECK_FAILED)
     if gates and comparison.missing_result_count:
         terminal.print_error(

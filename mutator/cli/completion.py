@@ -54,6 +54,7 @@ def specs_and_experiments(ctx: typer.Context, incomplete: str) -> list[str]:
 
 def _library_folder(ctx: typer.Context) -> Path:
     path_by_option: dict[str, Any] = {}
+    # options can stand before and after the subcommand; the later ones win
     for context in (ctx.find_root(), ctx):
         path_by_option |= {
             name: context.params.get(name) for name in ("root", "library") if context.params.get(name)

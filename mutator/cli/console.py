@@ -86,7 +86,7 @@ class Terminal:
 
     def print_json(self, data: Any) -> None:
         """Print the result as one JSON document; infinity and NaN become null."""
-        is_narrow = codecs.lookup(sys.stdout.encoding).name != "utf-8"
+        is_narrow = codecs.lookup(sys.stdout.encoding).name != "utf-8"  # other encodings lack characters
         json.dump(_as_json(data), sys.stdout, indent=2, ensure_ascii=is_narrow, allow_nan=False)
         sys.stdout.write("\n")
 
@@ -112,7 +112,7 @@ class Terminal:
         if self.as_json:
             return
         if not self.out.is_terminal:
-            sys.stdout.flush()
+            sys.stdout.flush()  # text that was printed before must come first
             sys.stdout.buffer.write(patch.encode("utf-8", "surrogateescape"))
             sys.stdout.buffer.flush()
             return
@@ -230,6 +230,7 @@ def short_path(where: str | Path | None) -> str:
         return ""
     path = Path(where)
     try:
+        # not `.`, which says nothing in a message
         return str(path.relative_to(Path.cwd()) if path.is_absolute() and path != Path.cwd() else path)
     except ValueError:
         return str(where)
@@ -247,7 +248,7 @@ def ignoring_output_errors() -> Iterator[None]:
 def discard_output(stream: TextIO) -> None:
     """Drop what is buffered in a standard stream and everything written to it later."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, stream.fileno())
+    os.dup2(nowhere, stream.fileno())  # closing it would give its number to the next file
     os.close(nowhere)
 
 
@@ -268,6 +269,7 @@ def _print_text(console: "Console", text: str, style: str | None, *, whole: bool
     if not whole:
         width = console.width if console.is_terminal else _pipe_line_width()
         text = wrap_text(text, width).replace(NO_BREAK_SPACE, " ")
+    # Rich must not fold again
     console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
 
 

@@ -102,6 +102,7 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     if events:
         rows = [
             (f"{t:.2f}", "" if activation_s is None else f"{t - activation_s:+.2f}", label)
+            # stable: of simultaneous events, causes precede effects
             for t, label in sorted(events, key=lambda e: e[0])
         ]
         terminal.print_table(["time [s]", "from activation [s]", "what"], rows, right=(0, 1))
@@ -137,10 +138,12 @@ def _unit_by_name(manifest: "TargetManifest") -> dict[str, str]:
 
 def _describe_values(values: Iterable[tuple[str, float]], units: Mapping[str, str]) -> str:
     texts = (f"{name} {value:.4g} {units.get(name, '')}".rstrip() for name, value in values)
+    # keep a value and its unit on one line
     return ", ".join(text.replace(" ", NO_BREAK_SPACE) for text in texts)
 
 
 def _missing_alert_note(record: "Record", manifest: "TargetManifest", reaction_s: float | None) -> str:
+    # no alert was possible, or nothing to warn of
     if not (manifest.alerts and record.outcome and record.activation):
         return ""
     if record.hazards:

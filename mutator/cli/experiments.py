@@ -101,7 +101,7 @@ def show(
         terminal.print_diff(patch)
         return
     plot_path, film_paths = stored.plot_file if stored.is_drawn else None, list[Path]()
-    if drive or plot or video or still:
+    if drive or plot or video or still:  # only this loads an engine
         run_experiment = experiment_view.find_run_experiment(workspace, run, experiment)
         if (drive or plot) and stored.record:
             plot_path = _rerun_and_plot(terminal, run_experiment, anew=drive)
@@ -175,7 +175,7 @@ def _parse_still(text: str, experiment: "RunExperiment") -> "mutator.Shot":
     try:
         time = float(t)
     except ValueError:
-        time = math.nan
+        time = math.nan  # refused below, like infinity
     if not math.isfinite(time) or (separator and not name):
         raise MutatorError(
             f"'{text}'", where="--still", expected="a time in s, alone or with a file: 14.5 or 14.5=early.png"

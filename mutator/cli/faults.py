@@ -27,7 +27,7 @@ from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 from mutator.mutants.readable_patches import readable_patch
 
 _DEFAULT_OUT = Path("runs/try")
-EXPERIMENT_ID_PATTERN = re.compile(r"[0-9a-f]{4,16}")
+EXPERIMENT_ID_PATTERN = re.compile(r"[0-9a-f]{4,16}")  # an id, or enough of its start
 
 SpecName = Annotated[
     str,

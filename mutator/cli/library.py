@@ -185,6 +185,7 @@ def check(
     for problem in problems:
         terminal.say(error_text(problem), style="red", whole=not terminal.out.is_terminal)
     for finding in findings:
+        # without --drive, passed checks are not news
         if drive or finding.level != "ok":
             _print_finding(terminal, finding)
     failed = [finding for finding in findings if finding.level == "failed"]

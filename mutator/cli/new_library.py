@@ -43,7 +43,7 @@ def init(
     try:
         mutator.init_library(folder, target=tree)
     except MutatorError as error:
-        raise with_options(error, {"target": "--target"}) from None
+        raise with_options(error, {"target": "--target"}) from None  # elsewhere, `target` is --manifest
     facts: dict[str, Any] = {"folder": str(folder)}
     content = "fault_library/, templates/"
     if tree is not None:

@@ -171,6 +171,7 @@ def with_workspace_options(verb: Callable[..., None]) -> Callable[..., None]:
             else None
         )
         replacements = option_signature.parameters.values() if option_signature else [parameter]
+        # keyword-only parameters can have defaults in any order
         parameters += [option.replace(kind=inspect.Parameter.KEYWORD_ONLY) for option in replacements]
 
     @functools.wraps(verb)
@@ -179,9 +180,11 @@ def with_workspace_options(verb: Callable[..., None]) -> Callable[..., None]:
             values[name] = options_class(
                 **{field.name: values.pop(field.name) for field in fields(options_class)}
             )
+        # `ctx.obj` has the options before the subcommand
         workspace_options = values.pop("workspace_options").with_defaults(ctx.obj or WorkspaceOptions())
         verb(workspace_options=workspace_options, **values)
 
+    # Typer reads both the signature and the annotations
     run_verb.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     run_verb.__annotations__ = {p.name: p.annotation for p in parameters}
     return run_verb

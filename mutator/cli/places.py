@@ -76,6 +76,11 @@ def _anchor_as_yaml(at: Mapping[str, Any]) -> str:
     import yaml
 
     line = yaml.safe_dump(
-        anchor, default_flow_style=True, sort_keys=False, width=math.inf, allow_unicode=True
+        # a place fills one line, however long
+        anchor,
+        default_flow_style=True,
+        sort_keys=False,
+        width=math.inf,
+        allow_unicode=True,
     )
     return str(line).strip()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 STYLE_BY_STATE = {"new": "yellow", "changed": "bold yellow", "rejected": "bold red", "approved": "green"}
 MOST_VALUE_ROWS = 24  # rows of values shown in a terminal
-MOST_CONDITIONS = 6
+MOST_CONDITIONS = 6  # conditions shown in a terminal; a group can have one for each context
 
 
 def group_as_json(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, Any]:
@@ -68,6 +68,7 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
     if terminal.out.is_terminal:
         terminal.print_table(["group", "state", "what", "when", "faults", "runs"], rows, right=(4, 5))
     else:
+        # in a pipe, each group is one line
         flat = [(*row[:2], row[2].replace("\n", "; "), *row[3:]) for row in rows]
         terminal.print_table(["group", "state", "what", "when", "faults", "runs"], flat, right=(4, 5))
     terminal.say(f"{counted(len(groups), 'group')}: {describe_counts(review, groups)}")

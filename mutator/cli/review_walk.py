@@ -45,7 +45,7 @@ def walk_through(
         except MutatorError as error:
             show_error(error)
             reviewed = reviewed.reread()
-            waiting.insert(0, (number, group))
+            waiting.insert(0, (number, group))  # shown again, with what the other reviewer decided
             continue
         style = review_view.STYLE_BY_STATE[reviewed.review.state(group).value]
         terminal.say(f"{group.id} {reviewed.review.describe(group)}", style=style)

@@ -63,6 +63,7 @@ def merge(
     terminal = Terminal(as_json)
     with terminal.show_spinner("merging"):
         merged = mutator.merge_runs(shards, out, accept_versions=accept_versions)
+        # computing the digests takes time, too
         planned, seals = merged.folder.planned_count, merged.seals
     if as_json:
         counts = {"run": str(out), "shards": len(shards), "experiments": planned}
@@ -118,7 +119,7 @@ def report(
     for summary in report_files.summaries:
         terminal.print_table(summary.heads, summary.rows, right=tuple(summary.right_aligned))
     terminal.say(f"report: {short_path(report_files.markdown)} and {short_path(report_files.page)}")
-    loaded_run.check_equivalence()
+    loaded_run.check_equivalence()  # last, because the report is wanted even if this fails
 
 
 def _write_history(terminal: Terminal, folder: Path) -> None:
@@ -163,7 +164,7 @@ def clean(
 
     terminal = Terminal()
     for run in runs:
-        check_run_folder(run)
+        check_run_folder(run)  # refuse before the first folder is deleted
     if not yes:
         if not sys.stdin.isatty():
             raise MutatorError("no terminal to ask for confirmation", remedy="add --yes to delete anyway")

@@ -18,7 +18,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 QUERY_LABEL = "Query over results.csv"
-MOST_EXAMINED = 5  # maximum number of candidates examined for each figure
+MOST_EXAMINED = 5  # candidates for each figure; examining one means unpacking two series
 
 
 def build_example_drawings(
@@ -53,6 +53,7 @@ def candidate_rows(frame: pd.DataFrame, figure: ActionFigure) -> pd.DataFrame:
         return frame.iloc[:0]
     if figure.order_column not in frame:
         return frame.iloc[:0]
+    # ids decide ties, so that every machine draws the same figures
     return matches.sort_values([figure.order_column, "experiment_id"], ascending=[False, True])
 
 

@@ -260,6 +260,7 @@ def _answer_claim(
     source: YamlSource,
     keys: tuple[str | int, ...],
 ) -> ClaimAnswer:
+    # a call that readers can repeat in Python
     query = f"{measure}(runs, {', '.join(f'{name}={text!r}' for name, text in arguments.items())})"
     call: Any = MEASURES[measure]
     try:

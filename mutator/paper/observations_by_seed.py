@@ -53,6 +53,7 @@ def verdicts_by_seed_table(judged: Sequence[JudgedObservation], by_seed: JudgedB
 
 
 def _seeds_with_verdict(number: int, verdict: ClaimVerdict, by_seed: JudgedBySeed) -> list[str]:
+    # numbers begin at 1
     return [seed for seed, judged in by_seed.items() if judged[number - 1].verdict is verdict]
 
 

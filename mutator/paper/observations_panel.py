@@ -72,7 +72,7 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
     ends = run.ends() or {}
     file_words = re.findall(r"\w+", read_bounded(file, MOST_YAML_BYTES).decode())
     frame = select_columns(run.frame, *file_words)  # the queries use only columns that the file names
-    frame = frame.assign(t_end=frame["scenario"].map(ends))
+    frame = frame.assign(t_end=frame["scenario"].map(ends))  # `median_time` needs the ends of the runs
     judged = observations.judge_observations(file, frame, list(_mixture_gaps(run, missing)))
     coverage = _describe_coverage(run, len(fault_types), missing)
     if all(observation.verdict is ClaimVerdict.UNDECIDED for observation in judged):

@@ -49,6 +49,7 @@ def check_published_numbers(workspace: Workspace) -> Iterator[MutatorError]:
         *_duplicate_rows(coverage, _fault_type_of),
         *_unknown_names(coverage, _fault_type_of, "fault type", fault_types),
     ]
+    # sums over wrong rows would only repeat the problems
     yield from problems or _unequal_sums(numbers, coverage, summary.path)
 
 

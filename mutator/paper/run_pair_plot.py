@@ -41,6 +41,7 @@ def plot_run_pair(
     panels = [(c, meaning) for c, meaning in figure_spec.panels if c in pair.golden and c in pair.faulty]
     first_s = max(float(pair.times_s[0]), pair.start_s - SHOWN_BEFORE_S)
     last_s = min(float(pair.times_s[-1]), pair.end_s + SHOWN_AFTER_S)
+    # inches: legend and time axis, then each panel
     figure, axes = style.blank(1.1 + 1.35 * len(panels), len(panels), 1)
     is_visible = (pair.times_s >= first_s) & (pair.times_s <= last_s)
     for axis, (channel, what) in zip(axes, panels, strict=True):
@@ -89,6 +90,7 @@ def _plot_channel(axis: "Axes", pair: RunPair, channel: str, is_visible: np.ndar
 
 
 def _shade_steps(axis: "Axes", t: np.ndarray, steps: StepFlags) -> None:
+    # zeros at both ends let the first and the last step begin and end a shade
     edges = np.flatnonzero(np.diff(np.concatenate(([0], steps.astype(int), [0]))))
     for begin, end in edges.reshape(-1, 2):
         axis.axvspan(t[begin], t[end - 1], color=SHADE_COLOUR, alpha=0.45, linewidth=0)
@@ -115,7 +117,7 @@ def _draw_marks(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> 
             f"{label} {mark.t:.2f} s",
             (mark.t, 1.0),
             xycoords=("data", "axes fraction"),
-            xytext=(0, 3 + 11 * level),
+            xytext=(0, 3 + 11 * level),  # points; a line of text is 11 high
             textcoords="offset points",
             ha="left" if fits else "right",
             fontsize=style.SMALL,

@@ -44,6 +44,7 @@ class RunPair:
         hazard: str | None,
     ) -> "RunPair":
         """Return the pair of an experiment with an activated fault, up to `hazard` or the end of the run."""
+        # a hazard can end a drive early
         steps = min(len(golden[time_channel]), len(faulty[time_channel]))
         times_s = faulty[time_channel][:steps]
         assert record.activation is not None  # the query finds only activated faults

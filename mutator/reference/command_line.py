@@ -54,15 +54,16 @@ def render_command_line_page(workspace: Workspace) -> str:
 def _subcommand_section(group: Any, name: str) -> Iterator[str]:
     command = group.commands[name]
     yield f"## {name}\n"
-    with command.make_context(
-        name, [], parent=group.make_context("mutator", [name]), resilient_parsing=True
-    ) as ctx:
+    parent = group.make_context("mutator", [name])
+    # resilient: otherwise, Click would demand the arguments
+    with command.make_context(name, [], parent=parent, resilient_parsing=True) as ctx:
         usage = " ".join(command.get_usage(ctx).removeprefix("Usage: ").split())
     yield f"```text\n{usage}\n```\n"
     yield f"{_unwrap_paragraphs(command.help)}\n"
     params = [param for param in command.params if param.name not in (*_WORKSPACE_OPTIONS, "help")]
     yield from _options_table(command, params)
     if command.epilog:
+        # Click's mark of lines that it must not fold
         title, _, lines = command.epilog.replace("\b", "").strip().partition("\n")
         examples, _, rest = lines.partition("\n\n")
         yield f"{title}\n\n```sh\n" + "\n".join(map(_example_line, examples.splitlines())) + "\n```\n"

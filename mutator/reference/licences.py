@@ -86,7 +86,7 @@ def _first_group_by_package(clone: Path) -> dict[str, str]:
     group_by_package: dict[str, str] = {}
     for group, lines in groups.items():
         for name in map(_package_name, lines):
-            group_by_package.setdefault(name, group)
+            group_by_package.setdefault(name, group)  # the first group counts: `mutator` before its extras
     return group_by_package
 
 

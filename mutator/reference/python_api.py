@@ -100,7 +100,7 @@ def members_of(cls: type) -> list[ApiMember]:
     for base in cls.__mro__:
         if base.__module__.partition(".")[0] == "mutator" and base not in public:
             for member in _members_defined_in(base):
-                member_by_name.setdefault(member.name, member)
+                member_by_name.setdefault(member.name, member)  # a class can override inherited members
     return list(member_by_name.values())
 
 
@@ -239,6 +239,7 @@ def _annotation_text(node: ast.arg | ast.AnnAssign) -> str:
 
 
 def _unquoted_text(annotation: ast.expr) -> str:
+    # quoted if the type is imported only for checking
     return ast.unparse(annotation).strip("'")
 
 
@@ -257,7 +258,7 @@ def _signature_text(node: FunctionNode, name: str, *, lines: bool = False) -> st
     texts = [text for text, arg in zip(texts, positional, strict=True) if arg.arg not in ("self", "cls")]
     if args.vararg:
         texts.append(f"*{_argument_text(args.vararg, None, lines)}")
-    elif args.kwonlyargs:
+    elif args.kwonlyargs:  # after `*args`, no `*` is needed
         texts.append("*")
     texts += [_argument_text(a, d, lines) for a, d in zip(args.kwonlyargs, args.kw_defaults, strict=True)]
     if not lines:

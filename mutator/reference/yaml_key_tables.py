@@ -59,6 +59,7 @@ def order_models(parts: dict[str, dict[str, Any]]) -> list[str]:
         name = waiting.pop()
         if name not in ordered:
             ordered[name] = None
+            # a stack, so reversed: the first reference comes next
             waiting += reversed(list(_referenced_models(parts[name])))
     return list(ordered)
 
