@@ -199,7 +199,7 @@ def ends(seed: int) -> None:
         for one in left:
             if count < EXPERIMENTS:
                 some.append(one)
-                count += len(one.places)
+                count += len(one.positions)
         ended, busy, pieces = simulated(folder, some, random.Random(seed))
     last, middle = max(ended), mean(ended)
     print(

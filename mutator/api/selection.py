@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from mutator._common.argument_checks import check_number, check_whole_number
-from mutator.campaigns.plan_warnings import is_idle
+from mutator.campaigns.idle_faults import is_idle
 from mutator.checks.library_check import spec_problems
 from mutator.config import units
 from mutator.errors import MutatorError, MutatorWarning

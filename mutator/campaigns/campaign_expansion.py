@@ -159,7 +159,7 @@ class CampaignExpansion:
         library, files = self._library_faults(), self._faults_of_files()
         selected: dict[str, _NumberedFault] = {}
         for i, selection in enumerate(self.campaign.fault_selections):
-            if selection.operator_selection is not None:
+            if selection.operators is not None:
                 continue
             variants: dict[str, list[_NumberedFault]] = {}
             for numbered in files.get(i, library):
@@ -179,15 +179,15 @@ class CampaignExpansion:
         """
         mutant_by_id: dict[str, OperatorFault] = {}
         for i, selection in enumerate(self.campaign.fault_selections):
-            if selection.operator_selection is not None:
+            if selection.operators is not None:
                 with self._errors_at(("faults", i, "in")):
                     mutants = self._operator_faults.faults_of_selection(
-                        selection.operator_selection, self._golden_drives(), self.seed, self.reading
+                        selection.operators, self._golden_drives(), self.seed, self.reading
                     )
                 for mutant in mutants:
                     earlier = mutant_by_id.get(mutant.fault.id, mutant)
                     mutant_by_id[mutant.fault.id] = replace(
-                        mutant, when=tuple(dict.fromkeys((*earlier.when, *mutant.when)))
+                        mutant, activity=tuple(dict.fromkeys((*earlier.activity, *mutant.activity)))
                     )
         return list(mutant_by_id.values())
 
@@ -251,9 +251,9 @@ class CampaignExpansion:
         for mutant in mutants:
             if scenario not in mutant.scenarios:
                 continue
-            if When.PERMANENT in mutant.when:
+            if When.PERMANENT in mutant.activity:
                 yield self._build_experiment(mutant.fault, scenario, Method.GUIDED, permanent)
-            if When.TRANSIENT in mutant.when:
+            if When.TRANSIENT in mutant.activity:
                 number = int(mutant.fault.id, 16)
                 for experiment in self._experiments_of_faults(scenario, [(number, mutant.fault)], triggers):
                     if experiment.trigger.condition != permanent.condition:

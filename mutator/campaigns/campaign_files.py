@@ -33,7 +33,7 @@ class FaultSelection:
     spec_pattern: str
     spec_file: Path | None = None
     values_per_variant: int | None = None  # number of values from each variant, spread evenly; None: all
-    operator_selection: OperatorSelection | None = None
+    operators: OperatorSelection | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +58,7 @@ class Campaign:
     random_until_s: float | None
     hold_s: float | None  # how long faults stay active; None: while the context holds, or to the end
     sample_size: int | None  # number of experiments, balanced over the variants
-    is_proportional: (
+    is_sample_proportional: (
         bool  # whether to sample pairs, in proportion to the size of each fault type and scenario
     )
     seeds: range  # the campaign is repeated with each seed
@@ -118,7 +118,7 @@ def load_campaign(path: Path) -> Campaign:
                 spec_pattern=item.spec or "",
                 spec_file=_spec_file_path(path, item.spec or ""),
                 values_per_variant=item.values,
-                operator_selection=_operator_selection(item),
+                operators=_operator_selection(item),
             )
             for item in model.faults
         ),
@@ -131,7 +131,7 @@ def load_campaign(path: Path) -> Campaign:
         random_until_s=triggers.random_until_s,
         hold_s=triggers.hold_s,
         sample_size=model.sample,
-        is_proportional=model.proportional,
+        is_sample_proportional=model.proportional,
         seeds=_seed_range(model),
         canary=model.canary,
         limits=model.limits,

@@ -19,7 +19,7 @@ from mutator.config.yaml_files import StrictModel, YamlRecord
 from mutator.model import AfterHazard, Limits, Method
 
 
-def _check_operator(name: str) -> str:
+def _validated_operator(name: str) -> str:
     if not OPERATORS.has(name):
         *others, last = map(repr, OPERATORS.names())
         raise PydanticKnownError("enum", {"expected": f"{', '.join(others)} or {last}"})
@@ -28,7 +28,7 @@ def _check_operator(name: str) -> str:
 
 _OperatorName = Annotated[
     str,
-    AfterValidator(_check_operator),
+    AfterValidator(_validated_operator),
     WithJsonSchema({"anyOf": [{"enum": OPERATORS.shipped_names()}, {"type": "string"}]}),
 ]
 

@@ -36,7 +36,7 @@ class PendingChunk:
     """The unfinished part of a chunk."""
 
     chunk_index: int
-    places: tuple[int, ...]  # positions in the chunk
+    positions: tuple[int, ...]  # of its experiments in the chunk
 
 
 def pending_chunks_of(folder: RunFolder, records: Mapping[str, Record]) -> tuple[PendingChunk, ...]:
@@ -50,9 +50,9 @@ def pending_chunks_of(folder: RunFolder, records: Mapping[str, Record]) -> tuple
     pending_chunks: list[PendingChunk] = []
     for index, (_, _, count) in enumerate(folder.head.chunks):
         if names is None:
-            positions = tuple(range(count))
+            pending_positions = tuple(range(count))
         else:
-            positions = tuple(i for i in range(count) if next(names) not in finished_ids)
-        if positions and (shard is None or shard.has_chunk(index)):
-            pending_chunks.append(PendingChunk(index, positions))
+            pending_positions = tuple(i for i in range(count) if next(names) not in finished_ids)
+        if pending_positions and (shard is None or shard.has_chunk(index)):
+            pending_chunks.append(PendingChunk(index, pending_positions))
     return tuple(pending_chunks)

@@ -91,7 +91,7 @@ class _FilterCompiler:
         if isinstance(op, ast.NotIn):
             return lambda a, b: not self.contains(b, a)
         if type(op) in _ORDER_OPERATORS:
-            return lambda a, b: self.is_ordered(type(op), a, b)
+            return lambda a, b: self.compare_in_order(type(op), a, b)
         raise _filter_error(self.text, "`is`", "== or !=")
 
     def contains(self, group: object, value: object) -> bool:
@@ -101,7 +101,7 @@ class _FilterCompiler:
             )
         return value in group
 
-    def is_ordered(self, op: type[ast.cmpop], a: object, b: object) -> bool:
+    def compare_in_order(self, op: type[ast.cmpop], a: object, b: object) -> bool:
         if a is None or b is None:
             return False
         try:

@@ -188,10 +188,10 @@ class GitClone:
             if not all(name.endswith("/") for name in unignored):
                 return True
             names = [
-                one
+                git_name
                 for name in unignored
                 for entry in _folder_entries(folder, name)
-                for one in _names_for_git(*entry)
+                for git_name in _names_for_git(*entry)
             ]
         return False
 

@@ -20,7 +20,7 @@ class OperatorFault:
     """A fault created by an operator, and the scenarios whose golden runs execute the changed line."""
 
     fault: Fault
-    when: tuple[When, ...]
+    activity: tuple[When, ...]
     scenarios: frozenset[str]
 
 
@@ -57,7 +57,7 @@ class OperatorFaults:
         return [
             OperatorFault(
                 fault=mutation.to_fault(reading),
-                when=selection.activity,
+                activity=selection.activity,
                 scenarios=frozenset(name for name in executed if self._is_executed(mutation, executed[name])),
             )
             for mutation in draw

@@ -16,8 +16,8 @@ from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_campaign_study
 from mutator.campaigns.chunks import chunk_lengths_of_runs
 from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.idle_faults import IdleFaults
 from mutator.campaigns.plan_parts import FaultTypeAndMethod, PlanPart, PlanTally, plan_digest
-from mutator.campaigns.plan_warnings import IdleFaults
 from mutator.campaigns.sampling import draw_balanced, draw_balanced_pairs, draw_in_proportion
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
 from mutator.errors import MutatorError
@@ -276,7 +276,7 @@ def _choose_experiments(
 def _sample_experiments(
     experiments: tuple[Experiment, ...], campaign: Campaign, count: int, seed: int
 ) -> tuple[Experiment, ...]:
-    if not campaign.is_proportional:
+    if not campaign.is_sample_proportional:
         return draw_balanced(experiments, count, seed)
     try:
         return draw_in_proportion(experiments, count, seed)

@@ -13,12 +13,12 @@ def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
     Such experiments differ only in scenarios that a change makes identical. The manifest lists these
     scenarios in `same_in`, and the preflight checks that they are identical.
     """
-    scenarios = equal_scenarios(manifest, experiment.changes)
+    scenarios = scenarios_sharing_runs(manifest, experiment.changes)
     place: Hashable = scenarios if experiment.scenario in scenarios else experiment.scenario
     return (experiment.fault.id, experiment.trigger, experiment.seed, experiment.changes, place)
 
 
-def equal_scenarios(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]:
+def scenarios_sharing_runs(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]:
     return next((manifest.same_in[change] for change in changes if change in manifest.same_in), ())
 
 

@@ -45,17 +45,17 @@ def input_facts(a: ComparedRun, b: ComparedRun) -> tuple[InputFact, ...]:
     return tuple(InputFact(name=n, a=heads[0].get(n, "-"), b=heads[1].get(n, "-")) for n in names)
 
 
-def _facts_of_run(side: ComparedRun) -> dict[str, str]:
-    head, stretches = side.folder.head, side.folder.stretches
+def _facts_of_run(run: ComparedRun) -> dict[str, str]:
+    head, stretches = run.folder.head, run.folder.stretches
     values = {name: str(getattr(head, name)) for name in _HEAD_FIELDS}
-    if len(seeds := side.folder.seeds) > 1:
+    if len(seeds := run.folder.seeds) > 1:
         values["seed"] = f"{seeds[0]} to {seeds[-1]}"
-    values["setting"] = ", ".join(dict.fromkeys(c for e in side.experiments for c in e.setting)) or "-"
+    values["setting"] = ", ".join(dict.fromkeys(c for e in run.experiments for c in e.setting)) or "-"
     values["chosen"] = (
         ", ".join(f"{k} {v}" for k, v in as_json_types(head.choices).items() if v is not None) or "-"
     )
     values |= {f"digest of {name}": value[:_SHOWN_DIGEST_DIGITS] for name, value in head.sources.items()}
-    if scale := side.folder.severity_scale:
+    if scale := run.folder.severity_scale:
         bounds = ", ".join(f"{name} from {least:.3g} m/s" for name, least, _ in scale.classes[1:])
         values["scale of severity"] = f"{scale.name}: {bounds}"
     values["digest of plan"] = head.plan[:_SHOWN_DIGEST_DIGITS]

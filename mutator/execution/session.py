@@ -197,7 +197,7 @@ class Session:
             "engine": self.engine,
             "goldens": dict(self.golden_digests),
             "secret": self.secret,
-            "pending": [[item.chunk_index, list(item.places)] for item in self.pending],
+            "pending": [[item.chunk_index, list(item.positions)] for item in self.pending],
             "proof": [[sample.number, sample.id] for sample in self.proof],
         }
 

@@ -80,7 +80,7 @@ class Worker:
         )
         self._delete_old_images(experiments[0].seed)
         errors = []
-        for ended in self._runner.run([experiments[place] for place in pending.places]):
+        for ended in self._runner.run([experiments[place] for place in pending.positions]):
             finished = self._without_outcome_if_stopped(ended)
             self._store_finished(finished)
             if finished.mode in MODES_TO_PROVE:

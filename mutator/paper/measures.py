@@ -95,7 +95,7 @@ def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
     strata = guided_against_random.strata_with_both_methods(
         tally_by_fault_type(_select_runs(runs, of)), "injected"
     )
-    ratio = guided_against_random.mantel_haenszel(strata)
+    ratio = guided_against_random.pool_odds_ratios(strata)
     types = counted(ratio.strata, "fault type")
     text = f"- ({types})"
     if not math.isnan(ratio.odds_ratio):

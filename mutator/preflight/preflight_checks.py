@@ -13,7 +13,7 @@ from mutator._common.files import json_bytes, raising_disk_full, read_json, writ
 from mutator._common.hashing import digest
 from mutator.campaigns import run_environment
 from mutator.campaigns.run_inputs import RunInputs
-from mutator.campaigns.shared_runs import equal_scenarios
+from mutator.campaigns.shared_runs import scenarios_sharing_runs
 from mutator.errors import CheckFailed, DiskFull, InvalidMutant, MutatorError
 from mutator.mutants.mutant_building import build
 from mutator.preflight import preflight_cache, unreached_triggers
@@ -242,7 +242,7 @@ class _PreflightChecks:
         """Check that scenarios which a change makes equal, according to the manifest, give the same bytes."""
         equal_runs: dict[GoldenRun, dict[str, CheckRun]] = {}
         for golden_run in self.golden_runs:
-            if golden_run.scenario in equal_scenarios(self.manifest, golden_run.changes):
+            if golden_run.scenario in scenarios_sharing_runs(self.manifest, golden_run.changes):
                 equal_runs.setdefault(golden_run._replace(scenario=""), {})[golden_run.scenario] = runs[
                     GOLDEN, golden_run
                 ]

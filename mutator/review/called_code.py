@@ -68,20 +68,20 @@ class CalledCode:
             for definition in sorted(source_by_definition)
         }
 
-    def _called_definitions(self, place: _Definition) -> Iterator[_Definition]:
+    def _called_definitions(self, definition: _Definition) -> Iterator[_Definition]:
         """Yield the places that the source of this place calls. A class includes its methods."""
-        module = self._module(place.path)
-        for node in module.nodes_of(place.name) if place.name else [module.tree]:
-            uses = uses_in(node, place.name.rpartition(".")[0])
+        module = self._module(definition.path)
+        for node in module.definitions_of(definition.name) if definition.name else [module.tree]:
+            uses = uses_in(node, definition.name.rpartition(".")[0])
             is_class = isinstance(node, ast.ClassDef)
             yield from self._definitions_of_uses(
-                place.path, (use for use in uses if not (is_class and use.owner)), place.self_class
+                definition.path, (use for use in uses if not (is_class and use.owner)), definition.self_class
             )
-            yield from self._named_data_files(place.path, node)
+            yield from self._named_data_files(definition.path, node)
 
-    def _source(self, place: _Definition) -> str:
-        data = self._tree.files[place.path]
-        text = self._module(place.path).source_of(place.name, data) if place.name else data
+    def _source(self, definition: _Definition) -> str:
+        data = self._tree.files[definition.path]
+        text = self._module(definition.path).source_of(definition.name, data) if definition.name else data
         return text.decode("utf-8", "surrogateescape")
 
     def _named_data_files(self, path: str, node: ast.AST) -> Iterator[_Definition]:
@@ -118,7 +118,7 @@ class CalledCode:
         module = self._module(path)
         if depth > _MOST_IMPORT_STEPS or not words:
             return
-        if module.nodes_of(words[0]):
+        if module.definitions_of(words[0]):
             yield _Definition(path, words[0])
         for import_ in module.imports.get(words[0], ()):
             yield from self._definitions_of_import(path, import_, words[1:], depth + 1)
@@ -157,7 +157,7 @@ class CalledCode:
     ) -> Iterator[_Definition]:
         """Yield the method that `self.name` refers to in an object of `self_class`."""
         path, inside = owner
-        if self._module(path).nodes_of(f"{inside}.{name}"):
+        if self._module(path).definitions_of(f"{inside}.{name}"):
             yield _Definition(path, f"{inside}.{name}", self_class)
         else:
             yield from self._methods_of_bases(owner, name, self_class, depth)

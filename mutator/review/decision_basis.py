@@ -57,10 +57,10 @@ def distinct_diffs(patches: Iterable[str]) -> list[str]:
 
 def function_sources(tree: SourceTree, locations: Iterable[FaultLocation]) -> dict[str, str]:
     return {
-        f"{place.path} {place.function}": _function_source(tree.files[place.path], place.function).decode(
-            "utf-8", "surrogateescape"
-        )
-        for place in locations
+        f"{location.path} {location.function}": _function_source(
+            tree.files[location.path], location.function
+        ).decode("utf-8", "surrogateescape")
+        for location in locations
     }
 
 

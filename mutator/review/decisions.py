@@ -17,8 +17,8 @@ from mutator._common.folder_locks import locking_folder
 from mutator._common.shipped_files import check_not_shipped
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, ReviewConflict
-from mutator.review import review_file, seen_texts
-from mutator.review.commits import check_four_eyes, library_commit
+from mutator.review import review_file, reviewed_texts
+from mutator.review.commit_authors import check_four_eyes, library_commit
 from mutator.review.entries import Decision, DecisionVerdict, Flag, Remark, ReviewEntry
 from mutator.review.mutant_groups import Group
 from mutator.workspace import Workspace
@@ -79,22 +79,22 @@ class Review:
         """The file, which might not exist."""
         return path_below(self.library, _review_file_name(self.target))
 
-    def decision(self, group: str) -> Decision | None:
-        entry = self.entries.get(group)
+    def decision(self, group_id: str) -> Decision | None:
+        entry = self.entries.get(group_id)
         return entry.decision if entry else None
 
-    def remarks(self, group: str) -> tuple[Remark, ...]:
+    def remarks(self, group_id: str) -> tuple[Remark, ...]:
         """Return the group's remarks, oldest first."""
-        entry = self.entries.get(group)
+        entry = self.entries.get(group_id)
         return entry.remarks if entry else ()
 
-    def flag(self, group: str) -> Flag | None:
-        entry = self.entries.get(group)
+    def flag(self, group_id: str) -> Flag | None:
+        entry = self.entries.get(group_id)
         return entry.flag if entry else None
 
-    def revision(self, group: str) -> str:
+    def revision(self, group_id: str) -> str:
         """Digest of the group's review; empty if there is none."""
-        entry = self.entries.get(group)
+        entry = self.entries.get(group_id)
         return entry.revision if entry else ""
 
     def stale_parts(self, group: Group) -> list[str]:
@@ -115,13 +115,13 @@ class Review:
         decision = self.decision(group.id)
         if decision is None or not self.stale_parts(group):
             return ""
-        return seen_texts.diff_from_reviewed_text(
+        return reviewed_texts.diff_from_reviewed_text(
             self.library, self.name_of_reviewed_text(group.id), decision.bound, group.reviewed_text
         )
 
-    def name_of_reviewed_text(self, group: str) -> str:
+    def name_of_reviewed_text(self, group_id: str) -> str:
         """Return the file in the library with the text of a group that the reviewer saw."""
-        return f"{_REVIEWS_FOLDER}/seen/{self.target}/{group}.txt"
+        return f"{_REVIEWS_FOLDER}/seen/{self.target}/{group_id}.txt"
 
     def in_list_order(self, groups: Iterable[Group]) -> list[Group]:
         """Return the groups in list order: new and changed ones first."""
@@ -207,7 +207,7 @@ def _refuse_unseen(
         expected="no changes since you last looked",
         remedy="check again, then decide (nothing was written)",
     )
-    conflict.groups, conflict.review = tuple(one.id for one in unseen), review
+    conflict.groups, conflict.review = tuple(stale_group.id for stale_group in unseen), review
     raise conflict
 
 
@@ -238,7 +238,7 @@ def _store(workspace: Workspace, review: Review, actions: Sequence[ReviewAction]
     updated = replace(review, entries=nonempty_entries)
     for action in actions:
         if action.kind in _VERDICT_BY_ACTION:
-            seen_texts.write_reviewed_text(
+            reviewed_texts.write_reviewed_text(
                 updated.library, updated.name_of_reviewed_text(action.group.id), action.group.reviewed_text
             )
     content = review_file.ReviewFileContent(entries=updated.entries, four_eyes=updated.four_eyes)

@@ -29,7 +29,7 @@ from mutator.review.called_code import CalledCode
 from mutator.review.decision_basis import DecisionBasis, distinct_diffs, fault_hunks, function_sources
 from mutator.review.entries import BasisDigests, ValueRanges
 from mutator.review.patch_shapes import PatchShape
-from mutator.review.seen_texts import render_reviewed_text
+from mutator.review.reviewed_texts import render_reviewed_text
 from mutator.review.value_ranges import value_ranges_of
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
@@ -168,7 +168,7 @@ class _GroupBuilder:
             (fault.id, label, patches[fault.injections]) for fault in faults.values()
         )
         fault, _ = members[0]
-        injections = tuple(dict.fromkeys(i for one in faults.values() for i in one.injections))
+        injections = tuple(dict.fromkeys(i for f in faults.values() for i in f.injections))
         models = tuple(dict.fromkeys(injection.model for injection in injections))
         operator = operator_name_of(fault)
         values: ValueRanges = {}

@@ -51,7 +51,7 @@ class SourceModule:
     definitions: Mapping[str, Sequence[ast.stmt]]
     imports: Mapping[str, Sequence[SourceImport]]
 
-    def nodes_of(self, name: str) -> Sequence[ast.stmt]:
+    def definitions_of(self, name: str) -> Sequence[ast.stmt]:
         """Return the statements that define a name: several if it is assigned more than once."""
         return self.definitions.get(name, ())
 
@@ -60,13 +60,15 @@ class SourceModule:
 
     def find_function(self, name: str) -> ast.stmt | None:
         """Return the function with that qualified name; the last if there are several."""
-        nodes = self.nodes_of(name)
+        nodes = self.definitions_of(name)
         return nodes[-1] if nodes else None
 
     def bases_of(self, name: str) -> list[tuple[str, ...]]:
-        classes = [node for node in self.nodes_of(name) if isinstance(node, ast.ClassDef)]
+        classes = [node for node in self.definitions_of(name) if isinstance(node, ast.ClassDef)]
         bases = (
-            base.value if isinstance(base, ast.Subscript) else base for one in classes for base in one.bases
+            base.value if isinstance(base, ast.Subscript) else base
+            for class_node in classes
+            for base in class_node.bases
         )
         return [words for base in bases if (words := _dotted_name(base))]
 
@@ -74,9 +76,9 @@ class SourceModule:
         """Return the lines of all statements that define a name, decorators included."""
         lines = data.splitlines(keepends=True)
         parts = []
-        for node in self.nodes_of(name):
+        for node in self.definitions_of(name):
             decorators = getattr(node, "decorator_list", [])
-            first = min(one.lineno for one in (node, *decorators))
+            first = min(part.lineno for part in (node, *decorators))
             parts += lines[first - 1 : node.end_lineno]
         return b"".join(parts)
 
@@ -213,21 +215,21 @@ def _local_names_and_imports(node: _FunctionNode) -> tuple[frozenset[str], list[
     imports: list[tuple[str, SourceImport]] = []
     pending: list[ast.AST] = list(node.body) if isinstance(node.body, list) else []
     while pending:
-        one = pending.pop()
-        if isinstance(one, ast.Import | ast.ImportFrom):
-            imports += _imports([one])
-        elif isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            names.add(one.name)
-        elif isinstance(one, ast.Global | ast.Nonlocal):
-            not_local |= set(one.names)
-        elif isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store | ast.Del):
-            names.add(one.id)
-        elif isinstance(one, ast.ExceptHandler | ast.MatchAs | ast.MatchStar) and one.name:
-            names.add(one.name)
-        if isinstance(one, ast.comprehension):
-            pending += (one.iter, *one.ifs)  # a comprehension's variables are local to it
-        elif not isinstance(one, (*_FUNCTION_NODES, ast.ClassDef)):
-            pending += ast.iter_child_nodes(one)
+        visited = pending.pop()
+        if isinstance(visited, ast.Import | ast.ImportFrom):
+            imports += _imports([visited])
+        elif isinstance(visited, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            names.add(visited.name)
+        elif isinstance(visited, ast.Global | ast.Nonlocal):
+            not_local |= set(visited.names)
+        elif isinstance(visited, ast.Name) and isinstance(visited.ctx, ast.Store | ast.Del):
+            names.add(visited.id)
+        elif isinstance(visited, ast.ExceptHandler | ast.MatchAs | ast.MatchStar) and visited.name:
+            names.add(visited.name)
+        if isinstance(visited, ast.comprehension):
+            pending += (visited.iter, *visited.ifs)  # a comprehension's variables are local to it
+        elif not isinstance(visited, (*_FUNCTION_NODES, ast.ClassDef)):
+            pending += ast.iter_child_nodes(visited)
     return frozenset(names - not_local - {name for name, _ in imports}), imports
 
 

@@ -24,8 +24,8 @@ _PAIR_COLUMNS = ["fault_id", "scenario", "row", "seed"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stratum:
-    kind: str
+class FaultTypeStratum:
+    fault_type: str
     guided_hazards: int
     guided: int
     random_hazards: int
@@ -68,15 +68,17 @@ class HazardRateDifference:
     fault_count: int
 
 
-def strata_with_both_methods(counts: Mapping[tuple[str, str], Tally], base: RateBase) -> tuple[Stratum, ...]:
+def strata_with_both_methods(
+    counts: Mapping[tuple[str, str], Tally], base: RateBase
+) -> tuple[FaultTypeStratum, ...]:
     """Return the fault types that have faults of both methods. `counts` has (method, fault type) as keys."""
     strata = []
     for kind in dict.fromkeys(kind for _, kind in counts):
         guided, random = counts.get((GUIDED, kind)), counts.get((RANDOM, kind))
         if guided and random and getattr(guided, base) and getattr(random, base):
             strata.append(
-                Stratum(
-                    kind=kind,
+                FaultTypeStratum(
+                    fault_type=kind,
                     guided_hazards=guided.hazards,
                     guided=getattr(guided, base),
                     random_hazards=random.hazards,
@@ -86,7 +88,7 @@ def strata_with_both_methods(counts: Mapping[tuple[str, str], Tally], base: Rate
     return tuple(strata)
 
 
-def mantel_haenszel(parts: Sequence[Stratum]) -> PooledOddsRatio:
+def pool_odds_ratios(parts: Sequence[FaultTypeStratum]) -> PooledOddsRatio:
     """Compare the odds of a hazard in guided and random runs, stratified by fault type (statsmodels)."""
     from statsmodels.stats.contingency_tables import StratifiedTable  # type: ignore[import-untyped]
 
@@ -107,7 +109,7 @@ def mantel_haenszel(parts: Sequence[Stratum]) -> PooledOddsRatio:
         )
 
 
-def fisher_p(stratum: Stratum) -> float:
+def fisher_p(stratum: FaultTypeStratum) -> float:
     from scipy.stats import fisher_exact  # type: ignore[import-untyped]
 
     return float(fisher_exact(stratum.contingency_table).pvalue)

@@ -17,7 +17,7 @@ def hazard_odds_sheet(frame: pd.DataFrame, published: PublishedCounts | None) ->
     for base in RATE_BASES:
         for source, counts in sources.items():
             parts = guided_against_random.strata_with_both_methods(counts, base)
-            pooled = guided_against_random.mantel_haenszel(parts)
+            pooled = guided_against_random.pool_odds_ratios(parts)
             rates = (
                 share(sum(s.guided_hazards for s in parts), sum(s.guided for s in parts)),
                 share(sum(s.random_hazards for s in parts), sum(s.random for s in parts)),
@@ -68,7 +68,7 @@ def hazards_by_fault_type_sheet(frame: pd.DataFrame, published: PublishedCounts 
             ):
                 guided = share(stratum.guided_hazards, stratum.guided)
                 random = share(stratum.random_hazards, stratum.random)
-                lines.append((base, source, stratum.kind, guided, random, PValue(p), PValue(adjusted)))
+                lines.append((base, source, stratum.fault_type, guided, random, PValue(p), PValue(adjusted)))
     return Sheet(
         name="guided_against_random_by_fault_type",
         title="Guided against random by fault type",

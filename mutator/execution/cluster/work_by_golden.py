@@ -44,7 +44,7 @@ def group_by_golden(
         chunks.setdefault(golden_key_of(folder, first, faults), []).append(chunk_work)
     return {
         golden: GoldenRunGroup(
-            golden, _list_runs(folder, chunk_works), sum(len(chunk_work.places) for chunk_work in chunk_works)
+            golden, _list_runs(folder, chunk_works), sum(len(chunk_work.positions) for chunk_work in chunk_works)
         )
         for golden, chunk_works in chunks.items()
     }
@@ -53,7 +53,7 @@ def group_by_golden(
 def _list_runs(folder: RunFolder, pending: Sequence[PendingChunk]) -> Iterator[RunLines]:
     for chunk_work in pending:
         lines = list(plan_file.read_chunk_lines(folder.path, folder.head.chunks[chunk_work.chunk_index]))
-        for _, same in groupby((lines[place] for place in chunk_work.places), key=_shared_run_key):
+        for _, same in groupby((lines[place] for place in chunk_work.positions), key=_shared_run_key):
             yield {id_on_line(line): line for line in same}
 
 

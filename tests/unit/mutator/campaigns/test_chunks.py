@@ -36,7 +36,7 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 def test_all_experiments_are_pending_at_first(folder: RunFolder) -> None:
     left = pending_chunks_of(folder, {})
     assert [item.chunk_index for item in left] == list(range(8))
-    assert sum(len(item.places) for item in left) == 24
+    assert sum(len(item.positions) for item in left) == 24
 
 
 def test_experiments_without_a_valid_record_are_pending(

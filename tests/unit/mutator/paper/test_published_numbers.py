@@ -104,7 +104,7 @@ def test_contradictory_counts_are_reported_with_their_line(tmp_path: Path) -> No
 
 def test_within_fault_types_guided_faults_are_ahead_only_per_activated_fault(paper: PublishedNumbers) -> None:
     activated, injected = (
-        guided_against_random.mantel_haenszel(
+        guided_against_random.pool_odds_ratios(
             guided_against_random.strata_with_both_methods(paper.tally_by_fault_type, whole)
         )
         for whole in guided_against_random.RATE_BASES

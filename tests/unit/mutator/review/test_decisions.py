@@ -22,7 +22,7 @@ from mutator.review.decisions import (
 )
 from mutator.review.entries import BasisDigests
 from mutator.review.mutant_groups import Group
-from mutator.review.seen_texts import diff_from_reviewed_text, render_reviewed_text, write_reviewed_text
+from mutator.review.reviewed_texts import diff_from_reviewed_text, render_reviewed_text, write_reviewed_text
 from mutator.workspace import Workspace
 
 BOUND = BasisDigests(diff="d" * 16, function="f" * 16, template="0" * 16, calls="c" * 16)

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from mutator.statistics import guided_against_random
-from mutator.statistics.guided_against_random import Stratum
+from mutator.statistics.guided_against_random import FaultTypeStratum
 from mutator.statistics.guided_against_random_tables import matched_pairs_sheet
 from mutator.statistics.paired_statistics import PairCounts
 
@@ -37,16 +37,16 @@ def frame() -> pd.DataFrame:
     return results(*made, {"fault_id": "f", "trigger": "C1"} | HIT)  # and one guided run without a partner
 
 
-def stratum(guided: tuple[int, int], random: tuple[int, int]) -> Stratum:
-    return Stratum(
-        kind="k", guided_hazards=guided[0], guided=guided[1], random_hazards=random[0], random=random[1]
+def stratum(guided: tuple[int, int], random: tuple[int, int]) -> FaultTypeStratum:
+    return FaultTypeStratum(
+        fault_type="k", guided_hazards=guided[0], guided=guided[1], random_hazards=random[0], random=random[1]
     )
 
 
 def test_the_pooled_odds_ratio_follows_the_textbook() -> None:
     """The Mantel-Haenszel ratio is the sum of a*d/n over the sum of b*c/n: (10*15/40 + 4*18/40) / (10*5/40 +
     16*2/40)."""
-    pooled = guided_against_random.mantel_haenszel([stratum((10, 20), (5, 20)), stratum((4, 20), (2, 20))])
+    pooled = guided_against_random.pool_odds_ratios([stratum((10, 20), (5, 20)), stratum((4, 20), (2, 20))])
     assert pooled.odds_ratio == pytest.approx((150 + 72) / (50 + 32))
     assert pooled.low < 1 < pooled.odds_ratio < pooled.high
     assert 0.05 < pooled.p < 1
@@ -54,9 +54,9 @@ def test_the_pooled_odds_ratio_follows_the_textbook() -> None:
 
 def test_strata_without_hazards_do_not_affect_the_odds_ratio() -> None:
     one = stratum((10, 20), (5, 20))
-    pooled = guided_against_random.mantel_haenszel([one, stratum((0, 9), (0, 9))])
-    assert pooled.odds_ratio == pytest.approx(guided_against_random.mantel_haenszel([one]).odds_ratio)
-    assert math.isnan(guided_against_random.mantel_haenszel([stratum((0, 9), (0, 9))]).odds_ratio)
+    pooled = guided_against_random.pool_odds_ratios([one, stratum((0, 9), (0, 9))])
+    assert pooled.odds_ratio == pytest.approx(guided_against_random.pool_odds_ratios([one]).odds_ratio)
+    assert math.isnan(guided_against_random.pool_odds_ratios([stratum((0, 9), (0, 9))]).odds_ratio)
 
 
 def test_holm_adjusts_as_in_the_textbook() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from mutator.paper.measures import estimate_of_difference, mean_time, paired
 from mutator.statistics import guided_against_random
-from mutator.statistics.guided_against_random import Stratum
+from mutator.statistics.guided_against_random import FaultTypeStratum
 from mutator.statistics.paired_statistics import mcnemar, paired_times
 from mutator.statistics.shares import share
 
@@ -15,9 +15,9 @@ from . import by_hand
 from .results_frame import results
 
 
-def stratum(a: int, b: int, c: int, d: int) -> Stratum:
+def stratum(a: int, b: int, c: int, d: int) -> FaultTypeStratum:
     """Guided with and without hazard, random with and without hazard."""
-    return Stratum(kind="k", guided_hazards=a, guided=a + b, random_hazards=c, random=c + d)
+    return FaultTypeStratum(fault_type="k", guided_hazards=a, guided=a + b, random_hazards=c, random=c + d)
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ BERKELEY = [
 
 def test_mantel_haenszel() -> None:
     """The result of R's `mantelhaen.test`."""
-    found = guided_against_random.mantel_haenszel([stratum(*table) for table in BERKELEY])
+    found = guided_against_random.pool_odds_ratios([stratum(*table) for table in BERKELEY])
     assert found.odds_ratio == pytest.approx(0.9046968, abs=1e-7)
     assert (found.low, found.high) == pytest.approx((0.7719074, 1.0603298), abs=1e-7)
     assert found.strata == 6
@@ -55,7 +55,7 @@ def test_mantel_haenszel() -> None:
 )
 def test_breslow_day(tables: list[tuple[int, int, int, int]], p: float) -> None:
     """The results equal those of DescTools' BreslowDayTest in the course P8120 of Columbia University."""
-    found = guided_against_random.mantel_haenszel([stratum(*table) for table in tables])
+    found = guided_against_random.pool_odds_ratios([stratum(*table) for table in tables])
     assert found.p_equal == pytest.approx(p, rel=2e-4)
 
 

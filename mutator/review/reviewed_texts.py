@@ -16,11 +16,11 @@ _CONTEXT_LINES = 3  # unchanged lines around a change
 _HUNK_PATTERN = re.compile(r"@@ -\S+ \+(\d+)\S* @@")
 
 
-def render_reviewed_text(bound: BasisDigests, values: ValueRanges, sections: Mapping[str, str]) -> str:
+def render_reviewed_text(digests: BasisDigests, values: ValueRanges, sections: Mapping[str, str]) -> str:
     """Return the stored text of a group: its digests, its values, then each section under its name."""
     parts = {"values": describe_ranges(values), **sections}
     named = (f"== {name} ==\n{text}" + "\n" * (not text.endswith("\n")) for name, text in parts.items())
-    return f"{_digest_line(bound)}\n" + "\n".join(named)
+    return f"{_digest_line(digests)}\n" + "\n".join(named)
 
 
 def write_reviewed_text(library: Path, name: str, text: str) -> None:
@@ -28,15 +28,15 @@ def write_reviewed_text(library: Path, name: str, text: str) -> None:
     write_below(library, name, text.encode("utf-8", "surrogateescape"))
 
 
-def diff_from_reviewed_text(library: Path, name: str, bound: BasisDigests, text: str) -> str:
+def diff_from_reviewed_text(library: Path, name: str, digests: BasisDigests, text: str) -> str:
     """Return a unified diff from the stored text to the current `text`; empty if no text was stored for the
-    decision with the digests `bound`.
+    decision with these digests.
     """
     try:
         before = read_below(library, name).decode("utf-8", "surrogateescape")
     except (OSError, MutatorError):
         return ""
-    if not before.startswith(f"{_digest_line(bound)}\n"):
+    if not before.startswith(f"{_digest_line(digests)}\n"):
         return ""
     old, new = (version.partition("\n")[2].splitlines(keepends=True) for version in (before, text))
     return "".join(_with_section_names(unified_diff(old, new, "as decided", "now", n=_CONTEXT_LINES), new))
@@ -60,5 +60,7 @@ def _last_section_name(lines: Iterable[str]) -> str:
     return ": ".join(filter(None, (section, part)))
 
 
-def _digest_line(bound: BasisDigests) -> str:
-    return f"# diff {bound.diff} function {bound.function} template {bound.template} calls {bound.calls}"
+def _digest_line(digests: BasisDigests) -> str:
+    return (
+        f"# diff {digests.diff} function {digests.function} template {digests.template} calls {digests.calls}"
+    )

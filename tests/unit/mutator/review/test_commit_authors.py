@@ -8,7 +8,7 @@ import pytest
 
 from mutator.campaigns.git_clone import find_user_name
 from mutator.errors import MutatorError
-from mutator.review.commits import library_commit
+from mutator.review.commit_authors import library_commit
 from mutator.review.decisions import (
     Review,
     ReviewAction,
