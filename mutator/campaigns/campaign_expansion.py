@@ -72,6 +72,7 @@ class CampaignExpansion:
                 *self._experiments_of_mutants(scenario, mutants, triggers),
             )
         ]
+        # changes within a scenario have golden runs of their own, which the experiments of a chunk share
         ordered.sort(key=lambda item: (item[0], item[1].changes))
         return tuple(experiment for _, experiment in ordered)
 
@@ -88,7 +89,7 @@ class CampaignExpansion:
         faults = [fault for _, fault in candidates if fault.spec == canary.spec]
         if not faults:
             raise self._unmatched_error(("canary", "spec"), canary.spec)
-        largest = max(faults, key=lambda fault: fault.size)
+        largest = max(faults, key=lambda fault: fault.size)  # the most likely one to cause the hazard
         trigger = trigger_at_time(canary.at_s, name="canary")
         return self._build_experiment(largest, canary.scenario, Method.RANDOM, trigger)
 
@@ -254,8 +255,10 @@ class CampaignExpansion:
             if When.PERMANENT in mutant.activity:
                 yield self._build_experiment(mutant.fault, scenario, Method.GUIDED, permanent)
             if When.TRANSIENT in mutant.activity:
+                # a mutant has no values to count, so its id distinguishes its random times
                 number = int(mutant.fault.id, 16)
                 for experiment in self._experiments_of_faults(scenario, [(number, mutant.fault)], triggers):
+                    # `always` in the campaign's list would repeat the permanent experiment
                     if experiment.trigger.condition != permanent.condition:
                         yield experiment
 
@@ -274,6 +277,7 @@ class CampaignExpansion:
         assert self.campaign.random_until_s is not None  # the schema requires it for random times
         time = draw_time(
             self.seed,
+            # what else the campaign selects does not affect this experiment's draw
             f"{scenario}/{fault.spec}/{number}/{paired_trigger.name}",
             first_s=self.armed_after_s,
             last_s=self.campaign.random_until_s,

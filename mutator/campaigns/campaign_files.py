@@ -101,6 +101,7 @@ def load_campaign(path: Path) -> Campaign:
     model, source = load_yaml_model(path, CampaignModel, SCHEMA, prepare=with_list_below_triggers)
     _check_no_duplicates(model, source)
     triggers = model.triggers
+    # these names become paths in the library
     for keys, name in {("target",): model.target, ("triggers", "table"): triggers.table or ""}.items():
         with source.locating_errors(keys):
             check_library_name(name, path)

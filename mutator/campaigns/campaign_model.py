@@ -82,7 +82,7 @@ class SelectionModel(StrictModel, title="A selection"):
         return self
 
 
-MOST_SEEDS = 10_000
+MOST_SEEDS = 10_000  # each repeats the whole campaign, so a larger range is probably mistyped
 _NAMES_SCHEMA = {"type": "array", "items": {"type": "string"}}
 
 

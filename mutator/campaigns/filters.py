@@ -22,7 +22,7 @@ _ORDER_OPERATORS: dict[type[ast.cmpop], Callable[[object, object], bool]] = {
     ast.Gt: operator.gt,  # type: ignore[dict-item]
     ast.GtE: operator.ge,  # type: ignore[dict-item]
 }
-_MOST_CHARACTERS = 2000
+_MOST_CHARACTERS = 2000  # more than anybody writes; limits how deep an expression can nest
 _ALLOWED_SYNTAX = (
     'columns, numbers, "strings", ==, !=, <, <=, >, >=, in, not in, and, or, not, match(column, "glob*")'
 )

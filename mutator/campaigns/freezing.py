@@ -62,7 +62,7 @@ def freeze_plan_with_tally(
     try:
         with owning_run_folder(out):
             return freeze_plan_in_owned_folder(plan, out, workspace)
-    except BaseException:
+    except BaseException:  # also an interruption: a new folder without a whole plan does not stay
         if is_new and not RunFolder.exists(out):
             remove_folder(out)
         raise

@@ -22,12 +22,13 @@ from mutator._common.confined_files import open_below
 from mutator.errors import MutatorError
 from mutator.store.work_stretches import CloneState
 
-_MOST_GIT_TIME_S = 10.0  # for one answer
+_MOST_GIT_TIME_S = 10.0  # for one answer; a clone on a stalled network folder must not stop a run
 _MOST_OUTPUT_BYTES = 32 << 20  # bytes of an answer; a tiny repository can list billions of files
-_MOST_EXCLUDE_FILE_BYTES = 1 << 20  # bytes of an exclude file
-_MOST_COMPARED_BYTES = 1 << 30  # bytes of files to compare
-_BLOCK_BYTES = 1 << 20  # bytes
+_MOST_EXCLUDE_FILE_BYTES = 1 << 20  # what is cut off excludes nothing, so its files count as changes
+_MOST_COMPARED_BYTES = 1 << 30  # hashing a GiB takes seconds, for which every start of a run would wait
+_BLOCK_BYTES = 1 << 20  # files are hashed in blocks, to limit memory
 _LINK_MODE, _SUBMODULE_MODE = 0o120000, 0o160000  # modes of git
+# a bare repository inside a clone brings a configuration of its own; fsmonitor names a program to run
 _CAUTIOUS_OPTIONS = ("-c", "safe.bareRepository=explicit", "-c", "core.fsmonitor=false")
 _USER_SCOPES = ("system", "global", "command")  # scopes of configuration that no clone can set
 
@@ -59,6 +60,7 @@ class GitClone:
         arguments = ("rev-parse", "--show-toplevel", *path_options, "--show-object-format", "HEAD")
         output = _git_output(folder, *_CAUTIOUS_OPTIONS, *arguments)
         parts = [] if output is None else os.fsdecode(output).splitlines()
+        # fewer parts without a commit, more if a path contains a line break
         if len(parts) != 6 or not folder.resolve().is_relative_to(parts[0]):
             return None
         root, objects, shallow, excluded, hash_name, commit = parts
@@ -259,8 +261,9 @@ def _git_output(
     Of the user's variables for git, it gets none. It cannot connect to anything.
     """
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    # no fetch of missing objects, and no write to the clone, such as a refreshed index
     restrictions = {"GIT_ALLOW_PROTOCOL": "none", "GIT_NO_LAZY_FETCH": "1", "GIT_OPTIONAL_LOCKS": "0"}
-    with TemporaryFile() as input_file:
+    with TemporaryFile() as input_file:  # a pipe could fill up while git waits for its output to be read
         input_file.write(input_bytes)
         input_file.seek(0)
         try:
@@ -279,7 +282,7 @@ def _git_output(
     with process:
         try:
             output = process.stdout.read(_MOST_OUTPUT_BYTES)
-            if process.stdout.read(1):
+            if process.stdout.read(1):  # a cut answer could look complete
                 process.kill()
         except BaseException:
             process.kill()

@@ -77,6 +77,7 @@ class OperatorFaults:
 
     def _is_executed(self, mutation: Mutation, lines: Mapping[str, Collection[int]]) -> bool:
         path = mutation.location.path
+        # mutations count lines from 0, measured lines begin at 1
         return mutation.line + 1 in facts_of(self._manifest.tree, path).extend_to_statements(
             lines.get(path, ())
         )

@@ -39,7 +39,7 @@ RUNS_PER_GOLDEN = 3  # two golden runs and the null mutant, for each scenario wi
 _DEFAULT_RUN_CPU_S = 1.4  # one run on the reference engine, including interpreter start
 _TIME_OUTSIDE_RUNS_S = 3.0  # time that a campaign needs outside its runs
 _BYTES_PER_EXPERIMENT = 9_000  # series, patch, record and table rows of an experiment
-_BYTES_PER_GOLDEN = 1_200_000
+_BYTES_PER_GOLDEN = 1_200_000  # golden runs are stored as whole traces
 _MOST_EXPERIMENTS_IN_MEMORY = 50_000  # larger plans are not read as a whole
 
 
@@ -184,6 +184,7 @@ class SeedBySeedPlan:
         for number, seed in enumerate(self.seeds):
             if limit == 0:
                 break
+            # an equal part of what remains, rounded up; what one seed lacks, the next ones get
             most_experiments = None if limit is None else -(-limit // (len(self.seeds) - number))
             part = self._build_part(seed, most_experiments)
             limit = None if limit is None else limit - len(part.experiments)

@@ -59,6 +59,7 @@ class PlanDigestBuilder:
     """The digest of the ids and chunks of the experiments, the canary's id, and the campaign."""
 
     def __init__(self) -> None:
+        # a JSON list, hashed as it grows, so that no plan has to be in memory as a whole
         self._hash = sha256(f"[{canonical_json(_DIGEST_PREFIX)},[".encode())
         self._separator = ""
 
@@ -68,6 +69,7 @@ class PlanDigestBuilder:
             self._separator = ","
 
     def finish(self, chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
+        # without its opening bracket, because it continues the list that began with the ids
         rest = [chunks, canary, as_json_types(campaign.canary), as_json_types(campaign.limits)]
         self._hash.update(f"],{canonical_json(rest)[1:]}".encode())
         return self._hash.hexdigest()

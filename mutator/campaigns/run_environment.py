@@ -19,6 +19,7 @@ from mutator.engines.target_processes import run_environment
 from mutator.store.work_stretches import Blas
 from mutator.targets.process_environment import THREADS
 
+# a process of its own, because variables of the environment decide which BLAS numpy loads
 _BLAS_SCRIPT = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threadpool_info()))"
 
 

@@ -43,6 +43,7 @@ class RunInputs:
 
     def to_bytes(self) -> bytes:
         """Return the inputs for another process, which reads the target's tree itself."""
+        # the copied manifest has no cached properties, such as the bytes of the tree
         return pickle.dumps(replace(self, manifest=replace(self.manifest)))
 
     def digest_by_source(self) -> dict[str, str]:

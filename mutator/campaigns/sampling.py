@@ -45,6 +45,7 @@ def _draw_units(
     if count >= len(experiments):
         return tuple(experiments)
     cells: dict[str, dict[_Cell, deque[list[Experiment]]]] = defaultdict(dict)
+    # a hash instead of a shuffle: a unit keeps its rank when others join the campaign
     for unit in sorted(units, key=lambda unit: digest([seed, _ignoring_after_hazard(unit[0]).id])):
         cell = _cell(unit)
         cells[cell[0]].setdefault(cell, deque()).append(unit)
@@ -115,6 +116,7 @@ def draw_in_proportion(experiments: Sequence[Experiment], count: int, seed: int)
         {key: len(pairs) for key, pairs in strata.items()}, count // size
     ).items():
         pairs = sorted(strata[stratum], key=lambda pair: (*pair[:2], digest([seed, pair])))
+        # a random start, then equal steps: each experiment is equally likely
         offset = random.Random(digest([seed, stratum])).random()
         for i in range(number):
             members = strata[stratum][pairs[int((i + offset) * len(pairs) / number)]]

@@ -235,6 +235,7 @@ def _side_cells(row: ResultRow) -> Iterator[tuple[str, object]]:
 def _csv_bytes(lines: Iterable[Mapping[str, object]], heads: tuple[str, ...] = ()) -> bytes:
     rows = list(lines)
     text = io.StringIO()
+    # there is always a pair; only the table of unmatched experiments can be empty
     writer = csv.DictWriter(text, heads or tuple(rows[0]), lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)

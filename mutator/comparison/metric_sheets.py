@@ -26,6 +26,7 @@ def metrics_sheets(
     for metric in b.folder.head.metrics:
         name, unit, worse = metric.name, metric.unit, metric.worse
         frame = _metric_values(usable, a, b, name)
+        # in another unit or direction, it is another metric with the same name
         if units.get(name) != (unit, worse) or frame.empty:
             continue
         whole.append((name, unit, worse, *_median_cells(frame)))

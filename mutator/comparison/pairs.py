@@ -10,6 +10,7 @@ from mutator.comparison.compared_runs import ComparedRun, experiment_key
 from mutator.model import Experiment, Outcome, Status
 from mutator.results.result_rows import ResultRow
 
+# a fault that never ran did as little harm as one that was masked
 _HARM_BY_OUTCOME = {Outcome.NOT_ACTIVATED: 0, Outcome.MASKED: 0, Outcome.SDC: 1, Outcome.HAZARD: 2}
 _TIME_DECIMALS = 6  # decimals of a time from activation; absorbs rounding errors
 

@@ -18,7 +18,7 @@ from mutator.review.source_names import SUPER, NameUse, SourceImport, SourceModu
 from mutator.targets.source_tree import SourceTree
 
 _ClassKey = tuple[str, str]  # its file, its name
-_MOST_IMPORT_STEPS = 20  # maximum number of imports to follow for a name
+_MOST_IMPORT_STEPS = 20  # imports to follow for a name; modules can import each other in a circle
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -101,7 +101,7 @@ class CalledCode:
         self, path: str, uses: Iterable[NameUse], self_class: _ClassKey | None = None
     ) -> Iterator[_Definition]:
         for use in uses:
-            if use.words[0] == PROBE_NAME:
+            if use.words[0] == PROBE_NAME:  # the probe has a group of its own
                 continue
             if use.imported:
                 yield from self._definitions_of_import(path, use.imported, use.words[1:], 0)

@@ -9,6 +9,7 @@ from mutator.errors import MutatorError
 from mutator.review.mutant_groups import Group
 from mutator.workspace import Workspace
 
+# NUL between the parts, because names can contain any other character
 _LOG_FORMAT = "--format=%H%x00%an <%ae>%x00%(trailers:key=Co-authored-by,valueonly,separator=%x00)"
 
 
@@ -49,6 +50,7 @@ def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
     """Raise MutatorError if a reviewer approves a group that they changed last, or if a group's last author
     is unknown.
     """
+    # many groups come from the same files: git, which is slow, is asked once for them
     commits_by_sources: dict[tuple[Path, ...], dict[Path, _Commit]] = {}
     for group, by in approvals:
         if group.source_files not in commits_by_sources:

@@ -14,6 +14,7 @@ from mutator.review.entries import BasisDigests
 from mutator.review.patch_shapes import HOLE, without_values
 from mutator.targets.source_tree import SourceTree
 
+# line numbers, which change when somebody edits lines above
 _HUNK_HEAD_PATTERN = re.compile(r"^@@ .*$", re.MULTILINE)
 _SHOWN_HOLE = "⟨⟩"
 

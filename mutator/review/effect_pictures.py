@@ -40,12 +40,12 @@ from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 IMAGE_EFFECT_MODEL = "image_effect"
-LEVEL_NAMES = ("least", "middle", "most")
+LEVEL_NAMES = ("least", "middle", "most")  # also in file names, and in addresses of the server
 MOST_DRAWN_VALUES = 9  # maximum number of a group's values to draw; three are shown
 MIN_CORRELATION = 0.5  # minimum correlation of amount and change for ranking severity by amount
-JPEG_QUALITY = 85
-RUN_LIMITS = Limits(cpu_s=60, wall_s=120)
-_SCHEMA = "pictures/1"
+JPEG_QUALITY = 85  # the images of a group then take about 0.15 MB in the cache
+RUN_LIMITS = Limits(cpu_s=60, wall_s=120)  # for a run that never reaches the injected lines
+_SCHEMA = "pictures/1"  # in the cache's keys, so that files of another format are never read
 _drawing_lock = Lock()  # a page requests all images of a group at once: the first request draws them
 
 

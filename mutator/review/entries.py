@@ -38,7 +38,7 @@ class BasisDigests:
 
     def changed_parts(self, now: "BasisDigests") -> list[str]:
         differs = {name: getattr(self, name) != getattr(now, name) for name in _PART_NAMES}
-        differs["calls"] &= self.calls is not None
+        differs["calls"] &= self.calls is not None  # decisions from older files have no such digest
         return [word for name, word in _PART_NAMES.items() if differs[name]]
 
 

@@ -8,6 +8,7 @@ from mutator.review.entries import describe_ranges
 from mutator.review.mutant_groups import Group
 from mutator.review.patch_shapes import PatchShape
 
+# the condition of a random time: thousands of them become one range
 _TIME_CONDITION_PATTERN = re.compile(r"t >= ([0-9.e+-]+)\Z")
 _ID_HOLE_PATTERN = re.compile(r"id(_\d+)?\Z")  # readers do not need ids
 

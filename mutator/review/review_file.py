@@ -25,8 +25,8 @@ _FILE_HEADER = """\
 # Reviews of this target's groups of mutants. `mutator review` reads and writes this file.
 # A decision is valid while diff, function, template and calls are unchanged and all values are in its ranges.
 """
-_DIGEST_PATTERN = r"^[0-9a-f]{16}$"
-_REQUIRED_KEYS = ("by", "diff", "function", "template")
+_DIGEST_PATTERN = r"^[0-9a-f]{16}$"  # as `content_id` returns them
+_REQUIRED_KEYS = ("by", "diff", "function", "template")  # older files lack the other ones
 
 
 class _BlockModel(StrictModel):

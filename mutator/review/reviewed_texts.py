@@ -25,6 +25,7 @@ def render_reviewed_text(digests: BasisDigests, values: ValueRanges, sections: M
 
 def write_reviewed_text(library: Path, name: str, text: str) -> None:
     """Write the text that a reviewer saw, replacing earlier text."""
+    # the source of a target need not be UTF-8
     write_below(library, name, text.encode("utf-8", "surrogateescape"))
 
 

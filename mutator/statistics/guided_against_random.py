@@ -133,6 +133,7 @@ def matched_pairs(frame: pd.DataFrame) -> pd.DataFrame:
     """
     columns = [*_PAIR_COLUMNS, "kind", "is_activated", "is_hazard"]
     guided, random = (frame.loc[frame["method"] == how, columns] for how in (GUIDED, RANDOM))
+    # a run that occurs twice would count as several pairs
     return guided.merge(
         random.drop(columns="kind"), on=_PAIR_COLUMNS, suffixes=("_guided", "_random"), validate="one_to_one"
     )

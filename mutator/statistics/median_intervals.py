@@ -13,8 +13,8 @@ import pandas as pd
 from mutator.statistics.paired_statistics import PairedDifference
 from mutator.statistics.shares import CONFIDENCE
 
-RESAMPLES = 999
-_RESAMPLING_SEED = 1
+RESAMPLES = 999  # fewer than for rates, because each draw of a median goes through all runs
+_RESAMPLING_SEED = 1  # fixed, so that equal results give equal tables
 _MOST_CELLS = 500_000  # maximum number of cells in one batch of draws, to limit memory
 _MIN_BLOCK_SIZE = 256  # minimum number of values in a block
 

@@ -57,6 +57,7 @@ def mutant_drives(
         **dict(
             zip(
                 _EFFECTS,
+                # `False` stands for new alerts; it is replaced or removed below
                 (mutant_runs["is_manifested"], False, mutant_runs["is_hazard"], is_broken),
                 strict=True,
             )

@@ -15,7 +15,7 @@ import pandas as pd
 
 from mutator.statistics.shares import CONFIDENCE
 
-RESAMPLES = 9999
+RESAMPLES = 9999  # a draw only adds up one number for each cluster
 _RESAMPLING_SEED = 1  # fixed, so that resampling is deterministic
 _TIME_DECIMALS = 9  # decimals of a time difference; absorbs rounding errors
 
@@ -106,7 +106,7 @@ def resampled_interval(clusters: Sequence[np.ndarray], statistic: Callable[..., 
             paired=True,
             vectorized=True,
             n_resamples=RESAMPLES,
-            batch=500,
+            batch=500,  # limits memory, which grows with draws times clusters
             confidence_level=CONFIDENCE,
             method="percentile",
             rng=np.random.default_rng(_RESAMPLING_SEED),
