@@ -44,7 +44,9 @@ def group_by_golden(
         chunks.setdefault(golden_key_of(folder, first, faults), []).append(chunk_work)
     return {
         golden: GoldenRunGroup(
-            golden, _list_runs(folder, chunk_works), sum(len(chunk_work.positions) for chunk_work in chunk_works)
+            golden,
+            _list_runs(folder, chunk_works),
+            sum(len(chunk_work.positions) for chunk_work in chunk_works),
         )
         for golden, chunk_works in chunks.items()
     }
