@@ -42,7 +42,7 @@ def main() -> int:
     for _ in range(options.rounds):
         with tempfile.TemporaryDirectory() as out:
             scenario = Workspace.find(root=ROOT).scenario(SCENARIO)
-            arguments = manifest.arguments(scenario=scenario, seed=0, out=Path(out))
+            arguments = manifest.run_arguments(scenario=scenario, seed=0, out=Path(out))
             run = (sys.executable, "-m", manifest.entry_module, *arguments)
             whole = cpu_s(*check, env=environment)
             golden = sum(cpu_s(*run, env=environment) for _ in range(3))

@@ -156,7 +156,7 @@ def patches_of(workspace: Workspace, experiments: Sequence[Experiment]) -> list[
 def made_up_records(workspace: Workspace, experiments: Sequence[Experiment]) -> list[Record]:
     """Return records with all fields, some fields or none."""
     draw = np.random.default_rng(1)
-    names = [metric.name for metric in workspace.manifest("openpilot").measures]
+    names = [metric.name for metric in workspace.manifest("openpilot").all_metrics]
     step = max(1, len(experiments) // KINDS)
     found = []
     for number, experiment in enumerate(experiments[::step][:KINDS]):
@@ -261,7 +261,7 @@ def write_series(
     first = folder.golden_runs[0]
     golden = dict(load_trace(manifest, folder.golden_folder(*first)))
     sampler, draw = SeriesSampler(manifest, golden), np.random.default_rng(1)
-    names = [channel.name for channel in manifest.compared]
+    names = [channel.name for channel in manifest.compared_channels]
     made = [sampler.encoded_golden]
     for number in range(SERIES):
         change = {name: golden[name] + draw.normal(size=len(golden[name])).cumsum() / 100 for name in names}

@@ -74,7 +74,7 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
         key = one.key
         out = looked_at.pending_folder / "golden" / key
         out.mkdir(parents=True)
-        for name in looked_at.manifest.outputs:
+        for name in looked_at.manifest.output_files:
             (out / name).write_bytes(bytes(500_000))
         goldens[key] = preflight_rules.output_digest_of(looked_at.manifest, out)
     said = {"schema": CHECKS_SCHEMA, "digest": looked_at.digest, "results": [], "goldens": goldens}

@@ -43,12 +43,14 @@ def main() -> int:
         load_manifest_channels(manifest, trial.single.golden),
         load_manifest_channels(manifest, out),
     )
-    needed = [*dict.fromkeys((*manifest.compared, *manifest.judged))]
+    needed = [*dict.fromkeys((*manifest.compared_channels, *manifest.judged_channels))]
     time = manifest.time_channel
     parts = {
         "load what a verdict needs": cpu_ms(lambda: load_trace(manifest, out, needed), repeat),
         "load all channels": cpu_ms(lambda: load_manifest_channels(manifest, out), repeat),
-        "compare actuators": cpu_ms(lambda: compare_traces(golden, faulty, manifest.compared, time), repeat),
+        "compare actuators": cpu_ms(
+            lambda: compare_traces(golden, faulty, manifest.compared_channels, time), repeat
+        ),
         "compare all channels": cpu_ms(
             lambda: departures_from_golden(golden, faulty, manifest.channels, time, None), repeat
         ),

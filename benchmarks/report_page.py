@@ -90,7 +90,7 @@ def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
     freeze_plan(replace(plan, experiments=tuple(experiments), chunks=(size,)), out, workspace)
     lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
     draw = np.random.default_rng(1)
-    names = [metric.name for metric in workspace.manifest("openpilot").measures]
+    names = [metric.name for metric in workspace.manifest("openpilot").all_metrics]
     for number, experiment in enumerate(experiments):
         metrics = tuple(zip(names, map(float, draw.normal(10.0, 5.0, len(names))), strict=True))
         lines.append(asdict(replace(record(experiment, number), metrics=metrics)))

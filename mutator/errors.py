@@ -17,7 +17,7 @@ Code in a target's process has its exceptions beside it, because it cannot impor
 from pathlib import Path
 from typing import Any
 
-_LONGEST = 2000  # longest part of an error, in characters
+_MOST_PART_LENGTH = 2000  # longest part of an error, in characters
 EXIT_OK = 0
 EXIT_CHECK_FAILED = 1
 EXIT_WRONG_INPUT = 2
@@ -44,12 +44,12 @@ class MutatorError(Exception):
         expected: str | None = None,
         remedy: str | None = None,
     ) -> None:
-        self.got = _short(got)  #: what was found
+        self.got = _shorten(got)  #: what was found
         self.where = str(where) if where is not None else None  #: the file with the error
         self.line = line  #: the number of the line with the error
         self.argument = argument  #: the name of the wrong argument, if the error is not in a file
-        self.expected = _short(expected) if expected else None  #: what is valid
-        self.remedy = _short(remedy) if remedy else None  #: what to do
+        self.expected = _shorten(expected) if expected else None  #: what is valid
+        self.remedy = _shorten(remedy) if remedy else None  #: what to do
         super().__init__(str(self))
 
     def __str__(self) -> str:
@@ -72,7 +72,7 @@ class MutatorError(Exception):
             "expected": self.expected,
             "remedy": self.remedy,
         }
-        return _rebuild, (type(self), self.got, state)
+        return _rebuild_error, (type(self), self.got, state)
 
 
 class MutatorWarning(UserWarning):
@@ -83,11 +83,11 @@ class MutatorWarning(UserWarning):
     """
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+def _shorten(text: str) -> str:
+    return text if len(text) <= _MOST_PART_LENGTH else f"{text[:_MOST_PART_LENGTH]}..."
 
 
-def _rebuild(cls: type[MutatorError], got: str, state: dict[str, Any]) -> MutatorError:
+def _rebuild_error(cls: type[MutatorError], got: str, state: dict[str, Any]) -> MutatorError:
     return cls(got, **state)
 
 
@@ -196,7 +196,7 @@ class GroupsChanged(MutatorError):
         self.groups = groups
 
 
-class Absent(MutatorError):
+class NotServed(MutatorError):
     """A request to the server names something that it does not serve.
 
     * When: no such run, job, group, target or file exists.
@@ -204,7 +204,7 @@ class Absent(MutatorError):
     """
 
 
-class UnknownPage(MutatorError):
+class PageRefused(MutatorError):
     """A request to the server is refused.
 
     * When: it comes from a page that may not send it, or from a page of an earlier server.
@@ -220,7 +220,7 @@ class IncompleteRun(UserWarning):
     """
 
 
-class Signal(Exception):
+class HarnessSignal(Exception):
     """What the harness raises for itself; users see what the catcher makes of it.
 
     * When: a function cannot do its part, and its caller has another way.
@@ -228,7 +228,7 @@ class Signal(Exception):
     """
 
 
-class BadTrace(Signal, ValueError):
+class BadTrace(HarnessSignal, ValueError):
     """A trace file is invalid.
 
     * When: its bytes are not what its format prescribes, or its format cannot be read here.
@@ -240,7 +240,7 @@ class BadTrace(Signal, ValueError):
         self.got, self.expected = got, expected
 
 
-class Misfit(Signal, ValueError):
+class TypeMisfit(HarnessSignal, ValueError):
     """A value of a file does not fit its type. `path` leads to it, from the outermost key.
 
     * When: a record is read from JSON that has another type there, or a key too few or too many.
@@ -253,7 +253,7 @@ class Misfit(Signal, ValueError):
         self.path: list[str | int] = []
 
 
-class ForkServerLost(Signal):
+class ForkServerLost(HarnessSignal):
     """The fork server cannot be used any more.
 
     * When: one of its processes is gone, does not answer, or does not have the pristine tree.
@@ -261,7 +261,7 @@ class ForkServerLost(Signal):
     """
 
 
-class NotForkable(Signal):
+class NotForkable(HarnessSignal):
     """A target or run that cannot be forked. The text says why; `remedy` is for the user, if known.
 
     * When: the target is not stepwise, cannot be loaded or driven, or has threads.
@@ -276,7 +276,7 @@ class NotForkable(Signal):
         return str(self.args[0])
 
 
-class NotSwappable(Signal):
+class NotSwappable(HarnessSignal):
     """A mutant that cannot be put into a running program. The text says why.
 
     * When: it changes more than functions, or a line that does not ask the probe first.
@@ -284,7 +284,7 @@ class NotSwappable(Signal):
     """
 
 
-class NotTestable(Signal):
+class NotTestable(HarnessSignal):
     """A comparison whose boundary cannot be tested.
 
     * When: it does not compare one variable with a constant.
@@ -292,7 +292,7 @@ class NotTestable(Signal):
     """
 
 
-class HarnessErrors(Signal):
+class HarnessErrors(HarnessSignal):
     """The work of a pytest item failed.
 
     * When: the harness could not judge some of its experiments, or the session met a problem.
@@ -300,7 +300,7 @@ class HarnessErrors(Signal):
     """
 
 
-class PieceNotWanted(Signal):
+class PieceNoLongerNeeded(HarnessSignal):
     """A piece of work is no longer needed.
 
     * When: the command no longer waits for it.
@@ -308,7 +308,7 @@ class PieceNotWanted(Signal):
     """
 
 
-class GoldenRunsDiffer(Signal):
+class GoldenRunsDiffer(HarnessSignal):
     """A worker computes something else than the machine of the command.
 
     * When: a golden run made on the worker differs from the campaign's.
@@ -316,7 +316,7 @@ class GoldenRunsDiffer(Signal):
     """
 
 
-class WorkerRefused(Signal):
+class WorkerRefused(HarnessSignal):
     """A worker gets no work, or no more work.
 
     * When: its calls fail, it differs from the command's machine, or it left the run.
@@ -332,7 +332,7 @@ class WorkerCutOff(WorkerRefused):
     """
 
 
-class SchedulerGone(Signal):
+class SchedulerGone(HarnessSignal):
     """A session on a cluster cannot go on.
 
     * When: the scheduler no longer answers.

@@ -37,7 +37,7 @@ import numpy as np
 TRACE = "trace.npz"
 RECORD = "record.json"
 TIME = "t"  # every trace has this channel, in s
-_OPTIONS = ("scenario", "seed", "out")
+_REQUIRED_OPTIONS = ("scenario", "seed", "out")
 
 
 class GlueError(Exception):
@@ -68,7 +68,7 @@ class Run:
     def __init__(self, *, step_s: float, duration_s: float) -> None:
         self.__channels: tuple[str, ...] = ()
         self.__rows: list[tuple[float, ...]] = []
-        self.__duration_s = _length("duration_s", duration_s)
+        self.__duration_s = _checked_duration_s("duration_s", duration_s)
         self.__since, self.__passed = 0.0, 0  # time and steps when the step length last changed
         self.__step_s = 0.0
         self.step_s = step_s
@@ -90,7 +90,7 @@ class Run:
 
     @step_s.setter
     def step_s(self, step_s: float) -> None:
-        step_s = _length("step_s", step_s)
+        step_s = _checked_duration_s("step_s", step_s)
         if self.__rows and step_s != self.__step_s:  # a sum of equal steps would add up errors
             self.__since, self.__passed = self.t, len(self.__rows)
         self.__step_s = step_s
@@ -124,7 +124,9 @@ class Run:
                 f"expected the same channels in each step, without {TIME}"
             )
         at = f"at {self.t:g} s: "
-        self.__rows.append((self.t, *(_number(at + name, channels[name]) for name in self.__channels)))
+        self.__rows.append(
+            (self.t, *(_checked_number(at + name, channels[name]) for name in self.__channels))
+        )
 
     def recorded(self) -> dict[str, float]:
         """Return the channels of the last recorded step and its time."""
@@ -154,8 +156,8 @@ class Run:
         columns = np.array(self.__rows, dtype=np.float64).T
         np.savez(out / TRACE, **dict(zip((TIME, *self.__channels), columns, strict=True)))
         unfinished = out / f".{RECORD}"  # renamed when complete: a killed run leaves no record
-        said = {"hazards": self.__hazards, "alerts": self.__alerts}
-        unfinished.write_text(json.dumps(said) + "\n", encoding="utf-8")
+        record = {"hazards": self.__hazards, "alerts": self.__alerts}
+        unfinished.write_text(json.dumps(record) + "\n", encoding="utf-8")
         unfinished.replace(out / RECORD)
 
     @classmethod
@@ -165,9 +167,9 @@ class Run:
         The manifest names this method in `stepwise`. Any other `--key value` replaces the scenario's value of
         that key, and `--key` alone sets it to true, so changes of a scenario need no code.
         """
-        given = _options(arguments)
+        options = _parse_options(arguments)
         subclass: Any = cls
-        run: Self = subclass(_scenario(given), _seed(given))
+        run: Self = subclass(_load_scenario(options), _parse_seed(options))
         if not hasattr(run, "_Run__rows"):
             raise GlueError(
                 f"{cls.__name__}.__init__ does not call super().__init__; "
@@ -187,7 +189,7 @@ class Run:
                 raise GlueError(
                     f"step() recorded {len(run.__rows) - steps} rows at {run.t:g} s; expected one"
                 )
-        run.write(Path(_needed(_options(arguments), "out")))
+        run.write(Path(_required_option(_parse_options(arguments), "out")))
 
 
 def seed_globals(seed: int) -> None:
@@ -201,19 +203,19 @@ def read_scenario(path: Path) -> Scenario:
 
     This is a subset of YAML. A value that is not valid JSON is text. A line of another form raises GlueError.
     """
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         text = line.partition(" #")[0].rstrip()
         if not text or text.startswith("#"):
             continue
         key, colon, value = text.partition(":")
-        if not (colon and key.isidentifier() and value.strip()) or key in found:
+        if not (colon and key.isidentifier() and value.strip()) or key in values:
             raise GlueError(f"{path}:{number}: '{text}'; expected `key: value`, each key once")
-        found[key] = _value(value.strip())
-    return Scenario(found, path)
+        values[key] = _parse_value(value.strip())
+    return Scenario(values, path)
 
 
-def _number(what: str, value: Any) -> float:
+def _checked_number(what: str, value: Any) -> float:
     try:
         if not isinstance(value, str | bytes) and np.ndim(value) == 0:
             return float(value)
@@ -222,55 +224,55 @@ def _number(what: str, value: Any) -> float:
     raise GlueError(f"{what} is {reprlib.repr(value)}; expected a number")
 
 
-def _length(what: str, value: Any) -> float:
-    number = _number(what, value)
+def _checked_duration_s(what: str, value: Any) -> float:
+    number = _checked_number(what, value)
     if not 0 < number < math.inf:
         raise GlueError(f"{what} is {number:g}; expected a finite time above 0 s")
     return number
 
 
-def _value(text: str) -> Any:
+def _parse_value(text: str) -> Any:
     try:
         return json.loads(text)
     except ValueError:
         return text
 
 
-def _options(arguments: Sequence[str]) -> dict[str, str | None]:
+def _parse_options(arguments: Sequence[str]) -> dict[str, str | None]:
     """Return the options `--key value`, `--key=value` and `--key` (None) by key, with `_` for `-`."""
-    found: dict[str, str | None] = {}
-    waiting = ""
+    options: dict[str, str | None] = {}
+    pending_key = ""
     for argument in arguments:
         if argument.startswith("--"):
             name, equals, value = argument[2:].partition("=")
-            waiting = name.replace("-", "_")
-            found[waiting] = value if equals else None
-        elif waiting and found[waiting] is None:
-            found[waiting] = argument
+            pending_key = name.replace("-", "_")
+            options[pending_key] = value if equals else None
+        elif pending_key and options[pending_key] is None:
+            options[pending_key] = argument
         else:
             raise GlueError(f"argument '{argument}'; expected --scenario FILE --seed N --out DIR")
-    return found
+    return options
 
 
-def _needed(given: dict[str, str | None], name: str) -> str:
-    value = given.get(name)
+def _required_option(options: dict[str, str | None], name: str) -> str:
+    value = options.get(name)
     if value is None:
         raise GlueError(f"no --{name}; expected --scenario FILE --seed N --out DIR")
     return value
 
 
-def _seed(given: dict[str, str | None]) -> int:
-    text = _needed(given, "seed")
+def _parse_seed(options: dict[str, str | None]) -> int:
+    text = _required_option(options, "seed")
     if not text.isdecimal():
         raise GlueError(f"--seed {text}; expected a whole number, 0 or more")
     return int(text)
 
 
-def _scenario(given: dict[str, str | None]) -> Scenario:
-    scenario = read_scenario(Path(_needed(given, "scenario")))
-    for key, value in given.items():
-        if key in _OPTIONS:
+def _load_scenario(options: dict[str, str | None]) -> Scenario:
+    scenario = read_scenario(Path(_required_option(options, "scenario")))
+    for key, value in options.items():
+        if key in _REQUIRED_OPTIONS:
             continue
         scenario[key]  # raises GlueError for an unknown key
-        scenario[key] = True if value is None else _value(value)
+        scenario[key] = True if value is None else _parse_value(value)
     return scenario

@@ -13,8 +13,8 @@ from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
 
 Value = int | float | str | bool | None
 
-MOST = 1_000_000_000  # maximum of any limit or time
-OPERATORS = "operators"  # the `module` of faults that mutation operators make
+MOST_LIMIT = 1_000_000_000  # maximum of any limit or time
+OPERATORS_MODULE = "operators"  # the `module` of faults that mutation operators make
 
 
 class AnchorKind(StrEnum):
@@ -208,13 +208,13 @@ class Experiment:
     def id(self) -> str:
         """Digest of its content."""
         # the fault's id, not its content: a plan then hashes each fault once instead of once per run
-        trigger = self.plain_trigger
+        trigger = self.trigger_as_json
         parts = (self.scenario, self.scenario_digest, self.method, trigger, self.seed, self.setting)
         later = added_values(self)
         return content_id([self.fault.id, *parts, *([later] if later else [])])
 
     @cached_property
-    def plain_trigger(self) -> dict[str, Any]:
+    def trigger_as_json(self) -> dict[str, Any]:
         """The trigger as JSON types."""
         return dict(as_json_types(self.trigger))
 
@@ -241,14 +241,20 @@ class Limits:
 
     __pydantic_config__ = mapping_config("Limits")
 
-    cpu_s: int = field(default=60, metadata=yaml_metadata("CPU time in seconds.", ge=1, le=MOST))
-    wall_s: int = field(default=300, metadata=yaml_metadata("Wall time in seconds.", ge=1, le=MOST))
-    memory_mb: int = field(default=4096, metadata=yaml_metadata("Address space in MiB.", ge=256, le=MOST))
-    steps: int = field(default=20_000, metadata=yaml_metadata("Number of simulation steps.", ge=1, le=MOST))
+    cpu_s: int = field(default=60, metadata=yaml_metadata("CPU time in seconds.", ge=1, le=MOST_LIMIT))
+    wall_s: int = field(default=300, metadata=yaml_metadata("Wall time in seconds.", ge=1, le=MOST_LIMIT))
+    memory_mb: int = field(
+        default=4096, metadata=yaml_metadata("Address space in MiB.", ge=256, le=MOST_LIMIT)
+    )
+    steps: int = field(
+        default=20_000, metadata=yaml_metadata("Number of simulation steps.", ge=1, le=MOST_LIMIT)
+    )
     disk_mb: int = added_field(
         1024,
         yaml_metadata(
-            "MiB in the run's output folder and TMPDIR together; also the limit for each file.", ge=1, le=MOST
+            "MiB in the run's output folder and TMPDIR together; also the limit for each file.",
+            ge=1,
+            le=MOST_LIMIT,
         ),
     )
 

@@ -20,18 +20,18 @@ from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec, load_spec
 from mutator.faults.library_readings import Readings, load_readings
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
 from mutator.results.table_columns import check_column_names
-from mutator.stpa.analysis_files import Analysis, StructureModel, load_analysis, load_structure
+from mutator.stpa.analysis_files import ControlStructureModel, HazardAnalysis, load_control_structure, load_hazard_analysis
 from mutator.stpa.context_tables import ContextTable, load_context_table
-from mutator.stpa.hazard_list import HazardList, load_hazards
-from mutator.targets.contact_severity import Scale
+from mutator.stpa.hazard_list import HazardList, load_hazard_list
+from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
-from mutator.targets.severity_model import load_scale
+from mutator.targets.severity_model import load_severity_scale
 
-_SANDBOX = "mutator.engines.sandbox"
+_SANDBOX_MODULE = "mutator.engines.sandbox"
 
 
 @dataclass(frozen=True, repr=False)
@@ -44,16 +44,16 @@ class Workspace:
     sandbox: bool = False  #: whether a target's code runs in a sandbox
 
     def __repr__(self) -> str:
-        counts = ", ".join(counted(len(names), what) for what, names in self._contents())
+        counts = ", ".join(counted(len(names), what) for what, names in self._names_by_kind())
         return f"<Workspace {self.library}: {counts}>"
 
     def _repr_html_(self) -> str:
         rows = [["library", str(self.library)], ["templates", str(self.templates)]]
         rows += [["target", str(self.target)]] if self.target else []
-        rows += [[counted(len(names), what), ", ".join(names)] for what, names in self._contents()]
+        rows += [[counted(len(names), what), ", ".join(names)] for what, names in self._names_by_kind()]
         return str(TextTable(heads=("workspace", ""), rows=rows).as_html())
 
-    def _contents(self) -> tuple[tuple[str, Collection[str]], ...]:
+    def _names_by_kind(self) -> tuple[tuple[str, Collection[str]], ...]:
         base = self.library / "faults"
         specs = [path.relative_to(base).with_suffix("").as_posix() for path in self.spec_files()]
         return (
@@ -83,31 +83,30 @@ class Workspace:
         network. MutatorError if a named folder does not exist, or if this machine has no sandbox.
         """
         if sandbox:
-            import_module(
-                _SANDBOX
-            ).check_sandbox_available()  # late: what only reads loads nothing of the engines
-        its_target = Path(target) if target else environment_path("MUTATOR_TARGET")
-        if its_target and not its_target.is_dir():
+            # late: what only reads loads nothing of the engines
+            import_module(_SANDBOX_MODULE).check_sandbox_available()
+        target_root = Path(target) if target else environment_path("MUTATOR_TARGET")
+        if target_root and not target_root.is_dir():
             raise MutatorError(
-                f"no folder {its_target}",
+                f"no folder {target_root}",
                 expected="the target folder",
                 remedy="correct MUTATOR_TARGET, or name another folder with the controller's source",
             )
         return cls(
-            library=_folder(library_folder(root, library), "fault_library", "library"),
-            templates=_folder(templates_folder(root, templates), "templates", "templates"),
-            target=its_target.resolve() if its_target else None,
+            library=_checked_folder(library_folder(root, library), "fault_library", "library"),
+            templates=_checked_folder(templates_folder(root, templates), "templates", "templates"),
+            target=target_root.resolve() if target_root else None,
             sandbox=sandbox,
         )
 
     def manifest(self, name: str) -> TargetManifest:
         """Return the manifest with this name or path."""
-        manifest = load_manifest(self._file("targets", name, "target"), self.target)
+        manifest = load_manifest(self._find_file("targets", name, "target"), self.target)
         manifest = replace(manifest, sandbox=self.sandbox)
         check_column_names(manifest)
         return manifest
 
-    def scale_of(self, manifest: TargetManifest) -> Scale | None:
+    def scale_of(self, manifest: TargetManifest) -> SeverityScale | None:
         """Return the severity scale for a target's contacts; None without contacts.
 
         MutatorError, at the manifest's line, for an unknown scale.
@@ -115,20 +114,20 @@ class Workspace:
         if manifest.contact is None:
             return None
         shipped = (shipped_folder() / "fault_library" / "severity").glob("*.yaml")
-        known = {path.stem: path for path in sorted(shipped)} | self._files("severity")
-        if manifest.contact.scale not in known:
+        path_by_name = {path.stem: path for path in sorted(shipped)} | self._path_by_name("severity")
+        if manifest.contact.scale not in path_by_name:
             raise manifest.source.error(
                 ("severity", "scale"),
                 f"'{manifest.contact.scale}'",
-                expected=f"one of {', '.join(known)}, or a file in {self.library / 'severity'}",
+                expected=f"one of {', '.join(path_by_name)}, or a file in {self.library / 'severity'}",
                 remedy="correct the name, or write the scale",
             )
-        return load_scale(known[manifest.contact.scale])
+        return load_severity_scale(path_by_name[manifest.contact.scale])
 
     @property
     def targets(self) -> Mapping[str, Path]:
         """The manifests of the library by name."""
-        return self._files("targets")
+        return self._path_by_name("targets")
 
     def fault_models(self) -> FaultModels:
         """Return the fault models of the templates folder."""
@@ -144,7 +143,7 @@ class Workspace:
 
     def spec(self, name: str | Path) -> FaultSpec:
         """Return the spec with this name, `<module>/<fault_type>`, or path."""
-        return load_spec(self._file("faults", name, "fault spec"), self.readings())
+        return load_spec(self._find_file("faults", name, "fault spec"), self.readings())
 
     def specs(self) -> tuple[FaultSpec, ...]:
         """All specs, in the order of `spec_files`. Each must be at `<module>/<fault_type>.yaml`."""
@@ -185,80 +184,80 @@ class Workspace:
         faults = tuple(
             fault
             for spec in specs
-            if any(fnmatchcase(name, glob) for name in (spec.name, *_variants(spec)))
-            for fault in expand(spec, seed, reading, models=models, manifest=manifest)
+            if any(fnmatchcase(name, glob) for name in (spec.name, *_variant_names(spec)))
+            for fault in expand_spec(spec, seed, reading, models=models, manifest=manifest)
             if fnmatchcase(spec.name, glob) or fnmatchcase(fault.spec, glob)
         )
         if not faults:
-            known = [name for spec in specs for name in (spec.name, *_variants(spec))]
+            names = [name for spec in specs for name in (spec.name, *_variant_names(spec))]
             raise MutatorError(
                 f"no fault matches '{glob}'",
                 where=self.library / "faults",
                 expected="<module>/<fault_type>, with or without /<variant>, with * for any text",
-                remedy="see `mutator list specs`" + suggestion(glob, known),
+                remedy="see `mutator list specs`" + suggestion(glob, names),
             )
         return faults
 
-    def target_name(self, given: str | None = None) -> str:
+    def target_name(self, name: str | None = None) -> str:
         """Return the given target, or the library's only target; MutatorError if the library has none or
         several.
         """
         names = tuple(self.targets)
-        if given is None and not names:
+        if name is None and not names:
             raise MutatorError(
                 "no target manifest",
                 where=self.library / "targets",
                 remedy="write one (see docs/how-to/add-a-target.md)",
             )
-        if given is None and len(names) > 1:
-            known = f"{len(names)} targets in the library ({', '.join(names)})"
-            raise MutatorError(known, argument="target", remedy="name one")
-        return given or names[0]
+        if name is None and len(names) > 1:
+            listed = f"{len(names)} targets in the library ({', '.join(names)})"
+            raise MutatorError(listed, argument="target", remedy="name one")
+        return name or names[0]
 
     @property
     def scenarios(self) -> Mapping[str, Path]:
         """The scenarios of the library by name."""
-        return self._files("scenarios")
+        return self._path_by_name("scenarios")
 
     def scenario(self, name: str | Path) -> Path:
         """Return the file of the scenario with this name or path."""
-        return self._file("scenarios", name, "scenario")
+        return self._find_file("scenarios", name, "scenario")
 
     @property
     def campaigns(self) -> Mapping[str, Path]:
         """The campaigns of the library by name."""
-        return self._files("campaigns")
+        return self._path_by_name("campaigns")
 
     def campaign(self, name: str | Path) -> Path:
         """Return the file of the campaign with this name or path."""
-        return self._file("campaigns", name, "campaign")
+        return self._find_file("campaigns", name, "campaign")
 
     @property
     def context_tables(self) -> Mapping[str, Path]:
         """The context tables of the library by name; `context_table` reads one."""
-        return self._files("stpa/contexts")
+        return self._path_by_name("stpa/contexts")
 
     def context_table(self, name: str | Path, variables: Collection[str] | None = None) -> ContextTable:
         """Return the context table with this name or path; `variables` are those that a target observes."""
-        return load_context_table(self._file("stpa/contexts", name, "context table"), variables)
+        return load_context_table(self._find_file("stpa/contexts", name, "context table"), variables)
 
     def hazards(self) -> HazardList | None:
         """Return the accidents and hazards in fault_library/stpa/hazards.yaml; None without that file."""
         path = check_inside(self.library, self.library / "stpa" / "hazards.yaml")
-        return load_hazards(path) if os.path.lexists(path) else None
+        return load_hazard_list(path) if os.path.lexists(path) else None
 
-    def analysis(self) -> Analysis | None:
+    def analysis(self) -> HazardAnalysis | None:
         """Return the hazard analysis in fault_library/stpa/; None without a control structure."""
         folder = self.library / "stpa"
         files_inside(self.library, "stpa", "*.yaml")  # all that it reads
-        return load_analysis(folder) if (folder / "control_structure.yaml").exists() else None
+        return load_hazard_analysis(folder) if (folder / "control_structure.yaml").exists() else None
 
-    def structure(self, manifest: TargetManifest) -> StructureModel | None:
+    def structure(self, manifest: TargetManifest) -> ControlStructureModel | None:
         """Return a target's control structure; None if no channel names one of its components."""
         path = check_inside(self.library, self.library / "stpa" / "control_structure.yaml")
-        structure = load_structure(path) if path.exists() else None
-        known = structure.components if structure else {}
-        return structure if any(channel.component in known for channel in manifest.channels) else None
+        structure = load_control_structure(path) if path.exists() else None
+        components = structure.components if structure else {}
+        return structure if any(channel.component in components for channel in manifest.channels) else None
 
     @property
     def references(self) -> Path:
@@ -266,30 +265,31 @@ class Workspace:
         files_inside(self.library, "references", "*.yaml")
         return self.library / "references"
 
-    def _files(self, folder: str) -> dict[str, Path]:
+    def _path_by_name(self, folder: str) -> dict[str, Path]:
         return library_files(self.library, folder)
 
-    def _file(self, folder: str, name: str | Path, what: str) -> Path:
-        known = self._files(folder)
+    def _find_file(self, folder: str, name: str | Path, kind: str) -> Path:
+        path_by_name = self._path_by_name(folder)
         if str(name).endswith((".yaml", ".yml")):
             if not Path(name).is_file():
                 raise MutatorError(
                     f"no file {name}",
-                    expected=f"a {what}: the path of a YAML file, or {describe_choices(known)}",
-                    remedy="correct the path" + suggestion(str(Path(name).with_suffix("")), list(known)),
+                    expected=f"a {kind}: the path of a YAML file, or {describe_choices(path_by_name)}",
+                    remedy="correct the path"
+                    + suggestion(str(Path(name).with_suffix("")), list(path_by_name)),
                 )
-            return _readable(Path(name))
-        if (path := known.get(str(name))) is not None:
-            return _readable(path)
+            return _checked_file(Path(name))
+        if (path := path_by_name.get(str(name))) is not None:
+            return _checked_file(path)
         raise MutatorError(
-            f"no {what} '{name}'",
+            f"no {kind} '{name}'",
             where=self.library / folder,
-            expected=f"{describe_choices(known)}, or the path of a YAML file",
-            remedy="correct the name" + suggestion(str(name), list(known)),
+            expected=f"{describe_choices(path_by_name)}, or the path of a YAML file",
+            remedy="correct the name" + suggestion(str(name), list(path_by_name)),
         )
 
 
-def _readable(path: Path) -> Path:
+def _checked_file(path: Path) -> Path:
     """Return the path of a file; MutatorError unless it is a regular file of a size to be read as a whole."""
     check_path_encodable(path)
     try:
@@ -302,11 +302,11 @@ def _readable(path: Path) -> Path:
     return path
 
 
-def _variants(spec: FaultSpec) -> list[str]:
+def _variant_names(spec: FaultSpec) -> list[str]:
     return [f"{spec.name}/{variant.name}" for variant in spec]
 
 
-def _folder(path: Path, what: str, argument: str) -> Path:
+def _checked_folder(path: Path, what: str, argument: str) -> Path:
     if not path.is_dir():
         raise MutatorError(
             f"no folder {path}",

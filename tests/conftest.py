@@ -306,7 +306,7 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         `changed` alters the campaign's plan."""
         plan = changed(build_plan(workspace, campaign, Choices(**choices)))
         freeze_plan(plan, out, workspace)
-        compared = workspace.manifest(plan.campaign.target).compared
+        compared = workspace.manifest(plan.campaign.target).compared_channels
         unchanged = {"max_dev": tuple((channel.name, 0.0) for channel in compared)}
         lines = LineWriter(out / "records" / "0001-a.jsonl", {"schema": SCHEMA, "plan": plan.digest})
         for experiment in plan.experiments:

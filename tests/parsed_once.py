@@ -14,7 +14,7 @@ from mutator.config import yaml_files
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults import fault_model_files
-from mutator.faults.fault_models import Example, FaultModel, FaultModels
+from mutator.faults.fault_models import FaultModel, FaultModelExample, FaultModels
 from mutator.mutants import anchors
 from mutator.mutants.anchors import ParsedFile
 
@@ -28,7 +28,11 @@ def parsed_once() -> Iterator[None]:
 
     Each caller gets its own copy. A text with a mistake is parsed anew, so that the error names its file.
     """
-    parse_yaml, parse_python, load_model = yaml_files.parse_yaml, anchors.parse_file, fault_model_files._load
+    parse_yaml, parse_python, load_model = (
+        yaml_files.parse_yaml,
+        anchors.parse_file,
+        fault_model_files._load_model,
+    )
     models: dict[tuple[str, bytes, bytes], FaultModel] = {}
     run_example, examples = library_check.apply_example, dict[str, str]()
 
@@ -64,13 +68,13 @@ def parsed_once() -> Iterator[None]:
         source = dataclasses.replace(found.source, path=path)
         return dataclasses.replace(found, source=source, template_path=template)
 
-    def example_of(model: FaultModel, models: FaultModels, example: Example) -> str:
-        key = repr((model.kind, model.template, model.expression, model.params, example))
+    def example_of(model: FaultModel, models: FaultModels, example: FaultModelExample) -> str:
+        key = repr((model.kind, model.template, model.expression_template, model.params, example))
         return examples.get(key) or examples.setdefault(key, run_example(model, models, example))
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(yaml_files, "parse_yaml", yaml)
         patch.setattr(anchors, "parse_file", python)
-        patch.setattr(fault_model_files, "_load", model)
+        patch.setattr(fault_model_files, "_load_model", model)
         patch.setattr(library_check, "apply_example", example_of)
         yield

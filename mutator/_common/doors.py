@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from mutator._common.files import is_disk_full_error
 from mutator._common.message_text import suggestion
 from mutator._common.resource_shortages import find_shortage
-from mutator.errors import BadAddition, MutatorError, Signal
+from mutator.errors import BadAddition, HarnessSignal, MutatorError
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
@@ -119,7 +119,7 @@ class Door:
         """
         try:
             yield
-        except (MutatorError, Signal):
+        except (MutatorError, HarnessSignal):
             raise
         except Exception as err:
             if (

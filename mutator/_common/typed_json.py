@@ -14,7 +14,7 @@ from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from mutator._common.hashing import is_added_field
-from mutator.errors import Misfit, MutatorError
+from mutator.errors import MutatorError, TypeMisfit
 
 _T = TypeVar("_T")
 _Reader = Callable[[Any], Any]
@@ -49,7 +49,7 @@ def _reader_of(kind: Any) -> _Reader:
     if origin is tuple and arguments[-1] is Ellipsis:
         return _tuple_reader(_reader_of(arguments[0]))
     if origin is tuple:
-        return _fixed_list_reader([_reader_of(one) for one in arguments], tuple)
+        return _fixed_list_reader([_reader_of(annotation) for annotation in arguments], tuple)
     if dataclasses.is_dataclass(kind):
         return _dataclass_reader(cast(type[Any], kind))
     if issubclass(kind, tuple):
@@ -63,7 +63,7 @@ def _scalar_reader(kind: type) -> _Reader:
 
     def read(data: Any) -> Any:
         if type(data) not in kinds or not _is_encodable(data):  # a bool is no number
-            raise Misfit(_describe_misfit(data), _TYPE_DESCRIPTIONS[kind])
+            raise TypeMisfit(_describe_misfit(data), _TYPE_DESCRIPTIONS[kind])
         return data
 
     return read
@@ -79,7 +79,7 @@ def _enum_reader(kind: type[Enum]) -> _Reader:
 
     def read(data: Any) -> Any:
         if not isinstance(data, str) or data not in values:
-            raise Misfit(_describe_misfit(data), f"one of {', '.join(values)}")
+            raise TypeMisfit(_describe_misfit(data), f"one of {', '.join(values)}")
         return values[data]
 
     return read
@@ -97,7 +97,7 @@ def _tuple_reader(item: _Reader) -> _Reader:
 def _fixed_list_reader(items: Sequence[_Reader], build: Callable[[list[Any]], Any]) -> _Reader:
     def read(data: Any) -> Any:
         if len(_checked_container(data, list)) != len(items):
-            raise Misfit(f"a list of {len(data)}", f"a list of {len(items)}")
+            raise TypeMisfit(f"a list of {len(data)}", f"a list of {len(items)}")
         return build([_read_within(place, item, data[place]) for place, item in enumerate(items)])
 
     return read
@@ -121,10 +121,10 @@ def _union_reader(kind: Any, readers: Sequence[_Reader]) -> _Reader:
         for reader in readers:
             try:
                 return reader(data)
-            except Misfit as err:
+            except TypeMisfit as err:
                 misfits.append(err)
         farthest = max(misfits, key=lambda err: len(err.path))
-        raise farthest if farthest.path else Misfit(_describe_misfit(data), expected)
+        raise farthest if farthest.path else TypeMisfit(_describe_misfit(data), expected)
 
     return read
 
@@ -137,14 +137,14 @@ def _dataclass_reader(kind: type[Any]) -> _Reader:
     def read(data: Any) -> Any:
         _checked_container(data, dict)
         if missing := [name for name in needed if name not in data]:
-            raise Misfit(f"no key '{missing[0]}'")
+            raise TypeMisfit(f"no key '{missing[0]}'")
         if unknown := [name for name in data if name not in readers]:
-            raise Misfit(f"an unknown key {_describe_misfit(unknown[0])}", f"only {', '.join(readers)}")
+            raise TypeMisfit(f"an unknown key {_describe_misfit(unknown[0])}", f"only {', '.join(readers)}")
         values = {name: _read_within(name, readers[name], value) for name, value in data.items()}
         try:
             return kind(**values)
         except (ValueError, MutatorError) as err:
-            raise Misfit(str(err)) from None
+            raise TypeMisfit(str(err)) from None
 
     return read
 
@@ -152,14 +152,14 @@ def _dataclass_reader(kind: type[Any]) -> _Reader:
 def _read_within(key: str | int, read: _Reader, data: Any) -> Any:
     try:
         return read(data)
-    except Misfit as err:
+    except TypeMisfit as err:
         err.path.insert(0, key)
         raise
 
 
 def _checked_container(data: Any, kind: type[list[Any]] | type[dict[str, Any]]) -> Any:
     if type(data) is not kind:
-        raise Misfit(_describe_misfit(data), "a list" if kind is list else "an object")
+        raise TypeMisfit(_describe_misfit(data), "a list" if kind is list else "an object")
     return data
 
 

@@ -17,7 +17,7 @@ from mutator.outcomes.verdict_rules import (
     reaction_time,
     severity_class_of,
 )
-from mutator.targets.contact_severity import Scale
+from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.target_facts import ChannelFacts
 
@@ -111,7 +111,7 @@ class ExperimentResult(ABC):
 
     @property
     @abstractmethod
-    def scale(self) -> Scale | None:
+    def scale(self) -> SeverityScale | None:
         """The severity scale; None for a target without one."""
 
     @property
@@ -168,7 +168,7 @@ def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
     names = [name for name in trace if name != time and name not in time_channels]
     columns = {name: values_on_steps(trace, name, trace[time]) for name in names}
     frame = pd.DataFrame(columns, index=pd.Index(trace[time], name=time))
-    frame.attrs["units"] = {c.name: c.unit for c in (*manifest.compared, *manifest.plotted)}
+    frame.attrs["units"] = {c.name: c.unit for c in (*manifest.compared_channels, *manifest.plotted_channels)}
     return frame
 
 
@@ -190,7 +190,7 @@ def experiment_facts(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def verdict_facts(record: Record, scale: Scale | None) -> dict[str, Any]:
+def verdict_facts(record: Record, scale: SeverityScale | None) -> dict[str, Any]:
     """Return the verdict as plain data. Times are simulation times in s; None: no such event.
 
     `largest_difference` covers the whole run, `difference_in_drive` only the time up to the end of the drive.

@@ -18,10 +18,10 @@ from mutator.mutants.possible_places import ListedPlace, places_of
 from mutator.onboarding.first_library import write_first_library
 from mutator.onboarding.source_survey import survey_source
 from mutator.onboarding.todo_marks import unfilled_mark_errors
-from mutator.stpa.analysis_checks import check_analysis
-from mutator.stpa.analysis_files import Analysis
-from mutator.stpa.structure_drawing import draw
-from mutator.targets.allowed_locations import check_file
+from mutator.stpa.analysis_checks import list_analysis_problems
+from mutator.stpa.analysis_files import HazardAnalysis
+from mutator.stpa.structure_drawing import render_structure
+from mutator.targets.allowed_locations import check_file_allowed
 from mutator.workspace import Workspace
 
 
@@ -67,7 +67,7 @@ def find_places(
     opened_workspace = open_workspace(workspace)
     manifest = opened_workspace.manifest(opened_workspace.target_name(target))
     path, _, function = where.partition("::")
-    check_file(manifest, path)  # a forbidden file must not even be read
+    check_file_allowed(manifest, path)  # a forbidden file must not even be read
     return places_of(parsed_file(manifest.tree, path), opened_workspace.fault_models(), function or None)
 
 
@@ -109,12 +109,12 @@ def check_hazard_analysis(
     opened_workspace = open_workspace(workspace)
     analysis = _load_analysis(opened_workspace)
     manifest = opened_workspace.manifest(opened_workspace.target_name(target))
-    return check_analysis(analysis, opened_workspace.specs(), manifest)
+    return list_analysis_problems(analysis, opened_workspace.specs(), manifest)
 
 
 def draw_control_structure(workspace: WorkspaceLike = None) -> str:
     """Draw the control structure of the hazard analysis as SVG; MutatorError for a library without one."""
-    return draw(_load_analysis(workspace))
+    return render_structure(_load_analysis(workspace))
 
 
 def doctor(workspace: "Workspace | str | PathLike[str] | MutatorError | None" = None) -> list[Finding]:
@@ -132,7 +132,7 @@ def doctor(workspace: "Workspace | str | PathLike[str] | MutatorError | None" = 
     return examine_machine(opened_workspace)
 
 
-def _load_analysis(workspace: WorkspaceLike) -> Analysis:
+def _load_analysis(workspace: WorkspaceLike) -> HazardAnalysis:
     opened_workspace = open_workspace(workspace)
     analysis = opened_workspace.analysis()
     if analysis is None:

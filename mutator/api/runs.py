@@ -21,7 +21,7 @@ from mutator.execution.shard_merging import merge_shards
 from mutator.exports import Format, Parts, find_export
 from mutator.exports import Table as ExportedTable
 from mutator.exports.write import export
-from mutator.model import OPERATORS
+from mutator.model import OPERATORS_MODULE
 from mutator.outcomes.fault_free_runs import (
     FaultFreeRun,
     alerts_by_drive,
@@ -113,7 +113,7 @@ class Run(RunContents):
         alert or caused a hazard, in total, by operator and by function. Empty without such mutants.
         """
         frame = self._results_frame
-        if not (frame["module"] == OPERATORS).any():
+        if not (frame["module"] == OPERATORS_MODULE).any():
             return mutation_score_sheet(prepare_results(frame), {}, None)
         try:
             alerts = alerts_by_drive(self.fault_free())

@@ -16,7 +16,7 @@ from mutator.config import units
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec, Variant
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault, Trigger
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
@@ -82,7 +82,9 @@ class SelectedTarget:
         spec = choice.narrow(declared)
         for problem in spec_problems(spec, self.models, self.manifest):
             raise problem
-        faults = expand(spec, choice.seed or 0, choice.reading, models=self.models, manifest=self.manifest)
+        faults = expand_spec(
+            spec, choice.seed or 0, choice.reading, models=self.models, manifest=self.manifest
+        )
         if choice.value is not None:
             _warn_of_value(choice.value, declared, faults, self.models)
         return faults
@@ -151,7 +153,7 @@ def find_trigger(
         )
     if matches:
         table, row = matches[0]
-        table.check(variables)
+        table.check_variables(variables)
         return table.triggers(armed_after_s=armed_after_s, rows=(row,))[0]
     try:
         return parse_trigger(text, armed_after_s, variables)

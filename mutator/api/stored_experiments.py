@@ -20,7 +20,7 @@ from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, rerun_command
 from mutator.store.work_stretches import Stretch
-from mutator.targets.contact_severity import Scale
+from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.target_facts import ChannelFacts
 from mutator.workspace import Workspace
@@ -116,7 +116,7 @@ class StoredExperiment(ExperimentResult):
         return build_selected(self.run.selected_target, self.fault, self.experiment.trigger).patch
 
     @property
-    def scale(self) -> Scale | None:
+    def scale(self) -> SeverityScale | None:
         """The severity scale that the run was planned with."""
         return self.run.folder.severity_scale
 

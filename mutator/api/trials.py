@@ -16,7 +16,7 @@ from mutator.figures.run_plot import save
 from mutator.model import Experiment, Method, Record
 from mutator.outcomes.golden_comparison import Trace, load_trace
 from mutator.outcomes.hazards_and_metrics import load_judged_run
-from mutator.targets.contact_severity import Scale
+from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.target_facts import ChannelFacts, channel_facts
 
@@ -31,7 +31,7 @@ class Trial(ExperimentResult):
     record: Record  #: the record of the run
     single: SingleRun  #: the run and its files
     manifest: TargetManifest  #: the target's manifest
-    scale: Scale | None = None  #: the severity scale; None for a target without one
+    scale: SeverityScale | None = None  #: the severity scale; None for a target without one
     #: whether the record equals the campaign's; None: the campaign has none
     same_as_record: bool | None = None
     _temporary: ScratchFolder | None = field(default=None)  # deletes the folder together with this object
@@ -139,7 +139,7 @@ def build_trial(
     single: SingleRun,
     manifest: TargetManifest,
     *,
-    scale: Scale | None,
+    scale: SeverityScale | None,
     same_as_record: bool | None = None,
     temporary: ScratchFolder | None = None,
 ) -> Trial:

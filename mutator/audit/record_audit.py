@@ -118,7 +118,9 @@ def verdict_problems(
     head: RunHead, records: Sequence[StoredRecord], manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
     """Yield an error for each field that contradicts another field, run.json or the manifest."""
-    tolerances = {channel.name: channel.tolerance for channel in manifest.compared} if manifest else {}
+    tolerances = (
+        {channel.name: channel.tolerance for channel in manifest.compared_channels} if manifest else {}
+    )
     for stored in records:
         flaws = (
             _verdict_contradictions(stored.record)

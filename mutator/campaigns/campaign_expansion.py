@@ -20,7 +20,7 @@ from mutator.campaigns.sampling import evenly_spread_indices
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Experiment, Fault, Method, Trigger
 from mutator.operators.executed_lines import GoldenRunInputs
 from mutator.targets.manifest import TargetManifest
@@ -78,11 +78,11 @@ class CampaignExpansion:
 
     def build_canary(self) -> Experiment:
         canary = self.campaign.canary
-        if canary.hazard not in self.manifest.hazards:
+        if canary.hazard not in self.manifest.hazard_names:
             raise self.campaign.error(
                 ("canary", "hazard"),
                 f"hazard '{canary.hazard}'",
-                expected=f"one of {', '.join(self.manifest.hazards)}",
+                expected=f"one of {', '.join(self.manifest.hazard_names)}",
                 remedy="name a hazard of the target's manifest",
             )
         candidates = (*self._library_faults(), *chain.from_iterable(self._faults_of_files().values()))
@@ -96,11 +96,11 @@ class CampaignExpansion:
     def _check_changes(self) -> None:
         keys = self.campaign.keys_of_changes(self.reading)
         for i, change in enumerate(self.campaign.changes_in(self.reading)):
-            if change not in self.manifest.changes:
+            if change not in self.manifest.args_by_change:
                 raise self.campaign.error(
                     (*keys, i),
                     f"change '{change}'",
-                    expected=describe_choices(self.manifest.changes),
+                    expected=describe_choices(self.manifest.args_by_change),
                     remedy="name a change of the target's manifest",
                 )
 
@@ -148,7 +148,7 @@ class CampaignExpansion:
         numbered: list[_NumberedFault] = []
         for spec in specs:
             count_by_variant: dict[str, int] = {}
-            for fault in expand(
+            for fault in expand_spec(
                 spec, self.seed, self.reading, models=self._fault_models, manifest=self.manifest
             ):
                 number = count_by_variant.get(fault.spec, 0)

@@ -18,7 +18,7 @@ from mutator.campaigns.operator_selection import OperatorSelection, When
 from mutator.config.yaml_files import load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.errors import MutatorError
-from mutator.faults.library_readings import FILE, Readings
+from mutator.faults.library_readings import READINGS_FILE, Readings
 from mutator.model import AfterHazard, Limits, Method
 
 SCHEMA = "campaign/1"
@@ -192,7 +192,7 @@ def load_campaign_study(campaign: Campaign) -> CheckableStudy | None:
 def check_readings(campaign: Campaign, readings: Readings) -> None:
     """Raise MutatorError for an undeclared reading, or if `armed_after_s` or `setting` omits a reading."""
     readings_text = ", ".join(readings.names)
-    remedy = f"correct the name, or declare the reading in the library's {FILE}"
+    remedy = f"correct the name, or declare the reading in the library's {READINGS_FILE}"
     if campaign.reading is not None and campaign.reading not in readings.names:
         raise campaign.error(
             ("reading",), f"reading '{campaign.reading}'", expected=f"one of {readings_text}", remedy=remedy

@@ -201,15 +201,15 @@ def _build_head(
 def collect_target_facts(workspace: Workspace, manifest: TargetManifest) -> TargetFacts:
     structure = workspace.structure(manifest)
     return TargetFacts(
-        hazards=manifest.hazards,
+        hazards=manifest.hazard_names,
         alerts=manifest.alerts,
-        compared=tuple(channel.name for channel in manifest.compared),
+        compared=tuple(channel.name for channel in manifest.compared_channels),
         metrics=metric_facts(manifest),
         about_hazards=hazard_facts(manifest),
         severity=workspace.scale_of(manifest),
         channels=channel_facts(manifest),
         structure=structure.model_dump(mode="json", by_alias=True) if structure else None,
-        golden_files=tuple(manifest.outputs),
+        golden_files=tuple(manifest.output_files),
         target_files=manifest.tree.digests,
     )
 

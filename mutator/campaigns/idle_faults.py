@@ -40,5 +40,5 @@ class IdleFaults:
 
 def is_idle(fault: Fault, models: FaultModels) -> bool:
     return all(
-        models.get(injection.model).changes_nothing(dict(injection.params)) for injection in fault.injections
+        models.get(injection.model).is_neutral(dict(injection.params)) for injection in fault.injections
     )

@@ -29,7 +29,7 @@ from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_head import CAMPAIGN
 from mutator.store.shards import Shard
-from mutator.targets.stop_code import stop_source
+from mutator.targets.stop_code import stop_function_source
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -152,10 +152,10 @@ class SeedBySeedPlan:
         load_campaign_study(self.campaign)
         self.reading = self.choices.reading or self.campaign.reading or readings.default
         if self.choices.reading is not None:
-            readings.check(self.choices.reading)
+            readings.check_name(self.choices.reading)
         self._workspace, self._manifest = workspace, workspace.manifest(self.campaign.target)
         if self.campaign.after_hazard is AfterHazard.STOP:
-            stop_source(self._manifest)  # raises before any run starts
+            stop_function_source(self._manifest)  # raises before any run starts
         self._expansion = CampaignExpansion(
             workspace, self.campaign, self._manifest, self.seeds[0], self.reading
         )

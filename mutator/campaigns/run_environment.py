@@ -17,7 +17,7 @@ from packaging.utils import canonicalize_name
 
 from mutator.engines.target_processes import run_environment
 from mutator.store.work_stretches import Blas
-from mutator.targets.process_environment import THREADS
+from mutator.targets.process_environment import THREAD_VARIABLES
 
 # a process of its own, because variables of the environment decide which BLAS numpy loads
 _BLAS_SCRIPT = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threadpool_info()))"
@@ -50,7 +50,7 @@ def processor_name() -> str | None:
 
 def thread_limits() -> dict[str, str]:
     """Return the thread limits for numerical libraries in the target's environment."""
-    return dict.fromkeys(THREADS, "1")
+    return dict.fromkeys(THREAD_VARIABLES, "1")
 
 
 @lru_cache(maxsize=1)

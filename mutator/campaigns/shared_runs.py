@@ -19,7 +19,14 @@ def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
 
 
 def scenarios_sharing_runs(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]:
-    return next((manifest.same_in[change] for change in changes if change in manifest.same_in), ())
+    return next(
+        (
+            manifest.same_scenarios_by_change[change]
+            for change in changes
+            if change in manifest.same_scenarios_by_change
+        ),
+        (),
+    )
 
 
 def order_for_sharing(runs: Iterable[list[Experiment]]) -> list[list[Experiment]]:

@@ -21,7 +21,7 @@ from mutator.checks.fast_engine_check import loading_finding
 from mutator.checks.findings import CheckState, Finding
 from mutator.engines.sandbox import reason_not_available as shortcoming_of_sandbox
 from mutator.errors import MutatorError
-from mutator.targets.required_packages import MISSING, check_requirements, shortcoming
+from mutator.targets.required_packages import NOT_INSTALLED, check_requirements, installation_problem
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -66,12 +66,12 @@ def _package_findings() -> Iterator[Finding]:
         if requirement.marker and not requirement.marker.evaluate({"extra": ""}):
             continue
         remedy = f"pip install '{requirement.name}{requirement.specifier}'"
-        problem = shortcoming(requirement)
+        problem = installation_problem(requirement)
         if not problem:
             version = importlib.metadata.version(requirement.name)
             yield Finding(name=requirement.name, level=CheckState.OK, found=version)
         else:
-            level = CheckState.FAIL if problem == MISSING else CheckState.WARN
+            level = CheckState.FAIL if problem == NOT_INSTALLED else CheckState.WARN
             yield Finding(name=requirement.name, level=level, found=problem, remedy=remedy)
 
 

@@ -7,7 +7,7 @@ from mutator._common.message_text import counted
 from mutator.checks.findings import CheckState, Finding
 from mutator.engines.forkable import find_obstacle_by_loading, reasons_by_unforkable_variant
 from mutator.errors import MutatorError, NotForkable
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -42,7 +42,7 @@ def forking_finding(refusal: NotForkable | None) -> Finding:
 def variants_finding(workspace: Workspace, manifest: TargetManifest) -> Finding:
     """Return the finding about variants whose mutants cannot be put into a loaded program."""
     models = workspace.fault_models()
-    faults = [f for spec in workspace.specs() for f in expand(spec, 0, models=models, manifest=manifest)]
+    faults = [f for spec in workspace.specs() for f in expand_spec(spec, 0, models=models, manifest=manifest)]
     count = len({fault.spec for fault in faults})
     reasons: dict[str, list[str]] = {}
     try:

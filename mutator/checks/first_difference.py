@@ -18,7 +18,7 @@ def describe_first_difference(manifest: TargetManifest, first_folder: Path, seco
 
     The text names the channel, step and time, or the key of the record, and both values.
     """
-    for name in manifest.outputs:
+    for name in manifest.output_files:
         if read_bounded(path_below(first_folder, name)) != read_bounded(path_below(second_folder, name)):
             in_trace = name == manifest.trace_file
             difference = (

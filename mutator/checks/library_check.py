@@ -10,18 +10,18 @@ from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.campaigns.installed_studies import study_problems
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import Example, FaultModel, FaultModels
+from mutator.faults.fault_models import FaultModel, FaultModelExample, FaultModels
 from mutator.faults.fault_specs import FaultSpec, Variant
-from mutator.faults.injection_parameters import resolve
+from mutator.faults.injection_parameters import resolve_injection
 from mutator.faults.library_readings import Readings
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import edits_of, injection_edit
 from mutator.mutants.mutant_building import build
 from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, unsplice
 from mutator.onboarding.todo_marks import unfilled_mark_errors
-from mutator.stpa.analysis_checks import check_analysis
+from mutator.stpa.analysis_checks import list_analysis_problems
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.required_packages import check_requirements
@@ -73,7 +73,7 @@ def library_problems(workspace: Workspace, target: str) -> list[MutatorError]:
         specs_in_order = collector.result_of(workspace.specs)
         analysis = collector.result_of(workspace.analysis)
         if analysis and specs_in_order and manifest:
-            collector.problems += check_analysis(analysis, specs_in_order, manifest)
+            collector.problems += list_analysis_problems(analysis, specs_in_order, manifest)
     return collector.problems
 
 
@@ -133,12 +133,12 @@ class _ProblemCollector:
 def spec_problems(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -> Iterator[MutatorError]:
     for reading in spec.readings.names:
         try:
-            faults = expand(spec, 0, reading, models=models, manifest=manifest)
+            faults = expand_spec(spec, 0, reading, models=models, manifest=manifest)
         except MutatorError as error:
             yield error
             return
         for variant in spec:
-            if reading in variant.readings:
+            if reading in variant.injections_by_reading:
                 name = f"{spec.name}/{variant.name}"
                 fault = next(f for f in faults if f.spec == name)
                 yield from _build_problems(spec, variant, fault, models, manifest)
@@ -171,21 +171,21 @@ def _describe_target_place(error: MutatorError, manifest: TargetManifest) -> str
     """Return the place of an error in the target, with the file named as in specs: ` (pkg/sonar.py:28)`."""
     if not error.where:
         return ""
-    path = manifest.tree.named(error.where)
+    path = manifest.tree.relative_name(error.where)
     return f" ({path})" if error.line is None else f" ({path}:{error.line})"
 
 
 def _unknown_hazard_problems(
     manifest: TargetManifest, hazard_names: tuple[str, ...], tables: list[ContextTable]
 ) -> Iterator[MutatorError]:
-    for name in manifest.hazards:
+    for name in manifest.hazard_names:
         if name not in hazard_names:
             yield MutatorError(
                 f"hazard '{name}'", where=manifest.path, expected=f"one of {', '.join(hazard_names)}"
             )
     for table in tables:
         for row in table.rows:
-            for action, verdicts in row.actions.items():
+            for action, verdicts in row.hazards_by_action.items():
                 for hazard in (verdicts.provided, verdicts.not_provided):
                     if hazard is not None and hazard not in hazard_names:
                         yield table.source.error(
@@ -213,10 +213,10 @@ def example_problems(models: FaultModels) -> Iterator[MutatorError]:
                 )
 
 
-def apply_example(model: FaultModel, models: FaultModels, example: Example) -> str:
+def apply_example(model: FaultModel, models: FaultModels, example: FaultModelExample) -> str:
     """Splice the example's injection into its `before`; the result must also un-splice."""
     file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
-    injection = resolve(example.injection, model, model.source)
+    injection = resolve_injection(example.injection, model, model.source)
     edit = injection_edit(file, models, injection, EXAMPLE_TAG)
     after = join_pieces(apply_edits(file, as_line_edits(file, [edit])))
     if unsplice(after) != file.data:

@@ -7,7 +7,7 @@ from mutator.checks import set_iteration_order
 from mutator.checks.findings import FindingPlace
 from mutator.engines.in_target.nondeterminism_watch import CLOCK, DRAW, HASH, PROCESS, THREAD
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.source_tree import matches
+from mutator.targets.source_tree import matches_any_glob
 
 _MOST_PLACES = 5  # the first causes hide the later ones, so a long list helps nobody
 _REMEDY_BY_KIND = {
@@ -48,7 +48,9 @@ def set_order_places(manifest: TargetManifest) -> list[FindingPlace]:
     last.
     """
     places = []
-    for path in sorted(manifest.tree.files, key=lambda path: (matches(path, manifest.forbid), path)):
+    for path in sorted(
+        manifest.tree.files, key=lambda path: (matches_any_glob(path, manifest.forbidden_globs), path)
+    ):
         if path.endswith(".py"):
             for use in set_iteration_order.list_set_order_uses(manifest.tree.files[path]):
                 what = f"in {use.function}: uses the order of a set, {use.set_source}"

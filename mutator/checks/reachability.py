@@ -126,7 +126,9 @@ def _spec_statements(workspace: Workspace, manifest: TargetManifest) -> Iterator
     for spec in workspace.specs():
         for variant in spec:
             for injection in (
-                injection_spec for reading in variant.readings.values() for injection_spec in reading
+                injection_spec
+                for reading in variant.injections_by_reading.values()
+                for injection_spec in reading
             ):
                 at, key = injection.location, (injection.location, variant.changes)
                 if key not in yielded:
@@ -161,7 +163,7 @@ def _with_counting_model(models: FaultModels) -> FaultModels:
         params=(),
         examples=(),
         template='_fi.active("{{ fi }}")\n',
-        expression="{{ original }}",
+        expression_template="{{ original }}",
         source=some.source,
         template_path=some.template_path,
     )

@@ -9,9 +9,9 @@ from jinja2.meta import find_undeclared_variables
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from mutator.checks.findings import CheckState, Finding, FindingPlace
-from mutator.faults.fault_models import NAMES, FaultModels, SnippetKind
+from mutator.faults.fault_models import NAME_TYPES, FaultModels, SnippetKind
 from mutator.faults.fault_specs import FaultSpec
-from mutator.faults.injection_specs import Drawn, InjectionSpec, reference
+from mutator.faults.injection_specs import DrawReference, InjectionSpec, parse_draw_reference
 
 _FINDING_NAME = "draws"
 
@@ -33,7 +33,7 @@ def _unused_draw_places(specs: tuple[FaultSpec, ...], models: FaultModels) -> It
     for spec in specs:
         for variant in spec:
             draw = variant.draw
-            for reading, injections in variant.readings.items():
+            for reading, injections in variant.injections_by_reading.items():
                 if draw and not any(_does_use_draw(injection, draw.name, models) for injection in injections):
                     what = f"{spec.name}/{variant.name} draws '{draw.name}', unused in reading {reading}"
                     yield FindingPlace(file=str(spec.path), line=spec.source.line_of(draw.keys), what=what)
@@ -43,8 +43,10 @@ def _does_use_draw(injection: InjectionSpec, name: str, models: FaultModels) -> 
     model = models.get(injection.model)
     for param in injection.params:
         schema = model.param(param.name)
-        drawn = param.value if isinstance(param.value, Drawn) else reference(str(param.value))
-        if schema and schema.type not in NAMES and drawn and drawn.name == name:
+        drawn = (
+            param.value if isinstance(param.value, DrawReference) else parse_draw_reference(str(param.value))
+        )
+        if schema and schema.type not in NAME_TYPES and drawn and drawn.name == name:
             return True
     return False
 

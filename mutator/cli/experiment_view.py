@@ -131,8 +131,8 @@ def _manifest_if_any(result: "ExperimentResult") -> "TargetManifest | None":
 
 
 def _unit_by_name(manifest: "TargetManifest") -> dict[str, str]:
-    channels = [(channel.name, channel.unit) for channel in manifest.compared]
-    pairs = channels + [(metric.name, metric.unit) for metric in manifest.measures]
+    channels = [(channel.name, channel.unit) for channel in manifest.compared_channels]
+    pairs = channels + [(metric.name, metric.unit) for metric in manifest.all_metrics]
     return {name: unit for name, unit in pairs if unit not in ("", "-")}
 
 
@@ -172,7 +172,7 @@ def _describe_component(component: "PathComponent") -> str:
 
 
 def _list_events(record: "Record", manifest: "TargetManifest | None") -> list[tuple[float, str]]:
-    meaning_by_hazard = {h.name: f": {h.about}" for h in manifest.rules if h.about} if manifest else {}
+    meaning_by_hazard = {h.name: f": {h.about}" for h in manifest.hazard_rules if h.about} if manifest else {}
     events: list[tuple[float, str]] = []
     if record.activation:
         times = counted(record.activation.count, "time")

@@ -13,7 +13,7 @@ from mutator.cli.options import Json, Manifest, WorkspaceOptions, with_workspace
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
-    from mutator.stpa.analysis_files import Analysis
+    from mutator.stpa.analysis_files import HazardAnalysis
     from mutator.stpa.context_tables import ContextTable
 
 EXAMPLES = """\b
@@ -60,10 +60,10 @@ def stpa(
     if problems:
         terminal.say(counted(len(problems), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
-    faults = {fault for factor in analysis.factors.values() for fault in factor.faults}
+    faults = {fault for factor in analysis.factors_by_id.values() for fault in factor.faults}
     terminal.say(
-        f"all well: {counted(len(analysis.factors), 'causal factor')}, {counted(len(faults), 'fault spec')}, "
-        "no gap, no contradiction",
+        f"all well: {counted(len(analysis.factors_by_id), 'causal factor')}, "
+        f"{counted(len(faults), 'fault spec')}, no gap, no contradiction",
         style="green",
     )
 
@@ -77,36 +77,37 @@ def _write_text(path: Path, text: str) -> None:
         ) from None
 
 
-def _print_analysis(terminal: Terminal, analysis: "Analysis") -> None:
+def _print_analysis(terminal: Terminal, analysis: "HazardAnalysis") -> None:
     hazards = analysis.hazards
     _print_section(terminal, "accidents", ["id", "about"], hazards.accidents.items())
     rows: Iterable[tuple[str, ...]] = (
-        (name, ", ".join(hazards.leads_to[name]), about) for name, about in hazards.hazards.items()
+        (name, ", ".join(hazards.accidents_by_hazard[name]), about) for name, about in hazards.hazards.items()
     )
     _print_section(terminal, "hazards", ["id", "leads to", "about"], rows)
     _print_structure(terminal, analysis)
-    for table in analysis.tables.values():
+    for table in analysis.context_tables.values():
         _print_context_table(terminal, table)
     rows = (
         (name, a.action, a.category.value, ", ".join(a.hazards), _context_ids(a.contexts), a.about)
-        for name, a in analysis.unsafe.items()
+        for name, a in analysis.unsafe_actions.items()
     )
     heads = ["id", "action", "unsafe when", "hazards", "contexts", "about"]
     _print_section(terminal, "unsafe control actions", heads, rows)
     rows = (
-        (name, ", ".join(f.where), ", ".join(f.leads_to), f.about) for name, f in analysis.factors.items()
+        (name, ", ".join(f.where), ", ".join(f.leads_to), f.about)
+        for name, f in analysis.factors_by_id.items()
     )
     _print_section(terminal, "causal factors", ["id", "where", "leads to", "about"], rows)
     rows = (
         (name, ", ".join(f.at), ", ".join(f.faults) or f"none: {f.no_fault}")
-        for name, f in analysis.factors.items()
+        for name, f in analysis.factors_by_id.items()
     )
     _print_section(
         terminal, "places and faults of the causal factors", ["id", "in the target", "faults"], rows
     )
 
 
-def _print_structure(terminal: Terminal, analysis: "Analysis") -> None:
+def _print_structure(terminal: Terminal, analysis: "HazardAnalysis") -> None:
     structure = analysis.structure
     rows: Iterable[tuple[str, ...]] = (
         (name, component.kind.value, ", ".join(component.process_model), component.about)
@@ -134,13 +135,15 @@ def _print_structure(terminal: Terminal, analysis: "Analysis") -> None:
 
 
 def _print_context_table(terminal: Terminal, table: "ContextTable") -> None:
-    actions = list(table.rows[0].actions)
+    actions = list(table.rows[0].hazards_by_action)
     heads = ["context", "trigger"]
     heads += [head for action in actions for head in (f"{action}", f"no {action}")] + ["about"]
     rows = []
     for row in table.rows:
         cells = [
-            verdict for a in actions for verdict in (row.actions[a].provided, row.actions[a].not_provided)
+            verdict
+            for a in actions
+            for verdict in (row.hazards_by_action[a].provided, row.hazards_by_action[a].not_provided)
         ]
         rows.append((row.id, row.condition, *(cell or "-" for cell in cells), row.about))
     _print_section(terminal, f"contexts of {table.name}", heads, rows, end=_describe_coverage(table))
@@ -148,9 +151,9 @@ def _print_context_table(terminal: Terminal, table: "ContextTable") -> None:
 
 def _describe_coverage(table: "ContextTable") -> str:
     coverage = table.coverage
-    if coverage.beyond:
-        return f"cannot prove that the contexts cover everything exactly once: {coverage.beyond}"
-    return f"the contexts cover everything exactly once: proved in {coverage.cells} cells"
+    if coverage.no_proof_reason:
+        return f"cannot prove that the contexts cover everything exactly once: {coverage.no_proof_reason}"
+    return f"the contexts cover everything exactly once: proved in {coverage.cell_count} cells"
 
 
 def _context_ids(names: list[str]) -> str:
@@ -168,24 +171,24 @@ def _print_section(
     terminal.say()
 
 
-def _analysis_as_json(analysis: "Analysis") -> dict[str, Any]:
+def _analysis_as_json(analysis: "HazardAnalysis") -> dict[str, Any]:
     hazards = analysis.hazards
     return {
         "accidents": hazards.accidents,
         "hazards": {
-            name: {"about": about, "leads_to": hazards.leads_to[name]}
+            name: {"about": about, "leads_to": hazards.accidents_by_hazard[name]}
             for name, about in hazards.hazards.items()
         },
         "control_structure": analysis.structure.model_dump(mode="json", by_alias=True),
         "context_tables": {
             table.name: {
-                "coverage": {"cells": table.coverage.cells, "beyond": table.coverage.beyond},
+                "coverage": {"cells": table.coverage.cell_count, "beyond": table.coverage.no_proof_reason},
                 "contexts": table.rows,
             }
-            for table in analysis.tables.values()
+            for table in analysis.context_tables.values()
         },
-        "unsafe_control_actions": _models_as_json(analysis.unsafe),
-        "causal_factors": _models_as_json(analysis.factors),
+        "unsafe_control_actions": _models_as_json(analysis.unsafe_actions),
+        "causal_factors": _models_as_json(analysis.factors_by_id),
     }
 
 

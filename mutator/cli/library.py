@@ -70,7 +70,7 @@ def list_library(
 
 
 def _list_specs(workspace: "Workspace") -> ColumnsAndRows:
-    rows = [{"name": s.name, "faults": s.count, "about": _join_lines(s.about)} for s in workspace.specs()]
+    rows = [{"name": s.name, "faults": s.fault_count, "about": _join_lines(s.about)} for s in workspace.specs()]
     return ["name", "faults", "about"], rows
 
 
@@ -192,7 +192,7 @@ def check(
     if problems or failed:
         terminal.say(counted(len(problems) + len(failed), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
-    faults = sum(spec.count for spec in workspace.specs())
+    faults = sum(spec.fault_count for spec in workspace.specs())
     readings_note = {1: "", 2: ", in both readings"}.get(
         number := len(workspace.readings().names), f", in all {number} readings"
     )

@@ -12,7 +12,7 @@ from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import frame_of_experiments
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.targets.contact_severity import Scale
+from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.target_facts import T_END
 
 
@@ -43,7 +43,7 @@ class ComparedRun:
     def name(self) -> str:
         return self.folder.path.name
 
-    def classified_by(self, scale: Scale | None) -> "ComparedRun":
+    def classified_by(self, scale: SeverityScale | None) -> "ComparedRun":
         """Return this side with contacts classified by `scale`, or unclassified if it is None."""
         rows = {}
         for name, row in self.row_by_id.items():

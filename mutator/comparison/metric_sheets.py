@@ -11,7 +11,7 @@ from mutator.comparison.pairs import ExperimentPair
 from mutator.statistics.median_intervals import median_difference
 from mutator.statistics.paired_statistics import wilcoxon_p
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
-from mutator.targets.contact_severity import CLASSES
+from mutator.targets.contact_severity import SEVERITY_CLASSES
 
 NO_CONTACT = "no contact"
 
@@ -63,7 +63,7 @@ def _median_cells(frame: pd.DataFrame) -> tuple[SheetCell, ...]:
 
 
 def severity_sheet(pairs: Sequence[ExperimentPair], names: RunNames) -> Sheet:
-    order = [*CLASSES[::-1], ""]
+    order = [*SEVERITY_CLASSES[::-1], ""]
     counts = Counter((p.row_a.severity, p.row_b.severity) for p in pairs if p.is_usable)
     classes = [name for name in order if any(name in pair for pair in counts)]
     return Sheet(

@@ -19,7 +19,7 @@ def files_with_bytecode(tree: SourceTree) -> dict[str, bytes]:
     """Return the files of a tree (relative path -> content) and the bytecode of its Python files."""
     files = dict(tree.files)
     for name in tree.files:
-        if name.endswith(".py") and (code := tree.derived(name, _compile_to_pyc)):
+        if name.endswith(".py") and (code := tree.derive_once(name, _compile_to_pyc)):
             files[bytecode_path(name)] = code
     return files
 

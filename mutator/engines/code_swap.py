@@ -18,7 +18,7 @@ from mutator.mutants.injected_lines import has_value_settings, tag_of
 from mutator.mutants.probe import Probe, probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.source_tree import matches
+from mutator.targets.source_tree import matches_any_glob
 
 _SUSPENDABLE_FLAGS = CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
 _IMPORT_PATTERN = re.compile(rb"\s*(?:from ([\w.]+) import|import ([\w.]+))")
@@ -61,7 +61,7 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], probe: Probe
     for path, data in files.items():
         if path == probe_file:
             continue
-        if matches(path, manifest.reads_itself):
+        if matches_any_glob(path, manifest.self_read_globs):
             raise NotSwappable(f"{path} is read by the run itself")
         if path not in manifest.tree.files:
             raise NotSwappable(f"{path} is a new file")

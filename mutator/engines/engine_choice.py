@@ -51,7 +51,7 @@ def reason_not_to_fork(manifest: TargetManifest, experiment_count: int) -> str:
 
 
 def reason_not_forkable(manifest: TargetManifest) -> str:
-    if manifest.stepwise is None:
+    if manifest.stepwise_function is None:
         return f"{manifest.path.name} names no `entry.stepwise`"
     if sys.platform != "linux":
         return "processes are forked on Linux only"

@@ -49,7 +49,7 @@ from mutator.model import Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import Probe, probe_module, probe_state_after, untriggered_report
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stop_code import stop_source
+from mutator.targets.stop_code import stop_function_source
 from mutator.triggers.trigger_kinds import always_trigger
 
 _GoldenKey = tuple[str, int, tuple[str, ...]]
@@ -84,7 +84,9 @@ class ForkEngine:
         self._patience_s = limits.wall_s + GUARD_PATIENCE_S
         self._server: ForkServer | None = None
         self._server_count = 0
-        self._obstacle = None if manifest.stepwise else NotForkable(f"target {manifest.name} is not stepwise")
+        self._obstacle = (
+            None if manifest.stepwise_function else NotForkable(f"target {manifest.name} is not stepwise")
+        )
         self._observations_by_golden: dict[
             _GoldenKey, GoldenObservations | NotForkable
         ] = {}  # observations, or why there are none
@@ -205,7 +207,7 @@ class ForkEngine:
 
     def _target_arguments(self, job: Job, out: Path) -> list[str]:
         return list(
-            self._manifest.arguments(
+            self._manifest.run_arguments(
                 scenario=job.scenario.resolve(), seed=job.seed, out=out, changes=job.changes
             )
         )
@@ -252,7 +254,7 @@ class ForkEngine:
             "probe_state": probe_state_after(
                 fork_point.observation_count, fork_point.earliest_time_s, fork_point.last_time_s
             ),
-            "stop": stop_source(self._manifest) if job.stop_at_hazard else None,
+            "stop": stop_function_source(self._manifest) if job.stop_at_hazard else None,
             "watch": [value.name for value in self._manifest.observation.values] if observe else None,
         }
         # the child must begin the run; a watched run has the arguments of the waiting processes
@@ -346,7 +348,7 @@ class ForkEngine:
                 raise ForkServerLost(execution.detail)
             if execution.status is not Status.OK:
                 raise NotForkable(f"its golden run ended as {execution.status.value}: {execution.detail}")
-            for name in self._manifest.outputs:
+            for name in self._manifest.output_files:
                 if read_bounded(execution.out / name) != read_bounded(golden / name):
                     raise NotForkable(f"its {name} differs when it is driven step by step")
             observed_values, *counts_and_modules = (

@@ -137,7 +137,7 @@ class ForkServer:
     def __init__(
         self, manifest: TargetManifest, scratch_folder: Path, parent_pid: int | None, scenarios_folder: Path
     ) -> None:
-        assert manifest.stepwise is not None
+        assert manifest.stepwise_function is not None
         self.scratch_folder = scratch_folder
         self.scenarios_folder = scenarios_folder
         self.tree_folder = scratch_folder / "tree"
@@ -151,7 +151,7 @@ class ForkServer:
             "home": str(scratch_folder),
             "packages": list(manifest.import_names),
             "module": manifest.entry_module,
-            "stepwise": manifest.stepwise,
+            "stepwise": manifest.stepwise_function,
         }
         start_path, data = scratch_folder / "start.marshal", marshal.dumps(start)
         start_path.write_bytes(data)

@@ -18,7 +18,9 @@ def find_obstacle_before_loading(manifest: TargetManifest) -> NotForkable | None
     """Return why the target cannot be forked here, as far as that is known without loading it."""
     why = reason_not_forkable(manifest)
     stepwise = (
-        "" if manifest.stepwise else f"in {manifest.path.name}, name a function that makes stepwise runs"
+        ""
+        if manifest.stepwise_function
+        else f"in {manifest.path.name}, name a function that makes stepwise runs"
     )
     return NotForkable(why, stepwise) if why else None
 

@@ -42,7 +42,7 @@ from mutator.model import Limits, Status
 from mutator.mutants.anchors import parsed_file
 from mutator.mutants.probe import probe_module, probe_state_after
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stop_code import stop_source
+from mutator.targets.stop_code import stop_function_source
 
 _CHILD_SCRIPT = Path(__file__).parent / "in_target" / "run_once.py"
 _PARENT_CHECK_INTERVAL_S = 0.5  # interval between two checks that the parent is alive
@@ -163,7 +163,7 @@ class ReferenceEngine:
         )
 
     def _job_request(self, job: Job, home: JobFolder) -> dict[str, Any]:
-        arguments = self.manifest.arguments(
+        arguments = self.manifest.run_arguments(
             scenario=job.scenario.resolve(),
             seed=job.seed,
             out=home.output_folder,
@@ -185,8 +185,8 @@ class ReferenceEngine:
             "memory_mb": self.limits.memory_mb,
             "disk_mb": self.limits.disk_mb,
             "steps": self.limits.steps,
-            "stop": stop_source(self.manifest) if job.stop_at_hazard else None,
-            "stepwise": self.manifest.stepwise,
+            "stop": stop_function_source(self.manifest) if job.stop_at_hazard else None,
+            "stepwise": self.manifest.stepwise_function,
             "watch": job.watch_nondeterminism,
             "observe": self._observed_names() if job.watch_nondeterminism or job.keep_observations else None,
             "lines": self._observation_lines() if job.note_executed_lines else None,

@@ -91,9 +91,9 @@ class Sandbox:
             return None
         if fault_free:
             with suppress(OSError):
-                manifest.cache.mkdir(parents=True, exist_ok=True)
-                return cls(folder, (*readable_paths, *manifest.read_by_runs()), manifest.cache)
-        return cls(folder, (*readable_paths, *manifest.read_by_runs(), manifest.cache))
+                manifest.cache_folder.mkdir(parents=True, exist_ok=True)
+                return cls(folder, (*readable_paths, *manifest.paths_read_by_runs()), manifest.cache_folder)
+        return cls(folder, (*readable_paths, *manifest.paths_read_by_runs(), manifest.cache_folder))
 
     def wrap_command(self, words: Sequence[str]) -> list[str]:
         """Return the command that runs `words` in the sandbox."""

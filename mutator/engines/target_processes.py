@@ -18,7 +18,7 @@ from mutator.engines.engine_jobs import RaisedException
 from mutator.engines.in_target import process_guard
 from mutator.errors import MutatorError, Outside
 from mutator.model import Limits, Status
-from mutator.targets.process_environment import FIXED, KEPT
+from mutator.targets.process_environment import FIXED_VARIABLES, INHERITED_VARIABLES
 
 GUARD_LOST = "lost"  # no process is left to report the ending
 GUARD_PATIENCE_S = 60.0  # time for the guard's report, after a run's wall limit
@@ -117,8 +117,8 @@ def run_environment(
     hash_seed: int, temporary_folder: Path, extra_variables: Mapping[str, str] | None = None
 ) -> dict[str, str]:
     """Return the environment of a run. Of the user's variables, it has only those that Python needs."""
-    inherited = {name: os.environ[name] for name in KEPT if name in os.environ}
-    fixed = {**FIXED, "PYTHONHASHSEED": str(hash_seed), "TMPDIR": str(temporary_folder)}
+    inherited = {name: os.environ[name] for name in INHERITED_VARIABLES if name in os.environ}
+    fixed = {**FIXED_VARIABLES, "PYTHONHASHSEED": str(hash_seed), "TMPDIR": str(temporary_folder)}
     return {**inherited, **(extra_variables or {}), **fixed}
 
 

@@ -98,7 +98,7 @@ class LoadedGoldens:
         return loaded
 
     def _read_files(self, folder: Path) -> UnchangedFiles:
-        paths = [path for name in self._manifest.outputs if (path := path_below(folder, name)).is_file()]
+        paths = [path for name in self._manifest.output_files if (path := path_below(folder, name)).is_file()]
         files = UnchangedFiles({str(path): read_bounded(path) for path in paths})
         if self._digests is not None and output_digest_of(self._manifest, folder) != self._digests[folder]:
             raise _changed_file_error(folder)
@@ -188,7 +188,7 @@ class ExperimentRunner:
 
     def _finish_without_run(self, experiment: Experiment, err: MutatorError) -> FinishedExperiment:
         status = Status.INVALID_MUTANT if isinstance(err, InvalidMutant) else Status.HARNESS_ERROR
-        place = f"{self.manifest.tree.named(err.where)}: " if err.where else ""
+        place = f"{self.manifest.tree.relative_name(err.where)}: " if err.where else ""
         return FinishedExperiment(
             experiment=experiment,
             record=_record_of_mutant_without_outcome(experiment, status, place + err.got, None),
@@ -276,7 +276,7 @@ class ExperimentRunner:
             reference = golden_comparison.trace_until(reference, faulty[time][-1], time)
         faulty = golden_comparison.with_golden_times(reference, faulty, time)
         difference = golden_comparison.compare_traces(
-            reference, faulty, self.manifest.compared, time, judged.t_end
+            reference, faulty, self.manifest.compared_channels, time, judged.t_end
         )
         if problem := _reason_not_by_fault(difference.t_first, activation):
             return _record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, problem, mutant)

@@ -16,24 +16,33 @@ from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults import probe_templates
 from mutator.faults.fault_models import (
-    FILES,
     TARGET_UNIT,
-    Example,
+    TEMPLATE_FOLDER_GLOBS,
     FaultModel,
+    FaultModelExample,
     FaultModels,
-    Needs,
     Param,
     ParamSchema,
     SnippetKind,
+    TemplateNeed,
 )
 from mutator.faults.injection_model import InjectionModel
 from mutator.faults.probe_templates import ProbeTemplates
 
 SCHEMA = "fault_model/1"
-_GIVEN = ("fi", "original", "left", "right", "called", "arguments", "statement", "next_statement")
+_TEMPLATE_VARIABLES = (
+    "fi",
+    "original",
+    "left",
+    "right",
+    "called",
+    "arguments",
+    "statement",
+    "next_statement",
+)
 
 
-_TARGET = ParamSchema(
+_TARGET_PARAM = ParamSchema(
     name="target",
     type="variable",
     about="the variable to change, if it is not the one that the anchor names",
@@ -81,16 +90,18 @@ class FaultModelModel(StrictModel, title="The file"):
 
 def load_fault_models(folder: Path) -> FaultModels:
     """Load the fault models of a templates folder, from memory unless a file has changed."""
-    paths = [check_inside(folder, path) for kind in FILES for path in sorted(folder.glob(kind))]
+    paths = [
+        check_inside(folder, path) for kind in TEMPLATE_FOLDER_GLOBS for path in sorted(folder.glob(kind))
+    ]
     try:
         contents = tuple((path, read_bounded(path, MOST_YAML_BYTES)) for path in paths)
     except OSError:
         return _load_all(folder)  # the error that names the file
-    return _unchanged(folder, contents)
+    return _load_cached(folder, contents)
 
 
 @lru_cache(maxsize=4)
-def _unchanged(folder: Path, contents: tuple[tuple[Path, bytes], ...]) -> FaultModels:
+def _load_cached(folder: Path, contents: tuple[tuple[Path, bytes], ...]) -> FaultModels:
     """Load a folder. `contents` of its files only distinguishes cached results."""
     return _load_all(folder)
 
@@ -98,22 +109,22 @@ def _unchanged(folder: Path, contents: tuple[tuple[Path, bytes], ...]) -> FaultM
 def _load_all(folder: Path) -> FaultModels:
     models = {}
     for path in sorted(folder.glob("*.yaml")):
-        model = _load(path)
+        model = _load_model(path)
         models[model.name] = model
     if not models:
         raise MutatorError("no fault model", where=folder, expected="<model>.yaml next to <model>.py.j2")
-    code, settings = (_text(folder / name) for name in probe_templates.FILES)
-    probe = ProbeTemplates.of(folder, code, settings)
+    code, settings = (_read_template(folder / name) for name in probe_templates.PROBE_TEMPLATE_FILES)
+    probe = ProbeTemplates.from_texts(folder, code, settings)
     texts = {
-        name: [model.template, model.expression] if model.expression else model.template
+        name: [model.template, model.expression_template] if model.expression_template else model.template
         for name, model in models.items()
     }
     raising = [name for name, model in models.items() if model.raises]
-    digest = hashing.digest([texts, probe.text, *([raising] if raising else [])])
-    return FaultModels(folder=folder, models=models, probe=probe, digest=digest)
+    digest = hashing.digest([texts, probe.whole_text, *([raising] if raising else [])])
+    return FaultModels(folder=folder, models=models, probe_templates=probe, digest=digest)
 
 
-def _load(path: Path) -> FaultModel:
+def _load_model(path: Path) -> FaultModel:
     model, source = load_yaml_model(path, FaultModelModel, SCHEMA)
     if model.name != path.stem:
         raise source.error(("name",), f"'{model.name}'", expected=f"'{path.stem}', the name of the file")
@@ -125,17 +136,17 @@ def _load(path: Path) -> FaultModel:
             expected="`expression` only with kind insert",
             remedy="delete `expression`",
         )
-    template = _text(template_path)
-    params = tuple(_param(name, param, source) for name, param in model.params.items())
+    template = _read_template(template_path)
+    params = tuple(_build_param(name, param, source) for name, param in model.params.items())
     return FaultModel(
         name=model.name,
         kind=kind,
         about=model.about,
         raises=model.raises,
-        needs=Needs(model.needs) if model.needs else None,
-        params=(*params, _TARGET) if kind is SnippetKind.VALUE and model.needs != "call" else params,
+        needs=TemplateNeed(model.needs) if model.needs else None,
+        params=(*params, _TARGET_PARAM) if kind is SnippetKind.VALUE and model.needs != "call" else params,
         examples=tuple(
-            Example(
+            FaultModelExample(
                 about=example.about,
                 injection=example.injection.injection(source, ("examples", i, "injection")),
                 before=example.before,
@@ -145,21 +156,22 @@ def _load(path: Path) -> FaultModel:
             for i, example in enumerate(model.examples)
         ),
         template=template,
-        expression=template.removesuffix("\n") if kind is SnippetKind.VALUE else model.expression,
+        expression_template=template.removesuffix("\n") if kind is SnippetKind.VALUE else model.expression,
         source=source,
         template_path=template_path,
     )
 
 
-def _param(name: str, param: Param, source: YamlSource) -> ParamSchema:
+def _build_param(name: str, param: Param, source: YamlSource) -> ParamSchema:
     keys = ("params", name)
     if not name.isidentifier() or units.split_unit(name)[1]:
         raise source.error(keys, f"parameter '{name}'", expected="an identifier without a unit suffix")
-    if name in _GIVEN:
+    if name in _TEMPLATE_VARIABLES:
         raise source.error(
             keys,
             f"parameter '{name}'",
-            expected=f"a name other than these, which templates already use: {', '.join(_GIVEN)}",
+            expected="a name other than these, which templates already use: "
+            + ", ".join(_TEMPLATE_VARIABLES),
             remedy="rename the parameter",
         )
     if param.unit not in (None, TARGET_UNIT, *units.UNITS):
@@ -174,7 +186,7 @@ def _param(name: str, param: Param, source: YamlSource) -> ParamSchema:
     return ParamSchema(name=name, **asdict(param))
 
 
-def _text(path: Path) -> str:
+def _read_template(path: Path) -> str:
     try:
         return read_bounded(path, MOST_YAML_BYTES).decode()
     except (OSError, UnicodeDecodeError) as error:

@@ -14,13 +14,13 @@ from mutator.errors import MutatorError
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.faults.probe_templates import ProbeTemplates
 
-FILES = ("*.yaml", "*.j2")  # what a templates folder consists of
+TEMPLATE_FOLDER_GLOBS = ("*.yaml", "*.j2")  # what a templates folder consists of
 TARGET_UNIT = "target"
 ParamType = Literal[
     "variable", "import", "number", "integer", "boolean", "constant", "choice", "unit", "seed"
 ]
-NAMES = ("variable", "import")
-_PARTS = re.compile(r"\b(?:left|right|called|arguments)\b")
+NAME_TYPES = ("variable", "import")
+_EXPRESSION_PART_PATTERN = re.compile(r"\b(?:left|right|called|arguments)\b")
 
 
 class SnippetKind(StrEnum):
@@ -31,7 +31,7 @@ class SnippetKind(StrEnum):
     VALUE = "value"  # a new value for the anchored expression or the assigned variable
 
 
-class Needs(StrEnum):
+class TemplateNeed(StrEnum):
     """What a template needs in addition to its parameters."""
 
     CALL = "call"  # the anchored expression is a call: `called`, `arguments`
@@ -89,7 +89,7 @@ class ParamSchema(Param):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Example:
+class FaultModelExample:
     """Documentation that runs as a test: source before and after one injection, tagged `example`."""
 
     about: str
@@ -104,7 +104,7 @@ class FaultModel:
     """A fault model: template text, parameter schema, examples.
 
     `raises`: the injected lines raise on purpose, so an exception in them is a crash of the target.
-    `expression` is the template of a changed value, or None if the model cannot change an expression.
+    `expression_template` is that of a changed value, or None if the model cannot change an expression.
     `needs`: what the templates need, which not every kind of anchor provides.
     """
 
@@ -112,11 +112,11 @@ class FaultModel:
     kind: SnippetKind
     about: str
     raises: bool = False
-    needs: Needs | None = None
+    needs: TemplateNeed | None = None
     params: tuple[ParamSchema, ...]
-    examples: tuple[Example, ...]
+    examples: tuple[FaultModelExample, ...]
     template: str
-    expression: str | None = None
+    expression_template: str | None = None
     source: YamlSource  # the YAML
     template_path: Path
 
@@ -124,11 +124,11 @@ class FaultModel:
         return next((p for p in self.params if p.name == name), None)
 
     @property
-    def parts(self) -> frozenset[str]:
+    def expression_parts(self) -> frozenset[str]:
         """The parts of an expression that the value template needs in addition to the whole."""
-        return frozenset(_PARTS.findall(self.expression or ""))
+        return frozenset(_EXPRESSION_PART_PATTERN.findall(self.expression_template or ""))
 
-    def changes_nothing(self, params: Mapping[str, object]) -> bool:
+    def is_neutral(self, params: Mapping[str, object]) -> bool:
         """Return whether these values certainly change nothing.
 
         False if an optional bound is set, because a bound can change a value that is otherwise left alone.
@@ -144,7 +144,7 @@ class FaultModels:
 
     folder: Path
     models: Mapping[str, FaultModel]
-    probe: ProbeTemplates
+    probe_templates: ProbeTemplates
     digest: str  # of everything that determines a mutant's text, and of which models raise
 
     def __iter__(self) -> Iterator[FaultModel]:

@@ -18,9 +18,9 @@ from mutator.faults.library_readings import Readings
 from mutator.model import Hold
 
 SCHEMA = "fault_spec/1"
-_NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
+_NAME_PATTERN = re.compile(r"[a-z][a-z0-9_]*\Z")
 _MOST_RANGES = 1000
-_LARGEST = 1e15  # limit of a drawn number: whole numbers up to it are exact
+_MOST_DRAWN_NUMBER = 1e15  # limit of a drawn number: whole numbers up to it are exact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +42,7 @@ class Draw:
     keys: KeyPath = ()
 
     @property
-    def count(self) -> int:
+    def value_count(self) -> int:
         return len(self.values) if self.kind == "list" else len(self.ranges)
 
     @property
@@ -56,8 +56,8 @@ class Draw:
 class Variant:
     """One row of the library: for each reading, injections that share a trigger and a draw.
 
-    `readings` starts with the default reading. `holds` overrides, by reading, how long the fault stays
-    active.
+    `injections_by_reading` starts with the default reading. `hold_by_reading` overrides how long the fault
+    stays active.
     """
 
     name: str
@@ -65,23 +65,23 @@ class Variant:
     about: str
     draw: Draw | None
     changes: tuple[str, ...]
-    readings: Mapping[str, tuple[InjectionSpec, ...]]
-    holds: Mapping[str, Hold | None]
+    injections_by_reading: Mapping[str, tuple[InjectionSpec, ...]]
+    hold_by_reading: Mapping[str, Hold | None]
     keys: KeyPath
 
     def injections(self, reading: str) -> tuple[InjectionSpec, ...]:
-        return self.readings[self._written(reading)]
+        return self.injections_by_reading[self._defined_reading(reading)]
 
     def hold(self, reading: str) -> Hold | None:
         """Return how long the fault stays active; None: the trigger decides."""
-        return self.holds[self._written(reading)]
+        return self.hold_by_reading[self._defined_reading(reading)]
 
-    def _written(self, reading: str) -> str:
-        return reading if reading in self.readings else next(iter(self.readings))
+    def _defined_reading(self, reading: str) -> str:
+        return reading if reading in self.injections_by_reading else next(iter(self.injections_by_reading))
 
     @property
-    def count(self) -> int:
-        return self.draw.count if self.draw else 1
+    def fault_count(self) -> int:
+        return self.draw.value_count if self.draw else 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,14 +105,14 @@ class FaultSpec:
         return self.source.path
 
     @property
-    def count(self) -> int:
-        return sum(v.count for v in self.variants)
+    def fault_count(self) -> int:
+        return sum(v.fault_count for v in self.variants)
 
     def __iter__(self) -> Iterator[Variant]:
         return iter(self.variants)
 
 
-_Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)]
+_DrawnNumber = Annotated[float, Field(ge=-_MOST_DRAWN_NUMBER, le=_MOST_DRAWN_NUMBER, allow_inf_nan=False)]
 
 
 class SweepModel(StrictModel, title="A sweep"):
@@ -120,9 +120,9 @@ class SweepModel(StrictModel, title="A sweep"):
     24 ranges [15, 24], [25, 34] ... [245, 254]. One value is drawn from each range, both ends included.
     """
 
-    first: list[_Number] = Field(description="The first range, [low, high].")
+    first: list[_DrawnNumber] = Field(description="The first range, [low, high].")
     step: float = Field(gt=0.0, allow_inf_nan=False, description="The distance from one range to the next.")
-    last: list[_Number] = Field(description="The last range, a whole number of steps above the first.")
+    last: list[_DrawnNumber] = Field(description="The last range, a whole number of steps above the first.")
 
     @model_validator(mode="after")
     def _even(self) -> "SweepModel":
@@ -165,14 +165,14 @@ class _DrawModel(StrictModel, title="A draw"):
     )
 
 
-_LATCHES = (
+_HOLD_DESCRIPTION = (
     "How long the fault stays active, if the trigger does not determine it: `to_end` for a fault that latches"
 )
 
 
 class _ReadingModel(StrictModel, title="A reading"):
     hold: Literal["while", "to_end"] | None = Field(
-        None, description=f"{_LATCHES} in this reading; default: the variant's `hold`."
+        None, description=f"{_HOLD_DESCRIPTION} in this reading; default: the variant's `hold`."
     )
     injections: list[InjectionModel] = Field(
         description="At least one. The fault is activated if any of them runs while the fault is active."
@@ -189,7 +189,7 @@ class _VariantBase(StrictModel, title="A variant"):
         description="Changes of the scenario that belong to the fault, by their names in the target's "
         "manifest.",
     )
-    hold: Literal["while", "to_end"] | None = Field(None, description=f"{_LATCHES}.")
+    hold: Literal["while", "to_end"] | None = Field(None, description=f"{_HOLD_DESCRIPTION}.")
     draw: dict[str, _DrawModel] | None = Field(
         None,
         description="Exactly one draw: name and unit -> draw. Without a draw, the variant is a single fault.",
@@ -209,10 +209,10 @@ class SpecModel(StrictModel, title="The file"):
 
 
 @cache
-def spec_model(readings: Readings) -> type[SpecModel]:
+def build_spec_model(readings: Readings) -> type[SpecModel]:
     """Make the schema of a library's spec files. A variant has one key for each reading."""
     keys: dict[str, Any] = {}
-    for name, about in zip(readings.names, readings.about, strict=True):
+    for name, about in zip(readings.names, readings.descriptions, strict=True):
         required = name == readings.default
         kind = _ReadingModel if required else _ReadingModel | None
         keys[name] = (kind, Field(... if required else None, description=about))
@@ -228,14 +228,14 @@ def spec_model(readings: Readings) -> type[SpecModel]:
 
 def load_spec(path: Path, readings: Readings) -> FaultSpec:
     """Read one spec of a library; errors have file and line. `expand` does the remaining checks."""
-    model, source = load_yaml_model(path, spec_model(readings), SCHEMA)
+    model, source = load_yaml_model(path, build_spec_model(readings), SCHEMA)
     models: dict[str, _VariantBase] = model.variants  # type: ignore[attr-defined]
     for key in ("module", "fault_type"):
         _check_name(getattr(model, key), source, (key,))
     if not models:
         raise source.error(("variants",), "no variant", expected="at least one", remedy="describe a fault")
     name = f"{model.module}/{model.fault_type}"
-    variants = tuple(_variant(name, key, variant, readings, source) for key, variant in models.items())
+    variants = tuple(_build_variant(name, key, variant, readings, source) for key, variant in models.items())
     return FaultSpec(
         module=model.module,
         fault_type=model.fault_type,
@@ -247,30 +247,42 @@ def load_spec(path: Path, readings: Readings) -> FaultSpec:
 
 
 def _check_name(name: str, source: YamlSource, keys: KeyPath) -> None:
-    if not _NAME.match(name):
+    if not _NAME_PATTERN.match(name):
         raise source.error(keys, f"'{name}'", expected="lowercase letters, digits and _", remedy="rename it")
 
 
-def _variant(spec: str, name: str, model: _VariantBase, readings: Readings, source: YamlSource) -> Variant:
+def _build_variant(
+    spec: str, name: str, model: _VariantBase, readings: Readings, source: YamlSource
+) -> Variant:
     keys: KeyPath = ("variants", name)
     _check_name(name, source, keys)
-    written: dict[str, _ReadingModel | None] = {name: getattr(model, name) for name in readings.names}
-    holds = {reading: one.hold or model.hold for reading, one in written.items() if one}
+    models_by_reading: dict[str, _ReadingModel | None] = {
+        name: getattr(model, name) for name in readings.names
+    }
+    holds = {
+        reading: reading_model.hold or model.hold
+        for reading, reading_model in models_by_reading.items()
+        if reading_model
+    }
     return Variant(
         name=name,
         aim=model.aim,
         about=model.about,
-        draw=_draw(f"{spec}/{name}", model.draw, source, (*keys, "draw")) if model.draw is not None else None,
+        draw=_build_draw(f"{spec}/{name}", model.draw, source, (*keys, "draw"))
+        if model.draw is not None
+        else None,
         changes=tuple(model.changes),
-        readings={
-            reading: _injections(one, source, (*keys, reading)) for reading, one in written.items() if one
+        injections_by_reading={
+            reading: _build_injections(one, source, (*keys, reading))
+            for reading, one in models_by_reading.items()
+            if one
         },
-        holds={reading: hold and Hold(hold) for reading, hold in holds.items()},
+        hold_by_reading={reading: hold and Hold(hold) for reading, hold in holds.items()},
         keys=keys,
     )
 
 
-def _injections(model: _ReadingModel, source: YamlSource, keys: KeyPath) -> tuple[InjectionSpec, ...]:
+def _build_injections(model: _ReadingModel, source: YamlSource, keys: KeyPath) -> tuple[InjectionSpec, ...]:
     if not model.injections:
         raise source.error((*keys, "injections"), "no injection", expected="at least one")
     return tuple(
@@ -278,7 +290,7 @@ def _injections(model: _ReadingModel, source: YamlSource, keys: KeyPath) -> tupl
     )
 
 
-def _draw(default_key: str, models: dict[str, _DrawModel], source: YamlSource, keys: KeyPath) -> Draw:
+def _build_draw(default_key: str, models: dict[str, _DrawModel], source: YamlSource, keys: KeyPath) -> Draw:
     if len(models) != 1:
         raise source.error(
             keys, f"{len(models)} draws", expected="one", remedy="use one draw for all injections"
@@ -287,19 +299,21 @@ def _draw(default_key: str, models: dict[str, _DrawModel], source: YamlSource, k
     name, unit = units.split_unit(key)
     _check_name(name, source, (*keys, key))
     ways = {"integers": model.integers_from, "reals": model.reals_from, "list": model.values}
-    given = [kind for kind, way in ways.items() if way is not None]
-    place = (*keys, key)
-    if len(given) != 1:
+    kinds = [kind for kind, way in ways.items() if way is not None]
+    draw_keys = (*keys, key)
+    if len(kinds) != 1:
         raise source.error(
-            place, f"{len(given)} ways to draw", expected="integers_from, reals_from or values"
+            draw_keys, f"{len(kinds)} ways to draw", expected="integers_from, reals_from or values"
         )
-    kind: Literal["integers", "reals", "list"] = given[0]  # type: ignore[assignment]
+    kind: Literal["integers", "reals", "list"] = kinds[0]  # type: ignore[assignment]
     ranges = model.integers_from or model.reals_from
     if model.integers_from and any(x != int(x) for pair in model.integers_from.ranges() for x in pair):
-        raise source.error((*place, "integers_from"), "a range with fractions", expected="whole numbers")
+        raise source.error((*draw_keys, "integers_from"), "a range with fractions", expected="whole numbers")
     if model.decimals is not None and kind != "reals":
         raise source.error(
-            (*place, "decimals"), f"decimals: {model.decimals}", expected="`decimals` only with reals_from"
+            (*draw_keys, "decimals"),
+            f"decimals: {model.decimals}",
+            expected="`decimals` only with reals_from",
         )
     return Draw(
         key=model.key or default_key,
@@ -310,5 +324,5 @@ def _draw(default_key: str, models: dict[str, _DrawModel], source: YamlSource, k
         values=tuple(model.values or ()),
         decimals=model.decimals,
         cap=model.cap,
-        keys=place,
+        keys=draw_keys,
     )

@@ -9,12 +9,12 @@ from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
 
-def check_import(manifest: TargetManifest, dotted: str) -> None:
+def check_import(manifest: TargetManifest, dotted_name: str) -> None:
     """Raise MutatorError unless `dotted` names something that a module of the target defines.
 
     The caller adds file and line to the error.
     """
-    module, _, name = dotted.rpartition(".")
+    module, _, name = dotted_name.rpartition(".")
     base = module.replace(".", "/")
     path = next((p for p in (f"{base}.py", f"{base}/__init__.py") if p in manifest.tree.files), None)
     if path is None:
@@ -23,9 +23,9 @@ def check_import(manifest: TargetManifest, dotted: str) -> None:
             expected="a module of the target and a name in it, such as package.module.Name",
             remedy=f"correct the name, or the `files` of {manifest.path.name}",
         )
-    known = manifest.tree.derived(path, _names)
-    if name not in known:
-        public = [x for x in known if not x.startswith("_")]
+    names = manifest.tree.derive_once(path, _sorted_module_names)
+    if name not in names:
+        public = [x for x in names if not x.startswith("_")]
         raise MutatorError(
             f"'{name}' is not defined in {path}",
             expected=describe_choices(public),
@@ -33,9 +33,9 @@ def check_import(manifest: TargetManifest, dotted: str) -> None:
         )
 
 
-def _names(path: str, data: bytes, root: Path) -> list[str]:
+def _sorted_module_names(path: str, data: bytes, root: Path) -> list[str]:
     try:
-        return sorted(_defined(ast.parse(data)))
+        return sorted(_module_names(ast.parse(data)))
     except (SyntaxError, ValueError, RecursionError) as error:
         message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
         raise MutatorError(
@@ -43,7 +43,7 @@ def _names(path: str, data: bytes, root: Path) -> list[str]:
         ) from None
 
 
-def _defined(module: ast.Module) -> Iterator[str]:
+def _module_names(module: ast.Module) -> Iterator[str]:
     for node in module.body:
         if isinstance(node, ast.ClassDef | ast.FunctionDef):
             yield node.name

@@ -11,7 +11,13 @@ from mutator.config.instance_conditions import canonical_instance_condition
 from mutator.config.location_model import LocationModel
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
-from mutator.faults.injection_specs import DIMENSIONLESS, InjectionSpec, ParamSpec, ParamValue, reference
+from mutator.faults.injection_specs import (
+    DIMENSIONLESS,
+    InjectionSpec,
+    ParamSpec,
+    ParamValue,
+    parse_draw_reference,
+)
 from mutator.model import FIXED_ANCHORS, AnchorKind
 
 
@@ -61,11 +67,18 @@ class InjectionModel(StrictModel, title="An injection"):
         params = []
         for key, value in self.params.items():
             name, unit = units.split_unit(key)
-            place = (*keys, "params", key)
+            param_keys = (*keys, "params", key)
             suffix = unit.suffix if unit else None
-            params.append(ParamSpec(name=name, unit=suffix, value=_value(value, source, place), keys=place))
+            params.append(
+                ParamSpec(
+                    name=name,
+                    unit=suffix,
+                    value=_parse_param_value(value, source, param_keys),
+                    keys=param_keys,
+                )
+            )
         location = self.at.location(source, (*keys, "at"))
-        self._check_instance(location.anchor.kind, source, keys)
+        self._check_instance_keys(location.anchor.kind, source, keys)
         return InjectionSpec(
             location=location,
             model=self.model,
@@ -77,16 +90,16 @@ class InjectionModel(StrictModel, title="An injection"):
             every=self.every,
         )
 
-    def _check_instance(self, kind: AnchorKind, source: YamlSource, keys: KeyPath) -> None:
-        given = [name for name in ("where", "call", "every") if getattr(self, name) is not None]
-        if given and kind in FIXED_ANCHORS:
+    def _check_instance_keys(self, kind: AnchorKind, source: YamlSource, keys: KeyPath) -> None:
+        instance_keys = [name for name in ("where", "call", "every") if getattr(self, name) is not None]
+        if instance_keys and kind in FIXED_ANCHORS:
             raise source.error(
-                (*keys, given[0]),
-                f"`{given[0]}` at a {kind.value}",
+                (*keys, instance_keys[0]),
+                f"`{instance_keys[0]}` at a {kind.value}",
                 expected="no `where`, `call` or `every`: the value is set once a step, for all instances",
                 remedy="leave it out, or anchor where the value is used",
             )
-        if {"call", "every"} <= set(given):
+        if {"call", "every"} <= set(instance_keys):
             raise source.error(
                 (*keys, "every"), "`call` and `every`", expected="one of them", remedy="leave one out"
             )
@@ -101,7 +114,7 @@ class InjectionModel(StrictModel, title="An injection"):
             ) from None
 
 
-def _value(value: Any, source: YamlSource, keys: KeyPath) -> ParamValue:
+def _parse_param_value(value: Any, source: YamlSource, keys: KeyPath) -> ParamValue:
     if value is None or isinstance(value, bool | int | float | str):
         return value
     key = keys[-1]
@@ -119,7 +132,7 @@ def _value(value: Any, source: YamlSource, keys: KeyPath) -> ParamValue:
                 f"{describe_value(value[name])} for '{name}'",
                 expected=f"one of {units.UNIT_LIST}",
             )
-    drawn = reference(str(value["draw"]))
+    drawn = parse_draw_reference(str(value["draw"]))
     if not drawn:
         raise source.error(
             (*keys, "draw"), f"{describe_value(value['draw'])} for 'draw'", expected="the draw's name"

@@ -6,17 +6,27 @@ from mutator.config import units
 from mutator.config.location_syntax import is_assignable, is_dotted_name
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, ParamSchema
+from mutator.faults.fault_models import NAME_TYPES, TARGET_UNIT, FaultModel, ParamSchema
 from mutator.faults.fault_specs import Draw
-from mutator.faults.injection_specs import DIMENSIONLESS, Drawn, InjectionSpec, ParamSpec, quantity, reference
+from mutator.faults.injection_specs import (
+    DIMENSIONLESS,
+    DrawReference,
+    InjectionSpec,
+    ParamSpec,
+    convert_drawn_value,
+    parse_draw_reference,
+)
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection, Value
 
-_NAMED = {"variable": "a name as in the source", "import": "a module of the target and a name in it"}
-_WITHOUT_TARGET = VALUE_ANCHORS | FIXED_ANCHORS
-_WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
+_EXPECTED_BY_NAME_TYPE = {
+    "variable": "a name as in the source",
+    "import": "a module of the target and a name in it",
+}
+_ANCHORS_WITHOUT_TARGET = VALUE_ANCHORS | FIXED_ANCHORS
+_ANCHORS_WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
 
-def resolve(
+def resolve_injection(
     spec: InjectionSpec,
     model: FaultModel,
     source: YamlSource,
@@ -32,12 +42,12 @@ def resolve(
     defaults to the name that the anchor assigns. A `seed` parameter is drawn from (seed, key). MutatorError
     with file and line for anything that does not fit the model.
     """
-    resolver = _Resolver(spec, model, source, draw, value)
+    resolver = _ParameterResolver(spec, model, source, draw, value)
     params: dict[str, Value] = {}
     for param in spec.params:
-        schema = resolver.schema(param)
-        params[schema.name] = resolver.value(param, schema)
-        if schema.name == "target" and spec.location.anchor.kind in _WITHOUT_TARGET:
+        schema = resolver.schema_of(param)
+        params[schema.name] = resolver.resolved_value(param, schema)
+        if schema.name == "target" and spec.location.anchor.kind in _ANCHORS_WITHOUT_TARGET:
             raise source.error(
                 param.keys,
                 f"'{param.value}' for '{param.key}' at `{spec.location.anchor.kind.value}`",
@@ -47,15 +57,15 @@ def resolve(
     for schema in model.params:
         if schema.type == "seed":
             params[schema.name] = int(random_generator(seed, f"{key}/{schema.name}").random() * 2**53)
-        elif schema.name == "target" and spec.location.anchor.kind in _WITH_DEFAULT_TARGET:
+        elif schema.name == "target" and spec.location.anchor.kind in _ANCHORS_WITH_DEFAULT_TARGET:
             params.setdefault("target", spec.location.anchor.name)
-        at_value = schema.name == "target" and spec.location.anchor.kind in _WITHOUT_TARGET
+        at_value = schema.name == "target" and spec.location.anchor.kind in _ANCHORS_WITHOUT_TARGET
         if schema.name not in params and not (schema.optional or at_value):
             raise source.error(
                 (*spec.keys, "params"),
                 f"parameter '{schema.name}' of model {model.name} is missing",
                 expected=schema.about,
-                remedy=f"add {resolver.key(schema)}",
+                remedy=f"add {resolver.example_key(schema)}",
             )
     return Injection(
         location=spec.location,
@@ -67,7 +77,7 @@ def resolve(
     )
 
 
-class _Resolver:
+class _ParameterResolver:
     def __init__(
         self,
         spec: InjectionSpec,
@@ -80,55 +90,57 @@ class _Resolver:
         self.model = model
         self.source = source
         self.draw = draw
-        self.drawn = value
+        self.drawn_value = value
 
-    def schema(self, param: ParamSpec) -> ParamSchema:
+    def schema_of(self, param: ParamSpec) -> ParamSchema:
         """Return the schema of a parameter, after checking the dimension of its unit suffix.
 
         A constant that is not a number must have no unit suffix.
         """
         schema = self.model.param(param.name)
         if schema is None or schema.type == "seed":
-            known = [p for p in self.model.params if p.type != "seed"]
-            names = [key for p in known for key in self.keys(p)]
+            settable = [p for p in self.model.params if p.type != "seed"]
+            names = [key for p in settable for key in self.valid_keys(p)]
             raise self.source.error(
                 param.keys,
                 f"unknown parameter '{param.key}' of model {self.model.name}",
-                expected=describe_choices(map(self.key, known)),
+                expected=describe_choices(map(self.example_key, settable)),
                 remedy="correct or remove it" + suggestion(param.key, names),
             )
-        unit = None if self.is_plain(param, schema) else self.unit(schema)
-        given = units.UNITS[param.unit] if param.unit else None
-        if (unit is None) != (given is None) or (unit and given and unit.dimension != given.dimension):
+        unit = None if self.is_verbatim(param, schema) else self.unit_of(schema)
+        key_unit = units.UNITS[param.unit] if param.unit else None
+        if (unit is None) != (key_unit is None) or (
+            unit and key_unit and unit.dimension != key_unit.dimension
+        ):
             raise self.source.error(
                 param.keys,
-                f"'{param.key}'" + (f" (a unit of {given.dimension})" if given else " (no unit)"),
-                expected=self.key(schema),
+                f"'{param.key}'" + (f" (a unit of {key_unit.dimension})" if key_unit else " (no unit)"),
+                expected=self.example_key(schema),
                 remedy="end the key with the number's unit",
             )
         return schema
 
-    def is_plain(self, param: ParamSpec, schema: ParamSchema) -> bool:
+    def is_verbatim(self, param: ParamSpec, schema: ParamSchema) -> bool:
         """Return whether a constant is a truth value, None, or a text other than the draw's name."""
         if schema.type != "constant" or param.unit:
             return False
         if not isinstance(param.value, str):
             return param.value is None or isinstance(param.value, bool)
-        drawn = reference(param.value)
+        drawn = parse_draw_reference(param.value)
         return drawn is None or self.draw is None or drawn.name != self.draw.name
 
-    def keys(self, schema: ParamSchema) -> list[str]:
+    def valid_keys(self, schema: ParamSchema) -> list[str]:
         """Return the keys that a spec can use: one for each unit of the right dimension."""
-        unit = self.unit(schema)
+        unit = self.unit_of(schema)
         if unit is None:
             return [schema.name]
         fitting = [u.suffix for u in units.UNITS.values() if u.dimension == unit.dimension]
         return [f"{schema.name}_{suffix}" for suffix in dict.fromkeys((unit.suffix, *fitting))]
 
-    def key(self, schema: ParamSchema) -> str:
-        return f"`{self.keys(schema)[0]}`"
+    def example_key(self, schema: ParamSchema) -> str:
+        return f"`{self.valid_keys(schema)[0]}`"
 
-    def unit(self, schema: ParamSchema) -> units.Unit | None:
+    def unit_of(self, schema: ParamSchema) -> units.Unit | None:
         if schema.unit != TARGET_UNIT:
             return units.UNITS[schema.unit] if schema.unit else None
         if self.spec.unit is None:
@@ -140,74 +152,74 @@ class _Resolver:
             )
         return None if self.spec.unit == DIMENSIONLESS else units.UNITS[self.spec.unit]
 
-    def value(self, param: ParamSpec, schema: ParamSchema) -> Value:
+    def resolved_value(self, param: ParamSpec, schema: ParamSchema) -> Value:
         """Return the value in the template's unit, after checking its type and range."""
-        if schema.type in NAMES:
+        if schema.type in NAME_TYPES:
             fits = is_dotted_name if schema.type == "import" else is_assignable
             if not isinstance(param.value, str) or not fits(param.value):
-                raise self._wrong(param, _NAMED[schema.type])
+                raise self._value_error(param, _EXPECTED_BY_NAME_TYPE[schema.type])
             return param.value
         if schema.type == "boolean":
             if not isinstance(param.value, bool):
-                raise self._wrong(param, "true or false")
+                raise self._value_error(param, "true or false")
             return param.value
         if schema.type in ("choice", "unit"):
             words = schema.choices if schema.type == "choice" else tuple(units.UNITS)
             if param.value not in words:
-                raise self._wrong(param, f"one of {', '.join(words)}")
+                raise self._value_error(param, f"one of {', '.join(words)}")
             return str(param.value)
-        if self.is_plain(param, schema):
-            return self._constant(param)
-        number = self._number(param, schema)
+        if self.is_verbatim(param, schema):
+            return self._constant_value(param)
+        number = self._number_in_unit(param, schema)
         if schema.type == "integer":
             if not number.is_integer():
-                raise self._wrong(param, "a whole number", f"{number}")
+                raise self._value_error(param, "a whole number", f"{number}")
             number = int(number)
         low = "" if schema.min is None else f"at least {schema.min:g}"
         high = "" if schema.max is None else f"at most {schema.max:g}"
         below = schema.min is not None and not number >= schema.min
         above = schema.max is not None and not number <= schema.max
         if below or above:
-            unit = self.unit(schema)
+            unit = self.unit_of(schema)
             written = param.value if isinstance(param.value, int | float) else number
             expected = " and ".join(filter(None, (low, high))) + (f" {unit.symbol}" if unit else "")
-            raise self._wrong(param, expected, f"{written:g}")
+            raise self._value_error(param, expected, f"{written:g}")
         return number
 
-    def _constant(self, param: ParamSpec) -> Value:
+    def _constant_value(self, param: ParamSpec) -> Value:
         """Return the value; MutatorError for a text that resembles the draw's name, a likely typo."""
-        assert not isinstance(param.value, Drawn)
+        assert not isinstance(param.value, DrawReference)
         if isinstance(param.value, str) and self.draw and suggestion(param.value, [self.draw.name]):
-            raise self._wrong(param, f"'{self.draw.name}', the draw, or a text that is less similar")
+            raise self._value_error(param, f"'{self.draw.name}', the draw, or a text that is less similar")
         return param.value
 
-    def _number(self, param: ParamSpec, schema: ParamSchema) -> float:
+    def _number_in_unit(self, param: ParamSpec, schema: ParamSchema) -> float:
         value = param.value
-        unit = self.unit(schema)
+        unit = self.unit_of(schema)
         if isinstance(value, bool):
-            raise self._wrong(param, "a number")
+            raise self._value_error(param, "a number")
         if isinstance(value, int | float):
             return (
                 units.convert_unit(value, units.UNITS[param.unit], unit)
                 if unit and param.unit
                 else float(value)
             )
-        drawn = value if isinstance(value, Drawn) else reference(str(value))
-        if drawn is None or self.draw is None or self.drawn is None or drawn.name != self.draw.name:
+        drawn = value if isinstance(value, DrawReference) else parse_draw_reference(str(value))
+        if drawn is None or self.draw is None or self.drawn_value is None or drawn.name != self.draw.name:
             expected = f"a number, or '{self.draw.name}', the draw" if self.draw else "a number"
-            raise self._wrong(param, expected)
+            raise self._value_error(param, expected)
         source = units.UNITS[self.draw.unit] if self.draw.unit else None
         if unit is None or source is None:
             if unit is not source:
-                raise self._wrong(param, "a draw with a unit" if unit else "a draw without a unit")
-            return float(drawn.sign * self.drawn)
+                raise self._value_error(param, "a draw with a unit" if unit else "a draw without a unit")
+            return float(drawn.sign * self.drawn_value)
         try:
-            return quantity(drawn, self.drawn, source, unit)
+            return convert_drawn_value(drawn, self.drawn_value, source, unit)
         except ValueError as error:
-            raise self._wrong(param, f"the same dimension: {error}") from None
+            raise self._value_error(param, f"the same dimension: {error}") from None
 
-    def _wrong(self, param: ParamSpec, expected: str, got: str | None = None) -> MutatorError:
-        value = param.value.name if isinstance(param.value, Drawn) else param.value
+    def _value_error(self, param: ParamSpec, expected: str, got: str | None = None) -> MutatorError:
+        value = param.value.name if isinstance(param.value, DrawReference) else param.value
         text = got or describe_value(value)
         return self.source.error(
             param.keys, f"{text} for '{param.key}'", expected=expected, remedy="correct the value"

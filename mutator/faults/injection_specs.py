@@ -9,11 +9,11 @@ from mutator.config.yaml_sources import KeyPath
 from mutator.model import FaultLocation
 
 DIMENSIONLESS = "1"
-_REFERENCE = re.compile(r"(-?)([a-z][a-z0-9_]*)\Z")
+_DRAW_REFERENCE_PATTERN = re.compile(r"(-?)([a-z][a-z0-9_]*)\Z")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drawn:
+class DrawReference:
     """A parameter with the drawn value `name`, multiplied by `sign`.
 
     With `written_in` and `read_as`, the value is converted to the first unit and then misread as the second.
@@ -25,7 +25,7 @@ class Drawn:
     read_as: str | None = None
 
 
-ParamValue = int | float | str | bool | None | Drawn
+ParamValue = int | float | str | bool | None | DrawReference
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,13 +56,13 @@ class InjectionSpec:
     every: int | None = None
 
 
-def reference(text: str) -> Drawn | None:
+def parse_draw_reference(text: str) -> DrawReference | None:
     """Parse `distance` or `-distance` as a reference to the draw of that name."""
-    match = _REFERENCE.match(text)
-    return Drawn(name=match[2], sign=-1 if match[1] else 1) if match else None
+    match = _DRAW_REFERENCE_PATTERN.match(text)
+    return DrawReference(name=match[2], sign=-1 if match[1] else 1) if match else None
 
 
-def quantity(drawn: Drawn, number: float, unit: units.Unit, target: units.Unit) -> float:
+def convert_drawn_value(drawn: DrawReference, number: float, unit: units.Unit, target: units.Unit) -> float:
     """Convert the drawn `number` from `unit` to `target`; ValueError if the units are incompatible."""
     number = math.copysign(1.0, drawn.sign) * number
     if drawn.written_in and drawn.read_as:

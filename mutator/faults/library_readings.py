@@ -11,8 +11,8 @@ from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.errors import MutatorError
 
 SCHEMA = "readings/1"
-FILE = "readings.yaml"  # in a library
-_NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
+READINGS_FILE = "readings.yaml"  # in a library
+_NAME_PATTERN = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,25 +20,25 @@ class Readings:
     """The readings of a library, in order. The first is the default, which every variant must define."""
 
     names: tuple[str, ...]
-    about: tuple[str, ...]
+    descriptions: tuple[str, ...]
 
     @property
     def default(self) -> str:
         return self.names[0]
 
-    def check(self, name: str) -> None:
+    def check_name(self, name: str) -> None:
         """Raise MutatorError for an unknown name."""
         if name not in self.names:
             raise MutatorError(
                 f"reading '{name}'",
                 expected=f"one of {', '.join(self.names)}",
-                remedy=f"correct the name, or declare the reading in the library's {FILE}",
+                remedy=f"correct the name, or declare the reading in the library's {READINGS_FILE}",
             )
 
 
-UNDECLARED = Readings(
+DEFAULT_READINGS = Readings(
     names=("as_described", "as_coded"),
-    about=(
+    descriptions=(
         "The injections according to the text that describes the fault.",
         "The injections according to the code that was published with that text.",
     ),
@@ -61,12 +61,12 @@ class ReadingsModel(StrictModel, title="readings.yaml"):
 
 
 def load_readings(library: Path) -> Readings:
-    path = check_inside(library, library / FILE)
+    path = check_inside(library, library / READINGS_FILE)
     if not path.is_file():
-        return UNDECLARED
+        return DEFAULT_READINGS
     model, source = load_yaml_model(path, ReadingsModel, SCHEMA)
     for name in model.readings:
-        if not _NAME.match(name):
+        if not _NAME_PATTERN.match(name):
             raise source.error(
                 ("readings", name),
                 f"'{name}'",
@@ -74,4 +74,4 @@ def load_readings(library: Path) -> Readings:
                 remedy="rename it",
             )
     about = tuple(reading.about.strip() for reading in model.readings.values())
-    return Readings(names=tuple(model.readings), about=about)
+    return Readings(names=tuple(model.readings), descriptions=about)

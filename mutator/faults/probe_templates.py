@@ -11,10 +11,10 @@ from pathlib import Path
 from mutator.config.location_syntax import PROBE_NAME
 from mutator.errors import MutatorError
 
-CODE = f"{PROBE_NAME}.py.j2"
-SETTINGS = f"{PROBE_NAME}_settings.py.j2"
-FILES = (CODE, SETTINGS)
-_SETTINGS_HERE, _CODE_HERE = "{# settings #}\n", "{# code #}\n"
+CODE_TEMPLATE_FILE = f"{PROBE_NAME}.py.j2"
+SETTINGS_TEMPLATE_FILE = f"{PROBE_NAME}_settings.py.j2"
+PROBE_TEMPLATE_FILES = (CODE_TEMPLATE_FILE, SETTINGS_TEMPLATE_FILE)
+_SETTINGS_MARK, _CODE_MARK = "{# settings #}\n", "{# code #}\n"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,26 +34,30 @@ class ProbeTemplates:
     code: tuple[TemplatePart, ...]
 
     @classmethod
-    def of(cls, folder: Path, code_text: str, settings_text: str) -> "ProbeTemplates":
+    def from_texts(cls, folder: Path, code_text: str, settings_text: str) -> "ProbeTemplates":
         """Make the parts of the texts of `FILES`; MutatorError if their marks do not fit."""
-        before, *code = _parts(folder / CODE, code_text, _SETTINGS_HERE)
-        settings = _parts(folder / SETTINGS, settings_text, _CODE_HERE)
+        before, *code = _split_at_marks(folder / CODE_TEMPLATE_FILE, code_text, _SETTINGS_MARK)
+        settings = _split_at_marks(folder / SETTINGS_TEMPLATE_FILE, settings_text, _CODE_MARK)
         if before.text or len(code) != len(settings):
             raise MutatorError(
                 f"{len(settings)} parts of settings",
-                where=folder / SETTINGS,
-                expected=f"{len(code)}, one for each `{_SETTINGS_HERE.strip()}` in {CODE}, its first line",
-                remedy=f"correct the lines `{_SETTINGS_HERE.strip()}` there and `{_CODE_HERE.strip()}` here",
+                where=folder / SETTINGS_TEMPLATE_FILE,
+                expected=f"{len(code)}, one for each `{_SETTINGS_MARK.strip()}` in {CODE_TEMPLATE_FILE}, "
+                "its first line",
+                remedy=f"correct the lines `{_SETTINGS_MARK.strip()}` there and `{_CODE_MARK.strip()}` here",
             )
         return cls(settings=tuple(settings), code=tuple(code))
 
     @property
-    def text(self) -> str:
+    def whole_text(self) -> str:
         """The template of the whole probe. Ids of mutants, and reviews, are bound to this text."""
-        return "".join(one.text + other.text for one, other in zip(self.settings, self.code, strict=True))
+        return "".join(
+            settings_part.text + code_part.text
+            for settings_part, code_part in zip(self.settings, self.code, strict=True)
+        )
 
 
-def _parts(path: Path, text: str, mark: str) -> list[TemplatePart]:
+def _split_at_marks(path: Path, text: str, mark: str) -> list[TemplatePart]:
     texts = text.split(mark)
-    lines = accumulate((one.count("\n") + 1 for one in texts[:-1]), initial=1)
+    lines = accumulate((part.count("\n") + 1 for part in texts[:-1]), initial=1)
     return [TemplatePart(text=one, path=path, line=line) for one, line in zip(texts, lines, strict=True)]

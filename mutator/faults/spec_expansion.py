@@ -11,17 +11,17 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import Draw, FaultSpec, Variant
 from mutator.faults.injected_imports import check_import
-from mutator.faults.injection_parameters import resolve
+from mutator.faults.injection_parameters import resolve_injection
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.model import Fault, Injection
-from mutator.targets.allowed_locations import check_location
+from mutator.targets.allowed_locations import check_location_allowed
 from mutator.targets.manifest import TargetManifest
 
-_REDRAWS = 100  # of one value
-_ALL_REDRAWS = 20_000  # of all values; more mean that the ranges have too few different values
+_MOST_REDRAWS_OF_VALUE = 100  # of one value
+_MOST_REDRAWS = 20_000  # of all values; more mean that the ranges have too few different values
 
 
-def expand(
+def expand_spec(
     spec: FaultSpec,
     seed: int,
     reading: str | None = None,
@@ -36,8 +36,8 @@ def expand(
     outside the target or in a forbidden place. Anchors are resolved later, when a mutant is built.
     """
     reading = reading or spec.readings.default
-    spec.readings.check(reading)
-    expander = _Expander(spec, seed, reading, models, manifest)
+    spec.readings.check_name(reading)
+    expander = _SpecExpander(spec, seed, reading, models, manifest)
     return tuple(fault for variant in spec for fault in expander.faults(variant))
 
 
@@ -51,29 +51,31 @@ def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
         return draw.values
     stream = random_generator(seed, draw.key).random(len(draw.ranges))
     values: list[int | float] = []
-    left = _ALL_REDRAWS
-    for i, u in enumerate(map(float, stream)):
-        value = _value(draw, i, u)
-        for attempt in range(min(_REDRAWS, left)):
+    remaining_redraws = _MOST_REDRAWS
+    for i, fraction in enumerate(map(float, stream)):
+        value = _value_in_range(draw, i, fraction)
+        for attempt in range(min(_MOST_REDRAWS_OF_VALUE, remaining_redraws)):
             if value not in values and not (value == 0 and draw.kind == "reals"):
                 break
-            left -= 1
-            value = _value(draw, i, float(random_generator(seed, f"{draw.key}/{i}/{attempt}").random()))
+            remaining_redraws -= 1
+            value = _value_in_range(
+                draw, i, float(random_generator(seed, f"{draw.key}/{i}/{attempt}").random())
+            )
         values.append(value)
     return tuple(values)
 
 
-def _value(draw: Draw, index: int, u: float) -> int | float:
+def _value_in_range(draw: Draw, index: int, fraction: float) -> int | float:
     low, high = draw.ranges[index]
     if draw.kind == "integers":
-        whole = int(low) + math.floor(u * (int(high) - int(low) + 1))
+        whole = int(low) + math.floor(fraction * (int(high) - int(low) + 1))
         return whole if draw.cap is None else min(whole, int(draw.cap))
-    value = low + u * (high - low)
+    value = low + fraction * (high - low)
     value = value if draw.decimals is None else round(value, draw.decimals)
     return value if draw.cap is None else float(min(value, draw.cap))
 
 
-class _Expander:
+class _SpecExpander:
     def __init__(
         self, spec: FaultSpec, seed: int, reading: str, models: FaultModels, manifest: TargetManifest
     ) -> None:
@@ -85,7 +87,7 @@ class _Expander:
 
     def faults(self, variant: Variant) -> Iterator[Fault]:
         """Yield a fault for each drawn value of the variant, or one fault for a variant without a draw."""
-        self._check(variant)
+        self._check_variant(variant)
         draw = variant.draw
         unit = units.UNITS[draw.unit].symbol if draw and draw.unit else "-"
         values: tuple[int | float | None, ...] = draw_values(draw, self.seed) if draw else (None,)
@@ -105,7 +107,7 @@ class _Expander:
 
     def _injections(self, variant: Variant, value: int | float | None, number: int) -> tuple[Injection, ...]:
         return tuple(
-            resolve(
+            resolve_injection(
                 injection,
                 self.models.get(injection.model),
                 self.spec.source,
@@ -117,13 +119,17 @@ class _Expander:
             for i, injection in enumerate(variant.injections(self.reading))
         )
 
-    def _check(self, variant: Variant) -> None:
-        if variant.aim not in self.manifest.hazards:
-            raise self._wrong((*variant.keys, "aim"), f"aim '{variant.aim}'", self.manifest.hazards)
+    def _check_variant(self, variant: Variant) -> None:
+        if variant.aim not in self.manifest.hazard_names:
+            raise self._unknown_name_error(
+                (*variant.keys, "aim"), f"aim '{variant.aim}'", self.manifest.hazard_names
+            )
         for i, change in enumerate(variant.changes):
-            if change not in self.manifest.changes:
+            if change not in self.manifest.args_by_change:
                 keys = (*variant.keys, "changes", i)
-                raise self._wrong(keys, f"change '{change}'", tuple(self.manifest.changes))
+                raise self._unknown_name_error(
+                    keys, f"change '{change}'", tuple(self.manifest.args_by_change)
+                )
         for injection in variant.injections(self.reading):
             self._check_injection(injection)
 
@@ -132,7 +138,7 @@ class _Expander:
         try:
             model = self.models.get(injection.model)
             keys = (*injection.keys, "at", "file")
-            check_location(self.manifest, injection.location)
+            check_location_allowed(self.manifest, injection.location)
             for param in injection.params:
                 schema = model.param(param.name)
                 if schema and schema.type == "import":
@@ -143,10 +149,10 @@ class _Expander:
                 keys, error.got, expected=error.expected, remedy=error.remedy
             ) from None
 
-    def _wrong(self, keys: KeyPath, got: str, known: tuple[str, ...]) -> MutatorError:
+    def _unknown_name_error(self, keys: KeyPath, got: str, names: tuple[str, ...]) -> MutatorError:
         return self.spec.source.error(
             keys,
             got,
-            expected=f"{describe_choices(known)}, as in {self.manifest.path.name}",
+            expected=f"{describe_choices(names)}, as in {self.manifest.path.name}",
             remedy="correct it",
         )

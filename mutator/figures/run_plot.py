@@ -84,7 +84,11 @@ def draw_run(
     Data after the `end` of the drive (s) is grey and does not affect the axes. MutatorError if no channel is
     in both runs.
     """
-    channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden and c.name in faulty]
+    channels = [
+        c
+        for c in (*manifest.compared_channels, *manifest.plotted_channels)
+        if c.name in golden and c.name in faulty
+    ]
     if not channels:
         raise MutatorError("no channel of the manifest is in both traces", where=manifest.path)
     figure, axes = _figure(len(channels))

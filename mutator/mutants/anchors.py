@@ -114,7 +114,7 @@ class ParsedFile:
 
 def parsed_file(tree: SourceTree, path: str) -> ParsedFile:
     """Parse the file only once; MutatorError if it is not a Python file of the target."""
-    return tree.derived(path, parse_file)
+    return tree.derive_once(path, parse_file)
 
 
 @delaying_interrupts()

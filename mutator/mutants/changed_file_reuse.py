@@ -52,7 +52,7 @@ class ReusableChangedFile:
 
 def reuse_cache(tree: SourceTree, path: str) -> dict[ReuseKey, ReusableChangedFile | ChangedFile]:
     """Return the changes of this file that are already known. Callers add new ones to the dictionary."""
-    return tree.derived(path, _empty_cache)
+    return tree.derive_once(path, _empty_cache)
 
 
 def _empty_cache(path: str, data: bytes, root: Path) -> dict[ReuseKey, ReusableChangedFile | ChangedFile]:

@@ -41,7 +41,7 @@ def imports_of_constant(tree: SourceTree, path: str, name: str) -> tuple[str, ..
     MutatorError if an import prevents setting the constant: a star import, an import into a class, or one in
     a module that also sets the name in another way.
     """
-    files = [tree.derived(file, _module_imports) for file in tree.files if file.endswith(".py")]
+    files = [tree.derive_once(file, _module_imports) for file in tree.files if file.endswith(".py")]
     exported = {file.module: file.exported_names for file in files}
     names, refusals = [(module_name(path), name)], set[str]()
     for imported in names:  # grows during the loop: an imported name can be imported again

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from mutator.config.instance_conditions import names_in_condition
 from mutator.config.location_syntax import base_name
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
+from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind, TemplateNeed
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
 from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, parsed_file
 from mutator.mutants.changed_file_reuse import reuse_key
@@ -34,7 +34,7 @@ from mutator.mutants.splicing import (
 )
 from mutator.mutants.statement_texts import one_line_texts
 from mutator.mutants.template_rendering import render_changed_value, render_snippet
-from mutator.targets.allowed_locations import check_location
+from mutator.targets.allowed_locations import check_location_allowed
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import SourceTree
 
@@ -57,7 +57,7 @@ def edits_of(
     """
     edits = []
     for index, injection in enumerate(injections):
-        check_location(manifest, injection.location)
+        check_location_allowed(manifest, injection.location)
         name, file = injection_id(index, injection), parsed_file(manifest.tree, injection.location.path)
         edit = injection_edit(file, models, injection, name, manifest.tree)
         edits.append(InjectionEdit(id=name, file=file, edit=edit))
@@ -84,7 +84,7 @@ def injection_edit(
     site = file.resolve_statement(injection.location)
     variables = _checked_variables(file, site.names_in_function, site.first_line, model, injection)
     texts: dict[str, str] = {}
-    if model.needs is Needs.CALL:
+    if model.needs is TemplateNeed.CALL:
         raise _misfit_error(file, model, site.first_line)
     if model.needs is not None:
         site, texts = one_line_texts(file, site, model.needs)
@@ -105,7 +105,7 @@ def injection_edit(
 def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ValueEdit:
     expression = file.resolve_expression(injection.location)
     params, parts = dict(injection.params), template_parts(expression)
-    if model.needs is Needs.CALL and not parts["called"]:
+    if model.needs is TemplateNeed.CALL and not parts["called"]:
         raise _misfit_error(file, model, expression.start[0])
     changed = render_changed_value(model, params, name, expression.one_line_source, parts)
     names = file.names_in_function_at(injection.location)
@@ -137,10 +137,10 @@ def _names_set_in(node: ast.AST) -> set[str]:
 
 def _misfit_error(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
     expected_by_need = {
-        None: f"an expression with these parts: {', '.join(sorted(model.parts))}",
-        Needs.CALL: "a call: an anchor `result`, or another anchor whose expression is a call",
-        Needs.STATEMENT: "a statement, or an expression in a function",
-        Needs.NEXT_STATEMENT: "a statement, and another one after it",
+        None: f"an expression with these parts: {', '.join(sorted(model.expression_parts))}",
+        TemplateNeed.CALL: "a call: an anchor `result`, or another anchor whose expression is a call",
+        TemplateNeed.STATEMENT: "a statement, or an expression in a function",
+        TemplateNeed.NEXT_STATEMENT: "a statement, and another one after it",
     }
     return MutatorError(
         f"model {model.name} does not fit this anchor",
@@ -155,7 +155,7 @@ def _setting_edit(
     file: ParsedFile, model: FaultModel, injection: Injection, name: str, tree: SourceTree | None
 ) -> Edit:
     value, params = file.resolve_constant_or_default(injection.location), dict(injection.params)
-    if model.needs is Needs.CALL or model.parts:
+    if model.needs is TemplateNeed.CALL or model.expression_parts:
         raise _misfit_error(file, model, value.first_line)
     for param in model.params:
         if param.type == "variable" and params.get(param.name) is not None:

@@ -9,7 +9,7 @@ from mutator._common.confined_files import path_below
 from mutator._common.hashing import content_id
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.faults.probe_templates import CODE as PROBE_CODE
+from mutator.faults.probe_templates import CODE_TEMPLATE_FILE as PROBE_CODE
 from mutator.model import FIXED_ANCHORS, Fault, Hold, Trigger
 from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.mutants.changed_file_reuse import (
@@ -147,7 +147,7 @@ def _build_probe(
         )
     observation, step_s = manifest.observation, manifest.step_s
     settings = build_probe_settings(mutant_id, trigger, hold, ids, observation, step_s, sets=sets)
-    return render_probe(models.probe, settings)
+    return render_probe(models.probe_templates, settings)
 
 
 def _check_compiles(data: bytes, where: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from mutator.config.location_syntax import is_assignable, is_dotted_name, location_as_yaml
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
+from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind, TemplateNeed
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, functions_named, plain_function_name
 from mutator.mutants.expressions import NO_TEMPLATE_PARTS, Expression, template_parts
@@ -98,11 +98,11 @@ class _PlaceLister:
             )
 
     def fits_statement(self, model: FaultModel, kind: AnchorKind, site: ResolvedAnchor) -> bool:
-        if model.needs is Needs.CALL or (
+        if model.needs is TemplateNeed.CALL or (
             model.kind is SnippetKind.VALUE and kind is not AnchorKind.AFTER_ASSIGN
         ):
             return False
-        if model.kind is SnippetKind.VALUE and model.parts:
+        if model.kind is SnippetKind.VALUE and model.expression_parts:
             return False
         if model.kind is SnippetKind.GUARD and (
             site.first_line == site.end_line or not site.is_alone or site.is_after
@@ -145,8 +145,8 @@ def is_writable_in_spec(name: str) -> bool:
 
 def can_change(model: FaultModel, expression: Expression | None) -> bool:
     """Return whether a model can change this expression or, for None, a constant or default."""
-    if model.expression is None:
+    if model.expression_template is None:
         return False
     parts = template_parts(expression) if expression else NO_TEMPLATE_PARTS
-    needed = {"called"} if model.needs is Needs.CALL else set()
-    return all(parts[name] is not None and parts[name] != [] for name in needed | model.parts)
+    needed = {"called"} if model.needs is TemplateNeed.CALL else set()
+    return all(parts[name] is not None and parts[name] != [] for name in needed | model.expression_parts)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import Needs
+from mutator.faults.fault_models import TemplateNeed
 from mutator.mutants.anchors import ParsedFile, ResolvedAnchor
 
 # statements without a block: only these can be repeated or moved as one line
@@ -20,7 +20,7 @@ _BLOCK_FIELDS = ("body", "orelse", "finalbody")
 
 
 def one_line_texts(
-    file: ParsedFile, site: ResolvedAnchor, needs: Needs
+    file: ParsedFile, site: ResolvedAnchor, needs: TemplateNeed
 ) -> tuple[ResolvedAnchor, dict[str, str]]:
     """Return the site, and the text of each statement on one line, by its name in templates.
 
@@ -33,7 +33,7 @@ def one_line_texts(
     if isinstance(anchored, _BLOCK_ENDING_STATEMENTS):
         raise _unfit_error(file, site, f"`{ast.unparse(anchored)}` ends its block")
     texts = {"statement": _one_line_text(file, site, anchored)}
-    if needs is Needs.NEXT_STATEMENT:
+    if needs is TemplateNeed.NEXT_STATEMENT:
         if following is None:
             raise _unfit_error(
                 file, site, "the next statement is missing, shares its lines, or opens a block"

@@ -19,7 +19,7 @@ from jinja2 import TemplateError, TemplateSyntaxError, Undefined
 from mutator.config import units
 from mutator.config.location_syntax import PROBE_NAME, is_assignable, is_dotted_name
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import NAMES, FaultModel, ParamSchema, SnippetKind
+from mutator.faults.fault_models import NAME_TYPES, FaultModel, ParamSchema, SnippetKind
 from mutator.model import Value
 from mutator.mutants.normalized_source import normalized
 from mutator.mutants.template_language import TemplateEnvironment
@@ -157,7 +157,7 @@ def render_changed_value(
     `parts` are the components of `original`. MutatorError if the model cannot change values, or if the
     template fails or does not render one expression.
     """
-    if model.expression is None:
+    if model.expression_template is None:
         raise MutatorError(
             f"model {model.name} cannot change the value of an expression",
             where=model.source.path,
@@ -168,7 +168,7 @@ def render_changed_value(
         param.name: _checked_param(param, params) for param in model.params if param.name != "target"
     }
     names |= {"fi": injection_id, "original": original, **(parts or {})}
-    text = render_template(model.expression, names, model.template_path)
+    text = render_template(model.expression_template, names, model.template_path)
     plain = normalized(text, (injection_id,))
     if not _is_expression(plain):
         raise MutatorError(
@@ -216,7 +216,7 @@ def _checked_param(param: ParamSchema, params: Mapping[str, Value]) -> Value:
         return value
     fits = is_assignable if param.type == "variable" else is_dotted_name
     is_name = isinstance(value, str) and fits(value)
-    if is_name != (param.type in NAMES) or (isinstance(value, str) and not is_name):
+    if is_name != (param.type in NAME_TYPES) or (isinstance(value, str) and not is_name):
         raise MutatorError(
             f"{value!r} for '{param.name}'",
             expected=_EXPECTED_BY_PARAM_TYPE.get(param.type, f"a {param.type}"),

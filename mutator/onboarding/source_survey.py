@@ -12,8 +12,8 @@ from pathlib import Path
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import check_inside
 from mutator.errors import MutatorError, Outside
-from mutator.targets.roots import INSTALLED, installed_at
-from mutator.targets.source_tree import MOST_SOURCE
+from mutator.targets.roots import INSTALLED_PREFIX, find_installed
+from mutator.targets.source_tree import MOST_SOURCE_BYTES
 
 _MOST_FILES = 5000  # a controller has hundreds; more are a home folder or an environment, passed by mistake
 _SKIPPED_FOLDERS_AND_MODULES = {
@@ -49,14 +49,14 @@ class SourceSurvey:
 
 def survey_source(target: str) -> SourceSurvey:
     """Survey a folder, or the package `installed:NAME`. MutatorError if it does not exist."""
-    if target.startswith(INSTALLED):
-        return _survey_installed(target.removeprefix(INSTALLED))
+    if target.startswith(INSTALLED_PREFIX):
+        return _survey_installed(target.removeprefix(INSTALLED_PREFIX))
     folder = Path(target).resolve()
     if not folder.is_dir():
         raise MutatorError(
             f"no folder {target}",
             argument="target",
-            expected=f"the folder that holds a controller's source, or {INSTALLED}NAME",
+            expected=f"the folder that holds a controller's source, or {INSTALLED_PREFIX}NAME",
             remedy="correct `target`",
         )
     if (folder / "__init__.py").exists():
@@ -67,7 +67,7 @@ def survey_source(target: str) -> SourceSurvey:
 
 
 def _survey_installed(name: str) -> SourceSurvey:
-    package_path = installed_at(name) if name.isidentifier() else None
+    package_path = find_installed(name) if name.isidentifier() else None
     if package_path is None:
         raise MutatorError(
             f"no installed package '{name}'",
@@ -124,7 +124,7 @@ def _is_importable(name: str) -> bool:
 def _parse(path: Path) -> ast.Module:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # warnings concern the controller's code
-        return ast.parse(read_bounded(path, MOST_SOURCE))
+        return ast.parse(read_bounded(path, MOST_SOURCE_BYTES))
 
 
 def _survey_packages(root: Path, packages: tuple[str, ...], *, any_links: bool = False) -> SourceSurvey:

@@ -72,7 +72,7 @@ def _measure(engine: ReferenceEngine, golden_run: GoldenRunInputs, folder: Path)
 
 
 def _cache_key(manifest: TargetManifest, golden_run: GoldenRunInputs) -> str:
-    arguments = manifest.arguments(
+    arguments = manifest.run_arguments(
         scenario=Path("scenario"), seed=golden_run.seed, out=Path("out"), changes=golden_run.changes
     )
     at = manifest.observation.location

@@ -14,9 +14,9 @@ from mutator.operators.equal_code_filter import drop_equal_code
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutations import Mutation
 from mutator.operators.statement_facts import facts_of
-from mutator.targets.allowed_locations import check_file
+from mutator.targets.allowed_locations import check_file_allowed
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.source_tree import matches
+from mutator.targets.source_tree import matches_any_glob
 
 LinesByFile = Mapping[str, Collection[int]]  # by file, from 1
 _WILDCARDS = "*?["  # of `fnmatch`; a path without one must be a file of the target
@@ -129,10 +129,12 @@ def _functions_at(manifest: TargetManifest, place: str) -> Iterator[tuple[str, s
 
 def _paths_at(manifest: TargetManifest, path: str) -> list[str]:
     if not any(c in path for c in _WILDCARDS):
-        check_file(manifest, path)
+        check_file_allowed(manifest, path)
         return [path]
     matching = [
-        file for file in manifest.tree.files if matches(file, [path]) and _can_be_mutated(manifest, file)
+        file
+        for file in manifest.tree.files
+        if matches_any_glob(file, [path]) and _can_be_mutated(manifest, file)
     ]
     if not matching:
         raise MutatorError(
@@ -147,7 +149,7 @@ def _paths_at(manifest: TargetManifest, path: str) -> list[str]:
 
 def _can_be_mutated(manifest: TargetManifest, path: str) -> bool:
     try:
-        check_file(manifest, path)
+        check_file_allowed(manifest, path)
     except MutatorError:
         return False
     return True

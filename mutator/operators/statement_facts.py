@@ -43,7 +43,7 @@ def extent_of(node: ast.expr) -> NodeExtent:
 
 
 def facts_of(tree: SourceTree, path: str) -> StatementFacts:
-    return tree.derived(path, _collect_facts)
+    return tree.derive_once(path, _collect_facts)
 
 
 def _collect_facts(path: str, data: bytes, root: Path) -> StatementFacts:

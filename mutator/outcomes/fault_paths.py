@@ -24,7 +24,7 @@ from mutator.outcomes.fault_routes import (
 )
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, REMEDY
-from mutator.stpa.analysis_files import Kind, StructureModel
+from mutator.stpa.analysis_files import ComponentKind, ControlStructureModel
 from mutator.targets.channels import Role
 from mutator.targets.target_facts import ChannelFacts
 
@@ -132,7 +132,7 @@ class FaultPaths:
     then those of ground truth. In a chain, the place of injection is unknown.
     """
 
-    def __init__(self, channels: Sequence[ChannelFacts], structure: StructureModel | None) -> None:
+    def __init__(self, channels: Sequence[ChannelFacts], structure: ControlStructureModel | None) -> None:
         self.component_by_channel = {channel.name: channel.component for channel in channels}
         self._role_by_component = {c.component: c.role for c in channels if c.component}
         self._actuators = {c.component for c in channels if c.role is Role.ACTUATOR}
@@ -151,7 +151,7 @@ class FaultPaths:
             return frozenset(
                 name for name, role in self._role_by_component.items() if role == Role.TRUTH.value
             )
-        return frozenset(n for n, c in self.structure.components.items() if c.kind is Kind.PROCESS)
+        return frozenset(n for n, c in self.structure.components.items() if c.kind is ComponentKind.PROCESS)
 
     def _injected_components(self, fault: Fault) -> frozenset[str]:
         if fault.id not in self._injected_by_fault:
@@ -323,7 +323,7 @@ def fault_paths_of(folder: RunFolder) -> FaultPaths | None:
     if not any(channel.component for channel in head.channels):
         return None
     try:
-        structure = StructureModel.model_validate(head.structure) if head.structure else None
+        structure = ControlStructureModel.model_validate(head.structure) if head.structure else None
     except ValueError:
         raise MutatorError("damaged at 'structure'", where=folder.path / HEAD, remedy=REMEDY) from None
     return FaultPaths(head.channels, structure)

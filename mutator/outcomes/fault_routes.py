@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from mutator.stpa.analysis_files import Kind, StructureModel
+from mutator.stpa.analysis_files import ComponentKind, ControlStructureModel
 from mutator.targets.channels import Role
 
 
@@ -66,9 +66,9 @@ def structure_route(
     )
 
 
-def studied_links(structure: StructureModel) -> dict[str, tuple[str, str]]:
+def studied_links(structure: ControlStructureModel) -> dict[str, tuple[str, str]]:
     """Return the ends of each studied link that does not involve people."""
-    people = {name for name, component in structure.components.items() if component.kind is Kind.HUMAN}
+    people = {name for name, component in structure.components.items() if component.kind is ComponentKind.HUMAN}
     ends = ((name, (link.from_, link.to)) for name, link in structure.links.items() if link.studied)
     return {name: pair for name, pair in ends if not people.intersection(pair)}
 

@@ -76,7 +76,7 @@ def load_trace(
 
 def _check_importer_works(err: Exception, manifest: TargetManifest, path: Path) -> None:
     """Raise BadAddition if an importer of another package failed: nobody knows whether the run did."""
-    names = {name for channel in manifest.channels for name in (channel.in_trace, channel.time)}
+    names = {name for channel in manifest.channels for name in (channel.name_in_trace, channel.time)}
     is_missing_channel = (
         isinstance(err, KeyError) and err.args[:1] and err.args[0] in {manifest.time_channel, *names}
     )
@@ -158,7 +158,7 @@ def load_target_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
         raise BadOutput(
             f"not a readable record ({_error_text(err)})", where=path, expected="a JSON object"
         ) from None
-    judges = any(hazard.recorded for hazard in manifest.rules)
+    judges = any(hazard.is_in_record for hazard in manifest.hazard_rules)
     if not isinstance(data, dict) or not _has_event_times(data, needs_hazards=judges):
         expected = "{hazards: {NAME: time or null}, alerts: [{name: NAME, t: time}]}"
         raise BadOutput("no hazards and alerts with their times", where=path, expected=expected)

@@ -17,7 +17,7 @@ from mutator.outcomes.golden_comparison import (
     values_at_other_steps,
     values_on_steps,
 )
-from mutator.targets.contact_severity import DELTA_V
+from mutator.targets.contact_severity import DELTA_V_NAME
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers import temporal_logic, trace_formulas
@@ -54,7 +54,7 @@ def load_manifest_channels(manifest: TargetManifest, out: Path) -> Trace:
 
     BadOutput if a channel that the verdict needs is missing.
     """
-    needed = {*manifest.compared, *manifest.judged}
+    needed = {*manifest.compared_channels, *manifest.judged_channels}
     others = [channel for channel in manifest.channels if channel not in needed]
     return load_trace(manifest, out, [c for c in manifest.channels if c in needed], others)
 
@@ -70,20 +70,20 @@ def judge_run(
         values = {**values, **_golden_values(formula_values(manifest, golden), values[TIME])}
     hazards, metrics = [], []
     ends: dict[str, float] = {}
-    for hazard in manifest.rules:
+    for hazard in manifest.hazard_rules:
         robustness = _robustness(hazard, values, manifest) if hazard.stl else None
         first = _first_hazard_time(hazard, values, robustness, record)
         if first is not None:
             hazards.append((hazard.name, first))
         if (end := _drive_end(hazard, first, values)) is not None:
             ends[hazard.name] = end
-        if hazard.metric is not None:
+        if hazard.margin_metric is not None:
             numbers = (
                 robustness
                 if robustness is not None
                 else trace_formulas.formula_at_each_step(hazard.margin, values)
             )
-            metrics.append((hazard.metric, numbers))
+            metrics.append((hazard.margin_metric, numbers))
     measured = [metric for metric in manifest.metrics if golden is not None or not metric.uses_golden]
     metrics += [(metric, _metric_values(metric, values)) for metric in measured]
     t_end = min(ends.values(), default=None)
@@ -92,8 +92,8 @@ def judge_run(
     }
     contact = manifest.contact
     if contact and t_end is not None and ends.get(contact.hazard) == t_end:
-        speed = value_by_metric.get(contact.speed)
-        value_by_metric[DELTA_V] = None if speed is None else contact.delta_v(speed)
+        speed = value_by_metric.get(contact.speed_metric)
+        value_by_metric[DELTA_V_NAME] = None if speed is None else contact.delta_v(speed)
     return RunJudgement(
         hazards=tuple(hazards),
         alerts=tuple(alert_times(record, manifest.alerts)),
@@ -109,7 +109,7 @@ def formula_values(manifest: TargetManifest, trace: Trace) -> ValuesByName:
     """
     time = np.asarray(trace[manifest.time_channel], dtype=float)
     values = {TIME: time}
-    for channel in manifest.judged:
+    for channel in manifest.judged_channels:
         values[channel.name] = values_on_steps(trace, channel.name, time).astype(float)
     for value in manifest.observation.derived:
         if value.name not in values and all(name in values for name in names_in(value.text)):
@@ -136,7 +136,7 @@ def _robustness(hazard: Hazard, values: ValuesByName, manifest: TargetManifest) 
 def _first_hazard_time(
     hazard: Hazard, values: ValuesByName, robustness: np.ndarray | None, record: Mapping[str, Any]
 ) -> float | None:
-    if hazard.recorded:
+    if hazard.is_in_record:
         return record.get("hazards", {}).get(hazard.name)  # type: ignore[no-any-return]
     holds = (
         robustness < 0.0

@@ -34,7 +34,9 @@ class SeriesSampler:
     """Builds the series of a golden run, and the series of the faulty runs compared with it."""
 
     def __init__(self, manifest: TargetManifest, golden: Trace) -> None:
-        self._channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden]
+        self._channels = [
+            c for c in (*manifest.compared_channels, *manifest.plotted_channels) if c.name in golden
+        ]
         self._clock = manifest.time_channel
         self._time = np.asarray(golden[self._clock], dtype=float)
         self._values = self._values_on(golden, self._time)
@@ -241,7 +243,7 @@ def _channel_as_json(channel: Channel, manifest: TargetManifest) -> dict[str, An
         "role": channel.role.value,
         "component": channel.component,
         "about": channel.about,
-        "compared": channel in manifest.compared,
+        "compared": channel in manifest.compared_channels,
     }
 
 

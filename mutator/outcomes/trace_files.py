@@ -41,8 +41,8 @@ class TraceRequest:
         if self.everything:
             return dict.fromkeys(available)
         of_time = [channel.time for channel in self.channels if channel.time]
-        names = [self.time_channel, *of_time, *(channel.in_trace for channel in self.channels)]
-        optional_names = {name for channel in self.optional for name in (channel.in_trace, channel.time)}
+        names = [self.time_channel, *of_time, *(channel.name_in_trace for channel in self.channels)]
+        optional_names = {name for channel in self.optional for name in (channel.name_in_trace, channel.time)}
         return {name: None for name in names if name in available or name not in optional_names}
 
 
@@ -109,7 +109,7 @@ def by_channel(columns: Arrays, request: TraceRequest, *, has_empty_cells: bool 
 
     With `has_empty_cells`, rows without a step time belong to channels with their own times.
     """
-    channel_names = {c.in_trace for c in request.channels} | {c.time for c in request.channels if c.time}
+    channel_names = {c.name_in_trace for c in request.channels} | {c.time for c in request.channels if c.time}
     rest = {
         name: column for name, column in columns.items() if request.everything and name not in channel_names
     }
@@ -117,9 +117,9 @@ def by_channel(columns: Arrays, request: TraceRequest, *, has_empty_cells: bool 
     steps = ~_empty_mask(time) if has_empty_cells else slice(None)
     values = {name: column[steps] for name, column in rest.items()} | {request.time_channel: time[steps]}
     for channel in request.channels:
-        if channel.in_trace not in columns and (request.everything or channel in request.optional):
+        if channel.name_in_trace not in columns and (request.everything or channel in request.optional):
             continue
-        column = columns[channel.in_trace]
+        column = columns[channel.name_in_trace]
         rows = steps
         if channel.time:
             rows = ~_empty_mask(column) if has_empty_cells else slice(None)

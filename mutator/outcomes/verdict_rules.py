@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from mutator.model import Activation, Outcome, Record
-from mutator.targets.contact_severity import DELTA_V, Scale
+from mutator.targets.contact_severity import DELTA_V_NAME, SeverityScale
 
 EventTimes = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
 
@@ -59,9 +59,9 @@ def manifestation_to_hazard_time(record: Record) -> float | None:
     return record.hazards[0][1] - record.t_manifest
 
 
-def severity_class_of(record: Record, scale: Scale | None) -> str | None:
+def severity_class_of(record: Record, scale: SeverityScale | None) -> str | None:
     """Return the class of the contact that ended the drive. None without a contact after activation."""
-    delta_v = dict(record.metrics).get(DELTA_V)
+    delta_v = dict(record.metrics).get(DELTA_V_NAME)
     if scale is None or delta_v is None or record.activation is None or record.t_end is None:
         return None
     return scale.class_of(delta_v) if record.t_end >= record.activation.first else None

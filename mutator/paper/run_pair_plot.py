@@ -37,7 +37,9 @@ def plot_run_pair(
     manifest: TargetManifest,
 ) -> "Figure":
     """Draw the panels of `figure_spec` that both runs have. In its action channels, shade `steps`."""
-    units = {channel.name: channel.unit for channel in (*manifest.compared, *manifest.plotted)}
+    units = {
+        channel.name: channel.unit for channel in (*manifest.compared_channels, *manifest.plotted_channels)
+    }
     panels = [(c, meaning) for c, meaning in figure_spec.panels if c in pair.golden and c in pair.faulty]
     first_s = max(float(pair.times_s[0]), pair.start_s - SHOWN_BEFORE_S)
     last_s = min(float(pair.times_s[-1]), pair.end_s + SHOWN_AFTER_S)

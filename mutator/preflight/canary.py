@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from mutator.engines.engine_jobs import Job
 from mutator.errors import MutatorError
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Experiment, Fault, fault_label
 from mutator.mutants.mutant_building import build
 from mutator.preflight.preflight_rules import CheckRun
@@ -24,7 +24,7 @@ def experiments_to_try(
     others: dict[str, Fault] = {}
     for spec in workspace.specs():
         if canary_fault.spec.startswith(f"{spec.name}/") and canary_fault.reading in spec.readings.names:
-            faults = expand(spec, canary.seed, canary_fault.reading, models=models, manifest=manifest)
+            faults = expand_spec(spec, canary.seed, canary_fault.reading, models=models, manifest=manifest)
             others |= {f.id: f for f in faults if f.spec == canary_fault.spec and f.id != canary_fault.id}
     for fault in sorted(others.values(), key=lambda fault: fault.size, reverse=True):
         yield replace(canary, fault=fault)

@@ -57,7 +57,7 @@ def read_check_run(manifest: TargetManifest, execution: JobResult) -> CheckRun:
 def output_digest_of(manifest: TargetManifest, out: Path) -> str:
     """Digest of trace and record in an output folder; empty if they are missing."""
     try:
-        return digest([digest(read_bounded(path_below(out, name))) for name in manifest.outputs])
+        return digest([digest(read_bounded(path_below(out, name))) for name in manifest.output_files])
     except OSError:
         return ""
 

@@ -9,10 +9,10 @@ from mutator.results.propagation_columns import PROPAGATION_COLUMNS as PROPAGATI
 from mutator.results.table_columns import TIMING_COLUMNS, result_columns, severity_columns
 from mutator.results.table_files import ARROW_TYPES, TableColumn
 from mutator.targets.channels import Channel
-from mutator.targets.contact_severity import DELTA_V
+from mutator.targets.contact_severity import DELTA_V_NAME
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.observed_values import variable_units
+from mutator.targets.observed_values import units_and_meanings
 from mutator.targets.target_facts import metric_facts
 from mutator.workspace import Workspace
 
@@ -51,9 +51,9 @@ def render_results_page(workspace: Workspace) -> str:
 
 def _result_columns_section(manifest: TargetManifest) -> Iterator[str]:
     yield f"## Target {manifest.name}\n"
-    compared = [channel.name for channel in manifest.compared]
+    compared = [channel.name for channel in manifest.compared_channels]
     severity = severity_columns(has_classes=manifest.contact is not None)
-    columns = (manifest.hazards, compared, metric_facts(manifest), severity)
+    columns = (manifest.hazard_names, compared, metric_facts(manifest), severity)
     yield from _columns_table(result_columns(*columns, paths=True))
 
 
@@ -81,7 +81,7 @@ def render_channels_page(workspace: Workspace) -> str:
 def _target_section(manifest: TargetManifest) -> Iterator[str]:
     yield f"## {manifest.name}\n"
     yield "Triggers and contexts can use these variables:\n"
-    observed_variables = variable_units(manifest.observation)
+    observed_variables = units_and_meanings(manifest.observation)
     variables = [(f"`{name}`", *unit_and_meaning) for name, unit_and_meaning in observed_variables.items()]
     yield TextTable(heads=("variable", "unit", "meaning"), rows=variables).as_markdown(escape=False)
     yield ""
@@ -94,19 +94,19 @@ def _target_section(manifest: TargetManifest) -> Iterator[str]:
         escape=False
     )
     yield ""
-    hazards = [_hazard_row(hazard) for hazard in manifest.rules]
+    hazards = [_hazard_row(hazard) for hazard in manifest.hazard_rules]
     yield TextTable(heads=("hazard", "condition", "ends the drive", "meaning"), rows=hazards).as_markdown(
         escape=False
     )
     yield ""
-    metrics = [_metric_row(metric) for metric in manifest.measures]
+    metrics = [_metric_row(metric) for metric in manifest.all_metrics]
     if metrics:
         yield TextTable(heads=("metric", "unit", "is", "worse", "meaning"), rows=metrics).as_markdown(
             escape=False
         )
         yield ""
     yield f"Alerts: {', '.join(manifest.alerts) or 'none'}.\n"
-    changes = [(f"`{name}`", f"`{' '.join(arguments)}`") for name, arguments in manifest.changes.items()]
+    changes = [(f"`{name}`", f"`{' '.join(arguments)}`") for name, arguments in manifest.args_by_change.items()]
     yield TextTable(heads=("change of the scenario", "arguments it adds"), rows=changes).as_markdown(
         escape=False
     )
@@ -120,7 +120,7 @@ def _channel_row(channel: Channel) -> tuple[str, ...]:
 
 
 def _hazard_row(hazard: Hazard) -> tuple[str, ...]:
-    condition = f"`{hazard.when or hazard.stl}`" if not hazard.recorded else "as recorded"
+    condition = f"`{hazard.when or hazard.stl}`" if not hazard.is_in_record else "as recorded"
     if hazard.for_s:
         condition += f" for {hazard.for_s:g} s"
     ends = {"": "no", "True": "yes"}.get(hazard.terminal, f"`{hazard.terminal}`")
@@ -128,7 +128,7 @@ def _hazard_row(hazard: Hazard) -> tuple[str, ...]:
 
 
 def _metric_row(metric: Metric) -> tuple[str, ...]:
-    if metric.name == DELTA_V:
+    if metric.name == DELTA_V_NAME:
         definition = "as in `severity`"
     elif metric.formula:
         definition = f"{metric.aggregate} of `{metric.formula}`"

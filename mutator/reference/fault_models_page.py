@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from mutator._common.table_rendering import TextTable
 from mutator.faults import fault_model_files
-from mutator.faults.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema, SnippetKind
+from mutator.faults.fault_models import TARGET_UNIT, FaultModel, FaultModelExample, ParamSchema, SnippetKind
 from mutator.reference.yaml_key_tables import generated_page_head, model_sections
 from mutator.workspace import Workspace
 
@@ -84,7 +84,7 @@ def _parameter_row(param: ParamSchema) -> tuple[str, str, str, str]:
     return f"`{param.name}`", kind, unit, about
 
 
-def _example_diff(example: Example) -> str:
+def _example_diff(example: FaultModelExample) -> str:
     lines = difflib.ndiff(example.before.splitlines(), example.after.splitlines())
     return "\n".join((line[0] + line[2:]).rstrip() for line in lines if not line.startswith("?"))
 

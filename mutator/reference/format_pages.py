@@ -7,8 +7,8 @@ from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
 from mutator.execution.cluster import cluster_files
 from mutator.faults import fault_specs
+from mutator.faults.library_readings import DEFAULT_READINGS, ReadingsModel
 from mutator.faults.library_readings import SCHEMA as READINGS_SCHEMA
-from mutator.faults.library_readings import UNDECLARED, ReadingsModel
 from mutator.reference.yaml_key_tables import generated_page_head, model_sections
 from mutator.stpa import analysis_files, context_tables, hazard_list
 from mutator.targets import manifest_files, severity_model
@@ -38,7 +38,7 @@ def render_fault_spec_page(workspace: Workspace) -> str:
         f"The first key is `schema: {fault_specs.SCHEMA}`. Files with a newer schema are rejected.\n"
         "[Your editor can check the file](../how-to/edit-with-completion.md) while you write.\n",
         f"```yaml\n{example.rstrip()}\n```\n",
-        *model_sections("fault-spec.md", fault_specs.spec_model(workspace.readings())),
+        *model_sections("fault-spec.md", fault_specs.build_spec_model(workspace.readings())),
         *_readings_section(),
         "## Units\n",
         *_units_table(),
@@ -76,7 +76,7 @@ def render_manifests_page(workspace: Workspace) -> str:
         "The files in `fault_library/severity/` map a delta-v to a class; see [Verdicts](../explanation/"
         "verdicts.md#severity).\nA manifest names one of them in `severity.scale`. The first key is `schema: "
         f"{severity_model.SCHEMA}`.\n",
-        *model_sections("target-manifest.md", severity_model.ScaleModel, below=2),
+        *model_sections("target-manifest.md", severity_model.SeverityScaleModel, below=2),
     )
 
 
@@ -88,15 +88,15 @@ def render_hazard_analysis_page(workspace: Workspace) -> str:
         "analysis](../how-to/change-the-hazard-analysis.md) shows how to write "
         "them. `mutator stpa` prints and checks them.\n",
         f"{_STRICT_YAML_LINKS} The first key of each file is `schema`: "
-        f"`{hazard_list.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_SCHEMA}`,\n`control_structure/1`, "
+        f"`{hazard_list.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_TABLE_SCHEMA}`,\n`control_structure/1`, "
         "`unsafe_control_actions/1`, `causal_factors/1`.\n",
         *model_sections(
             "hazard-analysis.md",
             hazard_list.HazardsModel,
-            context_tables.TableModel,
-            analysis_files.StructureModel,
+            context_tables.ContextTableModel,
+            analysis_files.ControlStructureModel,
             analysis_files.UnsafeActionsModel,
-            analysis_files.FactorsModel,
+            analysis_files.CausalFactorsModel,
         ),
     )
 
@@ -122,7 +122,7 @@ def _readings_section() -> Iterator[str]:
     yield (
         "The [readings](../explanation/concepts.md#readings) of a library are the keys under which its "
         "variants have injections.\n`fault_library/readings.yaml` declares them; a library without it has "
-        f"{' and '.join(f'`{name}`' for name in UNDECLARED.names)}. "
+        f"{' and '.join(f'`{name}`' for name in DEFAULT_READINGS.names)}. "
         "The first is the\ndefault: every variant must have it, and it "
         "replaces readings that a variant does not have. The first key of the file is\n"
         f"`schema: {READINGS_SCHEMA}`.\n"

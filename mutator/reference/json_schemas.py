@@ -11,7 +11,7 @@ from mutator.config.yaml_files import StrictModel
 from mutator.execution.cluster import cluster_files
 from mutator.faults import fault_model_files, library_readings
 from mutator.faults import fault_specs as spec
-from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
+from mutator.faults.fault_models import NAME_TYPES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
 from mutator.faults.injection_specs import DIMENSIONLESS
 from mutator.faults.library_readings import Readings
 from mutator.stpa import analysis_files, context_tables, hazard_list
@@ -49,17 +49,17 @@ _FIXED_FORMATS: tuple[tuple[type[StrictModel], str, str], ...] = (
     (library_readings.ReadingsModel, library_readings.SCHEMA, "readings.yaml"),
     (campaign_model.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
     (manifest_files.ManifestModel, manifest_files.SCHEMA, "targets/*.yaml"),
-    (severity_model.ScaleModel, severity_model.SCHEMA, "severity/*.yaml"),
+    (severity_model.SeverityScaleModel, severity_model.SCHEMA, "severity/*.yaml"),
     (hazard_list.HazardsModel, hazard_list.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
-    (context_tables.TableModel, context_tables.CONTEXT_SCHEMA, "stpa/contexts/*.yaml"),
-    (analysis_files.StructureModel, "control_structure/1", "stpa/control_structure.yaml"),
+    (context_tables.ContextTableModel, context_tables.CONTEXT_TABLE_SCHEMA, "stpa/contexts/*.yaml"),
+    (analysis_files.ControlStructureModel, "control_structure/1", "stpa/control_structure.yaml"),
     (analysis_files.UnsafeActionsModel, "unsafe_control_actions/1", "stpa/unsafe_control_actions.yaml"),
-    (analysis_files.FactorsModel, "causal_factors/1", "stpa/causal_factors.yaml"),
+    (analysis_files.CausalFactorsModel, "causal_factors/1", "stpa/causal_factors.yaml"),
 )
 
 
 def file_formats(declared: Readings) -> tuple[YamlFormat, ...]:
-    specs = (spec.spec_model(declared), spec.SCHEMA, "faults/*/*.yaml")
+    specs = (spec.build_spec_model(declared), spec.SCHEMA, "faults/*/*.yaml")
     return (
         *(
             YamlFormat(model=m, schema=s, files_glob=f"fault_library/{files_glob}")
@@ -174,7 +174,7 @@ def parameter_keys(param: ParamSchema) -> Iterator[str]:
 
 
 def _value_schema(param: ParamSchema) -> dict[str, Any]:
-    if param.type in NAMES:
+    if param.type in NAME_TYPES:
         return {"type": "string"}
     if param.type == "boolean":
         return {"type": "boolean"}

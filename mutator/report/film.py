@@ -20,8 +20,8 @@ from mutator.execution.single_run import is_same_record, manifest_of_unchanged_t
 from mutator.figures.run_plot import marks_of
 from mutator.model import Experiment, Record
 from mutator.store.run_folder import RunFolder
-from mutator.targets.manifest import FILM, TargetManifest
-from mutator.targets.placeholders import filled
+from mutator.targets.manifest import FILM_FOLDER, TargetManifest
+from mutator.targets.placeholders import fill_placeholders
 from mutator.workspace import Workspace
 
 EVENTS_SCHEMA = "film-events/1"
@@ -50,7 +50,7 @@ class Filming:
         run.
         """
         manifest = manifest_of_unchanged_target(workspace, folder)
-        return cls(workspace, folder, manifest, manifest.filming())
+        return cls(workspace, folder, manifest, manifest.with_film_recording())
 
     def golden(self, experiment: Experiment, out: Path) -> Path:
         """Rerun an experiment's golden run into the folder `out`."""
@@ -78,7 +78,7 @@ class Filming:
                 golden=golden,
             )
             record = single.record
-            if not (single.faulty / FILM).is_dir():
+            if not (single.faulty / FILM_FOLDER).is_dir():
                 raise MutatorError(
                     f"the faulty run left no film: {record.status.value}, {record.detail}",
                     remedy="choose an experiment whose run finishes",
@@ -87,8 +87,8 @@ class Filming:
             names = hazards_in_words(self.workspace, self.target)
             events.write_text(json.dumps(_events(record, _title(experiment), names)), encoding="utf-8")
             places = {
-                "golden": str(single.golden / FILM),
-                "faulty": str(single.faulty / FILM),
+                "golden": str(single.golden / FILM_FOLDER),
+                "faulty": str(single.faulty / FILM_FOLDER),
                 "events": str(events),
             }
             for shot in shots:
@@ -103,7 +103,7 @@ def hazards_in_words(workspace: Workspace, manifest: TargetManifest) -> dict[str
     known = workspace.hazards()
     about = known.hazards if known else {}
     names = {name: words.partition(" (")[0].rstrip(".") for name, words in about.items()}
-    return names | {rule.name: rule.about for rule in manifest.rules if rule.about}
+    return names | {rule.name: rule.about for rule in manifest.hazard_rules if rule.about}
 
 
 def _title(experiment: Experiment) -> str:
@@ -137,7 +137,7 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
     for place in (out, made):
         make_folder(place.parent)
     arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
-    command = [sys.executable, "-P", "-s", "-m", film.module, *filled(arguments, here)]
+    command = [sys.executable, "-P", "-s", "-m", film.module, *fill_placeholders(arguments, here)]
     films = (Path(places["golden"]), Path(places["faulty"]))
     if sandbox := Sandbox.of_target(manifest, folder, [*films, tree]):
         command = sandbox.wrap_command(command)

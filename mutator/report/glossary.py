@@ -6,7 +6,7 @@ from mutator.config.yaml_files import load_yaml
 from mutator.errors import MutatorError
 from mutator.model import Method
 from mutator.report.reported_run import ReportedRun
-from mutator.targets.contact_severity import Scale
+from mutator.targets.contact_severity import SeverityScale
 
 Words = Mapping[str, Mapping[str, str]]  # heading -> term -> meaning
 
@@ -78,7 +78,7 @@ def meanings_of(run: ReportedRun) -> Words:
     }
 
 
-def _severity(scale: Scale | None, before: str = "") -> dict[str, str]:
+def _severity(scale: SeverityScale | None, before: str = "") -> dict[str, str]:
     if not scale:
         return {}
     told = {

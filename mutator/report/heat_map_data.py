@@ -10,7 +10,7 @@ import pandas as pd
 
 from mutator.report.reported_run import ReportedRun
 from mutator.statistics.results_frame import hazard_names
-from mutator.targets.contact_severity import CLASSES
+from mutator.targets.contact_severity import SEVERITY_CLASSES
 
 Cells = list[list[Any]]  # by row; each cell has a count or value, and its base (the number of runs)
 
@@ -53,8 +53,8 @@ def _shares(frame: pd.DataFrame, *, alerts: bool) -> Iterator[tuple[str, np.ndar
     for name in hazard_names(frame):
         yield name, frame[f"t_{name.lower()}"].notna().to_numpy(), active
     if "severity" in frame:
-        worst = pd.Index(CLASSES).get_indexer(pd.Index(frame["severity"]))
-        for place, name in enumerate(CLASSES):
+        worst = pd.Index(SEVERITY_CLASSES).get_indexer(pd.Index(frame["severity"]))
+        for place, name in enumerate(SEVERITY_CLASSES):
             yield f"severity-{name}", worst >= place, active
 
 

@@ -9,18 +9,18 @@ from urllib.parse import quote
 
 from mutator.report.fault_path_data import PathCounts, link_text
 from mutator.stpa import svg_shapes
-from mutator.stpa.analysis_files import LinkModel, StructureModel
-from mutator.stpa.structure_layout import Arrow, Box, lay_out
-from mutator.stpa.svg_shapes import course
+from mutator.stpa.analysis_files import ControlStructureModel, LinkModel
+from mutator.stpa.structure_layout import ComponentBox, LinkArrow, lay_out_structure
+from mutator.stpa.svg_shapes import path_data
 
 _WIDEST = 7.0  # px, width of a link that passed all its faults
 _THIN = 1.8
 
 
-def draw_path_counts(structure: StructureModel, counts: PathCounts, links: Collection[str]) -> str:
+def draw_path_counts(structure: ControlStructureModel, counts: PathCounts, links: Collection[str]) -> str:
     """Return the control structure as SVG. `links` are those that a fault can take."""
     plain = {n: c.model_copy(update={"process_model": {}}) for n, c in structure.components.items()}
-    layout = lay_out(structure.model_copy(update={"components": plain}), lines=2)
+    layout = lay_out_structure(structure.model_copy(update={"components": plain}), lines=2)
     size = f"{layout.width:.0f} {layout.height:.0f}"
     lines = [
         f'<svg class="path-figure" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" '
@@ -28,7 +28,7 @@ def draw_path_counts(structure: StructureModel, counts: PathCounts, links: Colle
         'aria-label="Control structure with the share of faults that got through each link">',
         "<defs>",
         *(
-            svg_shapes.tip(f"path-tip-{name}", 14, f'class="tip {name}" d="{svg_shapes.TIP}"')
+            svg_shapes.tip_marker(f"path-tip-{name}", 14, f'class="tip {name}" d="{svg_shapes.TIP_OUTLINE}"')
             for name in ("quiet", "through", "stopped")
         ),
         "</defs>",
@@ -44,7 +44,9 @@ def draw_path_counts(structure: StructureModel, counts: PathCounts, links: Colle
     return "\n".join((*lines, "</svg>"))
 
 
-def drawn_counts(structure: StructureModel, counts: PathCounts, links: Collection[str]) -> dict[str, Any]:
+def drawn_counts(
+    structure: ControlStructureModel, counts: PathCounts, links: Collection[str]
+) -> dict[str, Any]:
     """Return what path_counts.js changes in the drawing to show other counts."""
     return {
         "active": counts.active,
@@ -61,19 +63,19 @@ def share_text(through: int, came: int) -> str:
     return f"{through} of {came}, {100 * through / came:.0f} %" if came else ""
 
 
-def _is_short(arrow: Arrow) -> bool:
+def _is_short(arrow: LinkArrow) -> bool:
     """Whether the boxes are side by side, so that the count needs two lines."""
     return arrow.points[0][1] == arrow.points[-1][1]
 
 
-def _idle(arrow: Arrow, link: LinkModel) -> Iterator[str]:
+def _idle(arrow: LinkArrow, link: LinkModel) -> Iterator[str]:
     yield (
-        f'<g class="idle"><path d="{course(arrow.points)}" stroke-dasharray="3 4" '
-        f'marker-end="url(#path-tip-quiet)"/>{svg_shapes.label(arrow, escape(link.label))}</g>'
+        f'<g class="idle"><path d="{path_data(arrow.points)}" stroke-dasharray="3 4" '
+        f'marker-end="url(#path-tip-quiet)"/>{svg_shapes.label_line(arrow, escape(link.label))}</g>'
     )
 
 
-def _link(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
+def _link(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
     kind, width, share = _link_look(counts.through[name], counts.came[name])
     short = _is_short(arrow)
     first, _, last = share.partition(", ") if short else (share, "", "")
@@ -81,10 +83,11 @@ def _link(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Itera
         f'<a class="link is-{kind}" data-link="{escape(name)}"{" data-short" if short else ""} '
         f'href="#through={quote(link_text(link.from_, link.to))}">'
         f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}</title>"
-        f'<path class="hit" d="{course(arrow.points)}"/><path class="line" d="{course(arrow.points)}" '
+        f'<path class="hit" d="{path_data(arrow.points)}"/><path class="line" d="{path_data(arrow.points)}" '
         f'style="stroke-width: {width}" marker-end="url(#path-tip-{kind})"/>'
-        f"{svg_shapes.label(arrow, escape(link.label))}"
-        f"{svg_shapes.label(arrow, first, 1, 'count')}{svg_shapes.label(arrow, last, 2, 'count')}</a>"
+        f"{svg_shapes.label_line(arrow, escape(link.label))}"
+        f"{svg_shapes.label_line(arrow, first, 1, 'count')}"
+        f"{svg_shapes.label_line(arrow, last, 2, 'count')}</a>"
     )
 
 
@@ -103,13 +106,13 @@ def _box_look(injected: int, stopped: int, masked: int) -> tuple[str, str, str]:
     return f"box{has}", first, f"{masked} masked" if masked else ""
 
 
-def _box(name: str, box: Box, label: str, about: str, counts: PathCounts) -> Iterator[str]:
+def _box(name: str, box: ComponentBox, label: str, about: str, counts: PathCounts) -> Iterator[str]:
     classes, first, last = _box_look(counts.injected[name], counts.stopped[name], counts.masked[name])
     middle, top = box.x + box.width / 2, box.y + box.height / 2
     yield (
         f'<a class="{classes}" data-component="{escape(name)}" href="#stopped_at={quote(name)}">'
         f"<title>{escape(about)}</title>"
-        f"{svg_shapes.rectangle(box)}"
+        f"{svg_shapes.box_rectangle(box)}"
         f'<text class="name" x="{middle:.1f}" y="{top - 11:.1f}" text-anchor="middle">{escape(label)}</text>'
         f'<text class="count" x="{middle:.1f}" y="{top + 6:.1f}" text-anchor="middle">{first}</text>'
         f'<text class="count" x="{middle:.1f}" y="{top + 23:.1f}" text-anchor="middle">{last}</text></a>'

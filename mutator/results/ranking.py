@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
 from mutator.results.outcome_counting import endings_of_rows, hazard_margins
-from mutator.targets.contact_severity import CLASSES, DELTA_V
+from mutator.targets.contact_severity import DELTA_V_NAME, SEVERITY_CLASSES
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,12 +34,14 @@ def ranks_of_rows(frame: "pd.DataFrame") -> "np.ndarray":
 
     ending_rank = pd.Index(_ENDINGS_WORST_FIRST).get_indexer(pd.Index(endings_of_rows(frame)))
     severity = frame["severity"] if "severity" in frame else pd.Series("", frame.index)
-    severity_rank = pd.Index(CLASSES).get_indexer(pd.Index(severity))
+    severity_rank = pd.Index(SEVERITY_CLASSES).get_indexer(pd.Index(severity))
     has_class = severity_rank >= 0
     id_rank = np.empty(len(frame), dtype=np.int64)
     id_rank[np.argsort(frame["experiment_id"].to_numpy(dtype=object), kind="stable")] = np.arange(len(frame))
     margin_rank = np.where(has_class, 0.0, _margin_ranks(frame, ending_rank, has_class, id_rank))
-    speed = frame[DELTA_V].fillna(-1.0).to_numpy() if DELTA_V in frame else np.full(len(frame), -1.0)
+    speed = (
+        frame[DELTA_V_NAME].fillna(-1.0).to_numpy() if DELTA_V_NAME in frame else np.full(len(frame), -1.0)
+    )
     delta_v = np.where(has_class, -speed, 0.0)
     order = np.lexsort((id_rank, margin_rank, ending_rank, delta_v, -severity_rank, ~has_class))
     ranks = np.empty(len(frame), dtype=np.int64)

@@ -15,7 +15,7 @@ from mutator.results.outcome_counting import (
 )
 from mutator.results.plan_columns import numeric_value_of
 from mutator.results.table_columns import alert_names_in
-from mutator.targets.contact_severity import DELTA_V
+from mutator.targets.contact_severity import DELTA_V_NAME
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -116,6 +116,6 @@ def _build_row(
         reaction_time=cells["reaction_time"],
         detail=cells["detail"],
         severity=cells.get("severity", ""),
-        delta_v=cells.get(DELTA_V),
+        delta_v=cells.get(DELTA_V_NAME),
         margins=margins,
     )

@@ -19,7 +19,7 @@ from mutator.outcomes.verdict_rules import (
 )
 from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
 from mutator.results.table_files import TableColumn
-from mutator.targets.contact_severity import Scale
+from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.target_facts import T_END, MetricFacts
 
@@ -40,7 +40,7 @@ class FinishedExperiment:
         self,
         experiment: Experiment,
         record: Record,
-        scale: Scale | None = None,
+        scale: SeverityScale | None = None,
         fault_paths: "FaultPaths | None" = None,
     ) -> None:
         self.experiment, self.record, self.severity_scale = experiment, record, scale
@@ -340,12 +340,12 @@ def check_column_names(manifest: TargetManifest) -> None:
     """Raise MutatorError if a column of a hazard or metric has the name of another column, or if a metric's
     column could be taken for a hazard's.
     """
-    compared = [channel.name for channel in manifest.compared]
+    compared = [channel.name for channel in manifest.compared_channels]
     used_names = {column.name for column in result_columns((), compared, paths=True)}
     used_names |= {SEVERITY_COLUMN.name, *(column.name for column in TIME_TO_HAZARD_COLUMNS)}
     used_names |= {*DERIVED_COLUMN_NAMES, T_END, *driven_column_by_channel(compared).values()}
     is_mapping = isinstance(manifest.source.data.get("hazards"), dict)
-    for i, hazard in enumerate(manifest.hazards):
+    for i, hazard in enumerate(manifest.hazard_names):
         names = {column.name for column in hazard_columns(hazard)}
         if names & used_names:
             raise manifest.source.error(
@@ -355,7 +355,7 @@ def check_column_names(manifest: TargetManifest) -> None:
                 remedy="rename it",
             )
         used_names |= names
-    for metric in manifest.measures:
+    for metric in manifest.all_metrics:
         if {metric.name, f"t_{metric.name}", metric.name.removeprefix("t_")} & used_names:
             raise manifest.source.error(
                 ("metrics", metric.name),

@@ -172,7 +172,7 @@ class CalledCode:
                 yield from self._methods_of_self((base.path, base.name), name, self_class, depth + 1)
 
     def _module(self, path: str) -> SourceModule:
-        return self._tree.derived(path, source_names.parse_module)
+        return self._tree.derive_once(path, source_names.parse_module)
 
     def _path_of_module(self, module: str) -> str | None:
         stem = module.replace(".", "/")

@@ -124,7 +124,7 @@ class _DrawRequest:
         lines = tuple(_effect_lines(models, fault) for fault in faults)
         place = _effect_place(faults[0])
         assert place is not None  # the group has images
-        entry = manifest.arguments(
+        entry = manifest.run_arguments(
             scenario=Path("scenario"), seed=0, out=Path("out"), changes=faults[0].changes
         )
         probe = digest(Path(picture_probe.__file__).read_bytes())

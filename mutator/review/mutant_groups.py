@@ -17,7 +17,7 @@ from mutator.config.location_syntax import PROBE_NAME
 from mutator.faults import probe_templates
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault, Injection, Trigger
 from mutator.mutants.anchors import parsed_file
 from mutator.mutants.mutant_building import build
@@ -114,7 +114,7 @@ def groups_of_library(
         fault
         for spec in chosen
         for name in ((reading,) if reading else spec.readings.names)
-        for fault in expand(spec, seed, name, models=models, manifest=manifest)
+        for fault in expand_spec(spec, seed, name, models=models, manifest=manifest)
     ]
     members = [(fault, trigger) for fault in faults for trigger in triggers]
     return _GroupBuilder(models, manifest, chosen).build_groups(members, None)
@@ -253,7 +253,7 @@ class _GroupBuilder:
         material = DecisionBasis(
             diff=distinct_diffs([patch]),
             functions=function_sources(self.manifest.tree, [location]),
-            templates={probe_templates.CODE: self.models.probe.text},
+            templates={probe_templates.CODE_TEMPLATE_FILE: self.models.probe_templates.whole_text},
             called_code={},
         )
         return Group(
@@ -271,7 +271,10 @@ class _GroupBuilder:
             experiment_count=None if runs is None else sum(runs.values()),
             basis_digests=material.digests,
             reviewed_text=render_reviewed_text(material.digests, {}, material.sections),
-            source_files=(*(self.models.folder / name for name in probe_templates.FILES), self.manifest.path),
+            source_files=(
+                *(self.models.folder / name for name in probe_templates.PROBE_TEMPLATE_FILES),
+                self.manifest.path,
+            ),
         )
 
     def _group_id(self, label: str) -> str:

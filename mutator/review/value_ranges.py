@@ -7,7 +7,7 @@ from math import isfinite
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec, Variant
-from mutator.faults.injection_parameters import resolve
+from mutator.faults.injection_parameters import resolve_injection
 from mutator.model import Fault, Injection
 from mutator.review.entries import ValueRanges
 
@@ -46,7 +46,7 @@ def _injections_at_bounds(
             for value in _drawn_bounds(variant):
                 with suppress(MutatorError):  # values out of range are never drawn
                     yield tuple(
-                        resolve(
+                        resolve_injection(
                             injection,
                             models.get(injection.model),
                             spec.source,

@@ -14,7 +14,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from mutator.errors import Absent, MutatorError
+from mutator.errors import MutatorError, NotServed
 from mutator.serve.home import home_page, offered
 from mutator.serve.job_requests import TRIES, Desk, Work
 from mutator.serve.jobs import Jobs
@@ -122,7 +122,7 @@ def _pages(site: Site) -> list[Route]:
     def plot(request: Request) -> Response:
         tried = re.fullmatch(r"[0-9a-f]{16}", request.path_params["name"])
         if tried is None:
-            raise Absent("no such plot")
+            raise NotServed("no such plot")
         return OpenFile(open_file(site.runs.new, f"{TRIES}/{tried[0]}/{_PLOT}"), _PLOT)
 
     def review(request: Request) -> Response:
@@ -147,5 +147,5 @@ def _pages(site: Site) -> list[Route]:
 def _own(request: Request) -> Response:
     name = request.path_params["name"]
     if name not in (*assets(".js"), *assets(".css")):
-        raise Absent("no such file")
+        raise NotServed("no such file")
     return Response(asset(name), media_type=kind_of(name))

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from mutator._common.progress_events import EVENTS_FD_VARIABLE
-from mutator.errors import Absent, JobEnded, MutatorError
+from mutator.errors import JobEnded, MutatorError, NotServed
 from mutator.execution.progress_text import describe_outcomes
 from mutator.serve.job_events import Event, EventReader, Link, Phase
 from mutator.serve.job_requests import TRIES, Work
@@ -135,7 +135,7 @@ class Jobs:
         with self._lock:
             if name in self._jobs:
                 return self._jobs[name]
-        raise Absent(f"no job '{name}'", expected="the id of a job of this server")
+        raise NotServed(f"no job '{name}'", expected="the id of a job of this server")
 
     def cancel(self, name: str) -> None:
         """Cancel a job with all its processes; JobEnded if the job has already ended."""

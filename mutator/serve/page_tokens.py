@@ -11,7 +11,7 @@ import secrets
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator.errors import UnknownPage
+from mutator.errors import PageRefused
 
 HEADER = "x-mutator-page"
 HOME = "home"
@@ -29,7 +29,7 @@ class PageTokens:
     def check(self, token: str, *pages: str) -> None:
         """Raise UnknownPage unless the token is that of one of these pages."""
         if not any(hmac.compare_digest(self.token(page).encode(), token.encode()) for page in pages):
-            raise UnknownPage(
+            raise PageRefused(
                 "the request does not come from the page that may send it",
                 remedy="reload the page; start other jobs on the first page",
             )

@@ -12,7 +12,7 @@ from mutator._common.hashing import digest
 from mutator.audit.table_audit import audit_tables
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
-from mutator.errors import Absent, MutatorError
+from mutator.errors import MutatorError, NotServed
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note, load_fault_free_runs
 from mutator.report import report_builder
 from mutator.report.panel import FOLDER
@@ -65,7 +65,7 @@ class Shown:
             for old in list(self._compared)[:-_MOST_COMPARED]:
                 del self._compared[old]
         if name not in made:
-            raise Absent("no such file", expected=f"one of {', '.join(made)}")
+            raise NotServed("no such file", expected=f"one of {', '.join(made)}")
         return Response(made[name], media_type=kind_of(name))
 
     def _of_report(self, run: Path, name: str) -> Response:
@@ -75,7 +75,7 @@ class Shown:
             key = made_from(folder, self._workspace)
             data = self._reports.file(key, name, lambda: self._built(folder))
         if data is None:
-            raise Absent("no such file", expected="a file of the report")
+            raise NotServed("no such file", expected="a file of the report")
         if not name.endswith(".html"):
             return Response(data, media_type=kind_of(name), headers=STORED)
         if name == report_builder.PAGE_FILE:
@@ -121,4 +121,4 @@ def _series(run: Path, name: str) -> bytes:
             return data
     except MutatorError:
         pass
-    raise Absent("no such file", expected="series as a run writes them")
+    raise NotServed("no such file", expected="series as a run writes them")

@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.types import Receive, Scope, Send
 
-from mutator.errors import Absent, MutatorError, UnknownPage
+from mutator.errors import MutatorError, NotServed, PageRefused
 from mutator.serve.home import error_page
 
 _KINDS = {
@@ -72,7 +72,7 @@ def error_facts(error: MutatorError) -> dict[str, Any]:
 def on_error(request: Request, error: Exception) -> Response:
     """Return the response to a failed request: JSON for scripts, a page for people."""
     known = _known(error)
-    status = 404 if isinstance(known, Absent) else 403 if isinstance(known, UnknownPage) else 400
+    status = 404 if isinstance(known, NotServed) else 403 if isinstance(known, PageRefused) else 400
     if isinstance(error, HTTPException):
         status = error.status_code
     facts = error_facts(known)
@@ -89,4 +89,4 @@ def _known(error: Exception) -> MutatorError:
         return MutatorError(str(first["msg"]), where=".".join(map(str, first["loc"])) or None)
     if isinstance(error, HTTPException) and error.status_code != 404:
         return MutatorError(error.detail)
-    return Absent("no such page", remedy="go back to the first page")
+    return NotServed("no such page", remedy="go back to the first page")

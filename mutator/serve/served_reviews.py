@@ -13,7 +13,7 @@ from pydantic import Field
 from mutator.campaigns.git_clone import find_user_name
 from mutator.campaigns.plan import build_plan
 from mutator.config.yaml_files import StrictModel
-from mutator.errors import Absent, GroupsChanged, MutatorError, ReviewConflict
+from mutator.errors import GroupsChanged, MutatorError, NotServed, ReviewConflict
 from mutator.review import effect_pictures, group_results, mutant_groups
 from mutator.review.decisions import Review, ReviewAction, ReviewActionKind, load_review, record_actions
 from mutator.review.mutant_groups import Group
@@ -73,16 +73,18 @@ class Reviews:
 
     def selection(self, target: str, campaign: str | None, specs: Sequence[str]) -> Selection:
         if target not in self.workspace.targets:
-            raise Absent(f"no target '{target}'", expected=f"one of {', '.join(self.workspace.targets)}")
+            raise NotServed(f"no target '{target}'", expected=f"one of {', '.join(self.workspace.targets)}")
         if campaign is not None and campaign not in self.workspace.campaigns:
-            raise Absent(
+            raise NotServed(
                 f"no campaign '{campaign}'", expected=f"one of {', '.join(self.workspace.campaigns)}"
             )
         if campaign and specs:
             raise MutatorError("a campaign together with specs", expected="one or the other")
         for spec in specs:
             if spec.endswith((".yaml", ".yml")):
-                raise Absent(f"no spec '{spec}'", expected="the name of a spec in the library, or a pattern")
+                raise NotServed(
+                    f"no spec '{spec}'", expected="the name of a spec in the library, or a pattern"
+                )
         return Selection(target=target, campaign=campaign, specs=tuple(specs))
 
     def groups(self, chosen: Selection) -> tuple[Group, ...]:
@@ -98,7 +100,7 @@ class Reviews:
     def group(self, chosen: Selection, name: str) -> Group:
         found = next((group for group in self.groups(chosen) if group.id == name), None)
         if found is None:
-            raise Absent(f"no group '{name}'", expected="the id of a group on the page")
+            raise NotServed(f"no group '{name}'", expected="the id of a group on the page")
         return found
 
     def page(self, chosen: Selection, query: str, runs: Sequence[Mapping[str, Any]], token: str) -> str:
@@ -122,7 +124,7 @@ class Reviews:
         """Save all changes or none; GroupsChanged if a group or a diff was changed elsewhere."""
         known = {group.id: group for group in self.groups(chosen)}
         if strangers := [one.group for one in wanted.changes if one.group not in known]:
-            raise Absent(f"no group '{strangers[0]}'", expected="the id of a group on the page")
+            raise NotServed(f"no group '{strangers[0]}'", expected="the id of a group on the page")
         if unseen := [one.group for one in wanted.changes if one.group not in wanted.seen]:
             raise MutatorError(f"no revision of group {unseen[0]}", where="seen")
         decided = [
@@ -153,7 +155,7 @@ class Reviews:
         manifest = self.workspace.manifest(chosen.target)
         found = effect_pictures.pictures_at_level(self.workspace, manifest, self.group(chosen, name), level)
         if found is None:
-            raise Absent(
+            raise NotServed(
                 "no such picture",
                 expected=f"one of the group's levels ({', '.join(effect_pictures.LEVEL_NAMES)})",
             )
@@ -190,7 +192,7 @@ class Reviews:
             )
         plan = build_plan(workspace, chosen.campaign, Choices())
         if plan.campaign.target != chosen.target:
-            raise Absent(f"campaign '{chosen.campaign}' belongs to target '{plan.campaign.target}'")
+            raise NotServed(f"campaign '{chosen.campaign}' belongs to target '{plan.campaign.target}'")
         return mutant_groups.groups_of_plan(workspace, plan)
 
     def _stamp(self, target: str) -> object:

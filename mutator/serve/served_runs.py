@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from mutator._common.confined_files import open_below
 from mutator._common.folder_search import RUN_HEAD_FILE
-from mutator.errors import Absent, MutatorError, Outside
+from mutator.errors import MutatorError, NotServed, Outside
 from mutator.results.outcome_counting import count_endings
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
@@ -43,7 +43,7 @@ class Runs:
     def folder(self, key: str) -> Path:
         with suppress(KeyError):
             return self.folders()[key]
-        raise Absent(f"no run '{key}'", expected="one of the served runs", remedy="see the first page")
+        raise NotServed(f"no run '{key}'", expected="one of the served runs", remedy="see the first page")
 
     def key_of(self, folder: Path) -> str | None:
         return next((key for key, path in self.folders().items() if path == folder.resolve()), None)
@@ -120,5 +120,5 @@ def open_file(root: Path, name: str) -> BinaryIO:
         raise _absent() from None
 
 
-def _absent() -> Absent:
-    return Absent("no such file", expected="a file of a report, not a link")
+def _absent() -> NotServed:
+    return NotServed("no such file", expected="a file of a report, not a link")

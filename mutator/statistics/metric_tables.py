@@ -9,7 +9,7 @@ from mutator.statistics.median_intervals import median_interval
 from mutator.statistics.results_frame import select_columns
 from mutator.statistics.shares import share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
-from mutator.targets.contact_severity import CLASSES
+from mutator.targets.contact_severity import SEVERITY_CLASSES
 from mutator.targets.target_facts import MetricFacts
 
 HIGHER_IS_WORSE = "higher"
@@ -51,7 +51,7 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
     columns = [name for name in ("kind", "severity") if name in frame]
     activated = frame.loc[frame["is_activated"], columns]
     for kind, group in _runs_by_fault_type(activated) if "severity" in frame else ():
-        counts = [int((group["severity"] == name).sum()) for name in CLASSES]
+        counts = [int((group["severity"] == name).sum()) for name in SEVERITY_CLASSES]
         shares = [share(count, len(group)) for count in (sum(counts), *counts)]
         lines.append((kind, *shares))
     return Sheet(
@@ -59,7 +59,7 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
         title="Severity by fault type",
         note="Activated faults whose drive ended in a contact, in total and by class. 95 % "
         "Wilson intervals; in brackets, the count and the total. Hazards without a contact have no class.",
-        heads=("fault type", "contact", *CLASSES),
+        heads=("fault type", "contact", *SEVERITY_CLASSES),
         lines=tuple(lines),
     )
 

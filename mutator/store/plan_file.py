@@ -231,7 +231,7 @@ def _line_values(experiment: Experiment) -> dict[str, Any]:
         "scenario": experiment.scenario,
         "scenario_digest": experiment.scenario_digest,
         "method": experiment.method,
-        "trigger": experiment.plain_trigger,
+        "trigger": experiment.trigger_as_json,
         "seed": experiment.seed,
         "setting": experiment.setting,
         **added_values(experiment),

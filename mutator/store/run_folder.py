@@ -24,7 +24,7 @@ from mutator.store.run_head import HEAD, RunHead, StoredGolden, load_head
 from mutator.store.shards import Shard
 from mutator.store.timings import load_timings
 from mutator.store.work_stretches import Stretch
-from mutator.targets.contact_severity import Scale
+from mutator.targets.contact_severity import SeverityScale
 
 STOP_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
 DEFAULT_SERIES_MB = 500  # budget of a run's series, unless the plan sets another
@@ -170,7 +170,7 @@ class RunFolder:
         return self.head.limits
 
     @property
-    def severity_scale(self) -> Scale | None:
+    def severity_scale(self) -> SeverityScale | None:
         """The scale of delta-v classes; None for a target without contacts."""
         return self.head.severity
 

@@ -10,7 +10,7 @@ from mutator._common.files import json_bytes, read_json
 from mutator._common.folder_search import RUN_HEAD_FILE
 from mutator._common.hashing import added_field, as_json_types
 from mutator._common.typed_json import from_json_types
-from mutator.errors import Misfit, MutatorError
+from mutator.errors import MutatorError, TypeMisfit
 from mutator.model import Limits
 from mutator.store.plan_choices import Choices
 from mutator.store.plan_file import Chunk
@@ -92,7 +92,7 @@ def load_head(run: Path) -> RunHead:
     path = run / HEAD
     try:
         head = from_json_types(RunHead, _with_unknown_keys_apart(read_json(path, SCHEMA)))
-    except Misfit as err:
+    except TypeMisfit as err:
         raise _damage_error(path, err) from None
     for name in head.golden_files:
         check_name(name, path)
@@ -107,7 +107,7 @@ def _with_unknown_keys_apart(content: dict[str, Any]) -> dict[str, Any]:
     return known_keys | {"later": {name: value for name, value in content.items() if name not in known_keys}}
 
 
-def _damage_error(path: Path, misfit: Misfit) -> MutatorError:
+def _damage_error(path: Path, misfit: TypeMisfit) -> MutatorError:
     if not misfit.path:
         return MutatorError(misfit.got, where=path, expected="a complete run.json", remedy=REMEDY)
     key, *below = misfit.path

@@ -7,16 +7,16 @@ from mutator._common.message_text import suggestion
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
-from mutator.stpa.analysis_files import Analysis, Category, FactorModel, UnsafeActionModel
+from mutator.stpa.analysis_files import CausalFactorModel, HazardAnalysis, UnsafeActionModel, UnsafeCategory
 from mutator.stpa.context_tables import ContextRow
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import names_in
 
-Specs = dict[str, FaultSpec]
+SpecsByName = dict[str, FaultSpec]
 
 
-def check_analysis(
-    analysis: Analysis, specs: tuple[FaultSpec, ...], manifest: TargetManifest
+def list_analysis_problems(
+    analysis: HazardAnalysis, specs: tuple[FaultSpec, ...], manifest: TargetManifest
 ) -> list[MutatorError]:
     """List every gap and contradiction, in the order of the files.
 
@@ -25,40 +25,40 @@ def check_analysis(
     * Each factor's faults are injected at the factor's places and aim at hazards that the factor leads to;
       each spec belongs to a factor.
     """
-    by_name = {spec.name: spec for spec in specs}
+    specs_by_name = {spec.name: spec for spec in specs}
     return [
-        *_hazards(analysis),
-        *_unobserved(analysis, manifest),
+        *_unreached_hazards(analysis),
+        *_unrecorded_actions(analysis, manifest),
         *_unknown_variables(analysis, manifest),
-        *_unmodelled(analysis),
-        *_categories(analysis),
-        *_contradictions(analysis),
-        *_unjudged(analysis),
-        *_causeless(analysis),
-        *_places(analysis, manifest),
-        *_faults(analysis, by_name),
-        *_unreached(analysis, specs),
+        *_unmodelled_variables(analysis),
+        *_missing_categories(analysis),
+        *_contradicted_contexts(analysis),
+        *_unmatched_hazards(analysis),
+        *_actions_without_factor(analysis),
+        *_missing_files_and_places(analysis, manifest),
+        *_factor_problems(analysis, specs_by_name),
+        *_specs_without_factor(analysis, specs),
     ]
 
 
-def _hazards(analysis: Analysis) -> Iterator[MutatorError]:
-    reached = {hazard for action in analysis.unsafe.values() for hazard in action.hazards}
+def _unreached_hazards(analysis: HazardAnalysis) -> Iterator[MutatorError]:
+    reached = {hazard for action in analysis.unsafe_actions.values() for hazard in action.hazards}
     source = analysis.hazards.source
     for hazard in analysis.hazards.hazards:
         if hazard not in reached:
             yield source.error(
                 ("hazards", hazard),
                 f"hazard '{hazard}' follows from no unsafe control action",
-                remedy=f"name it in {analysis.unsafe_source.path.name}, or delete it",
+                remedy=f"name it in {analysis.unsafe_actions_source.path.name}, or delete it",
             )
-    led_to = {accident for names in analysis.hazards.leads_to.values() for accident in names}
+    led_to = {accident for names in analysis.hazards.accidents_by_hazard.values() for accident in names}
     for accident in analysis.hazards.accidents:
         if accident not in led_to:
             yield source.error(("accidents", accident), f"accident '{accident}' follows from no hazard")
 
 
-def _unobserved(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
-    channels = [channel.name for channel in manifest.compared]
+def _unrecorded_actions(analysis: HazardAnalysis, manifest: TargetManifest) -> Iterator[MutatorError]:
+    channels = [channel.name for channel in manifest.compared_channels]
     for name, action in analysis.structure.control_actions.items():
         if action.channel not in channels:
             yield analysis.structure_source.error(
@@ -77,23 +77,23 @@ def _unobserved(analysis: Analysis, manifest: TargetManifest) -> Iterator[Mutato
             )
 
 
-def _unknown_variables(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
-    known = manifest.observation.variables
+def _unknown_variables(analysis: HazardAnalysis, manifest: TargetManifest) -> Iterator[MutatorError]:
+    observed = manifest.observation.variables
     for name, component in analysis.structure.components.items():
         for variable, model in component.process_model.items():
-            if model.observed is not None and model.observed not in known:
+            if model.observed is not None and model.observed not in observed:
                 yield analysis.structure_source.error(
                     ("components", name, "process_model", variable, "observed"),
                     f"variable '{model.observed}'",
-                    expected=f"one of the values observed in the target: {', '.join(known)}",
-                    remedy="correct the name" + suggestion(model.observed, list(known)),
+                    expected=f"one of the values observed in the target: {', '.join(observed)}",
+                    remedy="correct the name" + suggestion(model.observed, list(observed)),
                 )
 
 
-def _unmodelled(analysis: Analysis) -> Iterator[MutatorError]:
+def _unmodelled_variables(analysis: HazardAnalysis) -> Iterator[MutatorError]:
     models = [component.process_model for component in analysis.structure.components.values()]
     observed = {variable.observed for model in models for variable in model.values()}
-    for table in analysis.tables.values():
+    for table in analysis.context_tables.values():
         for row in table.rows:
             for name in sorted(set(names_in(row.condition)) - observed):
                 yield table.source.error(
@@ -103,70 +103,74 @@ def _unmodelled(analysis: Analysis) -> Iterator[MutatorError]:
                 )
 
 
-def _categories(analysis: Analysis) -> Iterator[MutatorError]:
+def _missing_categories(analysis: HazardAnalysis) -> Iterator[MutatorError]:
     for name in analysis.structure.control_actions:
-        judged = {action.category for action in analysis.unsafe.values() if action.action == name}
-        for category in Category:
+        judged = {action.category for action in analysis.unsafe_actions.values() if action.action == name}
+        for category in UnsafeCategory:
             if category not in judged:
                 yield analysis.structure_source.error(
                     ("control_actions", name),
                     f"no unsafe control action for '{name}' in category {category}",
                     expected="one in each of the four categories",
-                    remedy=f"add it to {analysis.unsafe_source.path.name}",
+                    remedy=f"add it to {analysis.unsafe_actions_source.path.name}",
                 )
 
 
-def _contradictions(analysis: Analysis) -> Iterator[MutatorError]:
-    for name, action in analysis.unsafe.items():
+def _contradicted_contexts(analysis: HazardAnalysis) -> Iterator[MutatorError]:
+    for name, action in analysis.unsafe_actions.items():
         for i, context in enumerate(action.contexts):
-            row = _row(analysis, context)
+            row = _context_row(analysis, context)
             for hazard in action.hazards:
-                if hazard not in _judged(row, action):
-                    table = analysis.tables[context.partition("/")[0]]
-                    yield analysis.unsafe_source.error(
+                if hazard not in _hazards_of_action(row, action):
+                    table = analysis.context_tables[context.partition("/")[0]]
+                    yield analysis.unsafe_actions_source.error(
                         ("unsafe_control_actions", name, "contexts", i),
                         f"{name} ({action.action} {action.category}) leads to {hazard} in {context}",
                         expected=f"what {table.path.name} says there: "
-                        f"{', '.join(sorted(_judged(row, action))) or 'no hazard'}",
+                        f"{', '.join(sorted(_hazards_of_action(row, action))) or 'no hazard'}",
                         remedy="correct the unsafe control action or the table",
                     )
 
 
-def _unjudged(analysis: Analysis) -> Iterator[MutatorError]:
+def _unmatched_hazards(analysis: HazardAnalysis) -> Iterator[MutatorError]:
     """Yield hazardous cells of the context tables that no unsafe action matches."""
-    known = {
+    matched = {
         (context, action.action, action.category, hazard)
-        for action in analysis.unsafe.values()
+        for action in analysis.unsafe_actions.values()
         for context in action.contexts
         for hazard in action.hazards
     }
-    for table in analysis.tables.values():
+    for table in analysis.context_tables.values():
         for row in table.rows:
-            for action, verdicts in row.actions.items():
-                for category in (Category.PROVIDED, Category.NOT_PROVIDED):
+            for action, verdicts in row.hazards_by_action.items():
+                for category in (UnsafeCategory.PROVIDED, UnsafeCategory.NOT_PROVIDED):
                     hazard = getattr(verdicts, category.value)
-                    if hazard and (f"{table.name}/{row.id}", action, category, hazard) not in known:
+                    if hazard and (f"{table.name}/{row.id}", action, category, hazard) not in matched:
                         yield table.source.error(
                             ("contexts", row.id, "actions", action, category.value),
                             f"{hazard} of '{action}' ({category}) in context '{row.id}' matches no unsafe "
                             "control action",
-                            remedy=f"add one to {analysis.unsafe_source.path.name}, or write null here",
+                            remedy=f"add one to {analysis.unsafe_actions_source.path.name}, or write null "
+                            "here",
                         )
 
 
-def _row(analysis: Analysis, context: str) -> ContextRow:
+def _context_row(analysis: HazardAnalysis, context: str) -> ContextRow:
     table, _, row = context.partition("/")
-    return next(r for r in analysis.tables[table].rows if r.id == row)
+    return next(r for r in analysis.context_tables[table].rows if r.id == row)
 
 
-def _judged(row: ContextRow, action: UnsafeActionModel) -> set[str]:
+def _hazards_of_action(row: ContextRow, action: UnsafeActionModel) -> set[str]:
     """Return the hazards that a row names for the category of `action`; for wrong timing or duration, those
     of both columns.
     """
-    verdicts = row.actions.get(action.action)
+    verdicts = row.hazards_by_action.get(action.action)
     if verdicts is None:
         return set()
-    cells = {Category.PROVIDED: (verdicts.provided,), Category.NOT_PROVIDED: (verdicts.not_provided,)}
+    cells = {
+        UnsafeCategory.PROVIDED: (verdicts.provided,),
+        UnsafeCategory.NOT_PROVIDED: (verdicts.not_provided,),
+    }
     return {
         hazard
         for hazard in cells.get(action.category, (verdicts.provided, verdicts.not_provided))
@@ -174,18 +178,18 @@ def _judged(row: ContextRow, action: UnsafeActionModel) -> set[str]:
     }
 
 
-def _causeless(analysis: Analysis) -> Iterator[MutatorError]:
-    caused = {action for factor in analysis.factors.values() for action in factor.leads_to}
-    for name in analysis.unsafe:
+def _actions_without_factor(analysis: HazardAnalysis) -> Iterator[MutatorError]:
+    caused = {action for factor in analysis.factors_by_id.values() for action in factor.leads_to}
+    for name in analysis.unsafe_actions:
         if name not in caused:
-            yield analysis.unsafe_source.error(
+            yield analysis.unsafe_actions_source.error(
                 ("unsafe_control_actions", name),
                 f"no causal factor leads to {name}",
                 remedy=f"add one to {analysis.factors_source.path.name}",
             )
 
 
-def _places(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
+def _missing_files_and_places(analysis: HazardAnalysis, manifest: TargetManifest) -> Iterator[MutatorError]:
     files = manifest.tree.files
     for name, component in analysis.structure.components.items():
         for i, path in enumerate(component.modules):
@@ -195,20 +199,22 @@ def _places(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorErr
                     f"no file '{path}' in target {manifest.name}",
                     remedy="correct the path" + suggestion(path, list(files)),
                 )
-    for name, factor in analysis.factors.items():
+    for name, factor in analysis.factors_by_id.items():
         for i, place in enumerate(factor.at):
             path, _, function = place.partition("::")
-            known = sorted(functions(files[path])) if path in files and path.endswith(".py") else []
-            if function not in known:
+            function_names = (
+                sorted(top_level_functions(files[path])) if path in files and path.endswith(".py") else []
+            )
+            if function not in function_names:
                 yield analysis.factors_source.error(
                     ("causal_factors", name, "at", i),
                     f"no place '{place}' in target {manifest.name}",
                     expected="file::Class.function",
-                    remedy="correct the place" + suggestion(function, known),
+                    remedy="correct the place" + suggestion(function, function_names),
                 )
 
 
-def functions(code: bytes) -> Iterator[str]:
+def top_level_functions(code: bytes) -> Iterator[str]:
     for node in ast.parse(code).body:
         if isinstance(node, ast.FunctionDef):
             yield node.name
@@ -216,28 +222,28 @@ def functions(code: bytes) -> Iterator[str]:
             yield from (f"{node.name}.{item.name}" for item in node.body if isinstance(item, ast.FunctionDef))
 
 
-def _faults(analysis: Analysis, specs: Specs) -> Iterator[MutatorError]:
-    for name, factor in analysis.factors.items():
+def _factor_problems(analysis: HazardAnalysis, specs: SpecsByName) -> Iterator[MutatorError]:
+    for name, factor in analysis.factors_by_id.items():
         keys: KeyPath = ("causal_factors", name)
-        known = True
+        all_exist = True
         for i, fault in enumerate(factor.faults):
             if fault not in specs:
-                known = False
+                all_exist = False
                 yield analysis.factors_source.error(
                     (*keys, "faults", i),
                     f"fault spec '{fault}'",
                     expected="a spec of the library",
                     remedy="correct the name" + suggestion(fault, list(specs)),
                 )
-        if known and factor.faults:
-            yield from _misplaced(analysis, keys, factor, specs)
-            yield from _misdirected(analysis, keys, factor, specs)
+        if all_exist and factor.faults:
+            yield from _wrong_places(analysis, keys, factor, specs)
+            yield from _wrong_aims(analysis, keys, factor, specs)
 
 
-def _misplaced(
-    analysis: Analysis, keys: KeyPath, factor: FactorModel, specs: Specs
+def _wrong_places(
+    analysis: HazardAnalysis, keys: KeyPath, factor: CausalFactorModel, specs: SpecsByName
 ) -> Iterator[MutatorError]:
-    actual = {place for fault in factor.faults for place in injected(specs[fault])}
+    actual = {place for fault in factor.faults for place in injection_places(specs[fault])}
     if actual != set(factor.at):
         yield analysis.factors_source.error(
             (*keys, "at"),
@@ -247,10 +253,10 @@ def _misplaced(
         )
 
 
-def _misdirected(
-    analysis: Analysis, keys: KeyPath, factor: FactorModel, specs: Specs
+def _wrong_aims(
+    analysis: HazardAnalysis, keys: KeyPath, factor: CausalFactorModel, specs: SpecsByName
 ) -> Iterator[MutatorError]:
-    hazards = {hazard for action in factor.leads_to for hazard in analysis.unsafe[action].hazards}
+    hazards = {hazard for action in factor.leads_to for hazard in analysis.unsafe_actions[action].hazards}
     for i, fault in enumerate(factor.faults):
         for variant in specs[fault]:
             if variant.aim not in hazards:
@@ -262,18 +268,18 @@ def _misdirected(
                 )
 
 
-def injected(spec: FaultSpec) -> set[str]:
+def injection_places(spec: FaultSpec) -> set[str]:
     """Return the places at which a spec injects in any reading, as `file::function`."""
     return {
         f"{injection.location.path}::{injection.location.function}"
         for variant in spec
-        for injections in variant.readings.values()
+        for injections in variant.injections_by_reading.values()
         for injection in injections
     }
 
 
-def _unreached(analysis: Analysis, specs: tuple[FaultSpec, ...]) -> Iterator[MutatorError]:
-    reached = {fault for factor in analysis.factors.values() for fault in factor.faults}
+def _specs_without_factor(analysis: HazardAnalysis, specs: tuple[FaultSpec, ...]) -> Iterator[MutatorError]:
+    reached = {fault for factor in analysis.factors_by_id.values() for fault in factor.faults}
     path = analysis.factors_source.path
     for spec in specs:
         if spec.name not in reached:

@@ -16,12 +16,12 @@ from mutator._common.message_text import describe_choices, suggestion
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.stpa.context_tables import ContextTable, load_context_table
-from mutator.stpa.hazard_list import HazardList, load_hazards
+from mutator.stpa.hazard_list import HazardList, load_hazard_list
 
-_WIDEST = 100  # most rows and columns of the drawing
+_MOST_GRID_SIZE = 100  # most rows and columns of the drawing
 
 
-class Kind(StrEnum):
+class ComponentKind(StrEnum):
     HUMAN = "human"
     CONTROLLER = "controller"
     ESTIMATOR = "estimator"
@@ -30,7 +30,7 @@ class Kind(StrEnum):
     PROCESS = "process"
 
 
-class Category(StrEnum):
+class UnsafeCategory(StrEnum):
     """The four ways in which a control action can be unsafe (Leveson, Engineering a Safer World, 2011)."""
 
     NOT_PROVIDED = "not_provided"
@@ -51,7 +51,7 @@ class VariableModel(StrictModel, title="A variable"):
 class ComponentModel(StrictModel, title="A component"):
     """A component, drawn as a box."""
 
-    kind: Kind = Field(strict=False, description="The kind of component.")
+    kind: ComponentKind = Field(strict=False, description="The kind of component.")
     label: str = Field(description="The name in the drawing.")
     about: str = Field(description="What the component does.")
     modules: list[str] = Field(
@@ -80,7 +80,7 @@ class LinkModel(StrictModel, title="A link"):
     )
 
 
-class ActionModel(StrictModel, title="A control action"):
+class ControlActionModel(StrictModel, title="A control action"):
     """An action by which a controller influences the process that it controls."""
 
     link: str = Field(description="The link that carries the action.")
@@ -88,12 +88,12 @@ class ActionModel(StrictModel, title="A control action"):
     about: str = Field(description="What the action does.")
 
 
-class StructureModel(StrictModel, title="control_structure.yaml"):
+class ControlStructureModel(StrictModel, title="control_structure.yaml"):
     """The controllers, their control actions, what these control, and the feedback they get."""
 
     about: str = Field(description="What the control structure shows.")
     components: dict[str, ComponentModel] = Field(description="Name -> component.")
-    control_actions: dict[str, ActionModel] = Field(description="Name -> control action.")
+    control_actions: dict[str, ControlActionModel] = Field(description="Name -> control action.")
     links: dict[str, LinkModel] = Field(description="Name -> link.")
 
 
@@ -101,7 +101,9 @@ class UnsafeActionModel(StrictModel, title="An unsafe control action"):
     """One way in which a control action causes a hazard."""
 
     action: str = Field(description="The control action.")
-    category: Category = Field(strict=False, description="In which of the four ways the action is unsafe.")
+    category: UnsafeCategory = Field(
+        strict=False, description="In which of the four ways the action is unsafe."
+    )
     about: str = Field(description="What happens.")
     hazards: list[str] = Field(min_length=1, description="The hazards that it causes.")
     contexts: list[str] = Field(
@@ -119,7 +121,7 @@ class UnsafeActionsModel(StrictModel, title="unsafe_control_actions.yaml"):
     unsafe_control_actions: dict[str, UnsafeActionModel] = Field(description="Id -> unsafe control action.")
 
 
-class FactorModel(StrictModel, title="A causal factor"):
+class CausalFactorModel(StrictModel, title="A causal factor"):
     """A cause of unsafe control actions. Give either `faults` or `no_fault`."""
 
     about: str = Field(description="What goes wrong.")
@@ -132,147 +134,153 @@ class FactorModel(StrictModel, title="A causal factor"):
     no_fault: str | None = Field(None, description="The reason why no fault spec represents it.")
 
 
-class FactorsModel(StrictModel, title="causal_factors.yaml"):
+class CausalFactorsModel(StrictModel, title="causal_factors.yaml"):
     """What can make a controller act unsafely, and the faults that represent it."""
 
     about: str = Field(description="What the file lists.")
-    causal_factors: dict[str, FactorModel] = Field(description="Id -> causal factor.")
+    causal_factors: dict[str, CausalFactorModel] = Field(description="Id -> causal factor.")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Analysis:
+class HazardAnalysis:
     """The whole analysis, in which all names are consistent; `*_source` refer to the files."""
 
     hazards: HazardList
-    structure: StructureModel
+    structure: ControlStructureModel
     structure_source: YamlSource
-    tables: Mapping[str, ContextTable]
-    unsafe: Mapping[str, UnsafeActionModel]
-    unsafe_source: YamlSource
-    factors: Mapping[str, FactorModel]
+    context_tables: Mapping[str, ContextTable]
+    unsafe_actions: Mapping[str, UnsafeActionModel]
+    unsafe_actions_source: YamlSource
+    factors_by_id: Mapping[str, CausalFactorModel]
     factors_source: YamlSource
 
 
-def load_structure(path: Path) -> StructureModel:
+def load_control_structure(path: Path) -> ControlStructureModel:
     """Read a control structure; MutatorError with file and line for a mistake."""
-    structure, source = load_yaml_model(path, StructureModel, "control_structure/1")
+    structure, source = load_yaml_model(path, ControlStructureModel, "control_structure/1")
     _check_structure(structure, source)
     return structure
 
 
-def load_analysis(folder: Path) -> Analysis:
+def load_hazard_analysis(folder: Path) -> HazardAnalysis:
     """Read hazards, control structure, unsafe control actions, context tables and causal factors from
     `folder`.
 
     MutatorError with file and line for the first unknown name, uncovered context or other mistake.
     """
-    hazards = load_hazards(folder / "hazards.yaml")
+    hazards = load_hazard_list(folder / "hazards.yaml")
     structure, s_source = load_yaml_model(
-        folder / "control_structure.yaml", StructureModel, "control_structure/1"
+        folder / "control_structure.yaml", ControlStructureModel, "control_structure/1"
     )
     _check_structure(structure, s_source)
     unsafe, u_source = load_yaml_model(
         folder / "unsafe_control_actions.yaml", UnsafeActionsModel, "unsafe_control_actions/1"
     )
-    tables = _tables(folder / "contexts", unsafe, u_source, structure)
+    tables = _load_context_tables(folder / "contexts", unsafe, u_source, structure)
     _check_unsafe(unsafe, u_source, structure, hazards, tables)
-    factors, f_source = load_yaml_model(folder / "causal_factors.yaml", FactorsModel, "causal_factors/1")
+    factors, f_source = load_yaml_model(
+        folder / "causal_factors.yaml", CausalFactorsModel, "causal_factors/1"
+    )
     _check_factors(factors, f_source, structure, unsafe)
-    return Analysis(
+    return HazardAnalysis(
         hazards=hazards,
         structure=structure,
         structure_source=s_source,
-        tables=tables,
-        unsafe=unsafe.unsafe_control_actions,
-        unsafe_source=u_source,
-        factors=factors.causal_factors,
+        context_tables=tables,
+        unsafe_actions=unsafe.unsafe_control_actions,
+        unsafe_actions_source=u_source,
+        factors_by_id=factors.causal_factors,
         factors_source=f_source,
     )
 
 
-def _known(source: YamlSource, keys: KeyPath, what: str, name: str, known: Collection[str]) -> None:
-    if name not in known:
+def _check_exists(source: YamlSource, keys: KeyPath, what: str, name: str, names: Collection[str]) -> None:
+    if name not in names:
         raise source.error(
             keys,
             f"{what} '{name}'",
-            expected=describe_choices(known),
-            remedy="correct the name" + suggestion(name, list(known)),
+            expected=describe_choices(names),
+            remedy="correct the name" + suggestion(name, list(names)),
         )
 
 
-def _check_structure(structure: StructureModel, source: YamlSource) -> None:
+def _check_structure(structure: ControlStructureModel, source: YamlSource) -> None:
     _check_grid(structure, source)
     for name, link in structure.links.items():
         if name in structure.components:
             raise source.error(("links", name), f"link '{name}'", expected="a name that no component has")
-        _known(source, ("links", name, "from"), "component", link.from_, structure.components)
-        _known(source, ("links", name, "to"), "component", link.to, structure.components)
+        _check_exists(source, ("links", name, "from"), "component", link.from_, structure.components)
+        _check_exists(source, ("links", name, "to"), "component", link.to, structure.components)
     for name, action in structure.control_actions.items():
         keys = ("control_actions", name, "link")
-        _known(source, keys, "link", action.link, structure.links)
-        if structure.components[structure.links[action.link].from_].kind is not Kind.CONTROLLER:
+        _check_exists(source, keys, "link", action.link, structure.links)
+        if structure.components[structure.links[action.link].from_].kind is not ComponentKind.CONTROLLER:
             raise source.error(keys, f"link '{action.link}'", expected="a link that comes from a controller")
 
 
-def _check_grid(structure: StructureModel, source: YamlSource) -> None:
-    taken: dict[tuple[int, int], str] = {}
+def _check_grid(structure: ControlStructureModel, source: YamlSource) -> None:
+    name_by_field: dict[tuple[int, int], str] = {}
     for name, component in structure.components.items():
         row, column, width = component.drawn
-        fields = [(row, column + i) for i in range(min(width, _WIDEST))]
-        other = next((taken[field] for field in fields if field in taken), None)
-        if other or not fields or min(row, column) < 0 or max(row, column, width) > _WIDEST:
+        fields = [(row, column + i) for i in range(min(width, _MOST_GRID_SIZE))]
+        other = next((name_by_field[field] for field in fields if field in name_by_field), None)
+        if other or not fields or min(row, column) < 0 or max(row, column, width) > _MOST_GRID_SIZE:
             raise source.error(
                 ("components", name, "drawn"),
                 f"'{name}' drawn at {component.drawn}" + (f", where '{other}' is" if other else ""),
-                expected=f"row, column and width of at most {_WIDEST}, a width of at least 1, no overlap",
+                expected=f"row, column and width of at most {_MOST_GRID_SIZE}, a width of at least 1, no "
+                "overlap",
             )
-        taken.update(dict.fromkeys(fields, name))
+        name_by_field.update(dict.fromkeys(fields, name))
 
 
-def _tables(
-    folder: Path, unsafe: UnsafeActionsModel, source: YamlSource, structure: StructureModel
+def _load_context_tables(
+    folder: Path, unsafe: UnsafeActionsModel, source: YamlSource, structure: ControlStructureModel
 ) -> dict[str, ContextTable]:
     """Load the context tables of the unsafe actions. They can judge only the structure's control actions."""
-    known = sorted(path.stem for path in folder.glob("*.yaml"))
+    table_names = sorted(path.stem for path in folder.glob("*.yaml"))
     tables = {}
     for i, name in enumerate(unsafe.tables):
-        _known(source, ("tables", i), "context table", name, known)
+        _check_exists(source, ("tables", i), "context table", name, table_names)
         tables[name] = table = load_context_table(path_below(folder, f"{name}.yaml"))
         for row in table.rows:
-            for action in row.actions:
+            for action in row.hazards_by_action:
                 keys = ("contexts", row.id, "actions", action)
-                _known(table.source, keys, "control action", action, structure.control_actions)
+                _check_exists(table.source, keys, "control action", action, structure.control_actions)
     return tables
 
 
 def _check_unsafe(
     unsafe: UnsafeActionsModel,
     source: YamlSource,
-    structure: StructureModel,
+    structure: ControlStructureModel,
     hazards: HazardList,
     tables: Mapping[str, ContextTable],
 ) -> None:
     rows = [f"{table.name}/{row.id}" for table in tables.values() for row in table.rows]
     for name, action in unsafe.unsafe_control_actions.items():
         keys: KeyPath = ("unsafe_control_actions", name)
-        _known(source, (*keys, "action"), "control action", action.action, structure.control_actions)
+        _check_exists(source, (*keys, "action"), "control action", action.action, structure.control_actions)
         for i, hazard in enumerate(action.hazards):
-            _known(source, (*keys, "hazards", i), "hazard", hazard, hazards.hazards)
+            _check_exists(source, (*keys, "hazards", i), "hazard", hazard, hazards.hazards)
         for i, context in enumerate(action.contexts):
-            _known(source, (*keys, "contexts", i), "context", context, rows)
+            _check_exists(source, (*keys, "contexts", i), "context", context, rows)
 
 
 def _check_factors(
-    factors: FactorsModel, source: YamlSource, structure: StructureModel, unsafe: UnsafeActionsModel
+    factors: CausalFactorsModel,
+    source: YamlSource,
+    structure: ControlStructureModel,
+    unsafe: UnsafeActionsModel,
 ) -> None:
     places = (*structure.components, *structure.links)
     for name, factor in factors.causal_factors.items():
         keys: KeyPath = ("causal_factors", name)
         for i, place in enumerate(factor.where):
-            _known(source, (*keys, "where", i), "link or component", place, places)
+            _check_exists(source, (*keys, "where", i), "link or component", place, places)
         for i, action in enumerate(factor.leads_to):
-            known = unsafe.unsafe_control_actions
-            _known(source, (*keys, "leads_to", i), "unsafe control action", action, known)
+            unsafe_actions = unsafe.unsafe_control_actions
+            _check_exists(source, (*keys, "leads_to", i), "unsafe control action", action, unsafe_actions)
         if bool(factor.faults) == (factor.no_fault is not None):
             got = "both faults and no_fault" if factor.faults else "neither faults nor no_fault"
             raise source.error(

@@ -15,11 +15,11 @@ from mutator._common.message_text import counted
 from mutator.errors import NotTestable
 from mutator.triggers.conditions import evaluate_condition
 
-MAX_TESTS = 400_000  # most tests: contexts times cells
+MOST_TESTS = 400_000  # most tests: contexts times cells
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class AxisCell:
     """A part of a variable's axis: `value` lies in it, and `text` describes it (`gap > 2.0`)."""
 
     value: float
@@ -27,70 +27,73 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Coverage:
+class TableCoverage:
     """The number of tested cells, and the first place that the contexts do not cover exactly once.
 
-    `beyond` says why no proof was possible; `rows` are the contexts that hold at `place`.
+    `no_proof_reason` says why no proof was possible; `overlapping_rows` are the contexts that hold at
+    `first_gap_or_overlap`, or none.
     """
 
-    cells: int = 0
-    beyond: str | None = None
-    place: str | None = None
-    rows: tuple[str, ...] = ()
+    cell_count: int = 0
+    no_proof_reason: str | None = None
+    first_gap_or_overlap: str | None = None
+    overlapping_rows: tuple[str, ...] = ()
 
 
-def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
+def measure_coverage(conditions: Mapping[str, str]) -> TableCoverage:
     """Test the conditions of a table, row id -> condition, in every cell."""
     try:
-        cuts = _cuts(conditions.values())
+        cuts = _constants_by_variable(conditions.values())
     except NotTestable as error:
-        return Coverage(beyond=f"{error}; only comparisons of one variable with a constant can be tested")
-    lines = [_cells(name, sorted(values)) for name, values in cuts.items()]
-    total = math.prod(len(line) for line in lines)
-    if total * len(conditions) > MAX_TESTS:
-        found = f"{counted(total, 'cell')} for {counted(len(conditions), 'context')}"
-        return Coverage(beyond=f"its constants yield {found}, too many to test")
-    for place in product(*lines):
+        return TableCoverage(
+            no_proof_reason=f"{error}; only comparisons of one variable with a constant can be tested"
+        )
+    axes = [_axis_cells(name, sorted(values)) for name, values in cuts.items()]
+    total = math.prod(len(axis) for axis in axes)
+    if total * len(conditions) > MOST_TESTS:
+        size = f"{counted(total, 'cell')} for {counted(len(conditions), 'context')}"
+        return TableCoverage(no_proof_reason=f"its constants yield {size}, too many to test")
+    for place in product(*axes):
         values = {name: cell.value for name, cell in zip(cuts, place, strict=True)}
         rows = tuple(row for row, condition in conditions.items() if evaluate_condition(condition, values))
         if len(rows) != 1:
             text = " and ".join(cell.text for cell in place) or "any observation"
-            return Coverage(cells=total, place=text, rows=rows)
-    return Coverage(cells=total)
+            return TableCoverage(cell_count=total, first_gap_or_overlap=text, overlapping_rows=rows)
+    return TableCoverage(cell_count=total)
 
 
-def _cuts(conditions: Iterable[str]) -> dict[str, set[float]]:
-    found: dict[str, set[float]] = {}
+def _constants_by_variable(conditions: Iterable[str]) -> dict[str, set[float]]:
+    cuts: dict[str, set[float]] = {}
     for condition in conditions:
         for node in ast.walk(ast.parse(condition, mode="eval")):
             if isinstance(node, ast.Compare):
                 for left, right in pairwise((node.left, *node.comparators)):
-                    name, value = _cut(left, right)
-                    found.setdefault(name, set()).add(value)
-    return found
+                    name, value = _variable_and_constant(left, right)
+                    cuts.setdefault(name, set()).add(value)
+    return cuts
 
 
-def _cut(left: ast.expr, right: ast.expr) -> tuple[str, float]:
+def _variable_and_constant(left: ast.expr, right: ast.expr) -> tuple[str, float]:
     for variable, constant in ((left, right), (right, left)):
-        value = _constant(constant)
+        value = _constant_value(constant)
         if isinstance(variable, ast.Name) and value is not None:
             return variable.id, value
     raise NotTestable(f"a condition compares '{ast.unparse(left)}' with '{ast.unparse(right)}'")
 
 
-def _constant(node: ast.expr) -> float | None:
+def _constant_value(node: ast.expr) -> float | None:
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-        value = _constant(node.operand)
+        value = _constant_value(node.operand)
         return None if value is None else -value
     return float(node.value) if isinstance(node, ast.Constant) and isinstance(node.value, float) else None
 
 
-def _cells(name: str, cuts: list[float]) -> list[Cell]:
-    cells = [Cell(value=-math.inf, text=f"{name} < {cuts[0]}")]
+def _axis_cells(name: str, cuts: list[float]) -> list[AxisCell]:
+    cells = [AxisCell(value=-math.inf, text=f"{name} < {cuts[0]}")]
     for low, high in pairwise(cuts):
-        cells.append(Cell(value=low, text=f"{name} = {low}"))
+        cells.append(AxisCell(value=low, text=f"{name} = {low}"))
         middle = low + (high - low) / 2.0
         if low < middle < high:  # otherwise no number lies between them
-            cells.append(Cell(value=middle, text=f"{low} < {name} < {high}"))
-    cells.append(Cell(value=cuts[-1], text=f"{name} = {cuts[-1]}"))
-    return [*cells, Cell(value=math.inf, text=f"{name} > {cuts[-1]}")]
+            cells.append(AxisCell(value=middle, text=f"{low} < {name} < {high}"))
+    cells.append(AxisCell(value=cuts[-1], text=f"{name} = {cuts[-1]}"))
+    return [*cells, AxisCell(value=math.inf, text=f"{name} > {cuts[-1]}")]

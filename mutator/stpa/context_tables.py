@@ -12,15 +12,15 @@ from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
-from mutator.stpa.context_coverage import Coverage, measure_coverage
+from mutator.stpa.context_coverage import TableCoverage, measure_coverage
 from mutator.triggers.conditions import TIME, canonical_condition, names_in
 
-CONTEXT_SCHEMA = "context_table/1"
-_CONSTANT = re.compile(r"[a-z][a-z0-9_]*\Z")
+CONTEXT_TABLE_SCHEMA = "context_table/1"
+_CONSTANT_NAME_PATTERN = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Verdicts:
+class ActionHazards:
     """The hazards that follow from one control action in one context; `null` means no hazard."""
 
     __pydantic_config__ = mapping_config("The hazards of an action")
@@ -40,7 +40,7 @@ class ContextRow:
     id: str
     condition: str
     about: str
-    actions: Mapping[str, Verdicts]
+    hazards_by_action: Mapping[str, ActionHazards]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,12 +54,12 @@ class ContextTable:
     path: Path
     constants: Mapping[str, float]
     rows: tuple[ContextRow, ...]
-    coverage: Coverage
+    coverage: TableCoverage
     source: YamlSource
 
-    def check(self, variables: Collection[str]) -> None:
+    def check_variables(self, variables: Collection[str]) -> None:
         """Raise MutatorError, with the line, for a row that uses an unknown variable."""
-        _check_names(self.rows, variables, self.source)
+        _check_variable_names(self.rows, variables, self.source)
 
     def triggers(
         self,
@@ -90,17 +90,17 @@ class ContextTable:
         )
 
 
-class _RowModel(StrictModel, title="A context"):
+class _ContextModel(StrictModel, title="A context"):
     when: str = Field(
         description="A condition. It may use `t` (s), the values observed in the target, and the constants."
     )
     about: str = Field(description="A description.")
-    actions: dict[str, YamlRecord[Verdicts]] = Field(
+    actions: dict[str, YamlRecord[ActionHazards]] = Field(
         description="Control action -> its hazards. All contexts must have the same actions."
     )
 
 
-class TableModel(StrictModel, title="contexts/*.yaml"):
+class ContextTableModel(StrictModel, title="contexts/*.yaml"):
     """A context table. Its rows must cover every situation exactly once; see [what is
     proved](../explanation/hazard-analysis.md#what-is-proved-about-a-context-table).
     """
@@ -108,7 +108,7 @@ class TableModel(StrictModel, title="contexts/*.yaml"):
     name: str = Field(description="The name. It must match the file name without `.yaml`.")
     about: str = Field("", description="The subject of the table.")
     constants: dict[str, float] = Field(description="Name -> number, for use in the conditions.")
-    contexts: dict[str, _RowModel] = Field(description="Id -> context.")
+    contexts: dict[str, _ContextModel] = Field(description="Id -> context.")
 
 
 def load_context_table(path: Path, variables: Collection[str] | None = None) -> ContextTable:
@@ -116,9 +116,9 @@ def load_context_table(path: Path, variables: Collection[str] | None = None) -> 
 
     MutatorError also if contexts provably overlap or leave a gap, or if rows judge different control actions.
     """
-    model, source = load_yaml_model(path, TableModel, CONTEXT_SCHEMA)
+    model, source = load_yaml_model(path, ContextTableModel, CONTEXT_TABLE_SCHEMA)
     for name in model.constants:
-        if not _CONSTANT.match(name) or name == TIME:
+        if not _CONSTANT_NAME_PATTERN.match(name) or name == TIME:
             raise source.error(
                 ("constants", name),
                 f"constant '{name}'",
@@ -128,14 +128,14 @@ def load_context_table(path: Path, variables: Collection[str] | None = None) -> 
     rows = tuple(
         ContextRow(
             id=name,
-            condition=_condition(row.when, model.constants, source, name),
+            condition=_canonical_condition(row.when, model.constants, source, name),
             about=row.about,
-            actions=row.actions,
+            hazards_by_action=row.actions,
         )
         for name, row in model.contexts.items()
     )
     if variables is not None:
-        _check_names(rows, variables, source)
+        _check_variable_names(rows, variables, source)
     _check_actions(rows, source)
     return ContextTable(
         name=model.name,
@@ -143,12 +143,12 @@ def load_context_table(path: Path, variables: Collection[str] | None = None) -> 
         path=path,
         constants=dict(model.constants),
         rows=rows,
-        coverage=_covered_once(rows, source),
+        coverage=_complete_coverage(rows, source),
         source=source,
     )
 
 
-def _check_names(rows: Iterable[ContextRow], variables: Collection[str], source: YamlSource) -> None:
+def _check_variable_names(rows: Iterable[ContextRow], variables: Collection[str], source: YamlSource) -> None:
     for row in rows:
         unknown = [name for name in names_in(row.condition) if name not in variables]
         if unknown:
@@ -162,35 +162,35 @@ def _check_names(rows: Iterable[ContextRow], variables: Collection[str], source:
 
 def _check_actions(rows: tuple[ContextRow, ...], source: YamlSource) -> None:
     for row in rows[1:]:
-        if row.actions.keys() != rows[0].actions.keys():
+        if row.hazards_by_action.keys() != rows[0].hazards_by_action.keys():
             raise source.error(
                 ("contexts", row.id, "actions"),
-                f"actions {', '.join(row.actions) or '(none)'} in context '{row.id}'",
-                expected=f"the actions of '{rows[0].id}': {', '.join(rows[0].actions) or '(none)'}",
+                f"actions {', '.join(row.hazards_by_action) or '(none)'} in context '{row.id}'",
+                expected=f"the actions of '{rows[0].id}': {', '.join(rows[0].hazards_by_action) or '(none)'}",
                 remedy="judge every control action in every context",
             )
 
 
-def _covered_once(rows: tuple[ContextRow, ...], source: YamlSource) -> Coverage:
-    found = measure_coverage({row.id: row.condition for row in rows})
-    if found.place is None:
-        return found
-    if not found.rows:
+def _complete_coverage(rows: tuple[ContextRow, ...], source: YamlSource) -> TableCoverage:
+    coverage = measure_coverage({row.id: row.condition for row in rows})
+    if coverage.first_gap_or_overlap is None:
+        return coverage
+    if not coverage.overlapping_rows:
         raise source.error(
             ("contexts",),
-            f"no context holds at {found.place}",
+            f"no context holds at {coverage.first_gap_or_overlap}",
             expected="contexts that cover everything exactly once",
             remedy="add a context or widen one",
         )
-    first, second = found.rows[:2]
+    first, second = coverage.overlapping_rows[:2]
     raise source.error(
         ("contexts", second, "when"),
-        f"context '{second}' overlaps '{first}' at {found.place}",
+        f"context '{second}' overlaps '{first}' at {coverage.first_gap_or_overlap}",
         expected="contexts that cover everything exactly once",
         remedy="narrow one of the two",
     )
 
 
-def _condition(text: str, constants: Mapping[str, float], source: YamlSource, row: str) -> str:
+def _canonical_condition(text: str, constants: Mapping[str, float], source: YamlSource, row: str) -> str:
     with source.locating_errors(("contexts", row, "when")):
         return canonical_condition(text, constants)

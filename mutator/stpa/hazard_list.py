@@ -19,10 +19,10 @@ class HazardList:
     source: YamlSource
     accidents: Mapping[str, str]
     hazards: Mapping[str, str]
-    leads_to: Mapping[str, tuple[str, ...]]
+    accidents_by_hazard: Mapping[str, tuple[str, ...]]
 
 
-class _HazardModel(StrictModel, title="A hazard"):
+class _HazardEntryModel(StrictModel, title="A hazard"):
     about: str = Field(description="What the hazard is.")
     leads_to: list[str] = Field(description="The accidents that it can cause.")
 
@@ -31,10 +31,10 @@ class HazardsModel(StrictModel, title="hazards.yaml"):
     """Accidents, and the hazards that can lead to them."""
 
     accidents: dict[str, str] = Field(description="Id -> description.")
-    hazards: dict[str, _HazardModel] = Field(description="Id -> hazard.")
+    hazards: dict[str, _HazardEntryModel] = Field(description="Id -> hazard.")
 
 
-def load_hazards(path: Path) -> HazardList:
+def load_hazard_list(path: Path) -> HazardList:
     """Read accidents and hazards; MutatorError if a hazard names an unknown accident."""
     model, source = load_yaml_model(path, HazardsModel, HAZARDS_SCHEMA)
     for name, hazard in model.hazards.items():
@@ -50,5 +50,5 @@ def load_hazards(path: Path) -> HazardList:
         source=source,
         accidents=dict(model.accidents),
         hazards={name: hazard.about for name, hazard in model.hazards.items()},
-        leads_to={name: tuple(hazard.leads_to) for name, hazard in model.hazards.items()},
+        accidents_by_hazard={name: tuple(hazard.leads_to) for name, hazard in model.hazards.items()},
     )

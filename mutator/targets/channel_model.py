@@ -7,7 +7,7 @@ from pydantic import Field
 from mutator._common.doors import IMPORTERS
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import YamlSource
-from mutator.targets.channels import ROUNDING, Channel, Role
+from mutator.targets.channels import ROUNDING_TOLERANCE, Channel, Role
 from mutator.triggers.conditions import RESERVED_NAMES
 
 
@@ -33,7 +33,8 @@ class ChannelModel(StrictModel, title="A channel"):
         allow_inf_nan=False,
         description="Differences from the golden run up to this value are ignored. If an actuator differs by "
         "more, the fault has manifested; if a component's channel does, the fault has reached the component. "
-        f"Default: 0 for actuators; for other channels {ROUNDING:g} of the unit, to ignore rounding.",
+        f"Default: 0 for actuators; for other channels {ROUNDING_TOLERANCE:g} of the unit, to ignore "
+        "rounding.",
     )
     about: str = Field("", description="What the channel contains.")
     time: str = Field(
@@ -65,7 +66,7 @@ class TraceModel(StrictModel, title="The trace"):
     )
 
 
-def read_channels(
+def build_channels(
     models: dict[str, ChannelModel], trace: TraceModel, source: YamlSource
 ) -> tuple[Channel, ...]:
     """Read a manifest's channels, in order; MutatorError for an invalid trace or channel."""
@@ -85,10 +86,10 @@ def read_channels(
             expected="a channel that holds what the controller commands; verdicts depend on it",
             remedy="give a channel the role actuator",
         )
-    return tuple(_channel(name, model, trace, source) for name, model in models.items())
+    return tuple(_build_channel(name, model, trace, source) for name, model in models.items())
 
 
-def _channel(name: str, model: ChannelModel, trace: TraceModel, source: YamlSource) -> Channel:
+def _build_channel(name: str, model: ChannelModel, trace: TraceModel, source: YamlSource) -> Channel:
     keys = ("channels", name)
     if name == trace.time:
         raise source.error(keys, f"'{name}'", expected="a channel other than the time", remedy="leave it out")
@@ -115,4 +116,4 @@ def _channel(name: str, model: ChannelModel, trace: TraceModel, source: YamlSour
         )
     plain = model.model_dump(exclude={"from_", "tolerance"})
     tolerance = model.role.tolerance if model.tolerance is None else model.tolerance
-    return Channel(name=name, source=model.from_, tolerance=tolerance, **plain)
+    return Channel(name=name, other_trace_name=model.from_, tolerance=tolerance, **plain)

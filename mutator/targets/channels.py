@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-ROUNDING = 1e-9  # in a channel's unit; smaller differences can come from the order of sums
+ROUNDING_TOLERANCE = 1e-9  # in a channel's unit; smaller differences can come from the order of sums
 
 
 class Role(StrEnum):
@@ -17,7 +17,7 @@ class Role(StrEnum):
 
     @property
     def tolerance(self) -> float:
-        return 0.0 if self is Role.ACTUATOR else ROUNDING
+        return 0.0 if self is Role.ACTUATOR else ROUNDING_TOLERANCE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +28,7 @@ class Channel:
     * `tolerance`: how much the channel may differ from the golden run (0: must be equal)
     * `component`: the part of the controller to which the channel belongs
     * `time`: the channel that holds its times, if it is not recorded in each step
-    * `source`: its name in the trace, if that differs
+    * `other_trace_name`: its name in the trace, if that differs
     """
 
     name: str
@@ -38,8 +38,8 @@ class Channel:
     tolerance: float = 0.0
     about: str = ""
     time: str = ""
-    source: str = ""
+    other_trace_name: str = ""
 
     @property
-    def in_trace(self) -> str:
-        return self.source or self.name
+    def name_in_trace(self) -> str:
+        return self.other_trace_name or self.name

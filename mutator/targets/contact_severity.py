@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
 
-CLASSES = ("S0", "S1", "S2", "S3")  # from ISO 26262-3, the mildest first
-DELTA_V = "delta_v"  # name of the metric
+SEVERITY_CLASSES = ("S0", "S1", "S2", "S3")  # from ISO 26262-3, the mildest first
+DELTA_V_NAME = "delta_v"  # name of the metric
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,17 +19,17 @@ class Contact:
     hazard: str = field(
         metadata=yaml_metadata("The terminal hazard that is a contact with another vehicle.", alias="contact")
     )
-    speed: str = field(
+    speed_metric: str = field(
         metadata=yaml_metadata(
             "The metric that holds the closing speed at the contact: one with `at_end`, in m/s. If it is "
             "negative, the cars separate, and delta-v is 0.",
             alias="contact_speed",
         )
     )
-    mass: float = field(
+    mass_kg: float = field(
         metadata=yaml_metadata("The mass of the ego car.", alias="mass_kg", gt=0.0, allow_inf_nan=False)
     )
-    other_mass: float = field(
+    other_mass_kg: float = field(
         metadata=yaml_metadata(
             "The mass of the other vehicle.", alias="other_mass_kg", gt=0.0, allow_inf_nan=False
         )
@@ -41,15 +41,15 @@ class Contact:
         )
     )
 
-    def delta_v(self, closing: float) -> float:
+    def delta_v(self, closing_speed_mps: float) -> float:
         """Return the change of the ego car's speed in m/s, in an inelastic collision along the line of
         travel; 0 if the closing speed is not positive.
         """
-        return max(closing, 0.0) * self.other_mass / (self.mass + self.other_mass)
+        return max(closing_speed_mps, 0.0) * self.other_mass_kg / (self.mass_kg + self.other_mass_kg)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scale:
+class SeverityScale:
     """The classes of delta-v: (name, least delta-v in m/s, meaning), the mildest first, beginning at 0.
     `source` cites the bounds.
     """

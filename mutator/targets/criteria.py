@@ -6,7 +6,7 @@ from typing import Literal
 from mutator.triggers.conditions import GOLDEN_PREFIX
 
 Aggregate = Literal["min", "max", "mean", "last", "integral", "duration", "at_end"]
-Worse = Literal["higher", "lower"]
+WorseDirection = Literal["higher", "lower"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,7 +20,7 @@ class Metric:
     formula: str
     where: str = ""
     unit: str
-    worse: Worse
+    worse: WorseDirection
     about: str
     source: str = ""
 
@@ -49,11 +49,11 @@ class Hazard:
     terminal: str = ""
 
     @property
-    def recorded(self) -> bool:
+    def is_in_record(self) -> bool:
         return not (self.when or self.stl)
 
     @property
-    def metric(self) -> Metric | None:
+    def margin_metric(self) -> Metric | None:
         """The metric `margin_<hazard>`: a run's smallest margin."""
         if not (self.margin or self.stl):
             return None

@@ -8,8 +8,8 @@ from pydantic import Field
 
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
-from mutator.targets.criteria import Aggregate, Hazard, Metric, Worse
-from mutator.targets.manifest_formulas import condition, formula
+from mutator.targets.criteria import Aggregate, Hazard, Metric, WorseDirection
+from mutator.targets.manifest_formulas import manifest_condition, manifest_formula
 from mutator.triggers import temporal_logic
 from mutator.triggers.conditions import GOLDEN_PREFIX, TIME, parse_expression
 
@@ -69,48 +69,48 @@ class MetricModel(StrictModel, title="A metric"):
     )
     where: str | None = Field(None, description="Use only the steps in which this condition holds.")
     unit: str = Field(description="The unit; `-` for none.")
-    worse: Worse = Field(description="Which values are worse: `higher` or `lower`.")
+    worse: WorseDirection = Field(description="Which values are worse: `higher` or `lower`.")
     about: str = Field(description="What the metric measures.")
     source: str = Field("", description="The source of the formula.")
 
 
-def read_hazards(
+def build_hazards(
     models: list[str] | dict[str, HazardModel],
-    known: Collection[str],
+    names: Collection[str],
     source: YamlSource,
     *,
-    recorded: bool,
+    has_record: bool,
     step_s: float,
 ) -> tuple[Hazard, ...]:
     """Read a manifest's hazards; MutatorError, with the line, for a mistake.
 
-    `known` are the names that formulas may use, `recorded` says whether the target writes a record, and
+    `names` are those that formulas may use, `has_record` says whether the target writes a record, and
     `step_s` is the length of a step in seconds.
     """
     if isinstance(models, list):
         hazards = tuple(Hazard(name=name) for name in models)
     else:
-        hazards = tuple(_hazard(name, model, known, source, step_s) for name, model in models.items())
-    if not recorded and (left := [hazard.name for hazard in hazards if hazard.recorded]):
-        keys: KeyPath = ("hazards", left[0]) if isinstance(models, dict) else ("hazards",)
+        hazards = tuple(_build_hazard(name, model, names, source, step_s) for name, model in models.items())
+    if not has_record and (unreported := [hazard.name for hazard in hazards if hazard.is_in_record]):
+        keys: KeyPath = ("hazards", unreported[0]) if isinstance(models, dict) else ("hazards",)
         raise source.error(
             keys,
-            f"hazard '{left[0]}' without `when`, in a manifest without `record`",
+            f"hazard '{unreported[0]}' without `when`, in a manifest without `record`",
             expected="the condition of the hazard, or a record in which the target reports it",
             remedy="add `when`, or name the record",
         )
     return hazards
 
 
-def _hazard(
-    name: str, model: HazardModel, known: Collection[str], source: YamlSource, step_s: float
+def _build_hazard(
+    name: str, model: HazardModel, names: Collection[str], source: YamlSource, step_s: float
 ) -> Hazard:
     keys: KeyPath = ("hazards", name)
     if model.when is not None and model.stl is not None:
         raise source.error((*keys, "stl"), "`when` and `stl`", expected="one of them", remedy="remove one")
     judged_by = "stl" if model.stl is not None else "the record"
-    useless = () if model.when is not None else ("for_s", "margin")
-    for key in useless:
+    condition_keys = () if model.when is not None else ("for_s", "margin")
+    for key in condition_keys:
         if key in model.model_fields_set:
             raise source.error(
                 (*keys, key),
@@ -118,10 +118,10 @@ def _hazard(
                 expected="this key only with `when`",
                 remedy="remove it",
             )
-    when = condition(model.when, known, source, (*keys, "when"))
+    when = manifest_condition(model.when, names, source, (*keys, "when"))
     if model.stl:
         with source.locating_errors((*keys, "stl")):
-            temporal_logic.check_stl_formula(model.stl, known, step_s)
+            temporal_logic.check_stl_formula(model.stl, names, step_s)
     terminal = model.terminal
     return Hazard(
         name=name,
@@ -129,9 +129,9 @@ def _hazard(
         when=when,
         stl=model.stl or "",
         for_s=model.for_s,
-        margin=formula(model.margin, known, source, (*keys, "margin")) or _margin_of(when),
+        margin=manifest_formula(model.margin, names, source, (*keys, "margin")) or _margin_of(when),
         unit=model.unit,
-        terminal=condition(terminal, known, source, (*keys, "terminal"))
+        terminal=manifest_condition(terminal, names, source, (*keys, "terminal"))
         if isinstance(terminal, str)
         else ("True" if terminal else ""),
     )
@@ -152,33 +152,33 @@ def _margin_of(when: str) -> str:
     return f"({low} - {high})"
 
 
-def read_metrics(
-    models: dict[str, MetricModel], known: Collection[str], source: YamlSource
+def build_metrics(
+    models: dict[str, MetricModel], names: Collection[str], source: YamlSource
 ) -> tuple[Metric, ...]:
-    """Read a manifest's metrics; the arguments and errors are those of `read_hazards`."""
-    known = (*known, *(GOLDEN_PREFIX + name for name in known if name != TIME))
-    return tuple(_metric(name, model, known, source) for name, model in models.items())
+    """Read a manifest's metrics; the arguments and errors are those of `build_hazards`."""
+    names = (*names, *(GOLDEN_PREFIX + name for name in names if name != TIME))
+    return tuple(_build_metric(name, model, names, source) for name, model in models.items())
 
 
-def _metric(name: str, model: MetricModel, known: Collection[str], source: YamlSource) -> Metric:
+def _build_metric(name: str, model: MetricModel, names: Collection[str], source: YamlSource) -> Metric:
     keys: KeyPath = ("metrics", name)
     if not name.isidentifier():
         raise source.error(keys, f"'{name}'", expected="a name of letters, digits and _", remedy="rename it")
-    given = [key for key in _AGGREGATES if getattr(model, key) is not None]
-    if len(given) != 1:
+    aggregates = [key for key in _AGGREGATES if getattr(model, key) is not None]
+    if len(aggregates) != 1:
         raise source.error(
             keys,
-            f"metric '{name}' with {' and '.join(given) or 'no aggregate'}",
+            f"metric '{name}' with {' and '.join(aggregates) or 'no aggregate'}",
             expected=f"one of {', '.join(_AGGREGATES)}",
             remedy="give each metric exactly one aggregate",
         )
-    (aggregate,) = given
-    check = condition if aggregate == "duration" else formula
+    (aggregate,) = aggregates
+    canonical = manifest_condition if aggregate == "duration" else manifest_formula
     return Metric(
         name=name,
         aggregate=aggregate,
-        formula=check(getattr(model, aggregate), known, source, (*keys, aggregate)),
-        where=condition(model.where, known, source, (*keys, "where")),
+        formula=canonical(getattr(model, aggregate), names, source, (*keys, aggregate)),
+        where=manifest_condition(model.where, names, source, (*keys, "where")),
         unit=model.unit,
         worse=model.worse,
         about=model.about,

@@ -7,11 +7,16 @@ from pydantic import Field
 from mutator._common.message_text import describe_choices
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import YamlSource
-from mutator.targets.manifest import Film
-from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, check_placeholders
+from mutator.targets.manifest import FilmCommands
+from mutator.targets.placeholders import (
+    FILM_PLACEHOLDERS,
+    FILMED_RUN_PLACEHOLDERS,
+    RUN_PLACEHOLDERS,
+    check_placeholders,
+)
 
 
-class ChangeModel(StrictModel, title="A change"):
+class ScenarioChangeModel(StrictModel, title="A change"):
     """Further arguments, and the scenarios that they make identical."""
 
     args: list[str] = Field(description="Further arguments.")
@@ -42,12 +47,12 @@ class EntryModel(StrictModel, title="The entry"):
         description="Extra arguments for runs that must not use data left by other runs. These are the runs "
         "of the equivalence check and of mutants of files in `reads_itself`.",
     )
-    changes: dict[str, list[str] | ChangeModel] = Field(
+    changes: dict[str, list[str] | ScenarioChangeModel] = Field(
         default_factory=dict, description="Name of a scenario change -> its arguments."
     )
 
 
-def check_commands(entry: EntryModel, film: Film | None, source: YamlSource) -> None:
+def check_commands(entry: EntryModel, film: FilmCommands | None, source: YamlSource) -> None:
     for key, command in (("entry", entry), ("film", film)):
         if command and not all(part.isidentifier() for part in command.module.split(".")):
             raise source.error(
@@ -64,24 +69,24 @@ def check_commands(entry: EntryModel, film: Film | None, source: YamlSource) -> 
             expected="a function of the entry module",
             remedy="write only its name, such as `open_run` or `Drive.open`",
         )
-    _check_runs(entry, source)
+    _check_run_arguments(entry, source)
     if film is not None:
-        _check_films(film, entry.changes, source)
+        _check_film_commands(film, entry.changes, source)
 
 
-def _check_runs(entry: EntryModel, source: YamlSource) -> None:
+def _check_run_arguments(entry: EntryModel, source: YamlSource) -> None:
     keys = ("entry",)
-    check_placeholders(entry.args, OF_RUNS, source, (*keys, "args"))
-    check_placeholders(entry.independent, OF_RUNS, source, (*keys, "independent"))
+    check_placeholders(entry.args, RUN_PLACEHOLDERS, source, (*keys, "args"))
+    check_placeholders(entry.independent, RUN_PLACEHOLDERS, source, (*keys, "independent"))
     for name, change in entry.changes.items():
-        place = (*keys, "changes", name)
+        change_keys = (*keys, "changes", name)
         if isinstance(change, list):
-            check_placeholders(change, OF_RUNS, source, place)
+            check_placeholders(change, RUN_PLACEHOLDERS, source, change_keys)
         else:
-            check_placeholders(change.args, OF_RUNS, source, (*place, "args"))
+            check_placeholders(change.args, RUN_PLACEHOLDERS, source, (*change_keys, "args"))
 
 
-def _check_films(film: Film, changes: Collection[str], source: YamlSource) -> None:
+def _check_film_commands(film: FilmCommands, changes: Collection[str], source: YamlSource) -> None:
     for i, name in enumerate(film.pictures):
         if name not in changes:
             raise source.error(
@@ -90,6 +95,6 @@ def _check_films(film: Film, changes: Collection[str], source: YamlSource) -> No
                 expected=f"{describe_choices(changes)}, the entry's changes",
                 remedy="correct the name",
             )
-    check_placeholders(film.run_args, OF_FILMED_RUNS, source, ("film", "run"))
-    check_placeholders(film.args, OF_FILMS, source, ("film", "args"))
-    check_placeholders(film.still_args, OF_FILMS, source, ("film", "still"))
+    check_placeholders(film.run_args, FILMED_RUN_PLACEHOLDERS, source, ("film", "run"))
+    check_placeholders(film.args, FILM_PLACEHOLDERS, source, ("film", "args"))
+    check_placeholders(film.still_args, FILM_PLACEHOLDERS, source, ("film", "still"))

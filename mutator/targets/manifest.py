@@ -14,28 +14,28 @@ from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
-from mutator.targets.contact_severity import DELTA_V, Contact
+from mutator.targets.contact_severity import DELTA_V_NAME, Contact
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.observed_values import Observation
-from mutator.targets.placeholders import filled
+from mutator.targets.placeholders import fill_placeholders
 from mutator.targets.scene import Scene
-from mutator.targets.source_tree import SourceTree, matches, read_tree
+from mutator.targets.source_tree import SourceTree, matches_any_glob, read_tree
 from mutator.triggers import temporal_logic
 from mutator.triggers.conditions import GOLDEN_PREFIX, names_in
 
-_DELTA_V = Metric(
-    name=DELTA_V,
+_DELTA_V_METRIC = Metric(
+    name=DELTA_V_NAME,
     aggregate="at_end",
     formula="",
     unit="m/s",
     worse="higher",
     about="change of the car's speed in the contact, from contact speed and masses",
 )
-FILM = "film"  # the output folder of a filmed run
+FILM_FOLDER = "film"  # the output folder of a filmed run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Film:
+class FilmCommands:
     """The commands for `mutator show --video` and `--still`. In `run`, `{film}` is the folder for the film.
     In `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of events,
     `{out}` the file to write, and `{t}` the time of a still in s.
@@ -75,18 +75,18 @@ class TargetManifest:
     path: Path
     root: Path  # absolute source root, added to sys.path
     packages: tuple[str, ...]  # import packages (`pkg`) and flat modules (`b.py`) in it
-    files: tuple[str, ...]  # globs, relative to the root: the files of the tree
+    file_globs: tuple[str, ...]  # globs, relative to the root: the files of the tree
     overlay: Path | None  # absolute: a folder of glue files laid over the root
     is_installed: bool  # whether the root is where pip installs packages, so that links may lead anywhere
-    forbid: tuple[str, ...]  # globs: files in which no fault may be injected
+    forbidden_globs: tuple[str, ...]  # globs: files in which no fault may be injected
     env: Mapping[str, str]
     requires: tuple[Requirement, ...]
     entry_module: str  # module, run as `python -m`
     entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}, {root}
-    stepwise: str | None  # function of the entry module: arguments -> a steppable run
-    independent: tuple[str, ...]  # extra arguments for a run that must not use data left by other runs
-    reads_itself: tuple[str, ...]  # globs: files of the tree whose content a run reads
-    changes: Mapping[str, tuple[str, ...]]  # scenario change -> extra arguments
+    stepwise_function: str | None  # function of the entry module: arguments -> a steppable run
+    independent_args: tuple[str, ...]  # extra arguments for a run that must not use data left by other runs
+    self_read_globs: tuple[str, ...]  # globs: files of the tree whose content a run reads
+    args_by_change: Mapping[str, tuple[str, ...]]  # scenario change -> extra arguments
     step_s: float
     armed_after_s: float  # by default, triggers are armed at this time, when the controller is ready
     trace_file: str  # the trace in {out}; its suffix gives the format
@@ -94,15 +94,15 @@ class TargetManifest:
     channels: tuple[Channel, ...]
     record_file: str | None  # a JSON file in {out}, if the target writes one
     observation: Observation
-    rules: tuple[Hazard, ...]
+    hazard_rules: tuple[Hazard, ...]
     metrics: tuple[Metric, ...]
     contact: Contact | None
     scene: Scene | None
     alerts: tuple[str, ...]  # other alerts are ignored
     source: YamlSource = field(repr=False, compare=False)  # the file's lines, for errors
-    film: Film | None = None
+    film: FilmCommands | None = None
     # change -> scenarios that it makes identical, e.g. because they differ only in traffic that it removes
-    same_in: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    same_scenarios_by_change: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     sandbox: bool = False  # whether the target's code runs in a sandbox
 
     @property
@@ -114,14 +114,16 @@ class TargetManifest:
     @property
     def import_names(self) -> tuple[str, ...]:
         """The top-level names of the target's modules, which a run must import from its own tree."""
-        laid_over = sorted(path for path in self.tree.overlaid if path.endswith(".py"))
+        laid_over = sorted(path for path in self.tree.overlaid_paths if path.endswith(".py"))
         names = (*self.packages, *(path.partition("/")[0] for path in laid_over))
         return tuple(dict.fromkeys(name.removesuffix(".py") for name in names))
 
     @cached_property
     def tree(self) -> SourceTree:
         library = self.path.parent.parent
-        tree = read_tree(self.root, self.files, self.overlay, library=library, any_links=self.is_installed)
+        tree = read_tree(
+            self.root, self.file_globs, self.overlay, library=library, any_links=self.is_installed
+        )
         for name in self.packages:
             if name not in tree.files and not any(path.startswith(f"{name}/") for path in tree.files):
                 raise MutatorError(
@@ -134,42 +136,42 @@ class TargetManifest:
         return tree
 
     @cached_property
-    def compared(self) -> tuple[Channel, ...]:
+    def compared_channels(self) -> tuple[Channel, ...]:
         """The actuator channels. A fault has manifested if one of them differs from the golden run."""
         return tuple(channel for channel in self.channels if channel.role is Role.ACTUATOR)
 
     @cached_property
-    def plotted(self) -> tuple[Channel, ...]:
+    def plotted_channels(self) -> tuple[Channel, ...]:
         return tuple(channel for channel in self.channels if channel.role is not Role.ACTUATOR)
 
     @cached_property
-    def judged(self) -> tuple[Channel, ...]:
+    def judged_channels(self) -> tuple[Channel, ...]:
         """The channels that hazards and metrics use."""
         channels = [channel.name for channel in self.channels]
-        known = self.observation.judgeable(channels)
-        needed = self.observation.inputs(_names_of(self.rules, self.metrics, known))
+        names = self.observation.judgeable_names(channels)
+        needed = self.observation.with_inputs(_names_in_criteria(self.hazard_rules, self.metrics, names))
         return tuple(channel for channel in self.channels if channel.name in needed)
 
     @cached_property
-    def hazards(self) -> tuple[str, ...]:
-        return tuple(hazard.name for hazard in self.rules)
+    def hazard_names(self) -> tuple[str, ...]:
+        return tuple(hazard.name for hazard in self.hazard_rules)
 
     @cached_property
-    def measures(self) -> tuple[Metric, ...]:
+    def all_metrics(self) -> tuple[Metric, ...]:
         """The margins of the hazards, the metrics and delta-v."""
-        margins = [hazard.metric for hazard in self.rules if hazard.metric]
-        return (*margins, *self.metrics, *([_DELTA_V] if self.contact else []))
+        margins = [hazard.margin_metric for hazard in self.hazard_rules if hazard.margin_metric]
+        return (*margins, *self.metrics, *([_DELTA_V_METRIC] if self.contact else []))
 
     @property
-    def outputs(self) -> tuple[str, ...]:
+    def output_files(self) -> tuple[str, ...]:
         """The files that a run writes into {out}."""
         return (self.trace_file, *([self.record_file] if self.record_file else []))
 
     def reads_any(self, paths: Iterable[str]) -> bool:
         """Whether a run reads one of these files, so that its caches depend on it."""
-        return any(matches(path, self.reads_itself) for path in paths)
+        return any(matches_any_glob(path, self.self_read_globs) for path in paths)
 
-    def arguments(
+    def run_arguments(
         self,
         *,
         scenario: Path,
@@ -180,18 +182,20 @@ class TargetManifest:
     ) -> tuple[str, ...]:
         """Return the entry module's arguments for one run; MutatorError for an unknown change."""
         values = {"scenario": str(scenario), "seed": str(seed), "out": str(out)}
-        values |= {"film": str(out / FILM), "cache": str(self.cache), "root": str(self.root)}
-        extra = [*self.independent] if independent else []
+        values |= {"film": str(out / FILM_FOLDER), "cache": str(self.cache_folder), "root": str(self.root)}
+        extra = [*self.independent_args] if independent else []
         for change in changes:
-            if change not in self.changes:
+            if change not in self.args_by_change:
                 raise MutatorError(
                     f"change '{change}'",
                     where=self.path,
-                    expected=f"one of {', '.join(self.changes)}" if self.changes else "no change",
+                    expected=f"one of {', '.join(self.args_by_change)}"
+                    if self.args_by_change
+                    else "no change",
                     remedy="add it to the manifest's `changes`, or correct the spec",
                 )
-            extra += self.changes[change]
-        return tuple(filled((*self.entry_args, *extra), values))
+            extra += self.args_by_change[change]
+        return tuple(fill_placeholders((*self.entry_args, *extra), values))
 
     @cached_property
     def cache_name(self) -> str:
@@ -201,22 +205,22 @@ class TargetManifest:
         return f"{self.name}-{digest(self.tree.digest.encode() + read_bounded(self.path))[:16]}"
 
     @property
-    def cache(self) -> Path:
+    def cache_folder(self) -> Path:
         """The folder `{cache}`, which need not exist."""
         return shared_cache.target_folder(self.cache_name)
 
-    def read_by_runs(self) -> tuple[Path, ...]:
+    def paths_read_by_runs(self) -> tuple[Path, ...]:
         """Return what runs read besides their tree, scenario and cache: the target's root, if an argument
         names it.
         """
         words = (
             *self.entry_args,
-            *self.independent,
-            *(word for args in self.changes.values() for word in args),
+            *self.independent_args,
+            *(word for args in self.args_by_change.values() for word in args),
         )
         return (self.root,) if any("{root}" in word for word in words) else ()
 
-    def filming(self) -> "TargetManifest":
+    def with_film_recording(self) -> "TargetManifest":
         """Return the same target, with runs that write a film; MutatorError if it cannot be filmed."""
         if self.film is None:
             raise MutatorError(
@@ -228,10 +232,12 @@ class TargetManifest:
         return replace(self, entry_args=(*self.entry_args, *self.film.run_args))
 
 
-def _names_of(rules: Iterable[Hazard], metrics: Iterable[Metric], known: Collection[str]) -> set[str]:
+def _names_in_criteria(
+    rules: Iterable[Hazard], metrics: Iterable[Metric], names: Collection[str]
+) -> set[str]:
     texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal)]
     texts += [text for metric in metrics for text in (metric.formula, metric.where)]
-    in_stl = (name for rule in rules for name in temporal_logic.names_in(rule.stl, known))
+    in_stl = (name for rule in rules for name in temporal_logic.names_in(rule.stl, names))
     return {name.removeprefix(GOLDEN_PREFIX) for text in texts if text for name in names_in(text)}.union(
         in_stl
     )

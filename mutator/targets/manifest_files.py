@@ -9,17 +9,23 @@ from mutator._common.confined_files import check_name
 from mutator._common.shipped_files import SHIPPED_TARGET_ROOT
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
-from mutator.targets.channel_model import ChannelModel, TraceModel, read_channels
+from mutator.targets.channel_model import ChannelModel, TraceModel, build_channels
 from mutator.targets.contact_severity import Contact
-from mutator.targets.criteria_model import HazardModel, MetricModel, read_hazards, read_metrics
-from mutator.targets.entry_model import ChangeModel, EntryModel, check_commands
-from mutator.targets.manifest import Film, TargetManifest
-from mutator.targets.observation_model import ObservationModel, read_observation
+from mutator.targets.criteria_model import HazardModel, MetricModel, build_hazards, build_metrics
+from mutator.targets.entry_model import EntryModel, ScenarioChangeModel, check_commands
+from mutator.targets.manifest import FilmCommands, TargetManifest
+from mutator.targets.observation_model import ObservationModel, build_observation
 from mutator.targets.process_environment import check_environment
-from mutator.targets.relative_paths import inside
-from mutator.targets.required_packages import read_requirements
-from mutator.targets.roots import INSTALLED, check_installed, find_overlay, find_root, read_packages
-from mutator.targets.scene_model import SceneModel, read_scene
+from mutator.targets.relative_paths import clean_relative_path
+from mutator.targets.required_packages import parse_requirements
+from mutator.targets.roots import (
+    INSTALLED_PREFIX,
+    check_only_installed_package,
+    find_overlay,
+    find_root,
+    package_names,
+)
+from mutator.targets.scene_model import SceneModel, build_scene
 from mutator.targets.severity_model import check_contact
 from mutator.triggers import temporal_logic
 
@@ -113,7 +119,7 @@ class ManifestModel(StrictModel, title="The file"):
         default_factory=list,
         description="The names of the alerts to use; other alerts in a record are ignored.",
     )
-    film: YamlRecord[Film] | None = Field(
+    film: YamlRecord[FilmCommands] | None = Field(
         None, description="How to film runs. Without it, runs cannot be filmed."
     )
 
@@ -121,31 +127,33 @@ class ManifestModel(StrictModel, title="The file"):
 def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = None) -> TargetManifest:
     """Read a manifest; `root` and `overlay` override the values in the file."""
     model, source = load_yaml_model(path, ManifestModel, SCHEMA)
-    requires = read_requirements(model.requires, source)
+    requires = parse_requirements(model.requires, source)
     folder = (root or find_root(model.root, source, requires)).resolve()
     if not folder.is_dir():
         raise source.error(
             ("root",),
             f"no folder {folder}",
             expected=f"the target's source root, relative to this file, or {SHIPPED_TARGET_ROOT}, or "
-            f"{INSTALLED}NAME",
+            f"{INSTALLED_PREFIX}NAME",
             remedy="correct `root`, or give the target with --target or MUTATOR_TARGET",
         )
-    _check_names(model, source)
+    _check_names_confined(model, source)
     check_commands(model.entry, model.film, source)
-    _check_record(model, source)
-    _check_events(model, source)
+    _check_record_name(model, source)
+    _check_event_names(model, source)
     check_environment(model.env, source)
-    packages = read_packages(model.package, model.packages, source)
-    check_installed(model.root, packages, model.files or (), source)
+    packages = package_names(model.package, model.packages, source)
+    check_only_installed_package(model.root, packages, model.files or (), source)
     changes = model.entry.changes
     trace = model.trace or TraceModel.model_validate({})
-    channels = read_channels(model.channels, trace, source)
-    observation = read_observation(model.observation, source)
-    known = observation.judgeable(channel.name for channel in channels)
-    _check_recorded(source, set(observation.variables) - set(known))
-    rules = read_hazards(model.hazards, known, source, recorded=model.record is not None, step_s=model.step_s)
-    metrics = read_metrics(model.metrics, known, source)
+    channels = build_channels(model.channels, trace, source)
+    observation = build_observation(model.observation, source)
+    judgeable_names = observation.judgeable_names(channel.name for channel in channels)
+    _check_criteria_recorded(source, set(observation.variables) - set(judgeable_names))
+    rules = build_hazards(
+        model.hazards, judgeable_names, source, has_record=model.record is not None, step_s=model.step_s
+    )
+    metrics = build_metrics(model.metrics, judgeable_names, source)
     if model.severity:
         check_contact(model.severity, rules, metrics, source)
     return TargetManifest(
@@ -153,19 +161,21 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         path=path,
         root=folder,
         packages=packages,
-        files=tuple(model.files or (p if p.endswith(".py") else f"{p}/**" for p in packages)),
+        file_globs=tuple(model.files or (p if p.endswith(".py") else f"{p}/**" for p in packages)),
         overlay=overlay or find_overlay(model.overlay, source),
-        is_installed=root is None and model.root.startswith(INSTALLED),
-        forbid=tuple(model.forbid),
+        is_installed=root is None and model.root.startswith(INSTALLED_PREFIX),
+        forbidden_globs=tuple(model.forbid),
         env=model.env,
         requires=requires,
         entry_module=model.entry.module,
         entry_args=tuple(model.entry.args),
-        stepwise=model.entry.stepwise,
-        independent=tuple(model.entry.independent),
-        reads_itself=tuple(model.reads_itself),
-        changes={n: tuple(c if isinstance(c, list) else c.args) for n, c in changes.items()},
-        same_in={n: tuple(c.same_in) for n, c in changes.items() if isinstance(c, ChangeModel)},
+        stepwise_function=model.entry.stepwise,
+        independent_args=tuple(model.entry.independent),
+        self_read_globs=tuple(model.reads_itself),
+        args_by_change={n: tuple(c if isinstance(c, list) else c.args) for n, c in changes.items()},
+        same_scenarios_by_change={
+            n: tuple(c.same_in) for n, c in changes.items() if isinstance(c, ScenarioChangeModel)
+        },
         step_s=model.step_s,
         armed_after_s=model.armed_after_s,
         trace_file=trace.file,
@@ -173,17 +183,17 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         channels=channels,
         record_file=model.record,
         observation=observation,
-        rules=rules,
+        hazard_rules=rules,
         metrics=metrics,
         contact=model.severity,
-        scene=None if model.scene is None else read_scene(model.scene, known, source),
+        scene=None if model.scene is None else build_scene(model.scene, judgeable_names, source),
         alerts=tuple(model.alerts),
         source=source,
         film=model.film,
     )
 
 
-def _check_names(model: ManifestModel, source: YamlSource) -> None:
+def _check_names_confined(model: ManifestModel, source: YamlSource) -> None:
     """Refuse names that point out of the folders to which they belong."""
     with source.locating_errors(("name",)):
         check_name(model.name, source.path)
@@ -193,10 +203,10 @@ def _check_names(model: ManifestModel, source: YamlSource) -> None:
     for key in ("files", "forbid", "reads_itself"):
         for i, glob in enumerate(getattr(model, key) or ()):
             with source.locating_errors((key, i)):
-                inside(glob)
+                clean_relative_path(glob)
 
 
-def _check_record(model: ManifestModel, source: YamlSource) -> None:
+def _check_record_name(model: ManifestModel, source: YamlSource) -> None:
     if model.record is not None and Path(model.record).name != model.record:
         raise source.error(
             ("record",),
@@ -206,32 +216,32 @@ def _check_record(model: ManifestModel, source: YamlSource) -> None:
         )
 
 
-def _check_recorded(source: YamlSource, hidden: Collection[str]) -> None:
+def _check_criteria_recorded(source: YamlSource, unrecorded: Collection[str]) -> None:
     """Check that hazards and metrics use only recorded values, because they are judged on the trace."""
     for key in ("hazards", "metrics"):
         entries = source.data.get(key)
         for name, entry in entries.items() if isinstance(entries, dict) else ():
             for field, text in entry.items() if isinstance(entry, dict) else ():
-                found = temporal_logic.names_in(text, hidden) if isinstance(text, str) else ()
-                if found and field not in ("about", "unit", "source"):
+                names = temporal_logic.names_in(text, unrecorded) if isinstance(text, str) else ()
+                if names and field not in ("about", "unit", "source"):
                     raise source.error(
                         (key, name, field),
-                        f"'{found[0]}', which is observed but not recorded",
+                        f"'{names[0]}', which is observed but not recorded",
                         expected="only values that follow from the channels",
-                        remedy=f"have the run record it, as a channel `{found[0]}` with `role: truth`",
+                        remedy=f"have the run record it, as a channel `{names[0]}` with `role: truth`",
                     )
 
 
-def _check_events(model: ManifestModel, source: YamlSource) -> None:
+def _check_event_names(model: ManifestModel, source: YamlSource) -> None:
     for key in ("hazards", "alerts"):
-        seen = set[str]()
+        used_names = set[str]()
         names = getattr(model, key)
         for i, name in enumerate(names):
-            if not name.isidentifier() or name.lower() in seen:
+            if not name.isidentifier() or name.lower() in used_names:
                 raise source.error(
                     (key, name if isinstance(names, dict) else i),
                     f"'{name}'",
                     expected="a unique name of letters, digits and _",
                     remedy="rename it",
                 )
-            seen.add(name.lower())
+            used_names.add(name.lower())

@@ -6,19 +6,19 @@ from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.triggers.conditions import canonical_condition, canonical_formula
 
 
-def condition(text: str | None, known: Collection[str], source: YamlSource, keys: KeyPath) -> str:
-    """Return the condition in canonical text ('' for none). It may use the names `known`; MutatorError at
+def manifest_condition(text: str | None, names: Collection[str], source: YamlSource, keys: KeyPath) -> str:
+    """Return the condition in canonical text ('' for none). It may use `names`; MutatorError at
     `keys` of the manifest.
     """
     if text is None:
         return ""
     with source.locating_errors(keys):
-        return canonical_condition(text, variables=known, over_time=True)
+        return canonical_condition(text, variables=names, over_time=True)
 
 
-def formula(text: str | None, known: Collection[str], source: YamlSource, keys: KeyPath) -> str:
+def manifest_formula(text: str | None, names: Collection[str], source: YamlSource, keys: KeyPath) -> str:
     """Return the formula in canonical text; otherwise like `condition`."""
     if text is None:
         return ""
     with source.locating_errors(keys):
-        return canonical_formula(text, known, over_time=True)
+        return canonical_formula(text, names, over_time=True)

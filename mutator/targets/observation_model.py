@@ -11,18 +11,23 @@ from mutator.config.location_syntax import PROBE_NAME, is_dotted_name
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import YamlSource
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS
-from mutator.targets.observed_values import Observation, Value
-from mutator.targets.relative_paths import inside
+from mutator.targets.observed_values import Observation, ObservedValue
+from mutator.targets.relative_paths import clean_relative_path
 from mutator.triggers.conditions import RESERVED_NAMES, TIME, canonical_formula
 
-_LONGEST = 1000  # characters in an expression, at most
-_READING = (
+_MOST_LENGTH = 1000  # characters in an expression, at most
+_ALLOWED_NODES = (
     *(ast.BinOp, ast.UnaryOp, ast.Compare, ast.Load, ast.Subscript, ast.Call),
     *(ast.operator, ast.unaryop, ast.cmpop),
 )
-_FUNCTIONS = ("abs", "min", "max", "hypot", "float", "len")
-_TAKEN = (*RESERVED_NAMES, "math")
-_ARGUMENTS = {"abs": (1, 1), "float": (1, 1), "len": (1, 1), "hypot": (2, 2)}  # other functions: one or more
+_ALLOWED_CALLS = ("abs", "min", "max", "hypot", "float", "len")
+_RESERVED_NAMES = (*RESERVED_NAMES, "math")
+_ARGUMENT_COUNTS = {
+    "abs": (1, 1),
+    "float": (1, 1),
+    "len": (1, 1),
+    "hypot": (2, 2),
+}  # other functions: one or more
 
 
 class _ValueModel(StrictModel, title="A value"):
@@ -60,7 +65,7 @@ class ObservationModel(StrictModel, title="The observation"):
     )
 
 
-def read_observation(model: ObservationModel, source: YamlSource) -> Observation:
+def build_observation(model: ObservationModel, source: YamlSource) -> Observation:
     location = model.at.location(source, ("observation", "at"))
     if location.anchor.kind in VALUE_ANCHORS | FIXED_ANCHORS:
         raise source.error(
@@ -69,20 +74,23 @@ def read_observation(model: ObservationModel, source: YamlSource) -> Observation
             expected="a statement, such as `after_assign: gap`",
         )
     with source.locating_errors(("observation", "at", "file")):
-        inside(location.path)
+        clean_relative_path(location.path)
     _check_names(model, source)
-    time = None if model.time is None else _read(model.time, source, ("observation", "time"))
+    time = None if model.time is None else _checked_expression(model.time, source, ("observation", "time"))
     values = tuple(
-        Value(
+        ObservedValue(
             name=name,
-            text=_read(value.is_, source, ("observation", "values", name, "is")),
+            text=_checked_expression(value.is_, source, ("observation", "values", name, "is")),
             unit=value.unit,
             about=value.about,
         )
         for name, value in model.values.items()
     )
     return Observation(
-        location=location, time=time, values=values, derived=_derived(model, source, [TIME, *model.values])
+        location=location,
+        time=time,
+        values=values,
+        derived=_build_derived(model, source, [TIME, *model.values]),
     )
 
 
@@ -90,76 +98,78 @@ def _check_names(model: ObservationModel, source: YamlSource) -> None:
     for key, names in (("values", model.values), ("derived", model.derived)):
         for name in names:
             good = name.isidentifier() and not keyword.iskeyword(name) and not name.startswith("_")
-            if not good or name in _TAKEN or (key == "derived" and name in model.values):
+            if not good or name in _RESERVED_NAMES or (key == "derived" and name in model.values):
                 raise source.error(
                     ("observation", key, name),
                     f"'{name}'",
-                    expected=f"a unique name of letters, digits and _, none of {', '.join(_TAKEN)}",
+                    expected=f"a unique name of letters, digits and _, none of {', '.join(_RESERVED_NAMES)}",
                     remedy="rename it",
                 )
 
 
-def _derived(model: ObservationModel, source: YamlSource, known: list[str]) -> tuple[Value, ...]:
-    found = []
+def _build_derived(
+    model: ObservationModel, source: YamlSource, names: list[str]
+) -> tuple[ObservedValue, ...]:
+    values = []
     for name, value in model.derived.items():
         with source.locating_errors(("observation", "derived", name, "is")):
-            text = canonical_formula(value.is_, known)
-        found.append(Value(name=name, text=text, unit=value.unit, about=value.about))
-        known.append(name)
-    return tuple(found)
+            text = canonical_formula(value.is_, names)
+        values.append(ObservedValue(name=name, text=text, unit=value.unit, about=value.about))
+        names.append(name)
+    return tuple(values)
 
 
-def _read(text: str, source: YamlSource, keys: tuple[str, ...]) -> str:
+def _checked_expression(text: str, source: YamlSource, keys: tuple[str, ...]) -> str:
     try:
-        return _expression(text)
+        return _canonical_expression(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise source.error(
             keys,
             describe_value(text),
             expected="names, attributes, items with constant keys, numbers, arithmetic, comparisons, and "
-            f"calls of {', '.join(_FUNCTIONS)}",
+            f"calls of {', '.join(_ALLOWED_CALLS)}",
             remedy="write an expression that gives the value at that statement",
         ) from None
 
 
-def _expression(text: str) -> str:
+def _canonical_expression(text: str) -> str:
     """Check that an expression only reads and computes; ValueError otherwise."""
-    if len(text) > _LONGEST:
+    if len(text) > _MOST_LENGTH:
         raise ValueError(text)
     tree = ast.parse(text.strip(), mode="eval").body
     for node in ast.walk(tree):
         if isinstance(node, ast.Call):
-            known = isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS
-            if not known or node.keywords:
+            is_allowed = isinstance(node.func, ast.Name) and node.func.id in _ALLOWED_CALLS
+            if not is_allowed or node.keywords:
                 raise ValueError(text)
-            least, most = _ARGUMENTS.get(ast.unparse(node.func), (1, _LONGEST))
+            least, most = _ARGUMENT_COUNTS.get(ast.unparse(node.func), (1, _MOST_LENGTH))
             if not least <= len(node.args) <= most:
                 raise ValueError(text)
         elif isinstance(node, ast.Subscript):
-            _check_constant(node.slice, text)
-        elif not _is_plain(node):
+            _check_constant_key(node.slice, text)
+        elif not _is_allowed_node(node):
             raise ValueError(text)
-    return ast.unparse(_Hypot().visit(tree))
+    return ast.unparse(_HypotOfProbe().visit(tree))
 
 
-def _check_constant(node: ast.expr, text: str) -> None:
+def _check_constant_key(node: ast.expr, text: str) -> None:
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         node = node.operand
     if not (isinstance(node, ast.Constant) and type(node.value) in (int, str)):
         raise ValueError(text)
 
 
-def _is_plain(node: ast.AST) -> bool:
+def _is_allowed_node(node: ast.AST) -> bool:
     if isinstance(node, ast.Constant):
         return type(node.value) in (int, float, str)
     if isinstance(node, ast.Name):
         return is_dotted_name(node.id)
     if isinstance(node, ast.Attribute):
         return is_dotted_name(node.attr)
-    return isinstance(node, _READING)
+    return isinstance(node, _ALLOWED_NODES)
 
 
-class _Hypot(ast.NodeTransformer):
+class _HypotOfProbe(ast.NodeTransformer):
     """Replace `hypot` by the probe's function, because the target's file might not import `hypot`."""
 
     def visit_Call(self, node: ast.Call) -> ast.AST:

@@ -9,7 +9,7 @@ from mutator.triggers.conditions import TIME, names_in
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Value:
+class ObservedValue:
     """An observed value. `text` is an expression at the place; for a derived value it is a formula over
     earlier values.
     """
@@ -28,8 +28,8 @@ class Observation:
 
     location: FaultLocation
     time: str | None
-    values: tuple[Value, ...]
-    derived: tuple[Value, ...]
+    values: tuple[ObservedValue, ...]
+    derived: tuple[ObservedValue, ...]
 
     @property
     def expressions(self) -> tuple[tuple[str, str], ...]:
@@ -41,26 +41,26 @@ class Observation:
         """The names for conditions: the time, the observed values and the derived values."""
         return (TIME, *(value.name for value in (*self.values, *self.derived)))
 
-    def inputs(self, names: Iterable[str]) -> frozenset[str]:
+    def with_inputs(self, names: Iterable[str]) -> frozenset[str]:
         """Return these names, and the inputs of those that are derived values."""
-        found = set(names)
+        needed = set(names)
         for value in reversed(self.derived):
-            if value.name in found:
-                found.update(names_in(value.text))
-        return frozenset(found)
+            if value.name in needed:
+                needed.update(names_in(value.text))
+        return frozenset(needed)
 
-    def judgeable(self, channels: Iterable[str]) -> tuple[str, ...]:
+    def judgeable_names(self, channels: Iterable[str]) -> tuple[str, ...]:
         """Return the names that formulas over a trace with these channels can use: time, channels, and values
         derived from them.
         """
-        known = dict.fromkeys((TIME, *(name for name in channels if name.isidentifier())))
+        judgeable = dict.fromkeys((TIME, *(name for name in channels if name.isidentifier())))
         for value in self.derived:
-            if all(name in known for name in names_in(value.text)):
-                known[value.name] = None
-        return tuple(known)
+            if all(name in judgeable for name in names_in(value.text)):
+                judgeable[value.name] = None
+        return tuple(judgeable)
 
 
-def variable_units(observation: Observation) -> Mapping[str, tuple[str, str]]:
+def units_and_meanings(observation: Observation) -> Mapping[str, tuple[str, str]]:
     """Return the unit and meaning of every name in conditions."""
     values = (*observation.values, *observation.derived)
     return {TIME: ("s", "time"), **{value.name: (value.unit, value.about) for value in values}}

@@ -5,19 +5,19 @@ from collections.abc import Mapping
 
 from mutator.config.yaml_sources import YamlSource
 
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-KEPT = ("PATH", "LD_LIBRARY_PATH", "HOME")  # the user's own values, needed to start Python
-FIXED = {
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
+INHERITED_VARIABLES = ("PATH", "LD_LIBRARY_PATH", "HOME")  # the user's own values, needed to start Python
+FIXED_VARIABLES = {
     "LC_ALL": "C.UTF-8",
     "PYTHONUTF8": "1",
     "PYTHONDONTWRITEBYTECODE": "1",
-    **dict.fromkeys(THREADS, "1"),
+    **dict.fromkeys(THREAD_VARIABLES, "1"),
     # pyarrow, imported by pandas, starts a thread for its allocator, which prevents forking
     "JE_ARROW_MALLOC_CONF": "background_thread:false",
 }
-_PREFIXES = ("PYTHON", "LD_")  # prefixes of variables that change the interpreter or what it loads
-_OWN = ("TMPDIR", *KEPT, *FIXED)
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+_REFUSED_PREFIXES = ("PYTHON", "LD_")  # prefixes of variables that change the interpreter or what it loads
+_HARNESS_VARIABLES = ("TMPDIR", *INHERITED_VARIABLES, *FIXED_VARIABLES)
+_NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 
 def check_environment(env: Mapping[str, str], source: YamlSource) -> None:
@@ -25,12 +25,12 @@ def check_environment(env: Mapping[str, str], source: YamlSource) -> None:
     differently.
     """
     for name, value in env.items():
-        if FIXED.get(name) == value:
+        if FIXED_VARIABLES.get(name) == value:
             continue
-        if not _NAME.match(name):
+        if not _NAME_PATTERN.match(name):
             raise source.error(("env", name), f"'{name}'", expected="a name of letters, digits and _")
-        if name in _OWN or name.startswith(_PREFIXES):
-            fixed = f" (it sets {name} to '{FIXED[name]}')" if name in FIXED else ""
+        if name in _HARNESS_VARIABLES or name.startswith(_REFUSED_PREFIXES):
+            fixed = f" (it sets {name} to '{FIXED_VARIABLES[name]}')" if name in FIXED_VARIABLES else ""
             raise source.error(
                 ("env", name),
                 f"variable {name}",

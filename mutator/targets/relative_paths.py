@@ -5,7 +5,7 @@ from pathlib import PurePosixPath
 from mutator.errors import MutatorError
 
 
-def inside(path: str) -> str:
+def clean_relative_path(path: str) -> str:
     """Return `path` as a clean relative path in a target's root; MutatorError, without a file position, if it
     is outside the root.
     """

@@ -11,15 +11,15 @@ from mutator.config.yaml_sources import YamlSource
 if TYPE_CHECKING:
     from mutator.targets.manifest import TargetManifest
 
-MISSING = "not installed"
+NOT_INSTALLED = "not installed"
 
 
-def read_requirements(texts: Sequence[str], source: YamlSource) -> tuple[Requirement, ...]:
+def parse_requirements(texts: Sequence[str], source: YamlSource) -> tuple[Requirement, ...]:
     """Read a manifest's `requires`; MutatorError with the line of an invalid requirement."""
-    found = []
+    requirements = []
     for i, text in enumerate(texts):
         try:
-            found.append(Requirement(text))
+            requirements.append(Requirement(text))
         except InvalidRequirement as error:
             raise source.error(
                 ("requires", i),
@@ -27,35 +27,39 @@ def read_requirements(texts: Sequence[str], source: YamlSource) -> tuple[Require
                 expected="a requirement in pip's syntax, such as gymnasium>=1.0",
                 remedy=f"correct it: {str(error).splitlines()[0]}",
             ) from None
-    return tuple(found)
+    return tuple(requirements)
 
 
-def shortcoming(wanted: Requirement) -> str:
+def installation_problem(requirement: Requirement) -> str:
     """Return what is wrong with a package: `not installed`, or the installed version. Empty if the package is
     installed as required, or is not needed on this platform.
     """
-    if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
+    if requirement.marker and not requirement.marker.evaluate({"extra": ""}):
         return ""
     try:
-        version = metadata.version(wanted.name)
+        version = metadata.version(requirement.name)
     except metadata.PackageNotFoundError:
-        return MISSING
-    fits = wanted.specifier.contains(version, prereleases=True)
-    return "" if fits else f"{version}, wanted {wanted.specifier}"
+        return NOT_INSTALLED
+    fits = requirement.specifier.contains(version, prereleases=True)
+    return "" if fits else f"{version}, wanted {requirement.specifier}"
 
 
 def check_requirements(manifest: "TargetManifest") -> None:
     """Raise MutatorError, with the install command, if packages are missing or have wrong versions."""
-    found = {wanted: problem for wanted in manifest.requires if (problem := shortcoming(wanted))}
-    if found:
-        first = manifest.requires.index(next(iter(found)))
+    problems = {
+        requirement: problem
+        for requirement in manifest.requires
+        if (problem := installation_problem(requirement))
+    }
+    if problems:
+        first = manifest.requires.index(next(iter(problems)))
         raise manifest.source.error(
             ("requires", first),
-            "; ".join(f"{wanted.name}: {problem}" for wanted, problem in found.items()),
+            "; ".join(f"{wanted.name}: {problem}" for wanted, problem in problems.items()),
             expected=f"the packages that target {manifest.name} requires",
-            remedy=pip_install(found),
+            remedy=pip_install_command(problems),
         )
 
 
-def pip_install(wanted: Iterable[Requirement | str]) -> str:
-    return " ".join(["pip install", *(f"'{one}'" for one in wanted)])
+def pip_install_command(requirements: Iterable[Requirement | str]) -> str:
+    return " ".join(["pip install", *(f"'{requirement}'" for requirement in requirements)])

@@ -10,9 +10,9 @@ from mutator._common.confined_files import is_inside
 from mutator._common.shipped_files import SHIPPED_TARGET_ROOT, shipped_folder
 from mutator.config.location_syntax import PROBE_NAME
 from mutator.config.yaml_sources import YamlSource
-from mutator.targets.required_packages import pip_install
+from mutator.targets.required_packages import pip_install_command
 
-INSTALLED = "installed:"  # prefix of an import package's name, as `root` of a manifest
+INSTALLED_PREFIX = "installed:"  # prefix of an import package's name, as `root` of a manifest
 
 
 def find_root(root: str, source: YamlSource, requires: Sequence[Requirement]) -> Path:
@@ -21,18 +21,20 @@ def find_root(root: str, source: YamlSource, requires: Sequence[Requirement]) ->
     """
     if root == SHIPPED_TARGET_ROOT:
         return shipped_folder() / "target"
-    if not root.startswith(INSTALLED):
+    if not root.startswith(INSTALLED_PREFIX):
         return source.path.parent / root
-    name = root.removeprefix(INSTALLED)
+    name = root.removeprefix(INSTALLED_PREFIX)
     if not name.isidentifier():
-        raise source.error(("root",), f"'{root}'", expected=f"{INSTALLED} and the name of an import package")
-    place = installed_at(name)
+        raise source.error(
+            ("root",), f"'{root}'", expected=f"{INSTALLED_PREFIX} and the name of an import package"
+        )
+    place = find_installed(name)
     if place is None:
         raise source.error(
             ("root",),
             f"no package or module '{name}' is installed here",
             expected="one that this Python can import, in a folder of that name or a .py file",
-            remedy=pip_install(requires or [name]),
+            remedy=pip_install_command(requires or [name]),
         )
     return place.parent
 
@@ -59,7 +61,7 @@ def find_overlay(overlay: str | None, source: YamlSource) -> Path | None:
     )
 
 
-def read_packages(package: str | None, packages: Sequence[str] | None, source: YamlSource) -> tuple[str, ...]:
+def package_names(package: str | None, packages: Sequence[str] | None, source: YamlSource) -> tuple[str, ...]:
     """Read the target's packages and modules, without duplicates."""
     if (package is None) == (packages is None):
         raise source.error(
@@ -78,23 +80,25 @@ def read_packages(package: str | None, packages: Sequence[str] | None, source: Y
             )
         return (package,)
     names = tuple(packages or ())
-    seen = {PROBE_NAME}
+    used_names = {PROBE_NAME}
     for i, name in enumerate(names):
         stem = name.removesuffix(".py")
-        if not stem.isidentifier() or stem in seen:
+        if not stem.isidentifier() or stem in used_names:
             raise source.error(
                 ("packages", i),
                 f"'{name}'",
                 expected=f"a package, or a module's file such as drive.py, each once, and not {PROBE_NAME}",
                 remedy="correct the name; do not list modules that are inside a package",
             )
-        seen.add(stem)
+        used_names.add(stem)
     return names
 
 
-def check_installed(root: str, packages: Sequence[str], files: Sequence[str], source: YamlSource) -> None:
+def check_only_installed_package(
+    root: str, packages: Sequence[str], files: Sequence[str], source: YamlSource
+) -> None:
     """Raise MutatorError if the tree would contain files outside an installed package."""
-    name = root.removeprefix(INSTALLED)
+    name = root.removeprefix(INSTALLED_PREFIX)
     if name == root:
         return
     for package in packages:
@@ -112,15 +116,15 @@ def check_installed(root: str, packages: Sequence[str], files: Sequence[str], so
             )
 
 
-def installed_at(name: str) -> Path | None:
+def find_installed(name: str) -> Path | None:
     """Return the folder or file of an import package or module; None if it has no single place on disk."""
     try:
-        found = find_spec(name)
+        spec = find_spec(name)
     except (ImportError, ValueError):
         return None
-    if found is None:
+    if spec is None:
         return None
-    folders = list(found.submodule_search_locations or ())
-    places = [Path(place) for place in folders or [found.origin or ""]]
-    own = [place for place in places if place.name in (name, f"{name}.py") and place.exists()]
-    return own[0] if len(own) == len(places) == 1 else None
+    folders = list(spec.submodule_search_locations or ())
+    places = [Path(place) for place in folders or [spec.origin or ""]]
+    existing = [place for place in places if place.name in (name, f"{name}.py") and place.exists()]
+    return existing[0] if len(existing) == len(places) == 1 else None

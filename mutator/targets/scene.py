@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-Shape = Literal["box", "circle"]
+ActorShape = Literal["box", "circle"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -15,7 +15,7 @@ class Actor:
     """
 
     name: str
-    shape: Shape
+    shape: ActorShape
     length: float
     width: float
     x: str
@@ -27,7 +27,7 @@ class Actor:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
+class GroundLine:
     """A line on the ground: points (x, y) in m, or a formula `y` for a line along x."""
 
     name: str
@@ -43,6 +43,6 @@ class Scene:
     """
 
     actors: tuple[Actor, ...]
-    lines: tuple[Line, ...]
+    lines: tuple[GroundLine, ...]
     follow: str
     speed: str

@@ -7,12 +7,12 @@ from pydantic import Field
 
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
-from mutator.targets.manifest_formulas import condition, formula
-from mutator.targets.scene import Actor, Line, Scene, Shape
+from mutator.targets.manifest_formulas import manifest_condition, manifest_formula
+from mutator.targets.scene import Actor, ActorShape, GroundLine, Scene
 
 
 class _ActorModel(StrictModel, title="An actor"):
-    shape: Shape = Field("box", description="The shape: `box` or `circle`.")
+    shape: ActorShape = Field("box", description="The shape: `box` or `circle`.")
     length_m: float = Field(
         gt=0.0,
         allow_inf_nan=False,
@@ -59,7 +59,7 @@ class SceneModel(StrictModel, title="The scene"):
     )
 
 
-def read_scene(model: SceneModel, known: Collection[str], source: YamlSource) -> Scene:
+def build_scene(model: SceneModel, names: Collection[str], source: YamlSource) -> Scene:
     if model.follow is not None and model.follow not in model.actors:
         raise source.error(
             ("scene", "follow"),
@@ -67,13 +67,13 @@ def read_scene(model: SceneModel, known: Collection[str], source: YamlSource) ->
             expected=f"one of {', '.join(model.actors)}",
             remedy="correct the name",
         )
-    actors = tuple(_actor(name, actor, known, source) for name, actor in model.actors.items())
-    lines = tuple(_line(name, line, known, source) for name, line in model.lines.items())
-    speed = formula(model.speed, known, source, ("scene", "speed"))
+    actors = tuple(_build_actor(name, actor, names, source) for name, actor in model.actors.items())
+    lines = tuple(_build_line(name, line, names, source) for name, line in model.lines.items())
+    speed = manifest_formula(model.speed, names, source, ("scene", "speed"))
     return Scene(actors=actors, lines=lines, follow=model.follow or "", speed=speed)
 
 
-def _actor(name: str, model: _ActorModel, known: Collection[str], source: YamlSource) -> Actor:
+def _build_actor(name: str, model: _ActorModel, names: Collection[str], source: YamlSource) -> Actor:
     keys: KeyPath = ("scene", "actors", name)
     if model.shape == "circle" and model.width_m is not None:
         raise source.error(
@@ -84,16 +84,16 @@ def _actor(name: str, model: _ActorModel, known: Collection[str], source: YamlSo
         shape=model.shape,
         length=model.length_m,
         width=model.width_m or model.length_m,
-        x=formula(model.x, known, source, (*keys, "x")),
-        y=formula(model.y, known, source, (*keys, "y")),
-        heading=formula(model.heading, known, source, (*keys, "heading")),
-        visible=condition(model.visible, known, source, (*keys, "visible")),
+        x=manifest_formula(model.x, names, source, (*keys, "x")),
+        y=manifest_formula(model.y, names, source, (*keys, "y")),
+        heading=manifest_formula(model.heading, names, source, (*keys, "heading")),
+        visible=manifest_condition(model.visible, names, source, (*keys, "visible")),
         believed=model.believed,
         about=model.about,
     )
 
 
-def _line(name: str, model: _LineModel, known: Collection[str], source: YamlSource) -> Line:
+def _build_line(name: str, model: _LineModel, names: Collection[str], source: YamlSource) -> GroundLine:
     keys: KeyPath = ("scene", "lines", name)
     if (model.points_m is None) == (model.y is None):
         raise source.error(
@@ -104,9 +104,9 @@ def _line(name: str, model: _LineModel, known: Collection[str], source: YamlSour
             raise source.error(
                 (*keys, "points_m", i), f"{point}", expected="[x, y]", remedy="give both numbers, in m"
             )
-    return Line(
+    return GroundLine(
         name=name,
         points=tuple((x, y) for x, y in model.points_m or ()),
-        y=formula(model.y, known, source, (*keys, "y")),
+        y=manifest_formula(model.y, names, source, (*keys, "y")),
         dashed=model.dashed,
     )

@@ -8,11 +8,11 @@ from pydantic import Field
 from mutator.config.units import UNITS
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
-from mutator.targets.contact_severity import CLASSES, Contact, Scale
+from mutator.targets.contact_severity import SEVERITY_CLASSES, Contact, SeverityScale
 from mutator.targets.criteria import Hazard, Metric
 
 SCHEMA = "severity/1"
-_KPH = UNITS["kph"].si_factor
+_MPS_PER_KPH = UNITS["kph"].si_factor
 
 
 class _ClassModel(StrictModel, title="A class"):
@@ -22,7 +22,7 @@ class _ClassModel(StrictModel, title="A class"):
     about: str = Field(description="The harm in this class.")
 
 
-class ScaleModel(StrictModel, title="severity/*.yaml"):
+class SeverityScaleModel(StrictModel, title="severity/*.yaml"):
     """The bounds of each class. A library can contain several scales."""
 
     about: str = Field("", description="The purpose of the scale.")
@@ -45,37 +45,37 @@ def check_contact(
             remedy="correct the name, or add `terminal: true` to the hazard",
         )
     speeds = [m.name for m in metrics if m.aggregate == "at_end" and m.unit == "m/s"]
-    if contact.speed not in speeds:
+    if contact.speed_metric not in speeds:
         raise source.error(
             ("severity", "contact_speed"),
-            f"'{contact.speed}'",
+            f"'{contact.speed_metric}'",
             expected=f"a metric with `at_end` and the unit m/s: {', '.join(speeds) or 'there is none'}",
             remedy="correct the name, or add the metric",
         )
 
 
-def load_scale(path: Path) -> Scale:
+def load_severity_scale(path: Path) -> SeverityScale:
     """Read a scale of a library; MutatorError, with the line, unless the classes are S0 to S3 in order."""
-    model, source = load_yaml_model(path, ScaleModel, SCHEMA)
-    if tuple(model.classes) != CLASSES:
+    model, source = load_yaml_model(path, SeverityScaleModel, SCHEMA)
+    if tuple(model.classes) != SEVERITY_CLASSES:
         raise source.error(
             ("classes",),
             f"the classes {', '.join(model.classes)}" if model.classes else "no classes",
-            expected=f"{', '.join(CLASSES)}, in this order",
+            expected=f"{', '.join(SEVERITY_CLASSES)}, in this order",
             remedy="define each of these classes once",
         )
-    least = [one.from_kph for one in model.classes.values()]
-    for i, name in enumerate(CLASSES):
-        if (i == 0 and least[0] != 0.0) or (i and least[i] <= least[i - 1]):
+    lower_bounds = [model_class.from_kph for model_class in model.classes.values()]
+    for i, name in enumerate(SEVERITY_CLASSES):
+        if (i == 0 and lower_bounds[0] != 0.0) or (i and lower_bounds[i] <= lower_bounds[i - 1]):
             raise source.error(
                 ("classes", name, "from_kph"),
-                f"{least[i]:g}",
+                f"{lower_bounds[i]:g}",
                 expected="0 for S0, and for each other class more than for the one before it",
                 remedy="correct the bound",
             )
-    return Scale(
+    return SeverityScale(
         name=path.stem,
         about=model.about,
         source=model.source,
-        classes=tuple((name, one.from_kph * _KPH, one.about) for name, one in model.classes.items()),
+        classes=tuple((name, one.from_kph * _MPS_PER_KPH, one.about) for name, one in model.classes.items()),
     )

@@ -16,38 +16,38 @@ from mutator._common.hashing import canonical_json, digest
 from mutator.errors import MutatorError
 
 T = TypeVar("T")
-MOST_SOURCE = 1_000_000  # bytes of a Python file
-MOST_TREE = 128_000_000  # bytes of all files, which are kept in memory
-_OF_LINK = 100  # files for which a link counts: it takes longer, and links in links multiply
+MOST_SOURCE_BYTES = 1_000_000  # bytes of a Python file
+MOST_TREE_BYTES = 128_000_000  # bytes of all files, which are kept in memory
+_FILES_PER_LINK = 100  # files for which a link counts: it takes longer, and links in links multiply
 MOST_FILES = 50_000  # files and folders below the folders that a manifest's globs name
-_SPECIAL = re.compile(r"(\*\*/|\*\*|\*|\?)")  # special characters in a glob
+_WILDCARD_PATTERN = re.compile(r"(\*\*/|\*\*|\*|\?)")  # special characters in a glob
 
 
 @dataclass(frozen=True)
 class SourceTree:
     """A snapshot of a target: path relative to the root -> bytes; `digest` identifies it.
 
-    The files of the folder `overlay` are laid over those of the root; `overlaid` has their paths.
+    The files of the folder `overlay` are laid over those of the root; `overlaid_paths` has their paths.
     """
 
     root: Path
     files: Mapping[str, bytes]
     digest: str
-    _entries: Mapping[str, str] = field(repr=False)  # input of the digest
+    _digest_inputs: Mapping[str, str] = field(repr=False)  # input of the digest
     overlay: Path | None = None
-    overlaid: frozenset[str] = frozenset()
-    _derived: dict[tuple[str, Callable[..., Any]], Any] = field(
+    overlaid_paths: frozenset[str] = frozenset()
+    _derived_by_file: dict[tuple[str, Callable[..., Any]], Any] = field(
         default_factory=dict, repr=False, compare=False
     )
 
-    def derived(self, path: str, make: Callable[[str, bytes, Path], T]) -> T:
+    def derive_once(self, path: str, make: Callable[[str, bytes, Path], T]) -> T:
         """Return `make(path, data, root)` for a file of the target, called once per path; `root` is the
         file's folder.
 
         MutatorError if the target has no file at `path`; errors of `make` pass through.
         """
         key = (path, make)
-        if key not in self._derived:
+        if key not in self._derived_by_file:
             if path not in self.files:
                 raise MutatorError(
                     f"no file '{path}' in the target",
@@ -55,11 +55,11 @@ class SourceTree:
                     expected="a path relative to the target's root, among the manifest's files",
                     remedy="correct the path, or add the file to the manifest's `files`",
                 )
-            root = self.overlay if self.overlay and path in self.overlaid else self.root
-            self._derived[key] = make(path, self.files[path], root)
-        return cast("T", self._derived[key])
+            root = self.overlay if self.overlay and path in self.overlaid_paths else self.root
+            self._derived_by_file[key] = make(path, self.files[path], root)
+        return cast("T", self._derived_by_file[key])
 
-    def named(self, where: str) -> str:
+    def relative_name(self, where: str) -> str:
         """Return the path of a file as a spec names it, relative to the root or the overlay."""
         for folder in (self.root, self.overlay or self.root):
             where = where.removeprefix(f"{folder}{os.sep}")
@@ -70,15 +70,15 @@ class SourceTree:
         return {path: digest(data) for path, data in self.files.items()}
 
     def digest_with(self, changed: Mapping[str, bytes]) -> str:
-        return _digest({**self._entries, **_entries(changed)})
+        return _digest_of({**self._digest_inputs, **_digest_inputs_of(changed)})
 
 
-def _entries(files: Mapping[str, bytes]) -> dict[str, str]:
+def _digest_inputs_of(files: Mapping[str, bytes]) -> dict[str, str]:
     """Return what each file adds to the digest: its path and digest, as canonical text."""
     return {path: canonical_json([path, digest(data)]) for path, data in files.items()}
 
 
-def _digest(entries: Mapping[str, str]) -> str:
+def _digest_of(entries: Mapping[str, str]) -> str:
     return digest(f"[{','.join(entries[path] for path in sorted(entries))}]".encode())
 
 
@@ -96,8 +96,8 @@ def read_tree(
 
     MutatorError for any other link, and for a path that is in both folders.
     """
-    files = _read(root, tuple(globs), None if any_links else root)
-    laid_over = _read(overlay, ("**",), library or overlay) if overlay else {}
+    files = _read_files(root, tuple(globs), None if any_links else root)
+    laid_over = _read_files(overlay, ("**",), library or overlay) if overlay else {}
     for path in laid_over:
         if os.path.lexists(path_below(root, path)):
             raise MutatorError(
@@ -107,33 +107,33 @@ def read_tree(
                 remedy="rename the overlay's file",
             )
     files |= laid_over
-    entries = _entries(files)
+    entries = _digest_inputs_of(files)
     return SourceTree(
         root=root,
         files=files,
-        digest=_digest(entries),
-        _entries=entries,
+        digest=_digest_of(entries),
+        _digest_inputs=entries,
         overlay=overlay,
-        overlaid=frozenset(laid_over),
+        overlaid_paths=frozenset(laid_over),
     )
 
 
-def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, bytes]:
+def _read_files(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, bytes]:
     """Read the files of `root` that match; Outside for a link that leads out of the folder `bounds`."""
-    seen = 0
+    file_count = 0
 
     def count(path: Path) -> None:
-        nonlocal seen
-        seen += _OF_LINK if path.is_symlink() else 1
-        if seen > MOST_FILES:
+        nonlocal file_count
+        file_count += _FILES_PER_LINK if path.is_symlink() else 1
+        if file_count > MOST_FILES:
             raise MutatorError(
-                f"more than {MOST_FILES:,} files and folders (a link counts as {_OF_LINK})",
+                f"more than {MOST_FILES:,} files and folders (a link counts as {_FILES_PER_LINK})",
                 where=root,
                 expected="the source of one controller",
                 remedy="name narrower folders in the manifest's `files`",
             )
 
-    def enters(folder: Path) -> bool:
+    def should_enter(folder: Path) -> bool:
         """Whether to read a folder; Outside if its files could be part of the tree but are elsewhere."""
         count(folder)
         if bounds is None or is_inside(bounds, folder):
@@ -142,16 +142,16 @@ def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, 
             check_inside(bounds, folder)
         return False
 
-    folders = {_SPECIAL.split(glob)[0].rpartition("/")[0] for glob in globs}
-    found = {}
-    for path in (path for name in folders for path in _below(root / name, enters)):
+    folders = {_WILDCARD_PATTERN.split(glob)[0].rpartition("/")[0] for glob in globs}
+    name_by_path = {}
+    for path in (path for name in folders for path in _files_below(root / name, should_enter)):
         count(path)
-        found[path] = path.relative_to(root).as_posix()
+        name_by_path[path] = path.relative_to(root).as_posix()
     files: dict[str, bytes] = {}
-    left = MOST_TREE
-    for path in sorted(path for path, name in found.items() if matches(name, globs)):
+    remaining_bytes = MOST_TREE_BYTES
+    for path in sorted(path for path, name in name_by_path.items() if matches_any_glob(name, globs)):
         check_path_encodable(path)
-        check_name(found[path], root)
+        check_name(name_by_path[path], root)
         if bounds is not None and path.is_symlink():
             check_inside(bounds, path)
         if path.is_symlink() and not path.exists():
@@ -162,17 +162,23 @@ def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, 
                 remedy="repair or remove the link, or leave it out of `files`",
             )
         if path.is_file():
-            data = read_bounded(path, min(left, MOST_SOURCE if path.suffix == ".py" else left))
-            files[found[path]] = data
-            left -= len(data)
+            data = read_bounded(
+                path, min(remaining_bytes, MOST_SOURCE_BYTES if path.suffix == ".py" else remaining_bytes)
+            )
+            files[name_by_path[path]] = data
+            remaining_bytes -= len(data)
     return files
 
 
-def _below(folder: Path, enters: Callable[[Path], bool], above: tuple[Path, ...] = ()) -> Iterator[Path]:
+def _files_below(
+    folder: Path, should_enter: Callable[[Path], bool], above: tuple[Path, ...] = ()
+) -> Iterator[Path]:
     """Yield all files below a folder except bytecode; a link to a folder above it is not followed."""
     here = folder.resolve()
     try:
-        inside = list(folder.iterdir()) if folder.is_dir() and here not in above and enters(folder) else []
+        inside = (
+            list(folder.iterdir()) if folder.is_dir() and here not in above and should_enter(folder) else []
+        )
     except PermissionError:
         return
     except OSError as err:
@@ -187,7 +193,7 @@ def _below(folder: Path, enters: Callable[[Path], bool], above: tuple[Path, ...]
     for path in inside:
         if path.is_dir():
             if path.name != "__pycache__":
-                yield from _below(path, enters, (*above, here))
+                yield from _files_below(path, should_enter, (*above, here))
         elif path.suffix != ".pyc":
             yield path
 
@@ -197,18 +203,18 @@ def _may_match_below(folder: Sequence[str], glob: Sequence[str]) -> bool:
     for part, pattern in zip(folder, glob, strict=False):
         if "**" in pattern:
             return True
-        if not _pattern(pattern).match(part):
+        if not _glob_pattern(pattern).match(part):
             return False
     return len(glob) > len(folder)
 
 
-def matches(path: str, globs: Iterable[str]) -> bool:
+def matches_any_glob(path: str, globs: Iterable[str]) -> bool:
     """Whether a relative path matches one of the globs; `**` spans folders, `*` does not."""
-    return any(_pattern(glob).match(path) for glob in globs)
+    return any(_glob_pattern(glob).match(path) for glob in globs)
 
 
 @lru_cache(maxsize=1024)
-def _pattern(glob: str) -> re.Pattern[str]:
-    parts = _SPECIAL.split(glob)
+def _glob_pattern(glob: str) -> re.Pattern[str]:
+    parts = _WILDCARD_PATTERN.split(glob)
     special = {"**/": r"(?:.*/)?", "**": r".*", "*": r"[^/]*", "?": r"[^/]"}
     return re.compile("".join(special.get(part, re.escape(part)) for part in parts) + r"\Z")

@@ -12,7 +12,7 @@ from mutator.triggers.conditions import TIME, divide, names_in, parse_expression
 _REMEDY = "leave `after_hazard` out of the campaign, so that runs continue"
 
 
-def stop_source(manifest: TargetManifest) -> str:
+def stop_function_source(manifest: TargetManifest) -> str:
     """Return the source of a function `over(recorded)`, which says whether a terminal hazard holds in a step.
 
     `recorded` has the step's values, by their names in the trace. The code needs `math`, and `min` and `max`
@@ -20,11 +20,13 @@ def stop_source(manifest: TargetManifest) -> str:
     hazard that cannot be decided from one step, because it has `for_s`, looks at earlier steps, is judged by
     the record or by temporal logic, or uses a channel that is not recorded in each step.
     """
-    if manifest.stepwise is None:
-        raise _refused(manifest, ("entry",), "no `stepwise`", "a run that can be ended between two steps")
-    conditions = [_condition(manifest, hazard) for hazard in manifest.rules if hazard.terminal]
+    if manifest.stepwise_function is None:
+        raise _cannot_stop_error(
+            manifest, ("entry",), "no `stepwise`", "a run that can be ended between two steps"
+        )
+    conditions = [_stop_condition(manifest, hazard) for hazard in manifest.hazard_rules if hazard.terminal]
     if not conditions:
-        raise _refused(manifest, ("hazards",), "no terminal hazard", "one with `terminal`")
+        raise _cannot_stop_error(manifest, ("hazards",), "no terminal hazard", "one with `terminal`")
     channels = {channel.name: channel for channel in manifest.channels}
     derived = [value for value in manifest.observation.derived if value.name not in channels]
     needed = {name for text in conditions for name in names_in(text)}
@@ -34,9 +36,11 @@ def stop_source(manifest: TargetManifest) -> str:
     for channel in manifest.channels:
         if channel.name in needed and channel.time:
             keys = ("channels", channel.name, "time")
-            raise _refused(manifest, keys, f"{channel.name} has separate times", "a number in each step")
+            raise _cannot_stop_error(
+                manifest, keys, f"{channel.name} has separate times", "a number in each step"
+            )
         if channel.name in needed:
-            lines.append(f"    {channel.name} = float(recorded[{channel.in_trace!r}])")
+            lines.append(f"    {channel.name} = float(recorded[{channel.name_in_trace!r}])")
     lines += [f"    {v.name} = {to_python(v.text, number=True)}" for v in derived if v.name in needed]
     holds = " or ".join(f"({to_python(text)})" for text in conditions)
     return "\n".join(
@@ -44,24 +48,28 @@ def stop_source(manifest: TargetManifest) -> str:
     )
 
 
-def _condition(manifest: TargetManifest, hazard: Hazard) -> str:
-    own = hazard.terminal != "True"
-    text = hazard.terminal if own else hazard.when
+def _stop_condition(manifest: TargetManifest, hazard: Hazard) -> str:
+    has_end_condition = hazard.terminal != "True"
+    text = hazard.terminal if has_end_condition else hazard.when
     keys = ("hazards", hazard.name)
     if not text:
         judge = "temporal logic" if hazard.stl else "the target itself"
-        raise _refused(manifest, keys, f"{hazard.name}, which is judged by {judge}", "a condition, `when`")
-    if hazard.for_s and not own:
-        raise _refused(manifest, (*keys, "for_s"), f"{hazard.name} has `for_s`", "a condition of one step")
+        raise _cannot_stop_error(
+            manifest, keys, f"{hazard.name}, which is judged by {judge}", "a condition, `when`"
+        )
+    if hazard.for_s and not has_end_condition:
+        raise _cannot_stop_error(
+            manifest, (*keys, "for_s"), f"{hazard.name} has `for_s`", "a condition of one step"
+        )
     calls = {
         ast.unparse(node.func) for node in ast.walk(parse_expression(text)) if isinstance(node, ast.Call)
     }
     if earlier := calls & {"ever", "rate"}:
         got = f"{hazard.name} uses `{min(earlier)}`"
-        raise _refused(manifest, keys, got, "a condition of a single step")
+        raise _cannot_stop_error(manifest, keys, got, "a condition of a single step")
     return text
 
 
-def _refused(manifest: TargetManifest, keys: KeyPath, got: str, expected: str) -> MutatorError:
+def _cannot_stop_error(manifest: TargetManifest, keys: KeyPath, got: str, expected: str) -> MutatorError:
     got = f"runs cannot stop at a terminal hazard: {got}"
     return manifest.source.error(keys, got, expected=expected, remedy=_REMEDY)

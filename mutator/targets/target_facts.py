@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from mutator.targets.channels import Role
-from mutator.targets.contact_severity import Scale
+from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 
 T_END = "t_end"  # the metric column with the end of the drive
@@ -51,7 +51,7 @@ class TargetFacts:
     compared: tuple[str, ...]
     metrics: tuple[MetricFacts, ...]
     about_hazards: tuple[HazardFacts, ...]
-    severity: Scale | None
+    severity: SeverityScale | None
     channels: tuple[ChannelFacts, ...]
     structure: Mapping[str, Any] | None
     golden_files: tuple[str, ...]
@@ -66,12 +66,15 @@ def metric_facts(manifest: TargetManifest) -> tuple[MetricFacts, ...]:
     """Return the facts of each metric column. If a hazard can end the drive, its end comes first."""
     about = "when a terminal hazard ended the drive; metrics do not cover later steps"
     end = (
-        [MetricFacts(T_END, "s", about, "lower")] if any(hazard.terminal for hazard in manifest.rules) else []
+        [MetricFacts(T_END, "s", about, "lower")]
+        if any(hazard.terminal for hazard in manifest.hazard_rules)
+        else []
     )
-    return (*end, *(MetricFacts(m.name, m.unit, m.about, m.worse) for m in manifest.measures))
+    return (*end, *(MetricFacts(m.name, m.unit, m.about, m.worse) for m in manifest.all_metrics))
 
 
 def hazard_facts(manifest: TargetManifest) -> tuple[HazardFacts, ...]:
     return tuple(
-        HazardFacts(name=one.name, about=one.about, terminal=bool(one.terminal)) for one in manifest.rules
+        HazardFacts(name=hazard.name, about=hazard.about, terminal=bool(hazard.terminal))
+        for hazard in manifest.hazard_rules
     )

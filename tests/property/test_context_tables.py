@@ -36,8 +36,8 @@ def test_a_proved_table_has_one_context_for_every_observation(
 ) -> None:
     texts = {"A": first, "B": f"not ({first}) and ({second})", "C": f"not ({first}) and not ({second})"}
     right = {row: canonical_condition(text) for row, text in texts.items()}
-    assert measure_coverage(right).place is None
+    assert measure_coverage(right).first_gap_or_overlap is None
     assert len(contexts_at(right, hwt, rs, v_ego)) == 1
     loose = {"A": canonical_condition(first), "B": canonical_condition(second)}
     if len(contexts_at(loose, hwt, rs, v_ego)) != 1:
-        assert measure_coverage(loose).place is not None
+        assert measure_coverage(loose).first_gap_or_overlap is not None

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mutator.faults.fault_specs import Draw
-from mutator.faults.spec_expansion import draw_values, expand
+from mutator.faults.spec_expansion import draw_values, expand_spec
 from mutator.model import Fault
 from mutator.workspace import Workspace
 
@@ -21,7 +21,7 @@ RANGES = st.lists(
 
 
 def library(seed: int, reading: str) -> list[Fault]:
-    return [f for s in SPECS for f in expand(s, seed, reading, models=MODELS, manifest=MANIFEST)]
+    return [f for s in SPECS for f in expand_spec(s, seed, reading, models=MODELS, manifest=MANIFEST)]
 
 
 @settings(max_examples=100, deadline=None)
@@ -69,11 +69,11 @@ def test_more_ranges_do_not_change_earlier_values(
 def test_both_readings_have_the_same_values(seed: int) -> None:
     described, coded = library(seed, "as_described"), library(seed, "as_coded")
     assert [(f.spec, f.value, f.unit) for f in described] == [(f.spec, f.value, f.unit) for f in coded]
-    assert len({f.id for f in (*described, *coded)}) == 2 * sum(spec.count for spec in SPECS)
+    assert len({f.id for f in (*described, *coded)}) == 2 * sum(spec.fault_count for spec in SPECS)
 
 
 @settings(max_examples=10, deadline=None)
 @given(SEEDS, st.permutations(SPECS), st.sampled_from(CLONE.readings().names))
 def test_the_order_of_specs_does_not_matter(seed: int, specs: list, reading: str) -> None:
-    found = {f.id for s in specs for f in expand(s, seed, reading, models=MODELS, manifest=MANIFEST)}
+    found = {f.id for s in specs for f in expand_spec(s, seed, reading, models=MODELS, manifest=MANIFEST)}
     assert found == {f.id for f in library(seed, reading)}

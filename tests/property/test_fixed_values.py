@@ -60,7 +60,7 @@ def probe(ids: Sequence[str]) -> Any:
     trigger = Trigger(name="test", condition="t >= 1 and t < 2")
     settings = build_probe_settings("m", trigger, Hold.WHILE, ids, observation, 1.0, sets=True)
     made = types.ModuleType("_fi")
-    exec(render_probe(models().probe, settings).text, vars(made))
+    exec(render_probe(models().probe_templates, settings).text, vars(made))
     return made
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
 from mutator.mutants.anchors import parsed_file
 from mutator.mutants.mutant_building import Mutant, build, build_without_reuse
@@ -47,7 +47,7 @@ def faults() -> list[Fault]:
         fault
         for reading in READINGS
         for spec in specs
-        for fault in expand(spec, 1, reading, models=models, manifest=manifest)
+        for fault in expand_spec(spec, 1, reading, models=models, manifest=manifest)
     ]
 
 

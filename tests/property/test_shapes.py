@@ -8,7 +8,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.review.patch_shapes import group_label, parameter_values, shapes_of_patches
@@ -26,7 +26,7 @@ def setting() -> tuple[object, object, list[Fault]]:
     found = {}
     for reading in WORKSPACE.readings().names:
         for spec in WORKSPACE.specs():
-            for fault in expand(spec, 1, reading, models=models, manifest=manifest):
+            for fault in expand_spec(spec, 1, reading, models=models, manifest=manifest):
                 found[reading, fault.spec] = fault
     return manifest, models, list(found.values())
 

@@ -167,7 +167,7 @@ def test_20000_mutants_differ_only_in_their_changed_values() -> None:
 
 
 def mutations(file: ParsedFile) -> Iterator[Mutation]:
-    tree = SourceTree(root=Path(), files={file.path: file.data}, digest="", _entries={})
+    tree = SourceTree(root=Path(), files={file.path: file.data}, digest="", _digest_inputs={})
     facts = facts_of(tree, file.path)
     for function in file.functions_by_name:
         yield from mutations_of(file, facts, function, models(), OPERATORS.shipped_names())

@@ -26,7 +26,7 @@ from mutator.errors import MutatorError, Outside
 from mutator.execution.cluster.parcel import pack_parcel, unpack_parcel
 from mutator.execution.cluster.unpacked_bundle import BUNDLE_SCHEMA, META_FILE, UnpackedBundle
 from mutator.faults.fault_model_files import load_fault_models
-from mutator.faults.fault_models import FILES
+from mutator.faults.fault_models import TEMPLATE_FOLDER_GLOBS
 from mutator.results.table_columns import check_column_names
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
@@ -109,13 +109,13 @@ def _bundle_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Itera
     yield f"manifest/{manifest.path.name}", read_bounded(manifest.path)
     tree = manifest.tree
     for path, data in tree.files.items():
-        yield f"{'overlay' if path in tree.overlaid else 'target'}/{path}", data
+        yield f"{'overlay' if path in tree.overlaid_paths else 'target'}/{path}", data
     for file in _files_named_by_arguments(manifest):
         name = file.relative_to(manifest.root).as_posix()
         if name not in tree.files:
             _check_size(file.stat().st_size, file)
             yield f"target/{name}", read_bounded(file)
-    for kind in FILES:
+    for kind in TEMPLATE_FOLDER_GLOBS:
         for file in sorted(workspace.templates.glob(kind)):
             yield f"templates/{file.name}", read_bounded(check_inside(workspace.templates, file))
     for name in sorted(folder.scenarios):

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from mutator._common.files import raising_disk_full, remove_folder
 from mutator._common.resource_shortages import find_shortage
-from mutator.errors import MutatorError, PieceNotWanted
+from mutator.errors import MutatorError, PieceNoLongerNeeded
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceResult
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
@@ -65,7 +65,7 @@ class _PieceProcess:
         since = time.monotonic()
         while time.monotonic() - since < patience_s:
             if not is_wanted():
-                raise PieceNotWanted
+                raise PieceNoLongerNeeded
             if self.connection.poll(_CHECK_INTERVAL_S):
                 message = self.connection.recv()
                 if isinstance(message, bytes):
@@ -176,7 +176,7 @@ class WorkerHost:
                 if isinstance(process_or_error, Exception):
                     raise process_or_error
                 return process_or_error
-        raise PieceNotWanted
+        raise PieceNoLongerNeeded
 
     def _start_process(self) -> _PieceProcess:
         """Start a process that dies with this thread."""

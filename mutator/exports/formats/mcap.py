@@ -240,7 +240,7 @@ def _chosen(folder: RunFolder, only: str | None) -> list[str]:
 
 
 def _of_trace(trace: Trace, manifest: TargetManifest) -> Iterator[Topic]:
-    for channel in (*manifest.compared, *manifest.plotted):
+    for channel in (*manifest.compared_channels, *manifest.plotted_channels):
         if channel.name in trace:
             clock = own_times(channel.name)
             time = trace[clock if clock in trace else manifest.time_channel]

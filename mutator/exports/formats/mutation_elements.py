@@ -14,7 +14,7 @@ from mutator._common.version import VERSION
 from mutator.execution import single_run
 from mutator.exports import Export, ExportRequest
 from mutator.faults.fault_models import FaultModels, SnippetKind
-from mutator.model import OPERATORS, Experiment, Fault, Injection, Outcome, Record, Status
+from mutator.model import OPERATORS_MODULE, Experiment, Fault, Injection, Outcome, Record, Status
 from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.mutants.expressions import parenthesized
 from mutator.mutants.injection_edits import edits_of
@@ -79,7 +79,7 @@ def _mutant(
     description += f"; also at {', '.join(also)}" if also else ""
     return {
         "id": fault.id,
-        "mutatorName": fault.fault_type if fault.module == OPERATORS else first.model,
+        "mutatorName": fault.fault_type if fault.module == OPERATORS_MODULE else first.model,
         "description": description,
         **_change(manifest, models, fault),
         **verdict(experiments, records),
@@ -97,7 +97,7 @@ def _change(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict
     if isinstance(edit, ValueEdit):
         # `parenthesized` adds parentheses if an adjacent operator could bind more tightly
         return _located(file, edit.start, edit.end, parenthesized(edit.changed))
-    if fault.module == OPERATORS and model.kind is SnippetKind.GUARD:  # the mutant omits the statement
+    if fault.module == OPERATORS_MODULE and model.kind is SnippetKind.GUARD:  # the mutant omits the statement
         line, last = file.lines[span[0]], file.lines[span[1] - 1].rstrip(b"\r\n")
         start = len(line) - len(line.lstrip())
         return _located(file, (span[0], start), (span[1] - 1, len(last)), "pass")

@@ -9,7 +9,7 @@ from mutator.outcomes.trace_files import Arrays, Importer, TraceRequest, own_tim
 def _read_mcap(request: TraceRequest) -> Arrays:
     """Read the channels, which are named `/topic:field.of.field`."""
     steps = request.time_channel
-    places = {channel.name: channel.in_trace.partition(":")[::2] for channel in request.channels}
+    places = {channel.name: channel.name_in_trace.partition(":")[::2] for channel in request.channels}
     may_miss = {channel.name for channel in request.optional}
     fields: dict[str, dict[str, None]] = {steps: {}}
     for topic, field in places.values():

@@ -150,7 +150,7 @@ READS = {  # a file of the library or its templates -> what reads it
     "stpa/hazards.yaml": lambda found: found.hazards(),
     "stpa/control_structure.yaml": lambda found: found.analysis(),
     "references/paper_summary.yaml": lambda found: found.references,
-    "severity/mine.yaml": lambda found: found._files("severity"),
+    "severity/mine.yaml": lambda found: found._path_by_name("severity"),
     "readings.yaml": lambda found: found.readings(),
     "notes/any.py": lambda found: list(unfilled_mark_errors(found.library)),
     "../templates/offset.yaml": lambda found: found.fault_models(),

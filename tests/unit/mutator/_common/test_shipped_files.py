@@ -9,7 +9,7 @@ import pytest
 from mutator._common import shipped_files
 from mutator._common.shipped_files import check_not_shipped, shipped_folder, write_new_library
 from mutator.errors import MutatorError
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.mutants.mutant_building import build
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
@@ -146,7 +146,7 @@ def test_edits_in_a_new_library_take_effect(tmp_path: Path) -> None:
     spec.write_text(spec.read_text().replace("after_assign: d_rel", "after_assign: v_rel"))
     workspace = Workspace.find(tmp_path / "new")
     manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
-    fault = expand(workspace.spec("radar/chaff"), 0, "as_described", models=models, manifest=manifest)[0]
+    fault = expand_spec(workspace.spec("radar/chaff"), 0, "as_described", models=models, manifest=manifest)[0]
     patch = build(manifest, models, fault, always_trigger(armed_after_s=1.5)).patch
     assert f"v_rel = v_rel + {fault.value} * 1.0" in patch
 

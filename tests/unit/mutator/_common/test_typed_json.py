@@ -10,7 +10,7 @@ import pytest
 
 from mutator._common.hashing import added_field, as_json_types
 from mutator._common.typed_json import from_json_types
-from mutator.errors import Misfit
+from mutator.errors import TypeMisfit
 
 
 class Colour(StrEnum):
@@ -98,20 +98,20 @@ def test_what_does_not_fit_is_refused_with_its_place(
     if path is None:
         assert from_json_types(Whole, data).more == tuple(change["more"])
         return
-    with pytest.raises(Misfit) as refused:
+    with pytest.raises(TypeMisfit) as refused:
         from_json_types(Whole, data)
     assert (refused.value.path, refused.value.got, refused.value.expected) == (path, got, expected)
 
 
 def test_a_value_in_a_message_is_short_and_printable() -> None:
-    with pytest.raises(Misfit) as refused:
+    with pytest.raises(TypeMisfit) as refused:
         from_json_types(int, "\x1b[2J" * 99)
     assert refused.value.got.isprintable() and len(refused.value.got) < 70
 
 
 def test_text_that_no_file_can_have_is_refused() -> None:
     """JSON can spell half of a character, but UTF-8 has none."""
-    with pytest.raises(Misfit) as error:
+    with pytest.raises(TypeMisfit) as error:
         from_json_types(Part, json.loads(r'{"name": "a\ud800", "size": null}'))
     assert (error.value.got, error.value.path) == (r"'a\ud800'", ["name"])
     assert from_json_types(Part, json.loads(r'{"name": "\ud83d\ude00", "size": null}')).name == "\U0001f600"

@@ -50,7 +50,7 @@ def changes() -> Changes:
             new = "".join(f"{indent}{one}  # fi:abc\n" for one in lines.split("\n"))
             text = text.replace(line, new + line)
         tree = SourceTree(None, {"car/car.py": PRISTINE.encode()}, "", {})  # type: ignore[arg-type]
-        manifest = SimpleNamespace(package="car", reads_itself=reads_itself, tree=tree)
+        manifest = SimpleNamespace(package="car", self_read_globs=reads_itself, tree=tree)
         return plan_swap(manifest, {"car/car.py": text.encode(), "car/_fi.py": b""}, PROBE, "/tree")  # type: ignore[arg-type]
 
     return make
@@ -109,7 +109,7 @@ def test_a_guard_must_keep_the_original_statement_in_its_else_branch(kept: int, 
     added = "" if kept else "            y = 0.0  # fi:abc guard:1\n"
     text = "from car import _fi  # fi:probe\n" + PRISTINE.replace(line, f"{guarded}{added}    {line}")
     tree = SourceTree(None, {"car/car.py": PRISTINE.encode()}, "", {})  # type: ignore[arg-type]
-    manifest = SimpleNamespace(package="car", reads_itself=(), tree=tree)
+    manifest = SimpleNamespace(package="car", self_read_globs=(), tree=tree)
     files = {"car/car.py": text.encode(), "car/_fi.py": b""}
     if swappable:
         assert [f.name_path for f in plan_swap(manifest, files, PROBE, "/tree").functions] == [("Car", "go")]  # type: ignore[arg-type]
@@ -126,7 +126,7 @@ def test_a_file_that_the_run_reads_itself_is_not_swapped(changes: Changes) -> No
 def test_a_change_beyond_inserted_lines_is_not_swapped(changes: Changes) -> None:
     manifest = SimpleNamespace(
         package="car",
-        reads_itself=(),
+        self_read_globs=(),
         tree=SimpleNamespace(files={"car/car.py": b"x = 1\n"}),
     )
     with pytest.raises(NotSwappable, match="more than inserted lines"):

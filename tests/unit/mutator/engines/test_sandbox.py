@@ -216,8 +216,8 @@ def test_a_mutant_that_exchanges_its_folder_for_a_link_reaches_nothing(
 @needed
 def test_only_fault_free_runs_write_to_a_cache_of_this_target_alone(run: Run, toycar: Workspace) -> None:
     manifest = toycar.manifest("toycar")
-    cache = replace(manifest, sandbox=True).cache
-    assert cache.parent == manifest.cache.parent and cache != manifest.cache
+    cache = replace(manifest, sandbox=True).cache_folder
+    assert cache.parent == manifest.cache_folder.parent and cache != manifest.cache_folder
     body = f"open({str(cache / 'frame')!r}, 'w').write('x')"
     assert run(body).detail.startswith("FileNotFoundError")
     assert run().status is Status.OK and list(cache.iterdir()) == []

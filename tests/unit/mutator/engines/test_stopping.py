@@ -19,7 +19,7 @@ from mutator.execution.experiment_runner import ExperimentRunner, FinishedExperi
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.golden_comparison import trace_until
-from mutator.targets.stop_code import stop_source
+from mutator.targets.stop_code import stop_function_source
 from mutator.triggers import trace_formulas
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 
@@ -148,14 +148,14 @@ def test_a_hazard_that_cannot_be_judged_in_each_step_is_refused(
 ) -> None:
     edit(MANIFEST, old, new)
     with pytest.raises(MutatorError, match=re.escape(f"cannot stop at a terminal hazard: {message}")):
-        stop_source(stopping.toy.manifest("toycar"))
+        stop_function_source(stopping.toy.manifest("toycar"))
 
 
 def test_a_target_without_a_terminal_hazard_is_refused(stopping: Fork, edit: Edit) -> None:
     edit(MANIFEST, ", terminal: true", "")
     edit(MANIFEST, ", terminal: speed > 90", "")
     with pytest.raises(MutatorError, match="no terminal hazard"):
-        stop_source(stopping.toy.manifest("toycar"))
+        stop_function_source(stopping.toy.manifest("toycar"))
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_a_target_without_a_terminal_hazard_is_refused(stopping: Fork, edit: Edi
     ],
 )
 def test_any_terminal_condition_ends_a_run(stopping: Fork, gap: float, speed: float, over: bool) -> None:
-    source = stop_source(stopping.toy.manifest("toycar"))
+    source = stop_function_source(stopping.toy.manifest("toycar"))
     assert compile_stop_condition(source)({"time": 1.0, "gap": gap, "speed": speed}) is over
 
 
@@ -177,12 +177,12 @@ def test_any_terminal_condition_ends_a_run(stopping: Fork, gap: float, speed: fl
 def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edit, terminal: str) -> None:
     edit(MANIFEST, "terminal: speed > 90", f"terminal: '{terminal}'")
     manifest = stopping.toy.manifest("toycar")
-    over = compile_stop_condition(stop_source(manifest))
+    over = compile_stop_condition(stop_function_source(manifest))
     for numbers in product((math.nan, 30.0, 50.0, 100.0), repeat=3):
         t, gap, speed = ([number] for number in numbers)
         values = {"t": t, "d_rel": gap, "near": gap, "speed": speed}
         trace = {name: np.array(value) for name, value in values.items()}
-        judged = [r.when if r.terminal == "True" else r.terminal for r in manifest.rules if r.terminal]
+        judged = [r.when if r.terminal == "True" else r.terminal for r in manifest.hazard_rules if r.terminal]
         expected = any(trace_formulas.condition_at_each_step(text, trace)[0] for text in judged)
         assert over({"time": t[0], "gap": gap[0], "speed": speed[0]}) is expected, numbers
 

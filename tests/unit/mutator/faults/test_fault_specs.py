@@ -7,7 +7,7 @@ import pytest
 from mutator.config.units import UNIT_LIST
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import Draw, load_spec
-from mutator.faults.spec_expansion import draw_values, expand
+from mutator.faults.spec_expansion import draw_values, expand_spec
 from mutator.model import Fault, Hold
 from mutator.workspace import Workspace
 from tests.costs import is_cheap
@@ -16,7 +16,7 @@ NAME = "sensor/distance"
 
 
 def faults(workspace: Workspace, seed: int = 3, reading: str | None = None) -> tuple[Fault, ...]:
-    return expand(
+    return expand_spec(
         workspace.spec(NAME),
         seed,
         reading,
@@ -32,8 +32,8 @@ def of(found: tuple[Fault, ...], variant: str) -> list[Fault]:
 def test_a_spec_keeps_the_order_of_its_variants(toy: Workspace) -> None:
     spec = toy.spec(NAME)
     assert [v.name for v in spec] == ["longer", "silent", "both"]
-    assert [v.count for v in spec] == [3, 1, 2]
-    assert spec.count == 6 == len(faults(toy))
+    assert [v.fault_count for v in spec] == [3, 1, 2]
+    assert spec.fault_count == 6 == len(faults(toy))
     assert spec.path == toy.library / "faults" / "sensor" / "distance.yaml"
 
 
@@ -313,7 +313,7 @@ def test_a_mistake_is_reported_with_a_remedy(toy: Workspace, old: str, new: str,
 def test_a_spec_outside_the_library_is_loaded_by_path(tmp_path: Path, toy: Workspace) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text((toy.library / "faults" / "sensor" / "distance.yaml").read_text())
-    assert load_spec(path, toy.readings()).count == toy.spec(path).count == 6
+    assert load_spec(path, toy.readings()).fault_count == toy.spec(path).fault_count == 6
 
 
 def test_an_unknown_reading_is_refused(toy: Workspace) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.faults.injected_imports import check_import
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.workspace import Workspace
 
 SPEC = """schema: fault_spec/1
@@ -33,7 +33,7 @@ def answer(toy: Workspace, name: str) -> str:
     path = toy.library / "faults" / "sensor" / "weather.yaml"
     path.write_text(SPEC.replace("toycar.sensor.NAME", name))
     try:
-        expand(toy.spec(path), 1, models=toy.fault_models(), manifest=toy.manifest("toy"))
+        expand_spec(toy.spec(path), 1, models=toy.fault_models(), manifest=toy.manifest("toy"))
     except MutatorError as error:
         return str(error).replace(str(path), "weather.yaml")
     return ""

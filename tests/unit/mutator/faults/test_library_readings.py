@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.faults.library_readings import FILE, UNDECLARED, load_readings
-from mutator.faults.spec_expansion import expand
+from mutator.faults.library_readings import DEFAULT_READINGS, READINGS_FILE, load_readings
+from mutator.faults.spec_expansion import expand_spec
 from mutator.workspace import Workspace
 
 TEXT = """\
@@ -20,14 +20,14 @@ readings:
 
 
 def declare(workspace: Workspace, first: str, second: str) -> None:
-    (workspace.library / FILE).write_text(TEXT.format(first=first, second=second))
+    (workspace.library / READINGS_FILE).write_text(TEXT.format(first=first, second=second))
 
 
 def test_the_first_reading_is_the_default(toy: Workspace) -> None:
     declare(toy, "printed", "measured")
     readings = load_readings(toy.library)
     assert (readings.names, readings.default) == (("printed", "measured"), "printed")
-    assert readings.about == ("The first.", "The second.")
+    assert readings.descriptions == ("The first.", "The second.")
 
 
 def test_a_library_without_the_file_has_one_reading(toy: Workspace) -> None:
@@ -36,11 +36,11 @@ def test_a_library_without_the_file_has_one_reading(toy: Workspace) -> None:
 
     def ids() -> list[str]:
         models, manifest = toy.fault_models(), toy.manifest("toy")
-        return [f.id for f in expand(toy.spec(spec), 3, models=models, manifest=manifest)]
+        return [f.id for f in expand_spec(toy.spec(spec), 3, models=models, manifest=manifest)]
 
     before = ids()
-    (toy.library / FILE).unlink()
-    assert toy.readings() == UNDECLARED
+    (toy.library / READINGS_FILE).unlink()
+    assert toy.readings() == DEFAULT_READINGS
     assert ids() == before
 
 
@@ -54,7 +54,7 @@ def test_specs_use_the_declared_readings_as_keys(toy: Workspace) -> None:
     [spec] = toy.specs()
     models, manifest = toy.fault_models(), toy.manifest("toy")
     for reading, expected in ((None, "printed"), ("measured", "measured")):
-        found = expand(spec, 3, reading, models=models, manifest=manifest)
+        found = expand_spec(spec, 3, reading, models=models, manifest=manifest)
         assert {fault.reading for fault in found} == {expected}
 
 
@@ -67,7 +67,7 @@ def test_specs_use_the_declared_readings_as_keys(toy: Workspace) -> None:
     ],
 )
 def test_a_mistake_is_reported_with_its_line(tmp_path: Path, text: str, said: str) -> None:
-    (tmp_path / FILE).write_text(text)
+    (tmp_path / READINGS_FILE).write_text(text)
     with pytest.raises(MutatorError) as error:
         load_readings(tmp_path)
     assert said in str(error.value)

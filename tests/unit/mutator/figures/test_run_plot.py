@@ -28,7 +28,8 @@ TIME = np.arange(300) * 0.01
 def manifest() -> SimpleNamespace:
     gas, speed = Channel(name="gas", unit="0..1"), Channel(name="v_ego", unit="m/s")
     gone = Channel(name="not_recorded", unit="m")
-    return SimpleNamespace(compared=(gas,), plotted=(speed, gone), time_channel="t", path=Path("m.yaml"))
+    channels = {"compared_channels": (gas,), "plotted_channels": (speed, gone)}
+    return SimpleNamespace(**channels, time_channel="t", path=Path("m.yaml"))
 
 
 def trace(offset: float = 0.0) -> dict[str, np.ndarray]:

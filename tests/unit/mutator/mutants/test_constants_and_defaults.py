@@ -122,7 +122,7 @@ def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
         )
         probe, module = (types.ModuleType(name) for name in names)
         models = clone.fault_models()
-        exec(contract.render_probe(models.probe, settings).text, vars(probe))
+        exec(contract.render_probe(models.probe_templates, settings).text, vars(probe))
         sys.modules |= {"_fi": probe, names[1]: module}
         exec(compile(mutant(clone, *locations), "m.py", "exec", dont_inherit=True), vars(module))
         return module, probe

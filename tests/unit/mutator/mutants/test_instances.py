@@ -51,7 +51,7 @@ def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list
     trigger = Trigger(name="test", condition="t >= 1 and t < 3")
     settings = contract.build_probe_settings("m", trigger, Hold.WHILE, ("a",), observation, 1.0)
     fi, models = types.ModuleType("_fi"), clone.fault_models()
-    exec(contract.render_probe(models.probe, settings).text, vars(fi))
+    exec(contract.render_probe(models.probe_templates, settings).text, vars(fi))
     names: dict[str, Any] = {"_fi": fi}
     exec(data.replace(b"import _fi", b"pass"), names)
     seen = []

@@ -37,7 +37,7 @@ class Toy:
         settings = build_probe_settings("m", trigger, Hold.WHILE, ("ab12",), observation, STEP_S)
         self.text = data.decode()
         self.probe: Any = types.ModuleType("_fi")
-        exec(render_probe(models.probe, settings).text, vars(self.probe))
+        exec(render_probe(models.probe_templates, settings).text, vars(self.probe))
         self.names: dict[str, Any] = {"_fi": self.probe}
         exec(self.text, self.names)
         self.steps = 0

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import InvalidMutant, MutatorError
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Trigger
 from mutator.mutants import mutant_building
 from mutator.mutants.mutant_building import Mutant, write_tree
@@ -25,7 +25,7 @@ CLOSING = Trigger(name="closing", condition="hwt <= 3.0 and rs > 0.0", armed_aft
 
 
 def toy_faults(toy: Workspace, reading: str = "as_described") -> dict[str, Fault]:
-    found = expand(
+    found = expand_spec(
         toy.spec("sensor/distance"), 3, reading, models=toy.fault_models(), manifest=toy.manifest("toy")
     )
     return {fault.spec.rpartition("/")[2]: fault for fault in reversed(found)}
@@ -92,7 +92,7 @@ def test_the_patch_the_tree_and_the_digest_agree(toy: Workspace, tmp_path: Path)
     manifest = toy.manifest("toy")
     before = manifest.tree.digest
     made = build(toy, toy_faults(toy)["both"])
-    files = (*manifest.files, probe_path(manifest.package))
+    files = (*manifest.file_globs, probe_path(manifest.package))
     write_tree(manifest, made, tmp_path / "tree")
     assert read_tree(tmp_path / "tree", files).digest == made.tree_digest != before
     if shutil.which("patch"):

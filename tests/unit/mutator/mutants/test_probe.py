@@ -13,7 +13,7 @@ import pytest
 
 from mutator.model import Hold, Trigger
 from mutator.mutants import probe as contract
-from mutator.targets.observed_values import Observation, Value
+from mutator.targets.observed_values import Observation, ObservedValue
 from mutator.triggers.conditions import canonical_condition, evaluate_condition
 from mutator.workspace import Workspace
 
@@ -27,7 +27,7 @@ def probe(
     settings = contract.build_probe_settings("m1", trigger, Hold.WHILE, ("a", "b"), observation, 0.1)
     module = types.ModuleType("_fi")
     models = clone.fault_models()
-    exec(contract.render_probe(models.probe, replace(settings, **more)).text, module.__dict__)
+    exec(contract.render_probe(models.probe_templates, replace(settings, **more)).text, module.__dict__)
     return module
 
 
@@ -131,7 +131,7 @@ def test_a_run_stops_in_the_step_after_its_limit(clone: Workspace) -> None:
 
 def test_observed_values_can_be_named_like_variables_of_the_probe(clone: Workspace) -> None:
     names = ("run", "values", "error", "active", "float", "map")
-    read = tuple(Value(name=name, text=f"now.{name}", unit="-", about="x") for name in names)
+    read = tuple(ObservedValue(name=name, text=f"now.{name}", unit="-", about="x") for name in names)
     observed = replace(clone.manifest("openpilot").observation, values=read, derived=())
     fi = probe(clone, " + ".join(names) + " > 14", observed)
     fi.observe(t=0.0, **dict.fromkeys(names, 2))

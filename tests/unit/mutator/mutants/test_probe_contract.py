@@ -14,7 +14,7 @@ from mutator._common.hashing import digest
 from mutator.engines.first_activation import activity_at_observations
 from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
-from mutator.faults.probe_templates import CODE, SETTINGS
+from mutator.faults.probe_templates import CODE_TEMPLATE_FILE, SETTINGS_TEMPLATE_FILE
 from mutator.model import Activation, Hold, Trigger
 from mutator.mutants import probe as contract
 from mutator.mutants.injected_lines import probe_setting_spans
@@ -31,7 +31,7 @@ MUTANT, IDS = "0123456789abcdef", ("0a1b2c3d", "4e5f6071")
 def probe(clone: Workspace, trigger: Trigger = TRIGGER) -> contract.Probe:
     models, observation = clone.fault_models(), clone.manifest("openpilot").observation
     settings = contract.build_probe_settings(MUTANT, trigger, trigger.hold, IDS, observation, 0.1)
-    return contract.render_probe(models.probe, settings)
+    return contract.render_probe(models.probe_templates, settings)
 
 
 def module(clone: Workspace) -> Any:
@@ -63,7 +63,7 @@ def test_the_decision_of_the_harness_agrees_with_the_probe(clone: Workspace) -> 
 
 def test_the_templates_of_settings_and_code_make_one_template(clone: Workspace) -> None:
     """The ids of all mutants depend on its text, so whoever changes the probe changes this digest, too."""
-    text = clone.fault_models().probe.text
+    text = clone.fault_models().probe_templates.whole_text
     assert digest(text.encode()) == "9870b87eb1d7a0cfc3f87928ba21888e140cfeeb9dc33194268d951f11aa0c08"
 
 
@@ -76,19 +76,24 @@ def test_parts_rendered_alone_equal_the_whole_template_rendered(
     if counted:
         observation = replace(observation, time=None)
     settings = contract.build_probe_settings(MUTANT, TRIGGER, TRIGGER.hold, IDS, observation, 0.1, sets=sets)
-    assert contract.render_probe(models.probe, settings).text == render_template(
-        models.probe.text, vars(settings), models.folder
+    assert contract.render_probe(models.probe_templates, settings).text == render_template(
+        models.probe_templates.whole_text, vars(settings), models.folder
     )
 
 
 def test_templates_whose_marks_do_not_fit_are_refused(toycar: Workspace) -> None:
-    path = toycar.templates / CODE
+    path = toycar.templates / CODE_TEMPLATE_FILE
     path.write_text(path.read_text().replace("{# settings #}\n", "", 1))
-    with pytest.raises(MutatorError, match=rf"{SETTINGS}: 3 parts of settings; expected 2, .* in {CODE}"):
+    with pytest.raises(
+        MutatorError,
+        match=rf"{SETTINGS_TEMPLATE_FILE}: 3 parts of settings; expected 2, .* in {CODE_TEMPLATE_FILE}",
+    ):
         load_fault_models(toycar.templates)
 
 
-@pytest.mark.parametrize(("name", "text"), [(CODE, "class _Run:"), (SETTINGS, "def _condition(")])
+@pytest.mark.parametrize(
+    ("name", "text"), [(CODE_TEMPLATE_FILE, "class _Run:"), (SETTINGS_TEMPLATE_FILE, "def _condition(")]
+)
 def test_an_error_in_a_part_names_the_line_of_its_file(toycar: Workspace, name: str, text: str) -> None:
     path = toycar.templates / name
     before = path.read_text()

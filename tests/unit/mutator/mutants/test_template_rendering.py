@@ -140,14 +140,14 @@ def test_a_guard_opens_a_block() -> None:
     ],
 )
 def test_an_expression_stays_one_operand(template: str, text: str) -> None:
-    made = replace(model(template, SnippetKind.VALUE), expression=template)
+    made = replace(model(template, SnippetKind.VALUE), expression_template=template)
     assert render_changed_value(made, {"by": 1.0}, "ab12", "y") == text
 
 
 @pytest.mark.parametrize("template", ["{{ original }} # why", "1\n", "yield 1", "x = 1", ""])
 def test_a_value_must_be_one_expression_without_a_comment(template: str) -> None:
     """A comment would hide the rest of the line."""
-    made = replace(model(template, SnippetKind.VALUE), expression=template)
+    made = replace(model(template, SnippetKind.VALUE), expression_template=template)
     with pytest.raises(MutatorError, match="expected one expression on one line"):
         render_changed_value(made, {"by": 1.0}, "ab12", "y")
 
@@ -155,7 +155,7 @@ def test_a_value_must_be_one_expression_without_a_comment(template: str) -> None
 @pytest.mark.parametrize("target", ["x # why", "x\n", "x[\n0]", " x", None])
 def test_a_target_must_be_a_plain_name(target: Value) -> None:
     """A comment in the target would disable the assignment."""
-    made = replace(model("-{{ original }}", SnippetKind.VALUE), expression="-{{ original }}")
+    made = replace(model("-{{ original }}", SnippetKind.VALUE), expression_template="-{{ original }}")
     for one in (made, model("{{ target }} = {{ target }} + 1")):
         with pytest.raises(MutatorError, match="for 'target'"):
             render_snippet(one, {"target": target, "by": 1.0}, "ab12")
@@ -257,7 +257,7 @@ def test_a_models_result_has_the_expected_value_and_type(
     observation = clone.manifest("openpilot").observation
     settings = build_probe_settings("m", always_trigger(), Hold.WHILE, ("ab12",), observation, 0.1)
     probe = types.ModuleType("_fi")
-    exec(render_probe(models.probe, settings).text, vars(probe))
+    exec(render_probe(models.probe_templates, settings).text, vars(probe))
     probe.observe(t=0.0, d_rel=1.0, v_ego=1.0, v_lead=1.0)
     names = {"_fi": probe, "x": value}
     exec("\n".join(lines), names)

@@ -19,14 +19,14 @@ MANIFEST: Any = SimpleNamespace(
     trace_file="trace.npz",
     record_file="record.json",
     time_channel="t",
-    rules=(Hazard(name="H1"),),
+    hazard_rules=(Hazard(name="H1"),),
     metrics=(),
     contact=None,
-    judged=(),
+    judged_channels=(),
     channels=(),
     observation=SimpleNamespace(derived=()),
     alerts=("fcw", "late"),
-    plotted=(Channel(name="v", unit="m/s"), Channel(name="not_recorded", unit="m")),
+    plotted_channels=(Channel(name="v", unit="m/s"), Channel(name="not_recorded", unit="m")),
 )
 
 

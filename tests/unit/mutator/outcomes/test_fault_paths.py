@@ -25,7 +25,7 @@ from mutator.model import (
 )
 from mutator.outcomes.fault_paths import ComponentState, FaultPath, FaultPaths, LinkState, fault_paths_of
 from mutator.store.run_folder import RunFolder
-from mutator.stpa.analysis_files import StructureModel
+from mutator.stpa.analysis_files import ControlStructureModel
 from mutator.targets.target_facts import ChannelFacts
 from tests.made_head import made_head
 
@@ -55,7 +55,7 @@ LINKS = {
     "turn": ("rack", "car"),
     "show": ("speed", "driver"),
 }
-STRUCTURE = StructureModel.model_validate(
+STRUCTURE = ControlStructureModel.model_validate(
     {
         "about": "",
         "components": {
@@ -304,8 +304,10 @@ def test_a_path_through_a_loop_has_each_component_once() -> None:
     assert found.reached == "car"
 
 
-def replace_links(links: dict[str, Any]) -> StructureModel:
-    return StructureModel.model_validate(STRUCTURE.model_dump(mode="json", by_alias=True) | {"links": links})
+def replace_links(links: dict[str, Any]) -> ControlStructureModel:
+    return ControlStructureModel.model_validate(
+        STRUCTURE.model_dump(mode="json", by_alias=True) | {"links": links}
+    )
 
 
 def test_the_structure_is_read_from_run_json(tmp_path: Folder) -> None:

@@ -33,7 +33,7 @@ MANIFEST: Any = SimpleNamespace(
     record_file="record.json",
     time_channel="t",
     channels=(),
-    rules=(Hazard(name="H1"),),
+    hazard_rules=(Hazard(name="H1"),),
 )
 
 

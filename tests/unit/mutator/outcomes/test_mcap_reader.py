@@ -59,7 +59,7 @@ def complete(*records: bytes, encoding: str = "json") -> bytes:
 def read(path: Path, *records: bytes, **other: str) -> dict[str, list[float]]:
     """Read channel `gap` as `load_trace` does."""
     path.write_bytes(complete(*records, **other))
-    channel = Channel(name="gap", unit="m", source="/cart:gap")
+    channel = Channel(name="gap", unit="m", other_trace_name="/cart:gap")
     try:
         found = mcap.IMPORTER.read(TraceRequest(path=path, time_channel="/cart", channels=[channel]))
     except (ValueError, MemoryError, EOFError) as error:

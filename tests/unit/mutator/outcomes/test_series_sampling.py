@@ -149,7 +149,7 @@ def test_a_channel_with_its_own_times_keeps_its_newest_value(
 
 def recorded(manifest: TargetManifest, golden: Trace, faulty: Trace, one: Record) -> Record:
     """The record with the deviations of two traces."""
-    difference = compare_traces(golden, faulty, manifest.compared, "time")
+    difference = compare_traces(golden, faulty, manifest.compared_channels, "time")
     left = departures_from_golden(golden, faulty, manifest.channels, "time", one.t_end)
     return replace(one, max_dev=difference.max_dev, left=left)
 

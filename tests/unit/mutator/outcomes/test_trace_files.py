@@ -11,7 +11,7 @@ from mutator.errors import BadOutput
 from mutator.outcomes.golden_comparison import load_trace
 from mutator.targets.channels import Channel
 
-GAP = Channel(name="gap", unit="m", source="distance")
+GAP = Channel(name="gap", unit="m", other_trace_name="distance")
 
 
 def test_a_trace_of_another_package_is_read(tmp_path: Path, door_examples: Path) -> None:

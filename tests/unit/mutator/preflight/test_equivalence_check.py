@@ -138,7 +138,7 @@ def test_only_large_campaigns_fork_by_default(toycar: Workspace) -> None:
     assert choose_engine(None, manifest, 10) == "reference"
     assert choose_engine("fork", manifest, 10) == "fork"
     assert choose_engine("reference", manifest, 1000) == "reference"
-    plain = replace(manifest, stepwise=None)
+    plain = replace(manifest, stepwise_function=None)
     assert choose_engine(None, plain, 1000) == "reference"
     for asked, told in (("fork", "names no `entry.stepwise`"), ("turbo", "engine 'turbo'")):
         with pytest.raises(MutatorError, match=told):

@@ -117,7 +117,7 @@ def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None
     (spec,) = (spec for spec in toycar.specs() if spec.name == "sensor/lane")
     faults = toycar.faults("sensor/lane", seed=3)
     values = sorted((fault.value for fault in faults), reverse=True)
-    assert len(values) == spec.count == 4
+    assert len(values) == spec.fault_count == 4
     assert error.value.got.endswith(", ".join(f"{value} m" for value in values))
 
 

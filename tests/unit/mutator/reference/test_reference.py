@@ -13,7 +13,7 @@ from mutator._common import shipped_files
 from mutator.cli.app import SUBCOMMAND_GROUPS, app
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
-from mutator.faults.fault_specs import spec_model
+from mutator.faults.fault_specs import build_spec_model
 from mutator.reference.generated_files import (
     PAGES_FOLDER,
     RENDER_BY_PAGE,
@@ -83,7 +83,7 @@ def test_every_model_and_key_is_described(kind: YamlFormat) -> None:
 
 
 def test_models_are_in_reading_order() -> None:
-    names = order_models(schema_by_model(spec_model(Workspace.find(CLONE).readings())))
+    names = order_models(schema_by_model(build_spec_model(Workspace.find(CLONE).readings())))
     assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "Location"]
 
 

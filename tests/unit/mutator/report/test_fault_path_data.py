@@ -16,7 +16,7 @@ from mutator.outcomes.fault_paths import (
 )
 from mutator.report.fault_path_data import PathCounts, RunPaths
 from mutator.report.path_drawing import draw_path_counts, drawn_counts
-from mutator.stpa.analysis_files import load_analysis
+from mutator.stpa.analysis_files import load_hazard_analysis
 from mutator.targets.target_facts import ChannelFacts
 from mutator.workspace import Workspace
 
@@ -108,7 +108,7 @@ def test_faults_are_counted_by_link_and_component() -> None:
 
 def test_the_drawing_of_other_counts_is_the_one_that_the_page_changes_to(clone: Workspace) -> None:
     """The script puts `drawn_counts` into the drawing of all faults."""
-    structure = load_analysis(clone.library / "stpa").structure
+    structure = load_hazard_analysis(clone.library / "stpa").structure
     links, name = list(structure.links), next(iter(structure.components))
     counts = PathCounts(active=8)
     counts.came.update({links[0]: 8, links[1]: 3})

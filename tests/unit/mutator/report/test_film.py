@@ -9,5 +9,5 @@ from mutator.workspace import Workspace
 def test_a_film_describes_a_hazard_as_the_page_does() -> None:
     workspace = Workspace.find(root=Path(__file__).parents[4])
     manifest = workspace.manifest("openpilot")
-    assert hazards_in_words(workspace, manifest) == {rule.name: rule.about for rule in manifest.rules}
+    assert hazards_in_words(workspace, manifest) == {rule.name: rule.about for rule in manifest.hazard_rules}
     assert "touches" in hazards_in_words(workspace, manifest)["H1"]

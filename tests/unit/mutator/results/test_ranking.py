@@ -13,7 +13,7 @@ from mutator.results.ranking import rank_by_experiment, ranks_of_rows
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_columns import SEVERITY_COLUMN, TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.results.table_reader import Results
-from mutator.targets.contact_severity import CLASSES
+from mutator.targets.contact_severity import SEVERITY_CLASSES
 from mutator.targets.target_facts import MetricFacts
 from tests.made_head import made_head
 from tests.made_up_results import write_results
@@ -95,7 +95,7 @@ def ranked_one_by_one(rows: Sequence[ResultRow]) -> list[ResultRow]:
     """Rank rows by the same rules, without columns."""
     lines: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for row in rows:
-        for hazard, margin in () if row.severity in CLASSES else row.margins:
+        for hazard, margin in () if row.severity in SEVERITY_CLASSES else row.margins:
             lines.setdefault((row.ending, hazard), []).append((margin, row.experiment_id))
     turns: dict[str, int] = {}
     for line in lines.values():
@@ -104,10 +104,10 @@ def ranked_one_by_one(rows: Sequence[ResultRow]) -> list[ResultRow]:
 
     def badness(row: ResultRow) -> tuple[float | str, ...]:
         ending = _ENDINGS.index(row.ending)
-        if row.severity not in CLASSES:
+        if row.severity not in SEVERITY_CLASSES:
             return (1, 0.0, 0.0, ending, turns.get(row.experiment_id, math.inf), row.experiment_id)
         delta_v = -1.0 if row.delta_v is None else row.delta_v
-        return (0, -CLASSES.index(row.severity), -delta_v, ending, 0, row.experiment_id)
+        return (0, -SEVERITY_CLASSES.index(row.severity), -delta_v, ending, 0, row.experiment_id)
 
     return sorted(rows, key=badness)
 

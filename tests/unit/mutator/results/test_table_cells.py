@@ -16,7 +16,7 @@ from mutator.results.table_columns import (
     result_columns,
     severity_columns,
 )
-from mutator.targets.contact_severity import Scale
+from mutator.targets.contact_severity import SeverityScale
 
 HAZARDS = ("H1", "H2", "H3")
 COLUMNS = result_columns(
@@ -25,7 +25,7 @@ COLUMNS = result_columns(
 MakeRecord = Callable[..., Record]
 
 
-def row_of(experiment: Experiment, record: Record, scale: Scale | None = None) -> dict[str, object]:
+def row_of(experiment: Experiment, record: Record, scale: SeverityScale | None = None) -> dict[str, object]:
     cells = cells_of(COLUMNS, [FinishedExperiment(experiment, record, scale)])
     return {column.name: cell for column, (cell,) in zip(COLUMNS, cells, strict=True)}
 
@@ -75,7 +75,7 @@ def test_the_row_of_a_run_with_a_hazard_has_the_expected_cells(
     assert {name: cells[name] for name in expected} == expected
 
 
-SCALE = Scale(
+SCALE = SeverityScale(
     name="x",
     about="",
     source="",
@@ -119,7 +119,7 @@ def test_a_scale_determines_the_columns_of_severity() -> None:
         severity = severity_columns(has_classes=has_classes)
         columns = [c.name for c in result_columns(("H1",), ("gas",), (), severity)]
         assert columns[columns.index("max_dev_gas") + 1 : columns.index("variant")] == names
-    assert from_json_types(Scale, as_json_types(SCALE)) == SCALE
+    assert from_json_types(SeverityScale, as_json_types(SCALE)) == SCALE
     with pytest.raises(ValueError, match="no class of severity begins at 0"):
         replace(SCALE, classes=SCALE.classes[1:])
 

@@ -22,7 +22,7 @@ def names(hazards: list[str], compared: list[str]) -> list[str]:
 
 def test_the_shipped_target_has_the_expected_columns_in_order(clone: Workspace) -> None:
     manifest = clone.manifest("openpilot")
-    made = names(list(manifest.hazards), [channel.name for channel in manifest.compared])
+    made = names(list(manifest.hazard_names), [channel.name for channel in manifest.compared_channels])
     assert ", ".join(made) == OF_OPENPILOT
 
 
@@ -98,4 +98,4 @@ def test_a_metric_with_an_existing_column_is_refused(toy: Workspace, metrics: li
 def test_hazard_names_without_an_existing_column_are_valid(toy: Workspace, name: str) -> None:
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("hazards: [H1]", f"hazards: [{name}]"))
-    assert toy.manifest("toy").hazards == (name,)
+    assert toy.manifest("toy").hazard_names == (name,)

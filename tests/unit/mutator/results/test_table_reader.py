@@ -38,7 +38,7 @@ from mutator.statistics.results_frame import hazard_names, load_usable_results, 
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import load_head
-from mutator.targets.process_environment import THREADS
+from mutator.targets.process_environment import THREAD_VARIABLES
 from mutator.targets.target_facts import metric_facts
 from mutator.workspace import Workspace
 from tests.costs import is_cheap, is_refused
@@ -89,7 +89,7 @@ def test_reading_tables_leaves_no_thread(run: Path) -> None:
     """A pyarrow thread that releases Python memory during shutdown kills the process. Threads of the
     allocator and of BLAS do not use Python."""
     table_building.build_tables(run)
-    words, env = [sys.executable, "-c", ALONE, str(run)], os.environ | dict.fromkeys(THREADS, "1")
+    words, env = [sys.executable, "-c", ALONE, str(run)], os.environ | dict.fromkeys(THREAD_VARIABLES, "1")
     ended = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120, env=env)
     assert [name for name in ended.stdout.split() if name != "jemalloc_bg_thd"] == [ended.stdout.split()[0]]
 
@@ -186,9 +186,9 @@ def test_a_real_run_fills_each_column(crane: Workspace, tmp_path: Path, write_ru
     manifest = crane.manifest("toycar")
     record = run_single(crane, manifest, experiment, tmp_path / "single").record
     assert record.status is Status.OK
-    compared = [channel.name for channel in manifest.compared]
+    compared = [channel.name for channel in manifest.compared_channels]
     columns = result_columns(
-        manifest.hazards, compared, metric_facts(manifest), (SEVERITY_COLUMN, *TIME_TO_HAZARD_COLUMNS)
+        manifest.hazard_names, compared, metric_facts(manifest), (SEVERITY_COLUMN, *TIME_TO_HAZARD_COLUMNS)
     )
     cells = cells_of(columns, [FinishedExperiment(experiment, record, crane.scale_of(manifest))])
     row = {column.name: cell for column, (cell,) in zip(columns, cells, strict=True)}

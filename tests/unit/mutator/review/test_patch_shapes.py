@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.review.patch_shapes import (
@@ -23,7 +23,7 @@ FAR = replace(NEAR, name="far", condition="hwt > 2.0 and rs > 0.0")
 
 def faults(toy: Workspace, name: str, spec: str = "sensor/distance") -> list[Fault]:
     manifest, models = toy.manifest("toycar"), toy.fault_models()
-    found = expand(toy.spec(spec), 7, models=models, manifest=manifest)
+    found = expand_spec(toy.spec(spec), 7, models=models, manifest=manifest)
     return [fault for fault in found if fault.spec == f"{spec}/{name}"]
 
 

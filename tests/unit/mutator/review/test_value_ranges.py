@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault, Value
 from mutator.review.value_ranges import value_ranges_of
 from mutator.workspace import Workspace
 
 
 def faults(toy: Workspace, spec: str, seed: int = 0) -> list[Fault]:
-    return list(expand(toy.spec(spec), seed, models=toy.fault_models(), manifest=toy.manifest("toycar")))
+    return list(expand_spec(toy.spec(spec), seed, models=toy.fault_models(), manifest=toy.manifest("toycar")))
 
 
 def test_a_range_covers_all_ranges_of_the_specs(toycar: Workspace) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from mutator._common.hashing import as_json_types
 from mutator._common.typed_json import from_json_types
-from mutator.errors import Misfit
+from mutator.errors import TypeMisfit
 from mutator.store.work_stretches import (
     Blas,
     CloneState,
@@ -47,7 +47,7 @@ def test_stretches_are_read_as_written() -> None:
     ],
 )
 def test_a_damaged_stretch_is_refused(stretch: Any, got: str) -> None:
-    with pytest.raises(Misfit, match=got):
+    with pytest.raises(TypeMisfit, match=got):
         from_json_types(Stretch, stretch)
 
 

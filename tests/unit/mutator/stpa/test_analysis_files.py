@@ -7,8 +7,8 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
-from mutator.stpa.analysis_checks import check_analysis, injected
-from mutator.stpa.analysis_files import Analysis, load_analysis
+from mutator.stpa.analysis_checks import injection_places, list_analysis_problems
+from mutator.stpa.analysis_files import HazardAnalysis, load_hazard_analysis
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -42,31 +42,31 @@ def spoil(folder: Path, file: str, old: str, new: str) -> int:
 
 
 @pytest.fixture(scope="module")
-def analysis(clone: Workspace) -> Analysis:
-    return load_analysis(clone.library / "stpa")
+def analysis(clone: Workspace) -> HazardAnalysis:
+    return load_hazard_analysis(clone.library / "stpa")
 
 
 def test_the_shipped_analysis_has_no_problem(
-    analysis: Analysis, specs: tuple[FaultSpec, ...], manifest: TargetManifest
+    analysis: HazardAnalysis, specs: tuple[FaultSpec, ...], manifest: TargetManifest
 ) -> None:
-    assert check_analysis(analysis, specs, manifest) == []
-    assert [table.coverage.beyond for table in analysis.tables.values()] == [None, None]
+    assert list_analysis_problems(analysis, specs, manifest) == []
+    assert [table.coverage.no_proof_reason for table in analysis.context_tables.values()] == [None, None]
     assert set(analysis.structure.control_actions) == {"accelerate", "decelerate", "steer"}
 
 
-def test_faults_are_injected_at_the_papers_locations_and_in_software(analysis: Analysis) -> None:
+def test_faults_are_injected_at_the_papers_locations_and_in_software(analysis: HazardAnalysis) -> None:
     """The paper injects no faults into the controllers' software."""
-    places = {place for factor in analysis.factors.values() if factor.faults for place in factor.where}
+    places = {place for factor in analysis.factors_by_id.values() if factor.faults for place in factor.where}
     sensed = {"own_speed", "own_motion", "steer_angle"}
     assert places == {"radar_points", "pictures", "vision_lead", "path", *sensed, "acc", "lkas"}
-    software = {name for name, factor in analysis.factors.items() if {"acc", "lkas"} & {*factor.where}}
-    faults = {fault for name in software for fault in analysis.factors[name].faults}
+    software = {name for name, factor in analysis.factors_by_id.items() if {"acc", "lkas"} & {*factor.where}}
+    faults = {fault for name in software for fault in analysis.factors_by_id[name].faults}
     assert faults and all(fault.startswith("software/") for fault in faults)
 
 
 def test_a_spec_with_two_locations_is_listed_at_both(clone: Workspace) -> None:
     """The as-coded reading can inject at another location."""
-    assert injected(clone.spec("radar/jamming")) == {
+    assert injection_places(clone.spec("radar/jamming")) == {
         "selfdrive/sim/radar.py::RadarSensor.measure",
         "selfdrive/sim/simulator.py::Simulator.step",
     }
@@ -119,7 +119,7 @@ def test_a_spec_with_two_locations_is_listed_at_both(clone: Workspace) -> None:
 def test_an_inconsistent_analysis_is_refused(folder: Path, file: str, old: str, new: str, said: str) -> None:
     spoil(folder, file, old, new)
     with pytest.raises(MutatorError) as caught:
-        load_analysis(folder)
+        load_hazard_analysis(folder)
     assert said in str(caught.value)
     assert caught.value.where == str(folder / file)
     assert caught.value.line is not None and caught.value.line > 1
@@ -178,7 +178,7 @@ def test_gaps_and_contradictions_are_reported_with_their_line(
     said: str,
 ) -> None:
     spoil(folder, file, old, new)
-    problems = check_analysis(load_analysis(folder), specs, manifest)
+    problems = list_analysis_problems(load_hazard_analysis(folder), specs, manifest)
     assert [p for p in problems if said in str(p) and p.where and p.line], [str(p) for p in problems]
 
 
@@ -191,7 +191,7 @@ def test_every_hazard_and_category_must_be_judged(
     (folder / "hazards.yaml").write_text(
         (folder / "hazards.yaml").read_text() + "  H4: {about: Too loud., leads_to: [A1]}\n"
     )
-    problems = [str(p) for p in check_analysis(load_analysis(folder), specs, manifest)]
+    problems = [str(p) for p in list_analysis_problems(load_hazard_analysis(folder), specs, manifest)]
     assert len(problems) == 2, problems
     assert "hazard 'H4' follows from no unsafe control action" in problems[0]
     assert "no unsafe control action for 'steer' in category wrong_duration" in problems[1]
@@ -202,5 +202,5 @@ def test_an_unsafe_action_without_a_cause_is_reported(
 ) -> None:
     text = (folder / FACTORS).read_text()
     (folder / FACTORS).write_text(text.replace(", UCA13", ""))
-    (problem,) = check_analysis(load_analysis(folder), specs, manifest)
+    (problem,) = list_analysis_problems(load_hazard_analysis(folder), specs, manifest)
     assert "no causal factor leads to UCA13" in str(problem)

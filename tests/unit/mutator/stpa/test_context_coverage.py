@@ -23,8 +23,8 @@ def prove(*conditions: str):
 )
 def test_a_table_that_covers_everything_once_is_accepted(conditions: tuple[str, ...]) -> None:
     found = prove(*conditions)
-    assert (found.beyond, found.place) == (None, None)
-    assert found.cells > 0
+    assert (found.no_proof_reason, found.first_gap_or_overlap) == (None, None)
+    assert found.cell_count > 0
 
 
 @pytest.mark.parametrize(
@@ -45,23 +45,26 @@ def test_the_first_wrong_cell_is_named(
 ) -> None:
     """A cell is wrong if it has no context or several."""
     found = prove(*conditions)
-    assert (found.place, found.rows) == (place, rows)
+    assert (found.first_gap_or_overlap, found.overlapping_rows) == (place, rows)
 
 
 def test_there_is_no_cell_between_neighbouring_numbers() -> None:
     found = prove("rs <= 1.0", "rs >= 1.0000000000000002")
-    assert found.place is None and found.cells == 4
+    assert found.first_gap_or_overlap is None and found.cell_count == 4
 
 
 @pytest.mark.parametrize("condition", ["rs < v_ego", "rs + 1 > 0", "abs(rs) < 1", "1 < 2"])
 def test_other_comparisons_are_not_provable(condition: str) -> None:
     found = prove(condition, f"not {condition}")
-    assert found.beyond is not None and "only comparisons of one variable with a constant" in found.beyond
-    assert found.place is None
+    assert (
+        found.no_proof_reason is not None
+        and "only comparisons of one variable with a constant" in found.no_proof_reason
+    )
+    assert found.first_gap_or_overlap is None
 
 
 def test_a_table_with_too_many_cells_is_not_provable() -> None:
     """The limit bounds the time of the proof."""
     names = ("t", "d_rel", "v_ego", "v_lead", "hwt", "rs")
     found = prove(" and ".join(f"{name} != {i}" for name in names for i in range(4)), "True")
-    assert found.beyond is not None and "531441 cells" in found.beyond
+    assert found.no_proof_reason is not None and "531441 cells" in found.no_proof_reason

@@ -50,7 +50,7 @@ def test_an_unknown_name_in_a_row_is_reported(toy: Workspace) -> None:
     with pytest.raises(
         MutatorError, match=r"pedals.yaml:6: unknown name 'safe' in 'hwt <= safe'; .*: t, d_rel"
     ):
-        table.check(variables)
+        table.check_variables(variables)
 
 
 def test_the_shipped_table_covers_every_situation_exactly_once(clone: Workspace) -> None:
@@ -66,7 +66,7 @@ def test_the_shipped_table_covers_every_situation_exactly_once(clone: Workspace)
     cells = {
         (row.id, action): (v.provided, v.not_provided)
         for row in table.rows
-        for action, v in row.actions.items()
+        for action, v in row.hazards_by_action.items()
         if v.provided or v.not_provided
     }
     assert cells == {
@@ -92,7 +92,7 @@ def test_the_table_in_the_docs_is_valid_and_complete(clone: Workspace, tmp_path:
     (tmp_path / "closing.yaml").write_text(text)
     table = load_context_table(tmp_path / "closing.yaml")
     assert [row.id for row in table.rows] == ["slow", "fast_near", "fast_far"]
-    assert table.coverage.cells == 9 and table.coverage.beyond is None
+    assert table.coverage.cell_count == 9 and table.coverage.no_proof_reason is None
 
 
 def test_rows_with_different_actions_are_refused(toy: Workspace) -> None:
@@ -107,8 +107,8 @@ def test_a_table_that_compares_two_variables_is_accepted_without_a_proof(toy: Wo
     path = toy.library / "stpa" / "contexts" / "pedals.yaml"
     path.write_text(path.read_text().replace("hwt <= safe_hwt_s", "v_ego <= v_lead"))
     table = load_context_table(path)
-    assert table.coverage.cells == 0
-    assert table.coverage.beyond == (
+    assert table.coverage.cell_count == 0
+    assert table.coverage.no_proof_reason == (
         "a condition compares 'v_ego' with 'v_lead'; only comparisons of one variable with a constant can be "
         "tested"
     )

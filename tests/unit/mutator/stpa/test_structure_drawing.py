@@ -7,38 +7,51 @@ from xml.etree import ElementTree
 import pytest
 
 import mutator
-from mutator.stpa.analysis_files import Analysis, load_analysis
-from mutator.stpa.structure_drawing import FAULT, draw, faulty_places, short
-from mutator.stpa.structure_layout import APART, Box, Layout, Point, lay_out
+from mutator.stpa.analysis_files import HazardAnalysis, load_hazard_analysis
+from mutator.stpa.structure_drawing import (
+    FAULT_COLOUR,
+    factors_by_place,
+    join_with_common_prefix,
+    render_structure,
+)
+from mutator.stpa.structure_layout import (
+    MIN_ARROW_DISTANCE,
+    ComponentBox,
+    Point,
+    StructureLayout,
+    lay_out_structure,
+)
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
 
 
 @pytest.fixture(scope="module")
-def analysis(clone: Workspace) -> Analysis:
-    return load_analysis(clone.library / "stpa")
+def analysis(clone: Workspace) -> HazardAnalysis:
+    return load_hazard_analysis(clone.library / "stpa")
 
 
 @pytest.fixture(scope="module")
-def layout(analysis: Analysis) -> Layout:
-    return lay_out(analysis.structure)
+def layout(analysis: HazardAnalysis) -> StructureLayout:
+    return lay_out_structure(analysis.structure)
 
 
-def meets(box: Box, start: Point, end: Point) -> bool:
+def meets(box: ComponentBox, start: Point, end: Point) -> bool:
     """Whether a horizontal or vertical segment has a point inside the box."""
     (x1, x2), (y1, y2) = sorted((start[0], end[0])), sorted((start[1], end[1]))
     return x1 < box.x + box.width and x2 > box.x and y1 < box.bottom and y2 > box.y
 
 
-def test_boxes_do_not_overlap_and_are_inside(layout: Layout) -> None:
+def test_boxes_do_not_overlap_and_are_inside(layout: StructureLayout) -> None:
     for one, other in combinations(layout.boxes.values(), 2):
         assert not meets(one, (other.x, other.y), (other.x + other.width, other.bottom))
     for box in layout.boxes.values():
         assert box.x >= 0 and box.x + box.width < layout.width and box.bottom < layout.height
 
 
-def test_arrows_join_their_boxes_and_cross_no_other_box(analysis: Analysis, layout: Layout) -> None:
+def test_arrows_join_their_boxes_and_cross_no_other_box(
+    analysis: HazardAnalysis, layout: StructureLayout
+) -> None:
     for name, link in analysis.structure.links.items():
         points = layout.arrows[name].points
         for place, point in ((link.from_, points[0]), (link.to, points[-1])):
@@ -48,7 +61,7 @@ def test_arrows_join_their_boxes_and_cross_no_other_box(analysis: Analysis, layo
             assert not any(meets(box, start, end) for start, end in pairwise(points)), name
 
 
-def test_arrows_do_not_overlap(layout: Layout) -> None:
+def test_arrows_do_not_overlap(layout: StructureLayout) -> None:
     for (one, first), (other, second) in combinations(layout.arrows.items(), 2):
         for a, b in pairwise(first.points):
             for c, d in pairwise(second.points):
@@ -57,16 +70,19 @@ def test_arrows_do_not_overlap(layout: Layout) -> None:
                         together = min(max(a[i], b[i]), max(c[i], d[i])) > max(
                             min(a[i], b[i]), min(c[i], d[i])
                         )
-                        assert not together or abs(a[1 - i] - c[1 - i]) >= APART - 8, (one, other)
+                        assert not together or abs(a[1 - i] - c[1 - i]) >= MIN_ARROW_DISTANCE - 8, (
+                            one,
+                            other,
+                        )
 
 
-def test_labels_overlap_nothing(analysis: Analysis, layout: Layout) -> None:
+def test_labels_overlap_nothing(analysis: HazardAnalysis, layout: StructureLayout) -> None:
     areas = {}
     for name, link in analysis.structure.links.items():
         arrow, width = layout.arrows[name], 7.0 * len(link.label)
-        (x, y), apart = arrow.label.at, arrow.label.apart
+        (x, y), apart = arrow.label.baseline, arrow.label.line_distance
         left = x - {"start": 0.0, "middle": width / 2, "end": width}[arrow.label.anchor]
-        areas[name] = Box(x=left, y=y - 12, width=width, height=apart + 15, row=0, lines=())
+        areas[name] = ComponentBox(x=left, y=y - 12, width=width, height=apart + 15, row=0, lines=())
     for (name, area), (other, beside) in combinations(areas.items(), 2):
         assert not meets(area, (beside.x, beside.y), (beside.x + beside.width, beside.bottom)), (name, other)
     for name, area in areas.items():
@@ -77,25 +93,25 @@ def test_labels_overlap_nothing(analysis: Analysis, layout: Layout) -> None:
                 assert not any(meets(area, a, b) for a, b in pairwise(arrow.points)), (name, other)
 
 
-def test_only_places_with_faults_have_the_colour_of_faults(analysis: Analysis) -> None:
-    text = draw(analysis)
-    assert text == draw(analysis)
+def test_only_places_with_faults_have_the_colour_of_faults(analysis: HazardAnalysis) -> None:
+    text = render_structure(analysis)
+    assert text == render_structure(analysis)
     root = ElementTree.fromstring(text)
-    lines = [e for e in root.iter("{http://www.w3.org/2000/svg}path") if e.get("stroke") == FAULT]
-    links = faulty_places(analysis).keys() & analysis.structure.links.keys()
+    lines = [e for e in root.iter("{http://www.w3.org/2000/svg}path") if e.get("stroke") == FAULT_COLOUR]
+    links = factors_by_place(analysis).keys() & analysis.structure.links.keys()
     assert len(lines) == len(links) + 1  # the links and the legend's line
     words = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
     assert {"ACC", "LKAS", "steer torque", "CF13, 14"} <= set(words)
 
 
-def test_the_diagram_in_the_docs_is_current(analysis: Analysis) -> None:
+def test_the_diagram_in_the_docs_is_current(analysis: HazardAnalysis) -> None:
     """After a change, run `mutator stpa --svg docs/explanation/hazard-analysis.svg`."""
-    assert (CLONE / "docs" / "explanation" / "hazard-analysis.svg").read_text() == draw(analysis)
+    assert (CLONE / "docs" / "explanation" / "hazard-analysis.svg").read_text() == render_structure(analysis)
 
 
 def test_a_common_prefix_is_written_once() -> None:
-    assert short(["CF9"]) == "CF9"
-    assert short(["CF9", "CF10"]) == "CF9, 10"
+    assert join_with_common_prefix(["CF9"]) == "CF9"
+    assert join_with_common_prefix(["CF9", "CF10"]) == "CF9, 10"
 
 
 @pytest.mark.parametrize("mark", ["<marker", '" L".join', "arrow.label.anchor"])

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.targets.severity_model import load_scale
+from mutator.targets.severity_model import load_severity_scale
 from mutator.workspace import Workspace
 
 KPH = 1 / 3.6
@@ -37,7 +37,7 @@ def test_the_shipped_contact_is_with_an_equal_car() -> None:
     """The mass is that of the simulator's car, so delta-v is half the closing speed."""
     contact = Workspace.find().manifest("openpilot").contact
     assert contact is not None
-    assert (contact.hazard, contact.mass, contact.delta_v(20.0)) == ("H1", 1461.6, 10.0)
+    assert (contact.hazard, contact.mass_kg, contact.delta_v(20.0)) == ("H1", 1461.6, 10.0)
 
 
 @pytest.mark.parametrize(
@@ -55,10 +55,10 @@ def test_the_shipped_contact_is_with_an_equal_car() -> None:
 )
 def test_mistakes_in_a_scale_are_reported(tmp_path: Path, old: str, new: str, message: str) -> None:
     (tmp_path / "hard.yaml").write_text(SCALE)
-    assert load_scale(tmp_path / "hard.yaml").classes[2] == ("S2", 20 * KPH, "c")
+    assert load_severity_scale(tmp_path / "hard.yaml").classes[2] == ("S2", 20 * KPH, "c")
     (tmp_path / "hard.yaml").write_text(SCALE.replace(old, new))
     with pytest.raises(MutatorError, match=re.escape(f"hard.yaml:{message}")):
-        load_scale(tmp_path / "hard.yaml")
+        load_severity_scale(tmp_path / "hard.yaml")
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.mutants.anchors import parse_file
-from mutator.targets.source_tree import MOST_SOURCE, read_tree
+from mutator.targets.source_tree import MOST_SOURCE_BYTES, read_tree
 from tests.costs import is_cheap, is_refused
 
 SOURCES = {
@@ -33,7 +33,7 @@ def test_a_hostile_source_file_ends_soon(source: str) -> None:
 
 
 def test_large_files_and_many_folders_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "a.py").write_bytes(b"#" * (MOST_SOURCE + 1))
+    (tmp_path / "a.py").write_bytes(b"#" * (MOST_SOURCE_BYTES + 1))
     assert "at most 1,000,000 bytes" in is_refused(lambda: read_tree(tmp_path, ("**",)))
     (tmp_path / "a.py").unlink()
     with (tmp_path / "model.bin").open("wb") as file:

@@ -6,11 +6,11 @@ import pytest
 
 from mutator._common import shared_cache
 from mutator.errors import MutatorError, Outside
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import AnchorKind
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest_files import load_manifest
-from mutator.targets.source_tree import matches, read_tree
+from mutator.targets.source_tree import matches_any_glob, read_tree
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
@@ -21,7 +21,7 @@ def test_a_manifest_is_read(toy: Workspace) -> None:
     manifest = toy.manifest("toy")
     assert manifest.root == (toy.library.parent / "target").resolve()
     assert manifest.step_s == 0.1
-    assert [(c.name, c.unit, c.tolerance) for c in manifest.compared] == [("speed", "m/s", 0.5)]
+    assert [(c.name, c.unit, c.tolerance) for c in manifest.compared_channels] == [("speed", "m/s", 0.5)]
     assert manifest.observation.location.anchor.kind is AnchorKind.AFTER_ASSIGN
     assert dict(manifest.observation.expressions)["v_lead"] == "now.lead_speed"
 
@@ -57,10 +57,10 @@ def test_a_manifest_of_another_schema_is_refused(toy: Workspace, schema: str, re
 
 def test_arguments_have_placeholders_and_changes(toy: Workspace) -> None:
     manifest = toy.manifest("toy")
-    given = manifest.arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"), changes=("alone",))
+    given = manifest.run_arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"), changes=("alone",))
     assert given == ("s.yaml", "--seed", "3", "--out", "o", "--alone", "--quiet")
     with pytest.raises(MutatorError, match="change 'no_lead'; expected one of alone"):
-        manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), changes=("no_lead",))
+        manifest.run_arguments(scenario=Path("s"), seed=0, out=Path("o"), changes=("no_lead",))
 
 
 def test_placeholders_can_be_anywhere_in_an_argument(toy: Workspace) -> None:
@@ -68,7 +68,7 @@ def test_placeholders_can_be_anywhere_in_an_argument(toy: Workspace) -> None:
     text = path.read_text().replace("alone: [--alone, --quiet]", 'alone: ["--in={out}/x", \'{"a": {}}\']')
     text = text.replace("  changes:", '  independent: ["--log={out}:{seed}"]\n  changes:')
     path.write_text(text)
-    given = toy.manifest("toy").arguments(
+    given = toy.manifest("toy").run_arguments(
         scenario=Path("s{seed}.yaml"), seed=3, out=Path("o"), changes=("alone",), independent=True
     )
     assert given == ("s{seed}.yaml", "--seed", "3", "--out", "o", "--log=o:3", "--in=o/x", '{"a": {}}')
@@ -78,7 +78,7 @@ def test_without_arguments_the_entry_gets_options(toy: Workspace) -> None:
     path = toy.library / "targets" / "toy.yaml"
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(line for line in lines if not line.startswith("  args:")))
-    given = toy.manifest("toy").arguments(scenario=Path("s"), seed=3, out=Path("o"))
+    given = toy.manifest("toy").run_arguments(scenario=Path("s"), seed=3, out=Path("o"))
     assert given == ("--scenario", "s", "--seed", "3", "--out", "o")
 
 
@@ -87,21 +87,21 @@ def test_every_run_has_the_same_cache_folder(toy: Workspace) -> None:
     path.write_text(path.read_text().replace('"{out}"', '"{out}", --cache, "{cache}"'))
     manifest = toy.manifest("toy")
     for independent in (False, True):
-        given = manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), independent=independent)
+        given = manifest.run_arguments(scenario=Path("s"), seed=0, out=Path("o"), independent=independent)
         assert given[given.index("--cache") + 1] == str(shared_cache.target_folder("toy"))
 
 
 def test_a_film_adds_arguments(toy: Workspace) -> None:
     with pytest.raises(MutatorError, match=r"target toy cannot be filmed; expected `film` in its manifest"):
-        toy.manifest("toy").filming()
+        toy.manifest("toy").with_film_recording()
     path = toy.library / "targets" / "toy.yaml"
     film = 'film: {run: [--film, "{film}"], module: toycar.show, args: [], still: []}\n'
     plain = path.read_text()
     path.write_text(plain + film)
-    filmed = toy.manifest("toy").filming()
-    given = filmed.arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"))
+    filmed = toy.manifest("toy").with_film_recording()
+    given = filmed.run_arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"))
     assert given == (
-        *toy.manifest("toy").arguments(scenario=Path("s.yaml"), seed=3, out=Path("o")),
+        *toy.manifest("toy").run_arguments(scenario=Path("s.yaml"), seed=3, out=Path("o")),
         "--film",
         "o/film",
     )
@@ -279,7 +279,7 @@ def test_a_package_without_files_is_refused(toy: Workspace) -> None:
 )
 def test_globs_match_the_whole_path(glob: str, hits: set[str]) -> None:
     paths = ["a/x.py", "a/b/y.py", "a/b/c/z.py", "a/b/d.dbc", "w.py", "a/xXpy"]
-    assert {p for p in paths if matches(p, [glob])} == hits
+    assert {p for p in paths if matches_any_glob(p, [glob])} == hits
 
 
 def test_linked_files_are_part_of_the_tree(toy: Workspace) -> None:
@@ -296,7 +296,7 @@ def test_linked_files_are_part_of_the_tree(toy: Workspace) -> None:
     before = (outside / "sensor.py").read_bytes()
     spec = toy.library / "faults" / "sensor" / "distance.yaml"
     spec.write_text(spec.read_text().replace("toycar/sensor.py", "toycar/linked/sensor.py"))
-    (fault, *_) = expand(toy.spec(spec), 0, models=toy.fault_models(), manifest=manifest)
+    (fault, *_) = expand_spec(toy.spec(spec), 0, models=toy.fault_models(), manifest=manifest)
     assert "toycar/linked/sensor.py" in build(manifest, toy.fault_models(), fault, always_trigger()).files
     assert (outside / "sensor.py").read_bytes() == before
 

@@ -58,7 +58,7 @@ def path(tmp_path: Path) -> Path:
 
 def test_the_manifest_is_valid_without_the_mistakes(path: Path) -> None:
     path.write_text(WHOLE)
-    assert load_manifest(path).hazards == ("HIT", "LATE")
+    assert load_manifest(path).hazard_names == ("HIT", "LATE")
 
 
 @pytest.mark.parametrize(

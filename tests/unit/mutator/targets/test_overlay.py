@@ -8,7 +8,7 @@ import pytest
 from mutator.api.trials import try_fault
 from mutator.checks.doctor import examine_machine
 from mutator.errors import MutatorError
-from mutator.faults.spec_expansion import expand
+from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Outcome
 from mutator.mutants.mutant_building import build
 from mutator.report.film import Shot, _show
@@ -27,7 +27,7 @@ def edit(path: Path, old: str, new: str) -> None:
 def test_an_overlay_is_part_of_the_tree(pole: Workspace) -> None:
     """A run must import the overlay's modules from the tree."""
     before = pole.manifest("pole")
-    assert before.tree.overlaid == {"drive.py", "glue_parts/scenario.py"}
+    assert before.tree.overlaid_paths == {"drive.py", "glue_parts/scenario.py"}
     assert before.overlay == (pole.library / "overlays" / "pole").resolve()
     assert set(before.import_names) == {"pole", "regulator", "filters", "drive", "glue_parts"}
     overlay = pole.library / "overlays" / "pole"
@@ -36,14 +36,14 @@ def test_an_overlay_is_part_of_the_tree(pole: Workspace) -> None:
     (overlay / "__pycache__" / "drive.pyc").write_text("x")
     after = pole.manifest("pole").tree
     assert after.files["gains.txt"] == b"1"
-    assert set(after.overlaid) == {*before.tree.overlaid, "gains.txt"}
+    assert set(after.overlaid_paths) == {*before.tree.overlaid_paths, "gains.txt"}
     assert after.digest != before.tree.digest
     assert not (before.root / "drive.py").exists()
 
 
 def test_an_overlay_is_also_looked_up_in_the_library(pole: Workspace) -> None:
     edit(pole.library / MANIFEST, "../overlays/pole", "overlays/pole")
-    assert "drive.py" in pole.manifest("pole").tree.overlaid
+    assert "drive.py" in pole.manifest("pole").tree.overlaid_paths
     edit(pole.library / MANIFEST, "overlays/pole", "overlays/none")
     with pytest.raises(MutatorError, match=r"pole.yaml:5: no folder .*expected a folder of glue"):
         pole.manifest("pole")
@@ -67,7 +67,7 @@ def test_no_fault_can_be_injected_into_an_overlay(pole: Workspace) -> None:
     with pytest.raises(
         MutatorError, match=r"angle.yaml:\d+: file 'drive.py' is in the overlay of target pole"
     ):
-        expand(pole.spec("sensor/angle"), 0, models=pole.fault_models(), manifest=pole.manifest("pole"))
+        expand_spec(pole.spec("sensor/angle"), 0, models=pole.fault_models(), manifest=pole.manifest("pole"))
 
 
 @pytest.mark.parametrize("name", ["regulator.py", "filters/low_pass.py", "notes.txt"])
@@ -119,7 +119,7 @@ def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
     with pytest.raises(MutatorError) as caught:
         build(pole.manifest("pole"), pole.fault_models(), None, always_trigger())
     assert caught.value.where == str(overlay / "drive.py")
-    assert pole.manifest("pole").tree.named(caught.value.where) == "drive.py"
+    assert pole.manifest("pole").tree.relative_name(caught.value.where) == "drive.py"
     (found,) = [finding for finding in examine_machine(pole) if finding.name == "target pole"]
     assert f"{pole.manifest('pole').root} and {overlay}: 6 files" in found.found
 

@@ -10,7 +10,8 @@ from mutator.api.trials import try_fault
 from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.run_provenance import accepted_version_differences, begin_stretch
-from mutator.checks.doctor import Level, examine_machine
+from mutator.checks.doctor import examine_machine
+from mutator.checks.findings import CheckState
 from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
@@ -52,7 +53,7 @@ def test_check_and_doctor_report_a_missing_package(toycar_without_packages: Work
     (found,) = [
         finding for finding in examine_machine(toycar_without_packages) if finding.name == "target toycar"
     ]
-    assert found.level is Level.FAIL
+    assert found.level is CheckState.FAIL
     assert found.remedy == "pip install 'no-such-thing==1.0' 'numpy>=999'"
 
 

@@ -38,7 +38,7 @@ def test_the_tree_has_only_the_installed_package_and_the_overlay(pole: Workspace
     )
     assert manifest.root == site.resolve()
     own = {"filters_of_poles/__init__.py", "filters_of_poles/gains.txt"}
-    assert manifest.tree.files.keys() - manifest.tree.overlaid == own
+    assert manifest.tree.files.keys() - manifest.tree.overlaid_paths == own
     assert manifest.package == "filters_of_poles"
     assert "filters_of_poles" not in sys.modules
     files = '["filters_of_poles/*.py"]'
@@ -50,7 +50,7 @@ def test_the_root_can_be_an_installed_module(pole: Workspace, site: Path) -> Non
     installed(pole, root="installed:aside_of_poles", packages="[aside_of_poles.py]")
     manifest = pole.manifest("pole")
     assert manifest.root == site.resolve()
-    assert manifest.tree.files.keys() - manifest.tree.overlaid == {"aside_of_poles.py"}
+    assert manifest.tree.files.keys() - manifest.tree.overlaid_paths == {"aside_of_poles.py"}
 
 
 @pytest.mark.parametrize(

@@ -22,13 +22,13 @@ def test_a_value_is_derived_once_for_each_path_and_function(tmp_path: Path) -> N
     def name(path: str, data: bytes, root: Path) -> str:
         return path
 
-    assert [tree.derived(path, size) for path in ("a.py", "b.py", "a.py")] == [6, 6, 6]
+    assert [tree.derive_once(path, size) for path in ("a.py", "b.py", "a.py")] == [6, 6, 6]
     assert calls == [("a.py", b"a = 1\n", tmp_path), ("b.py", b"b = 1\n", tmp_path)]
-    assert tree.derived("a.py", name) == "a.py"
+    assert tree.derive_once("a.py", name) == "a.py"
 
 
 def test_an_unknown_path_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("a")
     tree = read_tree(tmp_path, ["*.py"])
     with pytest.raises(MutatorError, match=r"no file 'a\.txt' in the target"):
-        tree.derived("a.txt", lambda *_: pytest.fail("the value was derived"))
+        tree.derive_once("a.txt", lambda *_: pytest.fail("the value was derived"))

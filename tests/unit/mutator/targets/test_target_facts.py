@@ -4,7 +4,7 @@ import pytest
 
 from mutator._common.hashing import as_json_types
 from mutator._common.typed_json import from_json_types
-from mutator.errors import Misfit
+from mutator.errors import TypeMisfit
 from mutator.targets.channels import Role
 from mutator.targets.target_facts import ChannelFacts, MetricFacts
 
@@ -20,5 +20,5 @@ def test_facts_are_stored_as_the_list_of_their_values() -> None:
 
 @pytest.mark.parametrize("values", [["gas", "-", "driver", "", ""], ["gas", "-", "actuator", ""], []])
 def test_an_unknown_role_or_another_length_is_refused(values: list[str]) -> None:
-    with pytest.raises(Misfit):
+    with pytest.raises(TypeMisfit):
         from_json_types(ChannelFacts, values)

@@ -22,7 +22,7 @@ from mutator.engines.job_tree_pool import JobTreePool
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Status
 from mutator.mutants.mutant_building import build
-from mutator.targets.source_tree import matches
+from mutator.targets.source_tree import matches_any_glob
 from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 
@@ -88,14 +88,16 @@ def test_the_manifest_lists_every_file_that_affects_detection() -> None:
     seeing = {f"selfdrive/{p.relative_to(package).as_posix()}" for glob in SEEING for p in package.glob(glob)}
     assert len(seeing) > 30
     assert [
-        path for path in sorted(seeing) if path.endswith(".py") and not matches(path, manifest.reads_itself)
+        path
+        for path in sorted(seeing)
+        if path.endswith(".py") and not matches_any_glob(path, manifest.self_read_globs)
     ] == []
     for path in (
         "selfdrive/visiond/visiond.py",
         "selfdrive/sim/picture_camera.py",
         "selfdrive/sim/simulator.py",
     ):
-        assert not matches(path, manifest.reads_itself)
+        assert not matches_any_glob(path, manifest.self_read_globs)
 
 
 def test_the_manifest_lists_every_file_that_compiled_code_replaces() -> None:
@@ -112,9 +114,9 @@ def test_the_manifest_lists_every_file_that_compiled_code_replaces() -> None:
         if name.endswith(".py")
     }
     assert len(stood_for) > 6
-    assert [path for path in sorted(stood_for) if not matches(path, manifest.reads_itself)] == []
+    assert [path for path in sorted(stood_for) if not matches_any_glob(path, manifest.self_read_globs)] == []
     choosing = [path.relative_to(target).as_posix() for path in target.rglob("compiled_*.py")]
-    assert [path for path in sorted(choosing) if not matches(path, manifest.forbid)] == []
+    assert [path for path in sorted(choosing) if not matches_any_glob(path, manifest.forbidden_globs)] == []
 
 
 def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:

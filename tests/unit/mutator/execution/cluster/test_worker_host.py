@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.errors import MutatorError, PieceNotWanted
+from mutator.errors import MutatorError, PieceNoLongerNeeded
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.bundle import Bundle, load_run_inputs
 from mutator.execution.cluster.golden_cache import GoldenRunCache
@@ -120,7 +120,7 @@ def test_the_process_of_a_cancelled_piece_ends(host: WorkerHost, sent: tuple[Bun
         return len(asked) < 4
 
     with attended(host):
-        with pytest.raises(PieceNotWanted):
+        with pytest.raises(PieceNoLongerNeeded):
             host.run_piece(sent[1].to_bytes(), wanted)
         assert children(host) == []
 
