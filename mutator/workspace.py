@@ -23,7 +23,12 @@ from mutator.faults.library_readings import Readings, load_readings
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
 from mutator.results.table_columns import check_column_names
-from mutator.stpa.analysis_files import ControlStructureModel, HazardAnalysis, load_control_structure, load_hazard_analysis
+from mutator.stpa.analysis_files import (
+    ControlStructureModel,
+    HazardAnalysis,
+    load_control_structure,
+    load_hazard_analysis,
+)
 from mutator.stpa.context_tables import ContextTable, load_context_table
 from mutator.stpa.hazard_list import HazardList, load_hazard_list
 from mutator.targets.contact_severity import SeverityScale

@@ -70,7 +70,9 @@ def list_library(
 
 
 def _list_specs(workspace: "Workspace") -> ColumnsAndRows:
-    rows = [{"name": s.name, "faults": s.fault_count, "about": _join_lines(s.about)} for s in workspace.specs()]
+    rows = [
+        {"name": s.name, "faults": s.fault_count, "about": _join_lines(s.about)} for s in workspace.specs()
+    ]
     return ["name", "faults", "about"], rows
 
 

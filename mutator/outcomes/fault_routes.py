@@ -68,7 +68,9 @@ def structure_route(
 
 def studied_links(structure: ControlStructureModel) -> dict[str, tuple[str, str]]:
     """Return the ends of each studied link that does not involve people."""
-    people = {name for name, component in structure.components.items() if component.kind is ComponentKind.HUMAN}
+    people = {
+        name for name, component in structure.components.items() if component.kind is ComponentKind.HUMAN
+    }
     ends = ((name, (link.from_, link.to)) for name, link in structure.links.items() if link.studied)
     return {name: pair for name, pair in ends if not people.intersection(pair)}
 
