@@ -106,7 +106,9 @@ def _target_section(manifest: TargetManifest) -> Iterator[str]:
         )
         yield ""
     yield f"Alerts: {', '.join(manifest.alerts) or 'none'}.\n"
-    changes = [(f"`{name}`", f"`{' '.join(arguments)}`") for name, arguments in manifest.args_by_change.items()]
+    changes = [
+        (f"`{name}`", f"`{' '.join(arguments)}`") for name, arguments in manifest.args_by_change.items()
+    ]
     yield TextTable(heads=("change of the scenario", "arguments it adds"), rows=changes).as_markdown(
         escape=False
     )
