@@ -70,7 +70,7 @@ class LoadedGoldens:
         self.folder_of = folder_of  # finds the output folder of the fault-free run
         self._manifest = manifest
         self._several_seeds = several_seeds
-        self._digests = digests  # what `digest_of` must return, by folder
+        self._digests = digests  # what `output_digest_of` must return, by folder
         self._files_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(self._read_files)
         self._trace_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
             lambda folder: self._load_unchanged(folder, load_manifest_channels)

@@ -40,7 +40,7 @@ class CheckRunner:
     pending_folder: Path
 
     def run_all(self, workers: int, notify: OnProgress) -> tuple[CheckRunByName, tuple[str, str]]:
-        """Do all runs of all checks, `workers` at a time. Return them with the result of `canary.judge`."""
+        """Do all runs of all checks, `workers` at a time. Return them with the result of the canary."""
         with self._engine_and_pool(workers) as (engine, pool):
             judged = pool.submit(self._judge_canary, engine)
             futures = {

@@ -92,7 +92,7 @@ def test_the_predicted_activation_step_agrees_with_the_probe(
 def test_the_probes_template_determines_the_precision_of_the_arming_time(probe) -> None:
     one = probe(Trigger(name="x", condition="True", armed_after_s=SEEN.values[3][0] + 0.001))
     changed = [
-        tuple(text.replace("_TINY = 1e-9\n", f"_TINY = {tiny}\n") for text in one.shared)
+        tuple(text.replace("_TINY = 1e-9\n", f"_TINY = {tiny}\n") for text in one.code_parts)
         for tiny in (0.0, 0.002)
     ]
     assert [find_fork_point(replace(one, shared=shared), SEEN).step for shared in changed] == [4, 3]
@@ -102,7 +102,7 @@ def test_the_two_parts_of_a_probe_equal_the_whole_probe(probe) -> None:
     trigger = Trigger(name="x", condition="hwt < 2.0", hold=Hold.FOR, hold_s=0.1)
     whole, parts = {}, {}
     exec(compile(probe(trigger).text, "_fi", "exec"), whole)
-    for part in probe(trigger).in_two:
+    for part in probe(trigger).settings_and_code:
         exec(compile(part, "_fi", "exec"), parts)
     assert parts.keys() == whole.keys()
     for name, thing in whole.items():
@@ -110,7 +110,7 @@ def test_the_two_parts_of_a_probe_equal_the_whole_probe(probe) -> None:
             assert parts[name].__code__ == thing.__code__
         elif isinstance(thing, str | float | list):
             assert parts[name] == thing
-    assert probe(trigger).in_two[1] == probe(always_trigger()).in_two[1]
+    assert probe(trigger).settings_and_code[1] == probe(always_trigger()).in_two[1]
 
 
 def test_a_step_can_have_several_observations_or_none(probe) -> None:
