@@ -321,10 +321,10 @@ class _DriveCheck:
         campaign, experiment, hazard = canary_experiment
 
         def run(tried: Experiment) -> CheckRun:
-            return self._check_run(self._run(canary.build_job(self.workspace, self.manifest, tried)))
+            return self._check_run(self._run(canary.build_canary_job(self.workspace, self.manifest, tried)))
 
         problem, success = canary.run_until_hazard(
-            canary.experiments_to_try(self.workspace, self.manifest, experiment), run, hazard
+            canary.canary_variants(self.workspace, self.manifest, experiment), run, hazard
         )
         return Finding(
             name=f"canary {campaign}",
@@ -336,8 +336,8 @@ class _DriveCheck:
         )
 
 
-def _thread_refusal(watched: JobResult) -> NotForkable | None:
-    threads = watched.watch_report.get("threads", [])
+def _thread_refusal(execution: JobResult) -> NotForkable | None:
+    threads = execution.watch_report.get("threads", [])
     return NotForkable(describe_too_many_threads(threads), remedy_for_threads(threads)) if threads else None
 
 

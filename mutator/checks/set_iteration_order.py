@@ -44,11 +44,14 @@ def list_set_order_uses(source: bytes) -> list[SetOrderUse]:
         tree = ast.parse(source)
     except (SyntaxError, ValueError, RecursionError):
         return []
-    uses = {(use.line, use.set_source): use for use in _Scope(tree, "<module>", frozenset()).set_order_uses()}
+    uses = {
+        (use.line, use.set_source): use
+        for use in _SetUseScope(tree, "<module>", frozenset()).set_order_uses()
+    }
     return sorted(uses.values(), key=lambda use: use.line)
 
 
-class _Scope:
+class _SetUseScope:
     """A module, class or function, with its names that hold sets."""
 
     def __init__(self, node: ast.AST, name: str, outer: frozenset[str]) -> None:
@@ -64,7 +67,7 @@ class _Scope:
         for node in self._scope_nodes:
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
                 prefix = "" if self.name == "<module>" else f"{self.name}."
-                yield from _Scope(node, prefix + node.name, self.set_names).set_order_uses()
+                yield from _SetUseScope(node, prefix + node.name, self.set_names).set_order_uses()
             elif set_expression := next(
                 (expression for expression in self._expressions_in_order(node) if self._is_set(expression)),
                 None,

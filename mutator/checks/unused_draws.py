@@ -34,12 +34,12 @@ def _unused_draw_places(specs: tuple[FaultSpec, ...], models: FaultModels) -> It
         for variant in spec:
             draw = variant.draw
             for reading, injections in variant.injections_by_reading.items():
-                if draw and not any(_does_use_draw(injection, draw.name, models) for injection in injections):
+                if draw and not any(_uses_draw(injection, draw.name, models) for injection in injections):
                     what = f"{spec.name}/{variant.name} draws '{draw.name}', unused in reading {reading}"
                     yield FindingPlace(file=str(spec.path), line=spec.source.line_of(draw.keys), what=what)
 
 
-def _does_use_draw(injection: InjectionSpec, name: str, models: FaultModels) -> bool:
+def _uses_draw(injection: InjectionSpec, name: str, models: FaultModels) -> bool:
     model = models.get(injection.model)
     for param in injection.params:
         schema = model.param(param.name)

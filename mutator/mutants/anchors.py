@@ -13,7 +13,7 @@ from mutator.mutants.constants_and_defaults import (
     choose_constant_or_default,
     list_constants_and_defaults,
 )
-from mutator.mutants.expression_anchors import choose_expression, describe_valid_nth, normalized_text
+from mutator.mutants.expression_anchors import choose_expression, describe_valid_nth, normalized_anchor_name
 from mutator.mutants.expressions import Expression, list_expressions
 from mutator.mutants.name_scopes import names_by_function, normalize_identifier
 from mutator.mutants.node_positions import NodePosition, positions_by_ast
@@ -170,7 +170,7 @@ def _resolve_statement(file: ParsedFile, location: FaultLocation) -> ResolvedAnc
     _refuse_awkward(file, location.anchor, statement)
     _check_position(file, statement.position)
     if statement.block_first_line is not None:
-        return _block_start(file, statement.block_first_line, function.used_names)
+        return _resolve_block_start(file, statement.block_first_line, function.used_names)
     first = statement.first_line
     return ResolvedAnchor(
         first_line=first,
@@ -183,11 +183,11 @@ def _resolve_statement(file: ParsedFile, location: FaultLocation) -> ResolvedAnc
     )
 
 
-def _block_start(file: ParsedFile, first: int, names: frozenset[str]) -> ResolvedAnchor:
-    indent = _indentation_of(file.lines[first])
+def _resolve_block_start(file: ParsedFile, first_line: int, names: frozenset[str]) -> ResolvedAnchor:
+    indent = _indentation_of(file.lines[first_line])
     return ResolvedAnchor(
-        first_line=first,
-        end_line=first,
+        first_line=first_line,
+        end_line=first_line,
         is_after=True,
         is_alone=True,
         indentable_count=0,
@@ -196,12 +196,15 @@ def _block_start(file: ParsedFile, first: int, names: frozenset[str]) -> Resolve
     )
 
 
-def _check_position(file: ParsedFile, place: NodePosition | None) -> None:
-    if place is not None and place.with_byte_columns(file.lines, file.encoding) not in file.ast_positions:
+def _check_position(file: ParsedFile, position: NodePosition | None) -> None:
+    if (
+        position is not None
+        and position.with_byte_columns(file.lines, file.encoding) not in file.ast_positions
+    ):
         raise MutatorError(
             "LibCST and Python's own parser give different positions for this statement",
             where=file.full_path,
-            line=place.start[0],
+            line=position.start[0],
             expected="the same position from both",
             remedy="anchor at another statement, or reformat the target",
         )
@@ -252,19 +255,19 @@ def _choose_statement(
 ) -> tuple[Function, Statement]:
     anchor = location.anchor
     verb = anchor.kind.partition("_")[2]
-    name = normalized_text(anchor.name)
+    name = normalized_anchor_name(anchor.name)
     pairs = [(f, s) for f in functions for s in f.statements if name in s.names_for(verb)]
     # heads of blocks are numbered last, so that `nth` in older specs selects the same statements
-    hits = sorted(
+    matches = sorted(
         (pair for pair in pairs if pair[1].unanchorable_reason is None),
         key=lambda pair: pair[1].block_first_line is not None,
     )
-    statements = sum(s.block_first_line is None for _, s in hits)
+    statements = sum(s.block_first_line is None for _, s in matches)
     nth = anchor.nth
     # one statement is no ambiguity, even if heads of blocks bind the same name
-    if hits and (1 in (len(hits), statements) if nth is None else nth <= len(hits)):
-        return hits[(nth or 1) - 1]
-    raise _ambiguous_or_missing_error(file, location, functions, pairs, hits)
+    if matches and (1 in (len(matches), statements) if nth is None else nth <= len(matches)):
+        return matches[(nth or 1) - 1]
+    raise _ambiguous_or_missing_error(file, location, functions, pairs, matches)
 
 
 def _ambiguous_or_missing_error(
@@ -272,7 +275,7 @@ def _ambiguous_or_missing_error(
     location: FaultLocation,
     functions: tuple[Function, ...],
     pairs: list[tuple[Function, Statement]],
-    hits: list[tuple[Function, Statement]],
+    matches: list[tuple[Function, Statement]],
 ) -> MutatorError:
     """Return the error about an ambiguous or missing anchor.
 
@@ -281,15 +284,15 @@ def _ambiguous_or_missing_error(
     anchor = location.anchor
     verb = anchor.kind.partition("_")[2]
     what, place = _describe_anchor(verb, anchor.name), f"in {location.function}"
-    if hits:
-        lines = ", ".join(str(s.first_line + 1) for _, s in hits)
-        nth_range = describe_valid_nth(len(hits))
-        statement_count = counted(len(hits), "statement")
-        got = f"{what} matches {statement_count} {place}: {'lines' if len(hits) > 1 else 'line'} {lines}"
+    if matches:
+        lines = ", ".join(str(s.first_line + 1) for _, s in matches)
+        nth_range = describe_valid_nth(len(matches))
+        statement_count = counted(len(matches), "statement")
+        got = f"{what} matches {statement_count} {place}: {'lines' if len(matches) > 1 else 'line'} {lines}"
         remedy = (
             f"give `nth`, {nth_range}" if anchor.nth is None else f"`nth` is {anchor.nth}: give {nth_range}"
         )
-        line, expected = hits[0][1].first_line, "exactly one"
+        line, expected = matches[0][1].first_line, "exactly one"
     elif pairs:
         statement = pairs[0][1]
         got = f"{what} {place} is not a separate statement: {statement.unanchorable_reason}"

@@ -21,10 +21,10 @@ def certainly_compiles(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -
         replace(edit, lines=tuple(text.encode(file.encoding).splitlines(keepends=True)))
         for edit, (*_, text) in zip(unchanged, key, strict=True)
     ]
-    return all(_all_parts_compile(file, some) for some in (unchanged, normalized))
+    return all(_functions_and_rest_compile(file, some) for some in (unchanged, normalized))
 
 
-def _all_parts_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
+def _functions_and_rest_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
     functions: dict[range, list[Edit]] = defaultdict(list)
     outside: list[Edit] = []
     for edit in edits:
@@ -35,12 +35,12 @@ def _all_parts_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
             outside.append(edit)
         else:
             functions[function].append(edit)
-    return _rest_compiles(file, tuple(outside)) and all(
+    return _compiles_outside_functions(file, tuple(outside)) and all(
         _function_compiles(file, function, function_edits) for function, function_edits in functions.items()
     )
 
 
-def _rest_compiles(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
+def _compiles_outside_functions(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
     """Return whether the file compiles with `outside`, and `outside` has at most the probe's import."""
     if len(outside) > 1 or any(edit.line_index != file.import_line for edit in outside):
         return False

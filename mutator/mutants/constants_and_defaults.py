@@ -22,7 +22,7 @@ from mutator.mutants.name_scopes import globals_set_in_functions, normalize_iden
 _READ_ONLY_BASES = ("Enum", "Flag", "NamedTuple", "TypedDict")  # endings of base class names
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 _EnclosingClasses = tuple[ast.ClassDef, ...]  # enclosing classes, from the outermost
-_Owner = ast.stmt | None
+_OwningStatement = ast.stmt | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,8 +45,8 @@ def list_constants_and_defaults(data: bytes, tree: ast.Module) -> tuple[Constant
 
     If a constant is assigned several times, the last assignment is used.
     """
-    owned_values: dict[tuple[AnchorKind, str, str], tuple[ConstantOrDefault, _Owner]] = {}
-    for value, owner in _Finder(data).values_in_body(tree.body, ()):
+    owned_values: dict[tuple[AnchorKind, str, str], tuple[ConstantOrDefault, _OwningStatement]] = {}
+    for value, owner in _ValueFinder(data).values_in_body(tree.body, ()):
         key = (value.kind, value.function, value.name)
         _, earlier_owner = owned_values.pop(key, (None, owner))
         if earlier_owner is not owner:
@@ -73,7 +73,7 @@ def parameters_with_default(arguments: ast.arguments) -> Iterator[tuple[str, ast
             yield argument.arg, keyword
 
 
-class _Finder:
+class _ValueFinder:
     """Walks the bodies of a module and its classes, and yields each value with its class or function."""
 
     def __init__(self, data: bytes) -> None:
@@ -83,7 +83,7 @@ class _Finder:
 
     def values_in_body(
         self, body: Sequence[ast.stmt], scope: _EnclosingClasses, around: ast.stmt | None = None
-    ) -> Iterator[tuple[ConstantOrDefault, _Owner]]:
+    ) -> Iterator[tuple[ConstantOrDefault, _OwningStatement]]:
         for statement in body:
             whole = around or statement
             match statement:
@@ -104,7 +104,7 @@ class _Finder:
 
     def constants(
         self, targets: Iterable[ast.expr], value: ast.expr, scope: _EnclosingClasses, whole: ast.stmt
-    ) -> Iterator[tuple[ConstantOrDefault, _Owner]]:
+    ) -> Iterator[tuple[ConstantOrDefault, _OwningStatement]]:
         for name in (name for target in targets for name in _assigned_names(target)):
             index, indent = self.insertion_point(whole)
             yield (
@@ -124,7 +124,7 @@ class _Finder:
 
     def defaults(
         self, function: _Function, scope: _EnclosingClasses, whole: ast.stmt
-    ) -> Iterator[tuple[ConstantOrDefault, _Owner]]:
+    ) -> Iterator[tuple[ConstantOrDefault, _OwningStatement]]:
         for name, value in parameters_with_default(function.args):
             index, indent = self.insertion_point(whole)
             yield (

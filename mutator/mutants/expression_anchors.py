@@ -13,7 +13,7 @@ from mutator.mutants.expressions import Expression
 _MOST_CANDIDATES = 12  # candidates listed in an error
 
 
-def normalized_text(name: str) -> str:
+def normalized_anchor_name(name: str) -> str:
     """Return the normalized text by which anchors are compared; invalid text is unchanged."""
     try:
         return ast.unparse(ast.parse(name.strip(), mode="eval"))
@@ -35,7 +35,7 @@ def choose_expression(
     matches.
     """
     anchor, kind = location.anchor, location.anchor.kind
-    name = normalized_text(anchor.name)
+    name = normalized_anchor_name(anchor.name)
     matches = [
         expression for expression in expressions if expression.matches_anchor(kind, name, anchor.which)
     ]

@@ -28,22 +28,22 @@ def source_of(node: ast.AST) -> str:
 
 def expressions_in(tree: ast.Module) -> Iterator[ExpressionInFunction]:
     """Yield function name, expression and roles for each expression in a function's body."""
-    yield from _in_scope(tree.body, (), inside=False)
+    yield from _expressions_in_scope(tree.body, (), inside=False)
 
 
-def _in_scope(
+def _expressions_in_scope(
     body: Iterable[ast.stmt], scope: tuple[str, ...], *, inside: bool
 ) -> Iterator[ExpressionInFunction]:
     for statement in body:
         if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             in_function = not isinstance(statement, ast.ClassDef)
-            yield from _in_scope(statement.body, (*scope, statement.name), inside=in_function)
+            yield from _expressions_in_scope(statement.body, (*scope, statement.name), inside=in_function)
             continue
         if inside:
             name = ".".join(scope)
-            yield from ((name, node, roles) for node, roles in _in_statement(statement))
+            yield from ((name, node, roles) for node, roles in _expressions_in_statement(statement))
         for block in blocks_of(statement):
-            yield from _in_scope(block, scope, inside=inside)
+            yield from _expressions_in_scope(block, scope, inside=inside)
 
 
 def blocks_of(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
@@ -57,72 +57,72 @@ def blocks_of(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
 _ExpressionsWithRoles = Iterator[tuple[ast.expr, tuple[AnchorRole, ...]]]
 
 
-def _in_statement(statement: ast.stmt) -> _ExpressionsWithRoles:
+def _expressions_in_statement(statement: ast.stmt) -> _ExpressionsWithRoles:
     match statement:
         case ast.Assign(targets=targets, value=value):
-            yield from _in_assignment(targets, value)
+            yield from _expressions_in_assignment(targets, value)
         case (
             ast.AugAssign(target=target, value=value)
             | ast.AnnAssign(target=target, value=ast.expr() as value)
         ):
-            yield from _in_assignment([target], value)
+            yield from _expressions_in_assignment([target], value)
         case ast.Return(value=ast.expr() as value):
-            yield from _in_expression(value, (AnchorKind.RETURN_VALUE, source_of(value), None))
+            yield from _expressions_within(value, (AnchorKind.RETURN_VALUE, source_of(value), None))
         case ast.If(test=test) | ast.While(test=test) | ast.Assert(test=test):
-            yield from _in_condition(test)
+            yield from _expressions_in_condition(test)
         case ast.For(target=target, iter=value) | ast.AsyncFor(target=target, iter=value):
-            yield from _in_expression(value)
-            yield from _in_target(target)
+            yield from _expressions_within(value)
+            yield from _expressions_in_target(target)
         case ast.With(items=items) | ast.AsyncWith(items=items):
             for item in items:
-                yield from _in_expression(item.context_expr)
+                yield from _expressions_within(item.context_expr)
         case ast.Match(subject=subject, cases=cases):
-            yield from _in_expression(subject)
+            yield from _expressions_within(subject)
             for case in cases:
                 if case.guard:
-                    yield from _in_condition(case.guard)
+                    yield from _expressions_in_condition(case.guard)
         case ast.Expr(value=value) if not isinstance(value, ast.Constant):
-            yield from _in_expression(value)
+            yield from _expressions_within(value)
         case ast.Raise(exc=ast.expr() as value):
-            yield from _in_expression(value)
+            yield from _expressions_within(value)
 
 
-def _in_assignment(targets: Sequence[ast.expr], value: ast.expr) -> _ExpressionsWithRoles:
-    yield from _in_expression(
+def _expressions_in_assignment(targets: Sequence[ast.expr], value: ast.expr) -> _ExpressionsWithRoles:
+    yield from _expressions_within(
         value, *((AnchorKind.ASSIGNED_VALUE, source_of(target), None) for target in targets)
     )
     for target in targets:
-        yield from _in_target(target)
+        yield from _expressions_in_target(target)
 
 
-def _in_condition(test: ast.expr) -> _ExpressionsWithRoles:
-    yield from _in_expression(test, (AnchorKind.CONDITION, source_of(test), None))
+def _expressions_in_condition(test: ast.expr) -> _ExpressionsWithRoles:
+    yield from _expressions_within(test, (AnchorKind.CONDITION, source_of(test), None))
 
 
-def _in_target(target: ast.expr) -> _ExpressionsWithRoles:
+def _expressions_in_target(target: ast.expr) -> _ExpressionsWithRoles:
     """Yield the expressions evaluated to find an assignment's target, such as an index."""
     match target:
         case ast.Tuple(elts=elements) | ast.List(elts=elements):
             for element in elements:
-                yield from _in_target(element)
+                yield from _expressions_in_target(element)
         case ast.Starred(value=value):
-            yield from _in_target(value)
+            yield from _expressions_in_target(value)
         case ast.Subscript(value=value, slice=index):
-            yield from _in_base(value)
-            yield from _in_expression(index)
+            yield from _expressions_in_base(value)
+            yield from _expressions_within(index)
         case ast.Attribute(value=value):
-            yield from _in_base(value)
+            yield from _expressions_in_base(value)
 
 
-def _in_base(node: ast.expr) -> _ExpressionsWithRoles:
+def _expressions_in_base(node: ast.expr) -> _ExpressionsWithRoles:
     """Yield the object of an attribute, item or method. Plain names are skipped."""
     if isinstance(node, ast.Attribute):
-        yield from _in_base(node.value)
+        yield from _expressions_in_base(node.value)
     elif not isinstance(node, ast.Name):
-        yield from _in_expression(node)
+        yield from _expressions_within(node)
 
 
-def _in_expression(node: ast.expr, *roles: AnchorRole) -> _ExpressionsWithRoles:
+def _expressions_within(node: ast.expr, *roles: AnchorRole) -> _ExpressionsWithRoles:
     if isinstance(node, ast.JoinedStr):
         yield node, roles  # before Python 3.12, the expressions inside it have no positions
         return
@@ -135,44 +135,44 @@ def _in_expression(node: ast.expr, *roles: AnchorRole) -> _ExpressionsWithRoles:
         yield node, roles
     match node:
         case ast.Call():
-            yield from _in_call(node)
+            yield from _expressions_in_call(node)
         case ast.Attribute() | ast.Subscript():
-            yield from _in_target(node)
+            yield from _expressions_in_target(node)
         case ast.IfExp(test=test, body=body, orelse=other):
-            yield from _in_expression(body)
-            yield from _in_condition(test)
-            yield from _in_expression(other)
+            yield from _expressions_within(body)
+            yield from _expressions_in_condition(test)
+            yield from _expressions_within(other)
         case ast.NamedExpr(target=target, value=value):
-            yield from _in_expression(value, (AnchorKind.ASSIGNED_VALUE, source_of(target), None))
+            yield from _expressions_within(value, (AnchorKind.ASSIGNED_VALUE, source_of(target), None))
         case ast.Lambda(body=body):
-            yield from _in_expression(body)
+            yield from _expressions_within(body)
         case ast.UnaryOp(operand=ast.Constant()):
             pass  # -1 is one constant
         case ast.ListComp() | ast.SetComp() | ast.GeneratorExp() | ast.DictComp():
-            yield from _in_comprehension(node)
+            yield from _expressions_in_comprehension(node)
         case _:
             for child in ast.iter_child_nodes(node):
                 if isinstance(child, ast.expr):
-                    yield from _in_expression(child)
+                    yield from _expressions_within(child)
 
 
-def _in_call(node: ast.Call) -> _ExpressionsWithRoles:
+def _expressions_in_call(node: ast.Call) -> _ExpressionsWithRoles:
     called = source_of(node.func)
-    yield from _in_base(node.func)
+    yield from _expressions_in_base(node.func)
     for number, argument in enumerate(node.args, 1):
-        yield from _in_expression(argument, (AnchorKind.ARGUMENT, called, str(number)))
+        yield from _expressions_within(argument, (AnchorKind.ARGUMENT, called, str(number)))
     for keyword in node.keywords:
         roles = [(AnchorKind.ARGUMENT, called, keyword.arg)] if keyword.arg else []
-        yield from _in_expression(keyword.value, *roles)
+        yield from _expressions_within(keyword.value, *roles)
 
 
-def _in_comprehension(
+def _expressions_in_comprehension(
     node: ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.DictComp,
 ) -> _ExpressionsWithRoles:
     values = (node.key, node.value) if isinstance(node, ast.DictComp) else (node.elt,)
     for value in values:
-        yield from _in_expression(value)
+        yield from _expressions_within(value)
     for generator in node.generators:
-        yield from _in_expression(generator.iter)
+        yield from _expressions_within(generator.iter)
         for test in generator.ifs:
-            yield from _in_condition(test)
+            yield from _expressions_in_condition(test)

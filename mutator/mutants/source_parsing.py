@@ -58,17 +58,17 @@ def parse_with_python(data: bytes, where: Path) -> ast.Module:
 
 def _check_tree_size(tree: ast.Module, where: Path) -> None:
     """Refuse what would take LibCST long, or end the process: it recurses along chains."""
-    for number, node in enumerate(ast.walk(tree), start=1):
+    for node_count, node in enumerate(ast.walk(tree), start=1):
         links = len(node.values) if isinstance(node, ast.BoolOp) else 0
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = [alias.name for alias in node.names] + [getattr(node, "module", None) or ""]
             links = max(name.count(".") for name in names)
-        if number > MOST_NODES or links > MOST_CHAIN_LINKS:
-            long = (
+        if node_count > MOST_NODES or links > MOST_CHAIN_LINKS:
+            excess = (
                 f"`and`, `or` or a dotted name with {links} parts" if links > MOST_CHAIN_LINKS else "its size"
             )
             raise MutatorError(
-                f"too large to be changed: {long}",
+                f"too large to be changed: {excess}",
                 where=where,
                 line=getattr(node, "lineno", None) if links > MOST_CHAIN_LINKS else None,
                 expected=f"at most {MOST_NODES:,} nodes in its syntax tree, and chains of {MOST_CHAIN_LINKS}",

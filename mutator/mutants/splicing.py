@@ -148,14 +148,14 @@ def as_line_edits(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[E
     return [*(edit for edit in edits if isinstance(edit, Edit)), *lines]
 
 
-def _replacement_edit(file: ParsedFile, index: int, texts: Sequence[tuple[int, bytes, str]]) -> Edit:
-    whole = file.lines[index]
+def _replacement_edit(file: ParsedFile, line_index: int, texts: Sequence[tuple[int, bytes, str]]) -> Edit:
+    whole = file.lines[line_index]
     original = whole.rstrip(b"\r\n")
     line = original
     for column, text, _ in reversed(texts):
         line = line[:column] + text + line[column:]
     tag = replacement_tag(dict.fromkeys(tag for *_, tag in texts), original)
-    return Edit(line_index=index, rank=EditRank.INSTEAD, lines=(line + tag + whole[len(original) :],))
+    return Edit(line_index=line_index, rank=EditRank.INSTEAD, lines=(line + tag + whole[len(original) :],))
 
 
 def probe_import_edit(file: ParsedFile, package: str | None) -> Edit:

@@ -68,9 +68,9 @@ def _one_line_text(file: ParsedFile, site: ResolvedAnchor, statement: ast.stmt) 
     return text
 
 
-def _unfit_error(file: ParsedFile, site: ResolvedAnchor, what: str) -> MutatorError:
+def _unfit_error(file: ParsedFile, site: ResolvedAnchor, problem: str) -> MutatorError:
     return MutatorError(
-        what,
+        problem,
         where=file.full_path,
         line=site.first_line + 1,
         expected="an anchor before or after a call, an assignment or a return that is alone on its lines",

@@ -240,9 +240,9 @@ def render_template(template: str, names: Mapping[str, object], where: Path, fir
         ) from None
 
 
-def _template_error(what: str, where: Path, line: int | None, first_line: int) -> MutatorError:
+def _template_error(problem: str, where: Path, line: int | None, first_line: int) -> MutatorError:
     return MutatorError(
-        f"the template fails: {what}",
+        f"the template fails: {problem}",
         where=where,
         line=line + first_line - 1 if line else None,
         expected="names of the model's parameters, `fi`, a loop over a list, a condition, arithmetic, or one "

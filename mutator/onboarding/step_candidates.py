@@ -71,14 +71,14 @@ def list_step_candidates(survey: SourceSurvey) -> tuple[StepCandidate, ...]:
     return tuple(sorted(candidates, key=lambda candidate: (-candidate.score, candidate.path, candidate.line)))
 
 
-def _candidates_in_module(module: SourceModule, looped: Counter[str]) -> Iterator[StepCandidate]:
+def _candidates_in_module(module: SourceModule, loop_call_counts: Counter[str]) -> Iterator[StepCandidate]:
     for node in module.tree.body:
         if isinstance(node, ast.ClassDef):
             for function in node.body:
                 if isinstance(function, Function) and _can_be_step(function):
-                    yield _build_candidate(module, node, function, looped)
+                    yield _build_candidate(module, node, function, loop_call_counts)
         elif isinstance(node, Function) and _can_be_step(node):
-            yield _build_candidate(module, None, node, looped)
+            yield _build_candidate(module, None, node, loop_call_counts)
 
 
 def _can_be_step(function: Function) -> bool:
@@ -97,27 +97,27 @@ def _can_be_step(function: Function) -> bool:
 
 
 def _build_candidate(
-    module: SourceModule, owner: ast.ClassDef | None, function: Function, looped: Counter[str]
+    module: SourceModule, class_node: ast.ClassDef | None, function: Function, loop_call_counts: Counter[str]
 ) -> StepCandidate:
     values = tuple(_value_candidates(function))
     # three calls in loops say as much as thirty, which only a helper has
-    hints = _name_score(function.name) + 2 * min(looped[function.name], 3)
+    hints = _name_score(function.name) + 2 * min(loop_call_counts[function.name], 3)
     score = min(len(values), _MOST_VALUE_POINTS) + (hints or _NO_HINT_POINTS)
-    if owner is not None:
-        score += min(len(_state_attributes(owner)), _MOST_STATE_POINTS) + _class_score(owner.name)
+    if class_node is not None:
+        score += min(len(_state_attributes(class_node)), _MOST_STATE_POINTS) + _class_score(class_node.name)
     score += _CONTROLLER_FILE_POINTS * bool(_CONTROLLER_PATTERN.search(module.path.lower()))
     init = (
-        next((n for n in owner.body if isinstance(n, Function) and n.name == "__init__"), None)
-        if owner
+        next((n for n in class_node.body if isinstance(n, Function) and n.name == "__init__"), None)
+        if class_node
         else None
     )
     return StepCandidate(
         module=module.name,
         path=module.path,
         line=function.lineno,
-        class_name=owner.name if owner else None,
+        class_name=class_node.name if class_node else None,
         function=function.name,
-        required_arguments=_required_arguments(function, is_method=owner is not None),
+        required_arguments=_required_arguments(function, is_method=class_node is not None),
         constructor_arguments=_required_arguments(init, is_method=True) if init else (),
         score=score,
         values=values,
@@ -149,10 +149,10 @@ def _required_arguments(function: Function, *, is_method: bool) -> tuple[str, ..
     return tuple(argument.arg for argument in (*positional[is_method and not static :], *keyword))
 
 
-def _state_attributes(owner: ast.ClassDef) -> set[str]:
+def _state_attributes(class_node: ast.ClassDef) -> set[str]:
     return {
         target.attr
-        for node in ast.walk(owner)
+        for node in ast.walk(class_node)
         for target in _assignment_targets(node)
         if isinstance(target, ast.Attribute)
         and isinstance(target.value, ast.Name)

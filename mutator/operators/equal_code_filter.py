@@ -30,7 +30,7 @@ def drop_equal_code(file: ParsedFile, mutations: Iterable[Mutation]) -> Distinct
         assert function is not None  # every place is in a function
         if function not in codes_by_function:
             codes_by_function[function] = [_comparable_code(file, file.lines[function.start : function.stop])]
-        code = _comparable_code(file, mutated_function(file, function, mutation))
+        code = _comparable_code(file, mutated_function_lines(file, function, mutation))
         if code is None:
             invalids += 1
         elif code == codes_by_function[function][0]:
@@ -48,7 +48,7 @@ def drop_equal_code(file: ParsedFile, mutations: Iterable[Mutation]) -> Distinct
     )
 
 
-def mutated_function(file: ParsedFile, function: range, mutation: Mutation) -> list[bytes]:
+def mutated_function_lines(file: ParsedFile, function: range, mutation: Mutation) -> list[bytes]:
     before, part = list(file.lines[function.start : mutation.line]), mutation.mutated_part
     if isinstance(part, Expression):
         first, last = file.lines[part.start[0]], file.lines[part.end[0]]

@@ -93,7 +93,7 @@ def _omission_mutations(
                 numbered_anchor = numbered_anchor or (verb, name, numbers[verb, name])
         if numbered_anchor is None or not _can_be_omitted(statement, facts, line):
             continue
-        omitting = [name for name, o in operators.items() if _does_omit(name, o, statement, facts)]
+        omitting = [name for name, o in operators.items() if _operator_omits(name, o, statement, facts)]
         if not omitting:
             continue
         verb, name, number = numbered_anchor
@@ -117,7 +117,7 @@ def _omission_mutations(
             )
 
 
-def _does_omit(name: str, operator: Operator, statement: Statement, facts: StatementFacts) -> bool:
+def _operator_omits(name: str, operator: Operator, statement: Statement, facts: StatementFacts) -> bool:
     with OPERATORS.blaming_package(name):
         return bool(operator.omits and operator.omits(statement, facts))
 

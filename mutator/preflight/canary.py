@@ -15,7 +15,7 @@ from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 
-def experiments_to_try(
+def canary_variants(
     workspace: Workspace, manifest: TargetManifest, canary: Experiment
 ) -> Iterator[Experiment]:
     """Yield the canary, then the same fault with each other value of its variant, largest first."""
@@ -30,7 +30,7 @@ def experiments_to_try(
         yield replace(canary, fault=fault)
 
 
-def build_job(workspace: Workspace, manifest: TargetManifest, experiment: Experiment) -> Job:
+def build_canary_job(workspace: Workspace, manifest: TargetManifest, experiment: Experiment) -> Job:
     mutant = build(manifest, workspace.fault_models(), experiment.fault, experiment.trigger)
     return Job(
         name=f"canary-{experiment.id}",

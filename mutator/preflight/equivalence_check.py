@@ -24,7 +24,7 @@ from mutator.store.records import PROOF_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
 
 _MIN_SAMPLE = 20  # finds an engine that changes one record in seven with a chance of 95%
-_EXPERIMENTS_PER_SAMPLED_ONE = 100  # one experiment in this many
+_EXPERIMENTS_PER_SAMPLED_EXPERIMENT = 100  # one experiment in this many
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ def mark_as_needed(run: Path) -> None:
 
 def choose_sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ...]:
     """Choose one experiment in a hundred, at least 20, with every fault type and every scenario."""
-    count = max(_MIN_SAMPLE, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_ONE))
+    count = max(_MIN_SAMPLE, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_EXPERIMENT))
     chosen = list(draw_balanced(experiments, count, seed))
     covered = {mark for experiment in chosen for mark in _traits_to_cover(experiment)}
     for experiment in sorted(experiments, key=lambda e: digest([seed, e.id])):
@@ -88,7 +88,7 @@ def _cached_sample_ids(run: Path, plan: str, seeds: int) -> tuple[str, ...]:
     for seed, group in groupby(plan_file.iterate_experiments(run), key=lambda experiment: experiment.seed):
         experiments = tuple(group)
         sampled_experiments = (
-            draw_balanced(experiments, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_ONE), seed)
+            draw_balanced(experiments, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_EXPERIMENT), seed)
             if ids
             else choose_sample(experiments, seed)
         )

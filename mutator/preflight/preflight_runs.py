@@ -82,12 +82,12 @@ class CheckRunner:
 
         def run(experiment: Experiment) -> CheckRun:
             return self._run_job(
-                engine, (_CANARY, None), canary.build_job(self.workspace, self.manifest, experiment)
+                engine, (_CANARY, None), canary.build_canary_job(self.workspace, self.manifest, experiment)
             )
 
         hazard = self.folder.head.canary_hazard
         return canary.run_until_hazard(
-            canary.experiments_to_try(self.workspace, self.manifest, self.folder.canary), run, hazard
+            canary.canary_variants(self.workspace, self.manifest, self.folder.canary), run, hazard
         )
 
     def _jobs_by_name(self) -> dict[tuple[str, Any], Job]:

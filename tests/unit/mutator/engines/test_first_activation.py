@@ -95,7 +95,7 @@ def test_the_probes_template_determines_the_precision_of_the_arming_time(probe) 
         tuple(text.replace("_TINY = 1e-9\n", f"_TINY = {tiny}\n") for text in one.code_parts)
         for tiny in (0.0, 0.002)
     ]
-    assert [find_fork_point(replace(one, shared=shared), SEEN).step for shared in changed] == [4, 3]
+    assert [find_fork_point(replace(one, code_parts=shared), SEEN).step for shared in changed] == [4, 3]
 
 
 def test_the_two_parts_of_a_probe_equal_the_whole_probe(probe) -> None:
@@ -110,7 +110,7 @@ def test_the_two_parts_of_a_probe_equal_the_whole_probe(probe) -> None:
             assert parts[name].__code__ == thing.__code__
         elif isinstance(thing, str | float | list):
             assert parts[name] == thing
-    assert probe(trigger).settings_and_code[1] == probe(always_trigger()).in_two[1]
+    assert probe(trigger).settings_and_code[1] == probe(always_trigger()).settings_and_code[1]
 
 
 def test_a_step_can_have_several_observations_or_none(probe) -> None:
