@@ -24,7 +24,7 @@ from mutator.mutants.source_parsing import (
     parse_with_python,
     translate_libcst_errors,
 )
-from mutator.mutants.standalone_functions import outer_functions
+from mutator.mutants.standalone_functions import list_outermost_function_lines
 from mutator.mutants.statements import Function, Statement, collect_functions
 from mutator.targets.source_tree import SourceTree
 
@@ -87,8 +87,8 @@ class ParsedFile:
         if location.anchor.kind in FIXED_ANCHORS:
             fixed = self.resolve_constant_or_default(location)
             return fixed.first_line, fixed.end_line
-        site = self.resolve_statement(location)
-        return site.first_line, site.end_line
+        anchor = self.resolve_statement(location)
+        return anchor.first_line, anchor.end_line
 
     def outermost_function_at(self, line: int) -> range | None:
         """Return the lines of the outermost function that contains this line (from 0)."""
@@ -136,7 +136,7 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
             functions_by_name=collect_functions(module, positions, names_by_function(data)),
             expressions_by_function=list_expressions(data, module, positions),
             constants_and_defaults=list_constants_and_defaults(data, tree),
-            outermost_function_lines=tuple(outer_functions(tree)),
+            outermost_function_lines=tuple(list_outermost_function_lines(tree)),
             ast_positions=positions_by_ast(tree),
             full_path=where,
         )

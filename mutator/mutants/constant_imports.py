@@ -91,7 +91,7 @@ def _module_imports(path: str, data: bytes, root: Path) -> _ModuleImports:
         return _ModuleImports(
             path=path, module=module_name(path), imported_names=(), rebound_names=frozenset()
         )
-    names = tuple(_imports_in_body(tree.body, path, inside=False))
+    names = tuple(_imports_in_body(tree.body, path, in_class=False))
     count_by_name = Counter(imported_name.local_name for imported_name in names if not imported_name.in_class)
     assigned = {symbol.get_name() for symbol in table.get_symbols() if symbol.is_assigned()}
     repeated = {name for name, count in count_by_name.items() if count > 1}
@@ -118,7 +118,7 @@ def _exported_names(tree: ast.Module) -> frozenset[str] | None:
     return None
 
 
-def _imports_in_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_ImportedName]:
+def _imports_in_body(body: Iterable[ast.stmt], path: str, *, in_class: bool) -> Iterator[_ImportedName]:
     """Yield the imports of a module and its classes, but not those in functions, which last for one call."""
     for statement in body:
         match statement:
@@ -127,15 +127,15 @@ def _imports_in_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> It
                 for alias in names:
                     local_name = alias.asname or alias.name
                     yield _ImportedName(
-                        module=source, name=alias.name, local_name=local_name, line=line, in_class=inside
+                        module=source, name=alias.name, local_name=local_name, line=line, in_class=in_class
                     )
             case ast.ClassDef(body=inner):
-                yield from _imports_in_body(inner, path, inside=True)
+                yield from _imports_in_body(inner, path, in_class=True)
             case ast.FunctionDef() | ast.AsyncFunctionDef():
                 pass
             case _:
                 for block in blocks_of(statement):
-                    yield from _imports_in_body(block, path, inside=inside)
+                    yield from _imports_in_body(block, path, in_class=in_class)
 
 
 def _relative_package(path: str, level: int) -> str:

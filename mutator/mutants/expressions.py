@@ -15,7 +15,7 @@ import libcst as cst
 
 from mutator.model import AnchorKind
 from mutator.mutants.expression_roles import AnchorRole, ExpressionInFunction, expressions_in, source_of
-from mutator.mutants.node_positions import Positions
+from mutator.mutants.node_positions import RangeByNode
 
 # line and column, from 0; in `Expression`, columns count bytes, elsewhere characters
 _LineColumn = tuple[int, int]
@@ -63,7 +63,7 @@ def _grouped_by_function(expressions: Iterable[Expression]) -> dict[str, tuple[E
 
 
 def list_expressions(
-    data: bytes, module: cst.Module, positions: Positions
+    data: bytes, module: cst.Module, positions: RangeByNode
 ) -> dict[str, tuple[Expression, ...]]:
     encoding = module.encoding.removesuffix("-sig")
     lines = [line.decode(encoding) for line in data.splitlines(keepends=True)]
@@ -142,7 +142,7 @@ def _nodes_to_confirm(node: ast.expr) -> Iterator[ast.expr]:
         yield node
 
 
-def _libcst_extents(positions: Positions) -> frozenset[tuple[_LineColumn, _LineColumn]]:
+def _libcst_extents(positions: RangeByNode) -> frozenset[tuple[_LineColumn, _LineColumn]]:
     return frozenset(
         ((span.start.line - 1, span.start.column), (span.end.line - 1, span.end.column))
         for node, span in positions.items()

@@ -120,13 +120,13 @@ def tag_of(line: bytes) -> Tag | None:
     return Tag(id=match[1].decode(), guarded_line_count=int(match[2] or 0), code=code, replaced_line=match[3])
 
 
-def tagged_line(code: str, tag: str, guarded: int = 0) -> str:
+def tagged_line(code: str, tag: str, guarded_line_count: int = 0) -> str:
     """Add a tag to `code`. The tag of a guard's line includes the number of lines that the guard wraps."""
-    return f"{code}  {_TAG_START}{tag}" + (f" guard:{guarded}" if guarded else "")
+    return f"{code}  {_TAG_START}{tag}" + (f" guard:{guarded_line_count}" if guarded_line_count else "")
 
 
-def replacement_tag(ids: Iterable[str], was: bytes) -> bytes:
-    return f"  {_TAG_START}{'+'.join(ids)} was:".encode() + was
+def replacement_tag(ids: Iterable[str], replaced_line: bytes) -> bytes:
+    return f"  {_TAG_START}{'+'.join(ids)} was:".encode() + replaced_line
 
 
 def active_check(tag: str) -> str:

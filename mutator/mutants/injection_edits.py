@@ -81,23 +81,23 @@ def injection_edit(
         return _value_edit(file, model, injection, name)
     if injection.location.anchor.kind in FIXED_ANCHORS:
         return _setting_edit(file, model, injection, name, tree)
-    site = file.resolve_statement(injection.location)
-    variables = _checked_variables(file, site.names_in_function, site.first_line, model, injection)
+    anchor = file.resolve_statement(injection.location)
+    variables = _checked_variables(file, anchor.names_in_function, anchor.first_line, model, injection)
     texts: dict[str, str] = {}
     if model.needs is TemplateNeed.CALL:
-        raise _misfit_error(file, model, site.first_line)
+        raise _misfit_error(file, model, anchor.first_line)
     if model.needs is not None:
-        site, texts = one_line_texts(file, site, model.needs)
-    _check_instance(file, site.names_in_function, site.first_line, injection)
+        anchor, texts = one_line_texts(file, anchor, model.needs)
+    _check_instance(file, anchor.names_in_function, anchor.first_line, injection)
     code = _limited_snippet(
         render_snippet(model, dict(injection.params), name, texts), injection, name, model
     )
     make_edit = guard_edit if model.kind is SnippetKind.GUARD else insertion_edit
-    edit = make_edit(file, site, code, name)
+    edit = make_edit(file, anchor, code, name)
     key = (variables, reuse_key(file, [edit], [name]))
     if key not in file.verified_edits:
-        _check_bound_names(file, site, model, code, variables.union(*map(_bound_names, texts.values())))
-        _check_scopes(file, site, edit)
+        _check_bound_names(file, anchor, model, code, variables.union(*map(_bound_names, texts.values())))
+        _check_scopes(file, anchor, edit)
         file.verified_edits.add(key)
     return edit
 
@@ -178,7 +178,7 @@ def _setting_edit(
 
 
 def _checked_variables(
-    file: ParsedFile, names: frozenset[str], first: int, model: FaultModel, injection: Injection
+    file: ParsedFile, names: frozenset[str], first_line: int, model: FaultModel, injection: Injection
 ) -> frozenset[str]:
     params = dict(injection.params)
     variables = set()
@@ -190,7 +190,7 @@ def _checked_variables(
                 raise MutatorError(
                     f"'{value}' is not known in {injection.location.function}",
                     where=file.full_path,
-                    line=first + 1,
+                    line=first_line + 1,
                     expected=f"a name used there: {', '.join(sorted(names))}",
                     remedy=f"correct `{param.name}`",
                 )
@@ -198,13 +198,13 @@ def _checked_variables(
     return frozenset(variables)
 
 
-def _check_instance(file: ParsedFile, names: frozenset[str], first: int, injection: Injection) -> None:
+def _check_instance(file: ParsedFile, names: frozenset[str], first_line: int, injection: Injection) -> None:
     unknown = names_in_condition(injection.where or "True") - names
     if unknown:
         raise MutatorError(
             f"'{min(unknown)}' in `where` is not known in {injection.location.function}",
             where=file.full_path,
-            line=first + 1,
+            line=first_line + 1,
             expected=f"names used there: {', '.join(sorted(names))}",
             remedy="correct `where`",
         )
@@ -229,17 +229,21 @@ def _limited_snippet(
 
 
 def _check_bound_names(
-    file: ParsedFile, site: ResolvedAnchor, model: FaultModel, code: Sequence[str], variables: frozenset[str]
+    file: ParsedFile,
+    anchor: ResolvedAnchor,
+    model: FaultModel,
+    code: Sequence[str],
+    variables: frozenset[str],
 ) -> None:
     block = [*code, "    pass"] if model.kind is SnippetKind.GUARD else code
     clashes = (
         {normalize_identifier(name) for name in _bound_names("\n".join(block))} - variables
-    ) & site.names_in_function
+    ) & anchor.names_in_function
     if clashes:
         raise MutatorError(
             f"the injected lines set '{min(clashes)}', a name that the function uses itself",
             where=file.full_path,
-            line=site.first_line + 1,
+            line=anchor.first_line + 1,
             expected="lines that set only parameters and names that the function does not use",
             remedy=f"rename it in {model.template_path.name}, or make it a parameter",
         )
@@ -261,7 +265,7 @@ def _bound_names(code: str) -> Iterator[str]:
                 yield name
 
 
-def _check_scopes(file: ParsedFile, site: ResolvedAnchor, edit: Edit) -> None:
+def _check_scopes(file: ParsedFile, anchor: ResolvedAnchor, edit: Edit) -> None:
     inserted = range(edit.line_index + 1, edit.line_index + 1 + len(edit.lines))
     try:
         moved = next(moved_names(file.data, join_pieces(apply_edits(file, [edit])), inserted), None)
@@ -272,7 +276,7 @@ def _check_scopes(file: ParsedFile, site: ResolvedAnchor, edit: Edit) -> None:
             f"the lines would make '{moved.name}' {moved.scope_after} in {moved.holder}, where it is "
             f"{moved.scope_before}",
             where=file.full_path,
-            line=site.first_line + 1,
+            line=anchor.first_line + 1,
             expected="a variable that the function sets itself, or declares `global` or `nonlocal`",
             remedy="inject where the variable is set, or into another variable that is computed from it",
         )

@@ -121,8 +121,8 @@ def _edits_by_path(manifest: TargetManifest, changes: Sequence[InjectionEdit]) -
 def _observation_edit(manifest: TargetManifest) -> Edit:
     observation = manifest.observation
     file = parsed_file(manifest.tree, observation.location.path)
-    site = file.resolve_statement(observation.location)
-    return insertion_edit(file, site, [observe_call(observation.expressions)], OBSERVE_TAG)
+    anchor = file.resolve_statement(observation.location)
+    return insertion_edit(file, anchor, [observe_call(observation.expressions)], OBSERVE_TAG)
 
 
 def _build_probe(

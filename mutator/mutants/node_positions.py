@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import libcst as cst
 from libcst.metadata import CodePosition, CodeRange
 
-Positions = Mapping[cst.CSTNode, CodeRange]
+RangeByNode = Mapping[cst.CSTNode, CodeRange]
 _LineColumn = tuple[int, int]
 # only these assign, call or return as a whole
 _ANCHORABLE_STATEMENTS = ast.Assign | ast.AugAssign | ast.AnnAssign | ast.Expr | ast.Return
@@ -40,7 +40,7 @@ class NodePosition:
         return replace(self, start=column(self.start), end=column(self.end))
 
 
-def function_position(node: cst.FunctionDef, positions: Positions) -> NodePosition:
+def function_position(node: cst.FunctionDef, positions: RangeByNode) -> NodePosition:
     first: cst.CSTNode = node.body.body[0]
     if isinstance(first, cst.SimpleStatementLine):
         first = first.body[0]
@@ -52,7 +52,7 @@ def function_position(node: cst.FunctionDef, positions: Positions) -> NodePositi
     )
 
 
-def statement_position(node: cst.BaseSmallStatement, positions: Positions) -> NodePosition:
+def statement_position(node: cst.BaseSmallStatement, positions: RangeByNode) -> NodePosition:
     span = positions[node]
     return NodePosition(
         node_class=type(node).__name__, start=_line_and_column(span.start), end=_line_and_column(span.end)
@@ -60,7 +60,7 @@ def statement_position(node: cst.BaseSmallStatement, positions: Positions) -> No
 
 
 def line_after_statements(
-    node: cst.SimpleStatementLine | cst.SimpleStatementSuite, positions: Positions
+    node: cst.SimpleStatementLine | cst.SimpleStatementSuite, positions: RangeByNode
 ) -> int:
     """Return the index of the first line after a line of statements, including backslash continuations."""
     space = node.trailing_whitespace.whitespace.value

@@ -88,16 +88,16 @@ class _PlaceLister:
     ) -> Iterator[ListedPlace]:
         location = self.location_at(function, Anchor(kind=kind, name=name, nth=nth))
         try:
-            site = self.file.resolve_statement(location)
+            anchor = self.file.resolve_statement(location)
         except MutatorError:
             return  # for example, because the statement shares its line
-        models = tuple(model.name for model in self.models if self.fits_statement(model, kind, site))
+        models = tuple(model.name for model in self.models if self.fits_statement(model, kind, anchor))
         if models:
             yield ListedPlace(
-                line=min(site.first_line, len(self.file.lines) - 1) + 1, location=location, models=models
+                line=min(anchor.first_line, len(self.file.lines) - 1) + 1, location=location, models=models
             )
 
-    def fits_statement(self, model: FaultModel, kind: AnchorKind, site: ResolvedAnchor) -> bool:
+    def fits_statement(self, model: FaultModel, kind: AnchorKind, anchor: ResolvedAnchor) -> bool:
         if model.needs is TemplateNeed.CALL or (
             model.kind is SnippetKind.VALUE and kind is not AnchorKind.AFTER_ASSIGN
         ):
@@ -105,12 +105,12 @@ class _PlaceLister:
         if model.kind is SnippetKind.VALUE and model.expression_parts:
             return False
         if model.kind is SnippetKind.GUARD and (
-            site.first_line == site.end_line or not site.is_alone or site.is_after
+            anchor.first_line == anchor.end_line or not anchor.is_alone or anchor.is_after
         ):
             return False
         if model.needs is not None:
             try:
-                one_line_texts(self.file, site, model.needs)
+                one_line_texts(self.file, anchor, model.needs)
             except MutatorError:
                 return False
         return True

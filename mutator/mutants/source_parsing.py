@@ -12,7 +12,7 @@ from libcst.metadata import MetadataWrapper, PositionProvider
 
 from mutator.errors import MutatorError
 from mutator.mutants.injected_lines import find_instrumented_line
-from mutator.mutants.node_positions import Positions, line_after_statements
+from mutator.mutants.node_positions import RangeByNode, line_after_statements
 
 MOST_NODES = 50_000  # of a file's syntax tree; LibCST takes about 0.1 ms and 4 kB for each
 MOST_CHAIN_LINKS = 500  # LibCST recurses once for each link, and thousands would end the process
@@ -96,7 +96,7 @@ def translate_libcst_errors(where: Path) -> Iterator[None]:
         ) from None
 
 
-def parse_with_libcst(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
+def parse_with_libcst(data: bytes, where: Path) -> tuple[cst.Module, RangeByNode]:
     """Parse the file with LibCST; MutatorError unless LibCST reproduces the file's bytes."""
     module = cst.parse_module(data)
     written = module.bytes
@@ -116,7 +116,7 @@ def parse_with_libcst(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
     return module, MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
 
 
-def import_insertion_line(module: cst.Module, positions: Positions) -> int:
+def import_insertion_line(module: cst.Module, positions: RangeByNode) -> int:
     """Return the index of the line before which to insert imports: after docstring and `__future__`."""
     after = None
     for i, node in enumerate(module.body):
@@ -141,6 +141,6 @@ def import_insertion_line(module: cst.Module, positions: Positions) -> int:
     return _first_line(module.body[0], positions) if module.body else len(module.header)
 
 
-def _first_line(node: cst.CSTNode, positions: Positions) -> int:
+def _first_line(node: cst.CSTNode, positions: RangeByNode) -> int:
     decorators = node.decorators if isinstance(node, cst.FunctionDef | cst.ClassDef) else ()
     return min(positions[n].start.line for n in (node, *decorators)) - 1

@@ -73,32 +73,34 @@ class PatchPiece:
     lines: tuple[bytes, ...]
 
 
-def insertion_edit(file: ParsedFile, site: ResolvedAnchor, code: Sequence[str], tag: str) -> Edit:
-    """Return the edit that inserts `code` (4 spaces per indentation level) at `site`, each line tagged."""
-    lines = _tagged_lines(file, site, code, tag)
+def insertion_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], tag: str) -> Edit:
+    """Return the edit that inserts `code` (4 spaces per indentation level) at `anchor`, each line tagged."""
+    lines = _tagged_lines(file, anchor, code, tag)
     index, rank = (
-        (site.end_line, EditRank.AFTER_PREVIOUS) if site.is_after else (site.first_line, EditRank.BEFORE)
+        (anchor.end_line, EditRank.AFTER_PREVIOUS)
+        if anchor.is_after
+        else (anchor.first_line, EditRank.BEFORE)
     )
     return Edit(line_index=index, rank=rank, lines=lines)
 
 
-def guard_edit(file: ParsedFile, site: ResolvedAnchor, code: Sequence[str], tag: str) -> Edit:
-    """Return the edit that wraps the statement at `site` in `code`, whose last line opens a block."""
-    if site.first_line == site.end_line or not site.is_alone or site.is_after:
+def guard_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], tag: str) -> Edit:
+    """Return the edit that wraps the statement at `anchor` in `code`, whose last line opens a block."""
+    if anchor.first_line == anchor.end_line or not anchor.is_alone or anchor.is_after:
         raise MutatorError(
             "a guard needs a statement that is alone on its lines",
             where=file.full_path,
-            line=site.first_line + 1,
+            line=anchor.first_line + 1,
             expected="an anchor `before_call`, `before_assign` or `before_return`",
             remedy="anchor at the statement to omit",
         )
-    lines = _tagged_lines(file, site, code, tag, site.indentable_count)
+    lines = _tagged_lines(file, anchor, code, tag, anchor.indentable_count)
     return Edit(
-        line_index=site.first_line,
+        line_index=anchor.first_line,
         rank=EditRank.GUARD,
         lines=lines,
-        indented_count=site.indentable_count,
-        indent_unit=_indent_unit_of(file, site.indent),
+        indented_count=anchor.indentable_count,
+        indent_unit=_indent_unit_of(file, anchor.indent),
     )
 
 
@@ -176,15 +178,15 @@ def _indent_unit_of(file: ParsedFile, indent: bytes) -> bytes:
 
 
 def _tagged_lines(
-    file: ParsedFile, site: ResolvedAnchor, code: Sequence[str], tag: str, guarded: int = 0
+    file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], tag: str, guarded_line_count: int = 0
 ) -> tuple[bytes, ...]:
-    unit = _indent_unit_of(file, site.indent)
+    unit = _indent_unit_of(file, anchor.indent)
     result = []
     for line in code:
         body = line.lstrip(" ")
         levels = (len(line) - len(body)) // 4
-        text = _encode(file, tagged_line(body, tag, guarded), site.first_line)
-        result.append(site.indent + unit * levels + text + file.newline)
+        text = _encode(file, tagged_line(body, tag, guarded_line_count), anchor.first_line)
+        result.append(anchor.indent + unit * levels + text + file.newline)
     return tuple(result)
 
 

@@ -5,14 +5,14 @@ from collections.abc import Iterator, Sequence
 from types import CodeType
 
 
-def outer_functions(tree: ast.AST) -> Iterator[range]:
+def list_outermost_function_lines(tree: ast.AST) -> Iterator[range]:
     """Yield the lines (from 0) of each outermost function, including decorators."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             first = min(part.lineno for part in (node, *node.decorator_list)) - 1
             yield range(first, node.end_lineno or node.lineno)
         elif not isinstance(node, ast.expr):
-            yield from outer_functions(node)
+            yield from list_outermost_function_lines(node)
 
 
 def compile_standalone(lines: Sequence[bytes], encoding: str) -> CodeType | None:

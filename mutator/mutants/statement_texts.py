@@ -20,34 +20,34 @@ _BLOCK_FIELDS = ("body", "orelse", "finalbody")
 
 
 def one_line_texts(
-    file: ParsedFile, site: ResolvedAnchor, needs: TemplateNeed
+    file: ParsedFile, anchor: ResolvedAnchor, needs: TemplateNeed
 ) -> tuple[ResolvedAnchor, dict[str, str]]:
-    """Return the site, and the text of each statement on one line, by its name in templates.
+    """Return the anchor, and the text of each statement on one line, by its name in templates.
 
-    If the model needs the next statement, the site covers both. MutatorError if there is no such statement,
+    If the model needs the next statement, the anchor covers both. MutatorError if there is no such statement,
     or if its lines cannot be moved.
     """
-    anchored, following = _small_statements_by_line(file.data).get(site.first_line, (None, None))
-    if anchored is None or site.first_line == site.end_line or not site.is_alone:
-        raise _unfit_error(file, site, "the anchor is not at a statement that is alone on its lines")
+    anchored, following = _small_statements_by_line(file.data).get(anchor.first_line, (None, None))
+    if anchored is None or anchor.first_line == anchor.end_line or not anchor.is_alone:
+        raise _unfit_error(file, anchor, "the anchor is not at a statement that is alone on its lines")
     if isinstance(anchored, _BLOCK_ENDING_STATEMENTS):
-        raise _unfit_error(file, site, f"`{ast.unparse(anchored)}` ends its block")
-    texts = {"statement": _one_line_text(file, site, anchored)}
+        raise _unfit_error(file, anchor, f"`{ast.unparse(anchored)}` ends its block")
+    texts = {"statement": _one_line_text(file, anchor, anchored)}
     if needs is TemplateNeed.NEXT_STATEMENT:
         if following is None:
             raise _unfit_error(
-                file, site, "the next statement is missing, shares its lines, or opens a block"
+                file, anchor, "the next statement is missing, shares its lines, or opens a block"
             )
-        texts["next_statement"] = _one_line_text(file, site, following)
-        site = _cover_next_statement(file, site, following)
-    return site, texts
+        texts["next_statement"] = _one_line_text(file, anchor, following)
+        anchor = _cover_next_statement(file, anchor, following)
+    return anchor, texts
 
 
-def _cover_next_statement(file: ParsedFile, site: ResolvedAnchor, following: ast.stmt) -> ResolvedAnchor:
+def _cover_next_statement(file: ParsedFile, anchor: ResolvedAnchor, following: ast.stmt) -> ResolvedAnchor:
     last = following.end_lineno or 0
-    if site.indentable_count != site.end_line - site.first_line or _has_multiline_string(following):
-        raise _unfit_error(file, site, "a string spans several lines, so its statement cannot be indented")
-    return replace(site, end_line=last, indentable_count=last - site.first_line)
+    if anchor.indentable_count != anchor.end_line - anchor.first_line or _has_multiline_string(following):
+        raise _unfit_error(file, anchor, "a string spans several lines, so its statement cannot be indented")
+    return replace(anchor, end_line=last, indentable_count=last - anchor.first_line)
 
 
 def _has_multiline_string(statement: ast.stmt) -> bool:
@@ -57,22 +57,22 @@ def _has_multiline_string(statement: ast.stmt) -> bool:
     )
 
 
-def _one_line_text(file: ParsedFile, site: ResolvedAnchor, statement: ast.stmt) -> str:
+def _one_line_text(file: ParsedFile, anchor: ResolvedAnchor, statement: ast.stmt) -> str:
     text = ast.unparse(statement)
     if "\n" in text:
-        raise _unfit_error(file, site, "the statement cannot be written on one line")
+        raise _unfit_error(file, anchor, "the statement cannot be written on one line")
     if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in ast.walk(statement)):
         raise _unfit_error(
-            file, site, "the statement contains `yield`, which can be neither repeated nor moved"
+            file, anchor, "the statement contains `yield`, which can be neither repeated nor moved"
         )
     return text
 
 
-def _unfit_error(file: ParsedFile, site: ResolvedAnchor, problem: str) -> MutatorError:
+def _unfit_error(file: ParsedFile, anchor: ResolvedAnchor, problem: str) -> MutatorError:
     return MutatorError(
         problem,
         where=file.full_path,
-        line=site.first_line + 1,
+        line=anchor.first_line + 1,
         expected="an anchor before or after a call, an assignment or a return that is alone on its lines",
         remedy="anchor at another statement",
     )

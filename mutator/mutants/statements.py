@@ -10,7 +10,7 @@ from mutator.config.location_syntax import is_assignable
 from mutator.mutants.name_scopes import NamesByFunction, normalize_identifier
 from mutator.mutants.node_positions import (
     NodePosition,
-    Positions,
+    RangeByNode,
     function_position,
     line_after_statements,
     statement_position,
@@ -67,7 +67,7 @@ class Function:
 
 
 def collect_functions(
-    module: cst.Module, positions: Positions, names: NamesByFunction
+    module: cst.Module, positions: RangeByNode, names: NamesByFunction
 ) -> dict[str, tuple[Function, ...]]:
     """Return all functions by qualified name (`Class.method`, `outer.inner`), in source order."""
     collector = _FunctionCollector(positions, names)
@@ -92,7 +92,7 @@ def item_name_of(node: cst.Subscript) -> str | None:
 
 
 class _FunctionCollector(cst.CSTVisitor):
-    def __init__(self, positions: Positions, names: NamesByFunction) -> None:
+    def __init__(self, positions: RangeByNode, names: NamesByFunction) -> None:
         super().__init__()
         self.positions = positions
         self.names_by_function = names
@@ -285,7 +285,7 @@ def _inner_calls(small: cst.BaseSmallStatement, outer: cst.Call | None) -> Itera
         stack += node.children
 
 
-def _has_multiline_string(small: cst.BaseSmallStatement, positions: Positions) -> bool:
+def _has_multiline_string(small: cst.BaseSmallStatement, positions: RangeByNode) -> bool:
     """Return whether a string literal spans several lines, which must then not be indented."""
     stack: list[cst.CSTNode] = [small]
     while stack:
@@ -298,7 +298,7 @@ def _has_multiline_string(small: cst.BaseSmallStatement, positions: Positions) -
     return False
 
 
-def _entry_lines(node: cst.FunctionDef, positions: Positions) -> tuple[int, int] | None:
+def _entry_lines(node: cst.FunctionDef, positions: RangeByNode) -> tuple[int, int] | None:
     body = node.body
     if not isinstance(body, cst.IndentedBlock):
         return None
