@@ -12,6 +12,7 @@ from pathlib import Path
 
 from mutator.targets.source_tree import SourceTree
 
+# flags of a .pyc file (PEP 552): it has a hash of its source, and imports check it
 _CHECKED_HASH_FLAGS = (0b11).to_bytes(4, "little")
 
 
@@ -32,6 +33,7 @@ def bytecode_path(name: str) -> str:
 
 def write_files(files: Mapping[str, bytes], dest: Path) -> None:
     """Write files to the folder `dest`, which can exist."""
+    # as a set, because most files share few folders
     for folder in {dest, *((dest / name).parent for name in files)}:
         folder.mkdir(parents=True, exist_ok=True)
     for name, data in files.items():

@@ -20,6 +20,7 @@ from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches_any_glob
 
+# what is suspended between two steps goes on with its old code, which a swap does not reach
 _SUSPENDABLE_FLAGS = CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
 _IMPORT_PATTERN = re.compile(rb"\s*(?:from ([\w.]+) import|import ([\w.]+))")
 
@@ -189,6 +190,7 @@ def _check_swappable(old: CodeType, new: CodeType, described_function: str) -> N
             f"{described_function} has another signature, or other variables of an outer function"
         )
     before = _nested_code(old)
+    # injected lines may add functions, but each old one must still be there
     if len(before) > sum(
         any(has_same_behaviour(nested, new_nested) for new_nested in _nested_code(new)) for nested in before
     ):
@@ -215,6 +217,7 @@ def behaviour_key(code: CodeType) -> tuple[object, ...]:
 
 
 def _behaviour_key_without_nested(code: CodeType) -> tuple[object, ...]:
+    # types and texts, because 1 == True and 0.0 == -0.0; no line numbers, because insertions move lines
     values = tuple((type(c), None if isinstance(c, CodeType) else repr(c)) for c in code.co_consts)
     names = (code.co_name, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
     return (*names, _signature(code), code.co_code, code.co_exceptiontable, values)

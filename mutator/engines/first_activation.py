@@ -108,11 +108,11 @@ def _evaluate_expression(node: ast.expr, values: Mapping[str, Any]) -> Any:
         return _evaluate_expression(node, values)
 
     match node:
-        case ast.Constant():
+        case ast.Constant():  # as numpy scalars, because Python's raise on overflow and division by zero
             return np.bool_(node.value) if isinstance(node.value, bool) else np.float64(node.value)  # type: ignore[arg-type]
         case ast.Name():
             return values[node.id]
-        case ast.Attribute():
+        case ast.Attribute():  # a condition has no other attribute than `math.inf`
             return np.float64(np.inf)
         case ast.BoolOp():
             return reduce(

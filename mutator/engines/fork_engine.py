@@ -156,6 +156,7 @@ class ForkEngine:
     def _execute_by_fork(self, job: Job, folder: Path) -> JobResult:
         if self._obstacle:
             raise NotForkable(*self._obstacle.args)
+        # the server has started with one hash seed, which its forks cannot change
         if job.probe is None or job.golden_folder is None or job.hash_seed:
             raise NotForkable("not an experiment")
         swap = self._plan_swap(job, job.changed_files, job.probe)
@@ -289,6 +290,7 @@ class ForkEngine:
         if status is not Status.OK and was_disk_full(self._work_folder, report):
             raise disk_full_error(self._work_folder)
         if status is Status.CRASHED:
+            # a crash's record has its exception, which only the reference engine reports
             raise NotForkable(f"ended as crashed: {detail}")
         return JobResult(
             status=status,
@@ -379,7 +381,7 @@ class ForkEngine:
         return hmac.digest(self._secret, path.name.encode() + data, "sha256")
 
 
-_AUTHENTICATION_CODE_BYTES = 32
+_AUTHENTICATION_CODE_BYTES = 32  # of SHA-256
 _OBSERVATION_KEYS = ("seen", "before", "libraries")
 _BEFORE_FIRST_STEP = ForkPoint(step=0, observation_count=0, earliest_time_s=None, last_time_s=None)
 

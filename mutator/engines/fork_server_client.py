@@ -30,11 +30,10 @@ from mutator.targets.manifest import TargetManifest
 
 _SERVER_SCRIPT = Path(__file__).parent / "in_target" / "fork_server.py"
 _MOST_WAITING_PROCESSES = 8  # maximum number of waiting processes, because each takes about 20 MB
-_MOST_STEPS_TO_ADVANCE = (
-    100  # steps; a process at most this far behind is advanced, not copied: it is quickly remade
-)
+# steps; a process at most this far behind is advanced, not copied: it is quickly remade
+_MOST_STEPS_TO_ADVANCE = 100
 _PARENT_CHECK_INTERVAL_S = 0.5  # interval between two checks that the parent is alive
-_START_TIMEOUT_S = 120.0
+_START_TIMEOUT_S = 120.0  # to load the target, whose libraries a busy machine imports slowly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -24,7 +24,7 @@ class JobTree:
         self.changed_files = changed_files
         self._expected_names_by_folder: dict[str, set[str]] = {}  # names by folder
         for name in files:
-            while name:
+            while name:  # each folder on the way must hold the next one
                 folder, _, last = name.rpartition("/")
                 self._expected_names_by_folder.setdefault(folder, set()).add(last)
                 name = folder

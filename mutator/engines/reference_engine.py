@@ -250,7 +250,7 @@ class ReferenceEngine:
         """Return the guard's report; empty if none arrives in time. Exit if this process's parent is gone."""
         connection.settimeout(_PARENT_CHECK_INTERVAL_S)
         while time.monotonic() < deadline:
-            try:
+            try:  # the guard sends its report in one write
                 return connection.recv(_MOST_GUARD_REPORT_BYTES)
             except TimeoutError:
                 guard_process.send_signal(signal.SIGCONT)  # a run can stop its guard

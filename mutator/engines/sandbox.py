@@ -23,14 +23,16 @@ from mutator.targets.manifest import TargetManifest
 
 _HARNESS_FOLDER = Path(__file__).parents[1]  # the harness, parts of which run inside
 _ISOLATION_FLAGS = ("--unshare-all", "--die-with-parent", "--new-session", "--as-pid-1", "--cap-drop", "ALL")
+# where systems keep programs and libraries; the last two: NixOS and Guix
 _SYSTEM_FOLDERS = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store", "/gnu/store")
+# to find libraries, fonts, users and the time; nothing of the network, and no secrets
 _ETC_NAMES = ("alternatives", "fonts", "group", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "localtime")
 _MORE_ETC_NAMES = ("mime.types", "nsswitch.conf", "passwd", "timezone")
-_CPUS_FOLDER = "/sys/devices/system/cpu"
+_CPUS_FOLDER = "/sys/devices/system/cpu"  # libraries count the cores there
 _PRINT_PYTHON_FOLDERS = (
     "import json, sys; print(json.dumps([sys.prefix, sys.base_prefix, sys.exec_prefix, *sys.path]))"
 )
-_TRIAL_TIMEOUT_S = 60.0
+_TRIAL_TIMEOUT_S = 60.0  # to import numpy in a sandbox
 _TEMPORARY_FOLDERS = {"/tmp": "tmp", "/dev/shm": "shm"}  # folders of the sandbox -> their names in its folder
 
 

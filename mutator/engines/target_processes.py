@@ -22,12 +22,13 @@ from mutator.targets.process_environment import FIXED_VARIABLES, INHERITED_VARIA
 
 GUARD_LOST = "lost"  # no process is left to report the ending
 GUARD_PATIENCE_S = 60.0  # time for the guard's report, after a run's wall limit
-_GUARD_END_TIMEOUT_S = 10.0
+_GUARD_END_TIMEOUT_S = 10.0  # to kill what the run left behind
 _REPORT_FIELD_TYPES = {"ended": str, "disk_full": bool, "outside": list, "probe": object}
 _TEXT_LIST_FIELDS = ("outside", "modules", "libraries", "threads")  # lists of texts in a report
-_LOG_TAIL_BYTES = 4000
+_LOG_TAIL_BYTES = 4000  # a run can print without end
 _MIN_FREE_BYTES = 4 << 20  # with less free space than this, a failed run is not blamed on the target
 _TRIAL_FILE_BYTES = 1 << 20  # the same applies if a file of this size cannot be written
+# also sent by systems and users, so never blamed on the target
 _OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 
 
@@ -86,6 +87,7 @@ def _judge_stopped_run(limits: Limits, ending: ProcessEnding) -> tuple[Status, s
         return Status.TIMEOUT, f"wall time limit of {limits.wall_s} s"
     if ending.stopped == process_guard.DISK:
         return Status.TIMEOUT, f"disk limit of {limits.disk_mb} MiB"
+    # the kernel sends SIGXCPU at the limit, and SIGKILL soon after to a process that ignores it
     if killed is signal.SIGXCPU or (killed is signal.SIGKILL and ending.cpu_s >= limits.cpu_s):
         return Status.TIMEOUT, f"CPU time limit of {limits.cpu_s} s"
     if killed in _OUTSIDE_SIGNALS:
@@ -182,5 +184,6 @@ def was_disk_full(work_folder: Path, report: dict[str, Any] | None) -> bool:
 def without_run_specifics(detail: str, folder: Path) -> str:
     """Remove what differs between runs (scratch paths, addresses); keep the text printable and short."""
     text = detail.replace(str(folder / "tree") + os.sep, "").replace(str(folder), "...")
+    # four digits: a shorter number is a value of the target, not an address
     text = re.sub(r"0x[0-9a-fA-F]{4,}", "0x...", text)[:500]
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -165,7 +165,7 @@ class ExperimentRunner:
                 yield self._build_job(experiment, built)
 
         for job, execution in self.engine.run(jobs()):
-            while refused:
+            while refused:  # the engine has just asked for more jobs, and some had none
                 yield refused.popleft()
             yield self._finish_run(*started.pop(job.name), execution)
         yield from refused

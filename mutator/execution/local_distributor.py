@@ -31,6 +31,7 @@ class LocalDistributor:
         with _without_variables("PYTEST_ADDOPTS", "PYTEST_PLUGINS"):
             code = pytest.main(arguments, plugins=[CampaignController(session), output])
         if code in (pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR) and not session.problem:
+            # the error is at the end of what pytest prints
             session.problem = output.text.getvalue().strip()[-2000:] or f"pytest ended with {code!r}"
 
 

@@ -10,7 +10,7 @@ from mutator.preflight import equivalence_check
 from mutator.store.records import PROOF_FOLDER
 from mutator.store.run_progress import Progress, RecordTail
 
-_NOTIFY_INTERVAL_S = 0.5
+_NOTIFY_INTERVAL_S = 0.5  # a live bar needs no more, and each poll reads files
 
 
 @contextmanager

@@ -140,6 +140,7 @@ class CampaignController:
             return
         if type(excinfo.value) is KeyboardInterrupt:  # pytest's own exceptions mean a regular stop
             self.campaign_session.interrupted = True
+        # workers ignore Ctrl-C, and xdist would wait for their chunks
         for pid in living_worker_pids(self.campaign_session.folder.path):
             os.kill(pid, signal.SIGTERM)
 

@@ -54,8 +54,8 @@ from mutator.store.work_stretches import Machine
 from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
 
-EXIT_INTERRUPTED = 130
-_SECRET_BYTES = 16
+EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+_SECRET_BYTES = 16  # 128 bits, which no mutant can guess
 
 ProgressCallback = Callable[[Progress], None]
 
@@ -340,6 +340,7 @@ def open_session(
             raise
         file_digests.close_segments(folder.path)
         remove_anything_at(folder.scratch_folder)
+        # where files get their names only when they are complete
         folders = ("plan", "report", "series", "patches")
         candidates = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in folders))
         for path in chain(*candidates):

@@ -168,7 +168,7 @@ def _storing_output(finished_runs: Iterator[FinishedExperiment], out: Path) -> I
 
 def _replace_folder(new: Path, destination: Path) -> None:
     """Replace a folder that another process might be reading."""
-    aside = Path(mkdtemp(dir=new.parent))
+    aside = Path(mkdtemp(dir=new.parent))  # on the same disk, so that renaming moves nothing
     if os.path.lexists(destination):
         destination.rename(path_below(aside, destination.name))
     new.rename(destination)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from mutator.engines.in_target import process_guard
 
-_CHECK_INTERVAL_S = 1.0
-_STOPPED_STATE = "T"
+_CHECK_INTERVAL_S = 1.0  # what a stopped worker loses at most
+_STOPPED_STATE = "T"  # in /proc/PID/stat
 
 
 class WorkerContinuer:
@@ -32,7 +32,7 @@ class WorkerContinuer:
         while not self._ended.wait(_CHECK_INTERVAL_S):
             for pid in _stopped_children():
                 with suppress(ProcessLookupError):
-                    os.kill(pid, signal.SIGUSR1)
+                    os.kill(pid, signal.SIGUSR1)  # waits until the process continues
                     os.kill(pid, signal.SIGCONT)
 
 
@@ -44,6 +44,7 @@ def on_stop(callback: Callable[[], None]) -> None:
 def _stopped_children() -> Iterator[int]:
     for pid in process_guard.child_pids(os.getpid()):
         with suppress(OSError):
+            # after the name in parentheses, which can hold both spaces and parentheses
             state = Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()[0]
             if state == _STOPPED_STATE:
                 yield pid

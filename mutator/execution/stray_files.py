@@ -13,7 +13,7 @@ from mutator.engines.in_target import process_guard
 
 SHARED_FOLDERS = (Path("/tmp"), Path("/dev/shm"))
 _HARNESS_PREFIX = "mutator-"
-_MOST_LISTED_PATHS = 3
+_MOST_LISTED_PATHS = 3  # the remark is one line
 _MIN_REPORTED_BYTES = 1 << 20  # bytes on the disk
 
 
@@ -53,5 +53,6 @@ class StrayFiles:
 
 def _bytes_on_disk(path: str) -> int:
     with suppress(OSError):
+        # a folder's own entry, in the unit of st_blocks, and its content
         return os.lstat(path).st_blocks * 512 + process_guard.disk_usage_bytes(path)
     return 0

@@ -202,6 +202,7 @@ def python_dying_with(parent_pid: int) -> list[str]:
 
     It imports nothing from its working folder.
     """
+    # without site-packages, which the guard does not need and which take time to find
     return [sys.executable, "-I", "-S", process_guard.__file__, str(parent_pid), sys.executable, "-P"]
 
 

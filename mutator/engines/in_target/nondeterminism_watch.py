@@ -28,7 +28,7 @@ thread_names: Any = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(thread_names)
 
 CLOCK, DRAW, THREAD, HASH, PROCESS = "clock", "draw", "thread", "hash", "process"
-_MOST_NOTED_LINES = 200  # the maximum number of noted lines
+_MOST_NOTED_LINES = 200  # enough to find the causes; a list of thousands hides them
 _CLOCK_FUNCTIONS = ("time", "monotonic", "perf_counter", "process_time", "thread_time", "clock_gettime")
 _CLOCK_FUNCTIONS_WITHOUT_TIME = (
     "localtime",
@@ -108,7 +108,7 @@ class NondeterminismWatcher:
 
         def observe_and_look(**values: Any) -> None:
             observe(**values)
-            if not len(observations) & (len(observations) - 1):
+            if not len(observations) & (len(observations) - 1):  # a power of two: looking takes time
                 self._other_threads.update(thread_names.other_thread_names())
 
         probe.observe = observe_and_look

@@ -19,8 +19,10 @@ from typing import Any
 
 WALL, DISK, ABANDONED = "wall", "disk", "abandoned"  # reasons for stopping a process
 HARD_CPU_EXTRA_S = 2  # delay until a process that ignores SIGXCPU is killed
+# from linux/prctl.h, because Python has no names for them
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
+# without those that nobody can handle, and those that Python itself ignores in every process
 _SIGNALS_TO_RESTORE = signal.valid_signals() - {
     signal.SIGKILL,
     signal.SIGSTOP,
@@ -79,7 +81,7 @@ def fork_guarded(
         if stopped == ABANDONED and patience_s:
             _terminate_child(pid, patience_s)
     finally:
-        os.kill(pid, signal.SIGKILL)
+        os.kill(pid, signal.SIGKILL)  # also after its end: its pid is taken until `wait4` reaps it
         _, code, usage = os.wait4(pid, 0)
         _kill_leftover_processes()
     if not stopped and space_limit is not None and space_limit.is_used_up():
@@ -131,7 +133,7 @@ def _wait_for_child(pid: int, caller_fd: int, deadline: float, space_limit: Spac
     handle, pause = os.pidfd_open(pid), _SPACE_CHECK_INTERVAL_S
     poll = select.poll()
     poll.register(handle, select.POLLIN)
-    poll.register(caller_fd, 0)
+    poll.register(caller_fd, 0)  # 0: report only that the other end is closed
     try:
         while True:
             remaining_s = deadline - time.monotonic()

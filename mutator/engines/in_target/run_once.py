@@ -25,9 +25,8 @@ from typing import Any
 
 _NO_SPACE_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
 _MOST_MESSAGE_CHARACTERS = 2000  # maximum length of a stored exception message, in characters
-_MOST_STORED_EXCEPTIONS = (
-    50  # maximum number of stored exceptions: the one raised, its causes and those that it groups
-)
+# maximum number of stored exceptions: the one raised, its causes and those that it groups
+_MOST_STORED_EXCEPTIONS = 50
 
 
 def load_neighbour(name: str) -> Any:
@@ -68,7 +67,7 @@ def main(job_file: str, connection_fd: int) -> int:
         run_job(job)
     else:
         ending["cpu_s"] += time.process_time()  # includes the interpreter's start
-        with suppress(BrokenPipeError):
+        with suppress(BrokenPipeError):  # the harness is gone
             os.write(connection_fd, json.dumps(ending).encode())
         os._exit(0)
     return 0
@@ -124,7 +123,7 @@ def limit_resources(job: dict[str, Any]) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (job["cpu_s"], job["cpu_s"] + process_guard.HARD_CPU_EXTRA_S))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_FSIZE, (disk, disk))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a core file would use up the disk space of the run
 
 
 def run_module(module: str, args: list[str]) -> None:
@@ -214,6 +213,7 @@ def exception_chain(err: BaseException) -> list[BaseException]:
         if error is not None and id(error) not in errors_by_id:
             errors_by_id[id(error)] = error
             inner = error.exceptions if isinstance(error, BaseExceptionGroup) else ()
+            # taken from the end: first the cause, then the context, then the grouped ones
             todo += [*inner, error.__context__, error.__cause__]
     return list(errors_by_id.values())
 
@@ -236,6 +236,7 @@ def tree_stack(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
 def failing_column(trace: types.TracebackType) -> int:
     """Return the byte at which the failing or called expression starts in its line; -1 if unknown."""
     positions = trace.tb_frame.f_code.co_positions()
+    # a code object has one position for each instruction of two bytes
     *_, begins, _ = next(itertools.islice(positions, trace.tb_lasti // 2, None), (None,) * 4)
     return -1 if begins is None else begins
 

@@ -35,7 +35,7 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
 from mutator.workspace import Workspace
 
-MOST_BUNDLE_BYTES = 2_000_000_000
+MOST_BUNDLE_BYTES = 2_000_000_000  # the command and each worker hold a bundle in memory
 _BUNDLE_FOLDERS = ("manifest", "target", "overlay", "templates", "scenarios")
 _ROOT_PREFIX = "{root}/"
 

@@ -51,6 +51,7 @@ RESERVED_OPTIONS = (
     "scheduler_cls",
     "shutdown_on_close",
 )
+# also parameters of the classes that are no options of a cluster
 _FORBIDDEN_OPTIONS = {
     "self",
     "args",

@@ -74,9 +74,9 @@ class Crew:
         return f"{text}; {len(self.refusal_reasons)} refused" if self.refusal_reasons else text
 
     def _experiments_per_s(self, member: _AdmittedWorker) -> float | None:
-        if len(member.finished_pieces) < 2:
+        if len(member.finished_pieces) < 2:  # the time before the first one includes the start
             return None
-        (began, first), *_ = member.finished_pieces
+        (began, first), *_ = member.finished_pieces  # its experiments ran before `began`
         elapsed = self._now() - began
         return (sum(count for _, count in member.finished_pieces) - first) / elapsed if elapsed > 0 else None
 

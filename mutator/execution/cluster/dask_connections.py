@@ -155,7 +155,7 @@ async def connected_client(
     )
     try:
         try:
-            async with asyncio.timeout(CONNECT_TIMEOUT_S + 2):
+            async with asyncio.timeout(CONNECT_TIMEOUT_S + 2):  # after Dask's own, whose error says more
                 await client
         except (
             OSError,

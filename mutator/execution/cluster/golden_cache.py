@@ -35,7 +35,7 @@ class GoldenRunCache:
             [[path.relative_to(bundle.folder).as_posix(), digest(read_bounded(path))] for path in files],
             bundle.meta["limits"],
             run_environment.everything_outside_sources(),
-            platform.node(),
+            platform.node(),  # a cache on a shared disk has entries of many machines
         ]
 
     def copy_golden(self, golden: GoldenRun, expected_digest: str, destination: Path) -> bool:

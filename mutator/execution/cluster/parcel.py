@@ -7,6 +7,7 @@ from hashlib import sha256
 from mutator._common.bounded_reading import MOST_JSON_BYTES
 from mutator.errors import MutatorError
 
+# begins every parcel, with the version of the format; then a SHA-256, then the length of the head
 _PARCEL_MARK, _DIGEST_BYTES, _LENGTH_BYTES = b"FIP1", 32, 4
 
 

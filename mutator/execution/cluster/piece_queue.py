@@ -32,9 +32,8 @@ _ASSUMED_RUN_S = 0.5  # duration of a run before the first measurement
 _LATE_FACTOR = 3.0  # a piece that takes this many times as long as expected is repeated by another worker
 _MIN_LATE_S = 5.0  # no piece is repeated before this many seconds
 _DEATHS_BEFORE_SPLIT = 2  # a piece that has killed this many workers is split
-_MIN_IDLE_TO_PROVE_ITSELF_S = (
-    20.0  # a worker idle for this long (or longer, if runs are slow) proves its own runs
-)
+# a worker idle for this long (or longer, if runs are slow) proves its own runs
+_MIN_IDLE_TO_PROVE_ITSELF_S = 20.0
 
 
 @dataclass
@@ -109,6 +108,7 @@ class PieceQueue:
         With `ahead`, the piece waits at the worker while another piece runs there; near the end of the work,
         the result is then None.
         """
+        # near the end, a piece that waits here is one that an idle worker lacks
         if (
             ahead
             and self._waiting_count * self._mean_run_s(PieceKind.RUN) < 2 * self._slot_count * MIN_PIECE_S

@@ -28,7 +28,7 @@ from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.worker import python_dying_with
 
 _CHECK_INTERVAL_S = 0.25  # between two checks that the work is still wanted
-_LEAVE_TIMEOUT_S = 5.0
+_LEAVE_TIMEOUT_S = 5.0  # to kill the processes and delete the folder
 _START_TIMEOUT_S = 60.0  # time for a process to begin its first piece
 _PIECE_PROCESS_MODULE = "mutator.execution.cluster.piece_process"
 
@@ -112,6 +112,7 @@ class WorkerHost:
             folder = Path(tempfile.mkdtemp(prefix="mutator-", dir=parent_folder)).resolve()
         try:
             bundle.unpack_bundle(data, folder)
+            # twice: before a sign of life, a golden run or a failed fork can precede the run
             patience_s = 2.0 * UnpackedBundle(folder).limits.wall_s + _START_TIMEOUT_S
         except BaseException:
             remove_folder(folder)
@@ -153,6 +154,7 @@ class WorkerHost:
         keep = False
         try:
             result = child.run_piece(data, piece, self.patience_s, is_wanted)
+            # after any other ending, the process lacks something or may be damaged
             keep = result.ending in (PieceEnding.FINISHED, PieceEnding.GOLDEN_DIFFERS)
             return result
         finally:
