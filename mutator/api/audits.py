@@ -180,17 +180,17 @@ def _check_digest(argument: str, value: str | None) -> None:
             raise MutatorError(f"'{value}'", argument=argument, expected="a digest: 64 hex digits")
 
 
-def _expected_digest_check(folder: RunFolder, seals: Seals, expect: str) -> AuditCheck:
+def _expected_digest_check(folder: RunFolder, seals: Seals, expected: str) -> AuditCheck:
     """Compare with the seal or the results digest, whichever it is."""
-    if expect == seals.results_digest:
-        return _digest_check(folder, "results digest", expect, expect)
-    return _digest_check(folder, "seal", seals.seal, expect)
+    if expected == seals.results_digest:
+        return _digest_check(folder, "results digest", expected, expected)
+    return _digest_check(folder, "seal", seals.seal, expected)
 
 
-def _digest_check(folder: RunFolder, digest_name: str, actual: str | None, expect: str) -> AuditCheck:
-    wrong = MutatorError(f"{digest_name} {actual or 'none'}", where=folder.path, expected=expect)
+def _digest_check(folder: RunFolder, digest_name: str, actual: str | None, expected: str) -> AuditCheck:
+    wrong = MutatorError(f"{digest_name} {actual or 'none'}", where=folder.path, expected=expected)
     return AuditCheck(
-        what=f"{digest_name} as expected", count=1, differences=() if actual == expect else (wrong,)
+        what=f"{digest_name} as expected", count=1, differences=() if actual == expected else (wrong,)
     )
 
 

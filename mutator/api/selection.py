@@ -135,19 +135,19 @@ def context_tables(workspace: Workspace) -> tuple[ContextTable, ...]:
 
 
 def find_trigger(
-    workspace: Workspace, text: str, armed_after_s: float, variables: Collection[str]
+    workspace: Workspace, trigger_text: str, armed_after_s: float, variables: Collection[str]
 ) -> Trigger:
     tables = context_tables(workspace)
     matches = [
         (table, row.id)
         for table in tables
         for row in table.rows
-        if text in (row.id, f"{table.name}/{row.id}")
+        if trigger_text in (row.id, f"{table.name}/{row.id}")
     ]
     if len(matches) > 1:  # tables can use the same id for a row
         qualified_names = ", ".join(f"{table.name}/{row}" for table, row in matches)
         raise MutatorError(
-            f"context '{text}' is in {len(matches)} tables",
+            f"context '{trigger_text}' is in {len(matches)} tables",
             argument="trigger",
             expected=f"one of {qualified_names}",
         )
@@ -156,7 +156,7 @@ def find_trigger(
         table.check_variables(variables)
         return table.triggers(armed_after_s=armed_after_s, rows=(row,))[0]
     try:
-        return parse_trigger(text, armed_after_s, variables)
+        return parse_trigger(trigger_text, armed_after_s, variables)
     except MutatorError as e:
         names = ", ".join(row.id for table in tables for row in table.rows)
         contexts = f"a context ({names}), " if names else ""
@@ -173,17 +173,19 @@ def _split_variant(name: str) -> tuple[str, str | None]:
     return name, None
 
 
-def _warn_of_value(value: float, declared: FaultSpec, faults: Collection[Fault], models: FaultModels) -> None:
+def _warn_of_value(
+    value: float, declared_spec: FaultSpec, faults: Collection[Fault], models: FaultModels
+) -> None:
     ineffective = [fault.label for fault in faults if is_idle(fault, models)]
     if ineffective:
         warnings.warn(f"the value changes nothing: {', '.join(ineffective)}", MutatorWarning, stacklevel=4)
     outside = []
-    for variant in declared:
-        if variant.draw and f"{declared.name}/{variant.name}" in {fault.spec for fault in faults}:
+    for variant in declared_spec:
+        if variant.draw and f"{declared_spec.name}/{variant.name}" in {fault.spec for fault in faults}:
             low, high = variant.draw.bounds
             unit = f" {units.UNITS[variant.draw.unit].symbol}" if variant.draw.unit else ""
             if not low <= value <= high:
-                outside.append(f"{declared.name}/{variant.name}, {low:g} to {high:g}{unit}")
+                outside.append(f"{declared_spec.name}/{variant.name}, {low:g} to {high:g}{unit}")
     if outside:
         warnings.warn(
             f"value {value:g} is outside the range that the spec declares: {'; '.join(outside)}",

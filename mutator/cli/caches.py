@@ -73,7 +73,7 @@ def cache(
         (kind, len(of_kind), _describe_size(of_kind)) for kind, of_kind in _entries_by_kind(entries).items()
     ]
     rows.append(("total", len(entries), _describe_size(entries)))
-    terminal.print_table(("what", "entries", "size"), rows, right=(1, 2), total=True)
+    terminal.print_table(("what", "entries", "size"), rows, right_aligned=(1, 2), last_is_total=True)
     terminal.say(f"in {short_path(mutator.cache_folder())}")
 
 

@@ -137,8 +137,8 @@ def _print_plan(
     terminal.print_table(
         ["fault type", "method", "experiments"],
         [*rows, ("total", "", len(new_plan.experiments))],
-        right=(2,),
-        total=True,
+        right_aligned=(2,),
+        last_is_total=True,
     )
     for text in new_plan.operator_notes:
         terminal.say(text)

@@ -113,7 +113,9 @@ def _print_comparison(terminal: Terminal, run_comparison: "mutator.RunComparison
             continue
         terminal.say(sheet.title, style="bold")
         heads, lines = list(sheet.heads), sheet.table().rows
-        terminal.print_table(heads, lines, right=range(1, len(heads)), total=sheet.name == "changes")
+        terminal.print_table(
+            heads, lines, right_aligned=range(1, len(heads)), last_is_total=sheet.name == "changes"
+        )
         terminal.say()
     terminal.say(run_comparison.summary)
     for remark in comparison.remarks:

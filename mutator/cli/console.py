@@ -95,17 +95,17 @@ class Terminal:
         heads: Sequence[str],
         rows: Iterable[Sequence[object]],
         *,
-        right: Sequence[int] = (),
-        total: bool = False,
+        right_aligned: Sequence[int] = (),
+        last_is_total: bool = False,
     ) -> None:
-        """Print a table; columns in `right` are right-aligned; `total` sets the last row apart."""
+        """Print a table. `right_aligned` numbers columns from 0; `last_is_total` sets the last row apart."""
         cells = [[_cell_text(c) for c in row] for row in rows]
         if self.as_json:
             return
         if self.out.is_terminal:
-            self.out.print(_build_rich_table(heads, cells, right, total))
+            self.out.print(_build_rich_table(heads, cells, right_aligned, last_is_total))
         else:
-            self.say(TextTable(heads=heads, rows=cells, right_aligned=right).as_text(), whole=True)
+            self.say(TextTable(heads=heads, rows=cells, right_aligned=right_aligned).as_text(), whole=True)
 
     def print_diff(self, patch: str) -> None:
         """Print a unified diff: coloured in a terminal, elsewhere unchanged, as `patch` needs it."""
@@ -137,7 +137,7 @@ class Terminal:
             yield
 
     @contextmanager
-    def show_count(self, total: int, what: str) -> Iterator[Callable[[], None]]:
+    def show_count(self, total: int, label: str) -> Iterator[Callable[[], None]]:
         """Show a progress bar of `total` equal steps; yield the function to call after each step."""
         if self.as_json or not self.err.is_terminal:
             yield lambda: None
@@ -151,7 +151,7 @@ class Terminal:
             TimeRemainingColumn(compact=True),
         )
         with Progress(*columns, console=self.err, transient=True) as progress:
-            task = progress.add_task(what, total=total)
+            task = progress.add_task(label, total=total)
             yield lambda: progress.advance(task)
 
 
@@ -207,7 +207,7 @@ def error_text(error: MutatorError) -> str:
 
 
 def _build_rich_table(
-    heads: Sequence[str], rows: list[list[str]], right: Sequence[int], total: bool
+    heads: Sequence[str], rows: list[list[str]], right_aligned: Sequence[int], last_is_total: bool
 ) -> "RichTable":
     from rich import box
     from rich.table import Table as RichTable
@@ -215,25 +215,25 @@ def _build_rich_table(
 
     table = RichTable(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold")
     for i, head in enumerate(heads):
-        table.add_column(Text(head), justify="right" if i in right else "left", overflow="fold")
+        table.add_column(Text(head), justify="right" if i in right_aligned else "left", overflow="fold")
     for i, row in enumerate(rows):
-        is_total = total and i == len(rows) - 1
+        is_total = last_is_total and i == len(rows) - 1
         if is_total:
             table.add_section()
         table.add_row(*(Text(c, style=STYLE_BY_ENDING.get(c, "bold" if is_total else "")) for c in row))
     return table
 
 
-def short_path(where: str | Path | None) -> str:
+def short_path(location: str | Path | None) -> str:
     """Return a path as the user would type it: relative if it lies below the current folder."""
-    if not where:
+    if not location:
         return ""
-    path = Path(where)
+    path = Path(location)
     try:
         # not `.`, which says nothing in a message
         return str(path.relative_to(Path.cwd()) if path.is_absolute() and path != Path.cwd() else path)
     except ValueError:
-        return str(where)
+        return str(location)
 
 
 @contextmanager

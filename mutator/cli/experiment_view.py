@@ -29,15 +29,15 @@ _TIME_LABELS = {
 }
 
 
-def find_stored_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> StoredExperiment:
+def find_stored_experiment(workspace: "Workspace", run: Path | None, id_start: str) -> StoredExperiment:
     """Find an experiment of a run, the newest by default, only to read what is stored about it."""
-    return open_stored_run(run or find_newest_run(workspace.library.parent), workspace).experiment(prefix)
+    return open_stored_run(run or find_newest_run(workspace.library.parent), workspace).experiment(id_start)
 
 
-def find_run_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> "RunExperiment":
+def find_run_experiment(workspace: "Workspace", run: Path | None, id_start: str) -> "RunExperiment":
     """Find an experiment of a run, the newest by default, which can be rerun."""
     return mutator.load_run(run or find_newest_run(workspace.library.parent), workspace=workspace).experiment(
-        prefix
+        id_start
     )
 
 
@@ -51,7 +51,7 @@ def print_worst(
         terminal.print_json({"run": str(folder), "count": count, "worst": rows})
         return
     heads = tuple(rows[0]) if rows else ()
-    terminal.print_table(heads, [tuple(row.values()) for row in rows], right=(3, 5))
+    terminal.print_table(heads, [tuple(row.values()) for row in rows], right_aligned=(3, 5))
     terminal.say(f"{len(rows)} of {counted(count, 'experiment')} in {short_path(folder)}, the worst first")
 
 
@@ -70,11 +70,11 @@ def _row_facts(row: "ResultRow") -> dict[str, object]:
 
 
 def print_experiment(
-    terminal: Terminal, experiment: "Experiment", patch: str, *, tried: bool = False
+    terminal: Terminal, experiment: "Experiment", patch: str, *, is_trial: bool = False
 ) -> None:
     """Print what was injected, and the diff. An experiment run by `try` has no method."""
     facts = experiment_facts(experiment)
-    if tried:
+    if is_trial:
         del facts["method"]
     width = max(len(name) for name in facts)
     for name, value in facts.items():
@@ -105,7 +105,7 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
             # stable: of simultaneous events, causes precede effects
             for t, label in sorted(events, key=lambda e: e[0])
         ]
-        terminal.print_table(["time [s]", "from activation [s]", "what"], rows, right=(0, 1))
+        terminal.print_table(["time [s]", "from activation [s]", "what"], rows, right_aligned=(0, 1))
     verdict = result.verdict
     if manifest and (note := _missing_alert_note(record, manifest, verdict["reaction_time_s"])):
         terminal.say(note)
@@ -136,8 +136,8 @@ def _unit_by_name(manifest: "TargetManifest") -> dict[str, str]:
     return {name: unit for name, unit in pairs if unit not in ("", "-")}
 
 
-def _describe_values(values: Iterable[tuple[str, float]], units: Mapping[str, str]) -> str:
-    texts = (f"{name} {value:.4g} {units.get(name, '')}".rstrip() for name, value in values)
+def _describe_values(values: Iterable[tuple[str, float]], unit_by_name: Mapping[str, str]) -> str:
+    texts = (f"{name} {value:.4g} {unit_by_name.get(name, '')}".rstrip() for name, value in values)
     # keep a value and its unit on one line
     return ", ".join(text.replace(" ", NO_BREAK_SPACE) for text in texts)
 
@@ -202,7 +202,7 @@ def print_trial(terminal: Terminal, trial: "Trial") -> None:
             facts | {"traces": str(trial.single.faulty), "plot": str(plot_path) if plot_path else None}
         )
         return
-    print_experiment(terminal, trial.experiment, trial.patch, tried=True)
+    print_experiment(terminal, trial.experiment, trial.patch, is_trial=True)
     print_verdict(terminal, trial)
     if trial.golden_hazards:
         reached = ", ".join(f"{name} at {t:.2f} s" for name, t in trial.golden_hazards)

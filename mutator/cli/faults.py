@@ -136,7 +136,7 @@ Examples:
 
 @with_workspace_options
 def diff(
-    what: Annotated[
+    spec_or_experiment: Annotated[
         str,
         typer.Argument(
             metavar="SPEC|EXPERIMENT",
@@ -167,33 +167,33 @@ def diff(
     """
     terminal = Terminal(as_json)
     workspace = workspace_options.workspace()
-    if EXPERIMENT_ID_PATTERN.fullmatch(what) and not Path(what).exists():
+    if EXPERIMENT_ID_PATTERN.fullmatch(spec_or_experiment) and not Path(spec_or_experiment).exists():
         from mutator.cli.experiment_view import find_stored_experiment
 
-        experiment = find_stored_experiment(workspace, run, what)
-        _print_diffs(terminal, [(experiment.fault.label, experiment.id, experiment.patch)], whole=patch)
+        experiment = find_stored_experiment(workspace, run, spec_or_experiment)
+        _print_diffs(terminal, [(experiment.fault.label, experiment.id, experiment.patch)], whole_patch=patch)
         return
     from mutator.api.mutants import build_selected
     from mutator.api.selection import FaultChoice, SelectedTarget, middle_of_each_variant
 
     selected_target = SelectedTarget.of(workspace, manifest)
-    choice = FaultChoice(spec=what, variant=variant, value=value, seed=seed, reading=reading)
+    choice = FaultChoice(spec=spec_or_experiment, variant=variant, value=value, seed=seed, reading=reading)
     built_trigger = selected_target.trigger(trigger)
     diffs = []
     for fault, fault_count in middle_of_each_variant(selected_target.faults(choice)):
         mutant = build_selected(selected_target, fault, built_trigger)
         count_note = f", one of {fault_count}" if fault_count > 1 else ""
         diffs.append((fault.label + count_note, mutant.id, mutant.patch))
-    _print_diffs(terminal, diffs, whole=patch)
+    _print_diffs(terminal, diffs, whole_patch=patch)
 
 
-def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole: bool) -> None:
+def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole_patch: bool) -> None:
     if terminal.as_json:
         terminal.print_json([{"fault": fault, "id": name, "patch": patch} for fault, name, patch in diffs])
     for fault, _, patch in diffs:
         # `patch` skips text before a diff, so piped output can include the heading.
         terminal.say(f"# {fault}", style="bold", whole=True)
-        text, note = (patch, "") if whole else readable_patch(patch)
+        text, note = (patch, "") if whole_patch else readable_patch(patch)
         terminal.print_diff(text)
         if note:
             terminal.print_note(note)

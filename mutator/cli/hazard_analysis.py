@@ -146,7 +146,7 @@ def _print_context_table(terminal: Terminal, table: "ContextTable") -> None:
             for verdict in (row.hazards_by_action[a].provided, row.hazards_by_action[a].not_provided)
         ]
         rows.append((row.id, row.condition, *(cell or "-" for cell in cells), row.about))
-    _print_section(terminal, f"contexts of {table.name}", heads, rows, end=_describe_coverage(table))
+    _print_section(terminal, f"contexts of {table.name}", heads, rows, closing_text=_describe_coverage(table))
 
 
 def _describe_coverage(table: "ContextTable") -> str:
@@ -161,13 +161,13 @@ def _context_ids(names: list[str]) -> str:
 
 
 def _print_section(
-    terminal: Terminal, title: str, heads: list[str], rows: Iterable[tuple[str, ...]], end: str = ""
+    terminal: Terminal, title: str, heads: list[str], rows: Iterable[tuple[str, ...]], closing_text: str = ""
 ) -> None:
     cells = [tuple(" ".join(cell.split()) for cell in row) for row in rows]
     terminal.say(f"{title} ({len(cells)})", style="bold")
     terminal.print_table(heads, cells)
-    if end:
-        terminal.say(end)
+    if closing_text:
+        terminal.say(closing_text)
     terminal.say()
 
 

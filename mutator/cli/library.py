@@ -65,7 +65,7 @@ def list_library(
         numbers = [i for i, c in enumerate(columns) if all(isinstance(r[c], int) for r in rows)]
         terminal.say(f"{name} ({len(rows)})", style="bold")
         if rows:
-            terminal.print_table(columns, [[r[c] for c in columns] for r in rows], right=numbers)
+            terminal.print_table(columns, [[r[c] for c in columns] for r in rows], right_aligned=numbers)
         terminal.say()
 
 
@@ -84,13 +84,13 @@ def _list_campaigns(workspace: "Workspace") -> ColumnsAndRows:
     return _list_files(workspace.campaigns, "about")
 
 
-def _list_files(files: Mapping[str, Path], key: str) -> ColumnsAndRows:
+def _list_files(files: Mapping[str, Path], about_key: str) -> ColumnsAndRows:
     from mutator.config.yaml_files import load_yaml
 
     rows: list[dict[str, Any]] = []
     for name, path in files.items():
         data = load_yaml(path).data
-        about = data.get(key, "") if isinstance(data, dict) else ""
+        about = data.get(about_key, "") if isinstance(data, dict) else ""
         rows.append({"name": name, "file": short_path(path), "about": _join_lines(str(about))})
     return ["name", "file", "about"], rows
 

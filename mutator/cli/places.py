@@ -57,7 +57,7 @@ def _print_places(terminal: Terminal, places: Sequence["ListedPlace"]) -> None:
     for place in places:
         letter = letters.setdefault(place.models, _letters_of(len(letters)))
         rows.append([place.line, _anchor_as_yaml(place.at), letter])
-    terminal.print_table(["line", "at", "models"], rows, right=[0])
+    terminal.print_table(["line", "at", "models"], rows, right_aligned=[0])
     terminal.say()
     for models, letter in letters.items():
         terminal.say(f"{letter}: {', '.join(models)}")

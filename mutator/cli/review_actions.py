@@ -27,7 +27,7 @@ Yes = Annotated[
 Remark = Annotated[str, typer.Option(metavar="TEXT", help="Add this remark to each group.")]
 
 
-def _build_decision_command(action: str, about: str) -> Callable[..., None]:
+def _build_decision_command(action: str, help_text: str) -> Callable[..., None]:
     @with_workspace_options
     def verb(
         groups: SomeGroups = None,
@@ -36,17 +36,17 @@ def _build_decision_command(action: str, about: str) -> Callable[..., None]:
         only: OnlyGroups = None,
         yes: Yes = False,
         *,
-        mutants: MutantOptions,
+        mutant_options: MutantOptions,
         as_json: Json = False,
         workspace_options: WorkspaceOptions,
     ) -> None:
         terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
-        reviewed = mutants.load(terminal, workspace_options)
-        if groups_to_decide := _choose_groups(reviewed, action, groups, only, yes=yes):
+        reviewed = mutant_options.load(terminal, workspace_options)
+        if groups_to_decide := _choose_groups(reviewed, action, groups, only, is_confirmed=yes):
             decide = reviewed.approve if action == "approve" else reviewed.reject
             _print_decided(terminal, decide(groups_to_decide, by_name, remark), groups_to_decide)
 
-    verb.__doc__ = about
+    verb.__doc__ = help_text
     return verb
 
 
@@ -62,13 +62,13 @@ def clear(
     by: By = None,
     remark: Remark = "",
     *,
-    mutants: MutantOptions,
+    mutant_options: MutantOptions,
     as_json: Json = False,
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Withdraw decisions; remarks and flags stay."""
     terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
-    reviewed = mutants.load(terminal, workspace_options)
+    reviewed = mutant_options.load(terminal, workspace_options)
     _print_decided(terminal, reviewed.clear(selected := reviewed.find(groups), by_name, remark), selected)
 
 
@@ -78,32 +78,34 @@ def remark(
     text: Annotated[str, typer.Option("--text", metavar="TEXT", help="The remark, one line.")],
     by: By = None,
     *,
-    mutants: MutantOptions,
+    mutant_options: MutantOptions,
     as_json: Json = False,
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Add a remark to groups."""
     terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
-    reviewed = mutants.load(terminal, workspace_options)
+    reviewed = mutant_options.load(terminal, workspace_options)
     _print_decided(terminal, reviewed.remark(selected := reviewed.find(groups), by_name, text), selected)
 
 
-def _build_flag_command(flag: bool, about: str) -> Callable[..., None]:
+def _build_flag_command(adds_flag: bool, help_text: str) -> Callable[..., None]:
     @with_workspace_options
     def verb(
         groups: Groups,
         by: By = None,
         *,
-        mutants: MutantOptions,
+        mutant_options: MutantOptions,
         as_json: Json = False,
         workspace_options: WorkspaceOptions,
     ) -> None:
         terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
-        reviewed = mutants.load(terminal, workspace_options)
+        reviewed = mutant_options.load(terminal, workspace_options)
         selected = reviewed.find(groups)
-        _print_decided(terminal, (reviewed.flag if flag else reviewed.unflag)(selected, by_name), selected)
+        _print_decided(
+            terminal, (reviewed.flag if adds_flag else reviewed.unflag)(selected, by_name), selected
+        )
 
-    verb.__doc__ = about
+    verb.__doc__ = help_text
     return verb
 
 
@@ -113,21 +115,21 @@ unflag = _build_flag_command(False, "Remove flags.")
 
 def _choose_groups(
     reviewed: "mutator.ReviewedGroups",
-    verb: str,
-    starts: Sequence[str] | None,
+    action: str,
+    id_starts: Sequence[str] | None,
     only: str | None,
     *,
-    yes: bool,
+    is_confirmed: bool,
 ) -> "Sequence[Group]":
     """Return the chosen groups, or none without the user's confirmation."""
-    if bool(starts) == (only is not None):
+    if bool(id_starts) == (only is not None):
         raise MutatorError(
-            "groups together with --only" if starts else "neither groups nor --only",
-            where=f"mutator review {verb}",
+            "groups together with --only" if id_starts else "neither groups nor --only",
+            where=f"mutator review {action}",
             expected="either the ids of groups or --only",
         )
-    if starts:
-        return reviewed.find(starts)
+    if id_starts:
+        return reviewed.find(id_starts)
     selected = reviewed.matching(only).groups
     if not selected:
         raise MutatorError(
@@ -136,14 +138,14 @@ def _choose_groups(
     count_text = (
         f"{counted(len(selected), 'group')} ({review_view.describe_counts(reviewed.review, selected)})"
     )
-    if not yes:
+    if not is_confirmed:
         if not sys.stdin.isatty():
             raise MutatorError(
                 f"no terminal to ask for confirmation of {count_text}",
                 argument="only",
-                remedy=f"add --yes to {verb} without confirmation",
+                remedy=f"add --yes to {action} without confirmation",
             )
-        if not typer.confirm(f"{verb} {count_text}?"):
+        if not typer.confirm(f"{action} {count_text}?"):
             return ()
     return selected
 

@@ -54,8 +54,8 @@ def _status_as_json(reviewed: "mutator.ReviewedGroups") -> dict[str, Any]:
     }
 
 
-def _print_groups(terminal: Terminal, head: str, groups_with_notes: "Sequence[tuple[Group, str]]") -> None:
+def _print_groups(terminal: Terminal, heading: str, groups_with_notes: "Sequence[tuple[Group, str]]") -> None:
     if groups_with_notes:
-        terminal.say(f"{head}:", style="bold")
+        terminal.say(f"{heading}:", style="bold")
     for group, note in groups_with_notes:
         terminal.say(f"  {group.id}  {note}: {group.label}")

@@ -17,8 +17,8 @@ MOST_VALUE_ROWS = 24  # rows of values shown in a terminal
 MOST_CONDITIONS = 6  # conditions shown in a terminal; a group can have one for each context
 
 
-def group_as_json(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, Any]:
-    """Return a group as JSON data; with `whole`, also its diff and values."""
+def group_as_json(review: "Review", group: "Group", *, with_diff_and_values: bool = False) -> dict[str, Any]:
+    """Return a group as JSON data, on request also its diff and values."""
     from mutator.api.reviews import group_facts as group_facts
     from mutator.review.readable_groups import value_table
 
@@ -31,7 +31,7 @@ def group_as_json(review: "Review", group: "Group", *, whole: bool = False) -> d
         "bound": asdict(group.basis_digests),
         "ranges": group.value_ranges,
     }
-    if not whole:
+    if not with_diff_and_values:
         return facts
     heads, rows = value_table(group)
     return facts | {
@@ -66,11 +66,11 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
         for g in groups
     ]
     if terminal.out.is_terminal:
-        terminal.print_table(["group", "state", "what", "when", "faults", "runs"], rows, right=(4, 5))
+        terminal.print_table(["group", "state", "what", "when", "faults", "runs"], rows, right_aligned=(4, 5))
     else:
         # in a pipe, each group is one line
         flat = [(*row[:2], row[2].replace("\n", "; "), *row[3:]) for row in rows]
-        terminal.print_table(["group", "state", "what", "when", "faults", "runs"], flat, right=(4, 5))
+        terminal.print_table(["group", "state", "what", "when", "faults", "runs"], flat, right_aligned=(4, 5))
     terminal.say(f"{counted(len(groups), 'group')}: {describe_counts(review, groups)}")
     unlisted = review.entries.keys() - {group.id for group in groups}
     if unlisted:
@@ -133,7 +133,7 @@ def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
     terminal.say()
     heads, rows = value_table(group)
     if rows:
-        terminal.print_table(heads, rows[:MOST_VALUE_ROWS], right=range(2, len(heads)))
+        terminal.print_table(heads, rows[:MOST_VALUE_ROWS], right_aligned=range(2, len(heads)))
         if len(rows) > MOST_VALUE_ROWS:
             terminal.say(f"{len(rows) - MOST_VALUE_ROWS} more; `--json` has all of them")
     terminal.say()

@@ -17,7 +17,7 @@ WORD_BY_KEY = {"a": "approve", "r": "reject", "s": "skip", "q": "quit"}
 
 
 def walk_through(
-    terminal: Terminal, load: Callable[[], "mutator.ReviewedGroups"], reviewer: Callable[[], str]
+    terminal: Terminal, load_groups: Callable[[], "mutator.ReviewedGroups"], name_reviewer: Callable[[], str]
 ) -> None:
     """Show each new or changed group, ask for a decision, and save it at once. Ask again if somebody else has
     decided in the meantime. MutatorError without a terminal.
@@ -28,7 +28,7 @@ def walk_through(
             where="mutator review walk",
             remedy="use `mutator review approve GROUP... --by NAME`, or `reject`",
         )
-    by, reviewed = reviewer(), load()
+    by, reviewed = name_reviewer(), load_groups()
     waiting = list(enumerate(reviewed.undecided, start=1))
     count = len(waiting)
     while waiting:
@@ -53,10 +53,10 @@ def walk_through(
     terminal.say(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")
 
 
-def _ask_for_key(terminal: Terminal, where: str) -> str:
+def _ask_for_key(terminal: Terminal, position: str) -> str:
     choices = "  ".join(f"[{key}] {word}" for key, word in WORD_BY_KEY.items())
     while True:
-        terminal.say(f"{where}:  {choices}", style="bold")
+        terminal.say(f"{position}:  {choices}", style="bold")
         try:
             key = typer.getchar().lower()
         except EOFError:  # Ctrl-D

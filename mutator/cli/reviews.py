@@ -90,13 +90,13 @@ def list_groups(
     only: OnlyGroups = None,
     exclude: ExcludeGroups = None,
     *,
-    mutants: MutantOptions,
+    mutant_options: MutantOptions,
     as_json: Json = False,
     workspace_options: WorkspaceOptions,
 ) -> None:
     """List groups, new and changed ones first (the default)."""
     terminal = Terminal(as_json)
-    reviewed = mutants.load(terminal, workspace_options).matching(only, exclude)
+    reviewed = mutant_options.load(terminal, workspace_options).matching(only, exclude)
     review_view.print_list(terminal, reviewed.review, reviewed.groups)
 
 
@@ -111,13 +111,13 @@ def show(
         typer.Option(metavar="DIR", help="Also write frames before and after an image effect."),
     ] = None,
     *,
-    mutants: MutantOptions,
+    mutant_options: MutantOptions,
     as_json: Json = False,
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Show a group: its diff with holes, and the values that fill them."""
     terminal = Terminal(as_json)
-    reviewed = mutants.load(terminal, workspace_options)
+    reviewed = mutant_options.load(terminal, workspace_options)
     selected = reviewed.find(groups)
     for group in () if as_json else selected:
         (review_view.print_changes if changes else review_view.print_group)(terminal, reviewed.review, group)
@@ -127,7 +127,9 @@ def show(
             terminal, workspace_options, reviewed.review.target, selected, pictures
         )
     if as_json:
-        facts = [review_view.group_as_json(reviewed.review, group, whole=True) for group in selected]
+        facts = [
+            review_view.group_as_json(reviewed.review, group, with_diff_and_values=True) for group in selected
+        ]
         terminal.print_json(
             [
                 {**group_data, "pictures": pictures_by_group.get(str(group_data["group"]), {})}
@@ -160,7 +162,7 @@ def _write_pictures(
 @with_workspace_options
 def status(
     *,
-    mutants: MutantOptions,
+    mutant_options: MutantOptions,
     as_json: Json = False,
     workspace_options: WorkspaceOptions,
 ) -> None:
@@ -170,8 +172,8 @@ def status(
     from mutator.cli.review_status import print_status
 
     terminal = Terminal(as_json)
-    reviewed = mutants.load(terminal, workspace_options)
-    print_status(terminal, reviewed, mutants.campaign)
+    reviewed = mutant_options.load(terminal, workspace_options)
+    print_status(terminal, reviewed, mutant_options.campaign)
 
 
 @with_workspace_options
@@ -180,7 +182,7 @@ def walk(
     only: OnlyGroups = None,
     exclude: ExcludeGroups = None,
     *,
-    mutants: MutantOptions,
+    mutant_options: MutantOptions,
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Show new and changed groups one by one, and ask for a decision on each."""
@@ -189,7 +191,7 @@ def walk(
     terminal = Terminal()
 
     def load_groups() -> "mutator.ReviewedGroups":
-        reviewed = mutants.load(terminal, workspace_options)
+        reviewed = mutant_options.load(terminal, workspace_options)
         return reviewed.matching(only, exclude)
 
     walk_through(terminal, load_groups, lambda: reviewer(workspace_options, by))
@@ -201,13 +203,13 @@ def page(
     only: OnlyGroups = None,
     exclude: ExcludeGroups = None,
     *,
-    mutants: MutantOptions,
+    mutant_options: MutantOptions,
     as_json: Json = False,
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Write all groups to one self-contained page, with commands to copy."""
     terminal = Terminal(as_json)
-    reviewed = mutants.load(terminal, workspace_options).matching(only, exclude)
+    reviewed = mutant_options.load(terminal, workspace_options).matching(only, exclude)
     reviewed.write_page(out)
     if as_json:
         terminal.print_json({"page": str(out), "groups": len(reviewed.groups)})

@@ -29,10 +29,12 @@ def register(app: typer.Typer) -> None:
 
 def print_counts(terminal: Terminal, run: "Run") -> None:
     counts = run.counts()
-    terminal.print_table(counts.heads, counts.rows, right=tuple(counts.right_aligned), total=True)
+    terminal.print_table(
+        counts.heads, counts.rows, right_aligned=tuple(counts.right_aligned), last_is_total=True
+    )
     score = run.mutation_totals()
     if score.rows:
-        terminal.print_table(score.heads, score.rows, right=tuple(score.right_aligned))
+        terminal.print_table(score.heads, score.rows, right_aligned=tuple(score.right_aligned))
     with suppress(MutatorError):  # the note needs the library
         if note := run.alerts_note():
             terminal.say(note)
@@ -117,7 +119,7 @@ def report(
         )
     print_counts(terminal, loaded_run)
     for summary in report_files.summaries:
-        terminal.print_table(summary.heads, summary.rows, right=tuple(summary.right_aligned))
+        terminal.print_table(summary.heads, summary.rows, right_aligned=tuple(summary.right_aligned))
     terminal.say(f"report: {short_path(report_files.markdown)} and {short_path(report_files.page)}")
     loaded_run.check_equivalence()  # last, because the report is wanted even if this fails
 

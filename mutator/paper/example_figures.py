@@ -106,10 +106,10 @@ def _empty_drawing(figure: ActionFigure, reason: str) -> Drawing:
 
 
 def _describe_example(
-    figure: ActionFigure, row: Mapping[Hashable, Any], fault: str, rank: int, match_count: int
+    figure: ActionFigure, row: Mapping[Hashable, Any], fault_label: str, rank: int, match_count: int
 ) -> str:
     return (
-        f"{fault} in {row['scenario']}, {row['method']}, trigger "
+        f"{fault_label} in {row['scenario']}, {row['method']}, trigger "
         f"{row['trigger']}: experiment {row['experiment_id']}. "
         f"The query finds {counted(match_count, 'experiment')}. "
         f"Sorted by {figure.order_column}, largest first, this is number {rank}, and the first (of at most "

@@ -212,22 +212,24 @@ def _measure_share(runs: pd.DataFrame, of: str, part: str) -> Share:
 
 
 def _describe_difference(
-    difference: float, low: float, high: float, first: Share, second: Share, extra: str = ""
+    difference: float, low: float, high: float, first: Share, second: Share, extra_note: str = ""
 ) -> str:
     shares_text = f"{_describe_share(first)} against {_describe_share(second)}"
     if math.isnan(difference):
         return shares_text
-    return f"{100 * difference:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f}{extra}): {shares_text}"
+    return (
+        f"{100 * difference:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f}{extra_note}): {shares_text}"
+    )
 
 
 def _describe_share(share: Share) -> str:
     return f"{100 * share.rate:.1f} % ({share.count}/{share.of})" if share.of else "- (0/0)"
 
 
-def _time_estimate(time_s: float, low: float, high: float, n: int) -> Estimate:
+def _time_estimate(time_s: float, low: float, high: float, run_count: int) -> Estimate:
     interval = "" if math.isnan(low) else f"; {low:.2f} to {high:.2f}"
-    text = f"{time_s:.2f} s (N {n}{interval})" if n else "- (N 0)"
-    return Estimate(value=time_s, low=low, high=high, n=n, text=text)
+    text = f"{time_s:.2f} s (N {run_count}{interval})" if run_count else "- (N 0)"
+    return Estimate(value=time_s, low=low, high=high, n=run_count, text=text)
 
 
 MEASURES = {

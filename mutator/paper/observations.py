@@ -222,7 +222,7 @@ def _judge_claim(
     runs: pd.DataFrame,
     mixture_gaps: Sequence[str],
     source: YamlSource,
-    keys: tuple[str | int, ...],
+    yaml_keys: tuple[str | int, ...],
 ) -> JudgedClaim:
     if claim.measure is None or claim.claim_rule is None:
         return JudgedClaim(
@@ -234,7 +234,7 @@ def _judge_claim(
             reason=claim.see.strip(),
         )
     answers = tuple(
-        _answer_claim(group, claim.measure, claim.claim_rule, arguments, runs, source, keys)
+        _answer_claim(group, claim.measure, claim.claim_rule, arguments, runs, source, yaml_keys)
         for group, arguments in claim.measure_calls()
     )
     verdict, reason = combined_verdict([answer.verdict for answer in answers]), ""
@@ -253,23 +253,23 @@ def _judge_claim(
 
 def _answer_claim(
     group: str,
-    measure: str,
+    measure_name: str,
     rule: ClaimRule,
     arguments: dict[str, str],
     runs: pd.DataFrame,
     source: YamlSource,
-    keys: tuple[str | int, ...],
+    yaml_keys: tuple[str | int, ...],
 ) -> ClaimAnswer:
     # a call that readers can repeat in Python
-    query = f"{measure}(runs, {', '.join(f'{name}={text!r}' for name, text in arguments.items())})"
-    call: Any = MEASURES[measure]
+    query = f"{measure_name}(runs, {', '.join(f'{name}={text!r}' for name, text in arguments.items())})"
+    call: Any = MEASURES[measure_name]
     try:
         estimate: Estimate = call(runs, **arguments)
     except (NameError, SyntaxError, TypeError, ValueError, KeyError, AttributeError) as err:
         raise source.error(
-            keys,
+            yaml_keys,
             f"a query that fails: {err}",
-            expected=f"arguments that {measure} accepts, with names of columns of the results",
+            expected=f"arguments that {measure_name} accepts, with names of columns of the results",
             remedy="see mutator/paper/measures.py",
         ) from err
     return ClaimAnswer(group=group, query=query, result=estimate, verdict=rule.verdict_on(estimate))

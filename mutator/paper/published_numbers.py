@@ -114,7 +114,7 @@ def has_published_numbers(references: Path) -> bool:
     return all((references / name).is_file() for name in FILE_NAMES)
 
 
-def _check_tally(tally: Tally, source: YamlSource, row: int) -> None:
+def _check_tally(tally: Tally, source: YamlSource, row_index: int) -> None:
     """Raise MutatorError if a part exceeds its whole, or if counts of hazards and alerts are inconsistent."""
     parts = (tally.manifested or 0, tally.hazards, tally.alerts or 0)
     is_consistent = tally.activated <= tally.injected and max(parts) <= tally.activated
@@ -123,7 +123,7 @@ def _check_tally(tally: Tally, source: YamlSource, row: int) -> None:
         is_consistent = is_consistent and hazards_with_alert == tally.alerts - (tally.alerts_no_hazards or 0)
     if not is_consistent:
         raise source.error(
-            ("rows", row),
+            ("rows", row_index),
             f"counts that contradict each other: {tally}",
             expected="no count larger than one that includes it",
             remedy="compare with the published table",

@@ -68,25 +68,25 @@ def _duplicate_rows(source: YamlSource, name_of: Callable[[dict[str, Any]], str]
 
 
 def _unknown_names(
-    source: YamlSource, name_of: Callable[[dict[str, Any]], str], what: str, valid_names: set[str]
+    source: YamlSource, name_of: Callable[[dict[str, Any]], str], name_kind: str, valid_names: set[str]
 ) -> Iterator[MutatorError]:
     for i, row in enumerate(source.data["rows"]):
         if name_of(row) not in valid_names:
             yield source.error(
                 ("rows", i),
-                f"unknown {what} '{name_of(row)}'",
+                f"unknown {name_kind} '{name_of(row)}'",
                 expected=f"one of {', '.join(sorted(valid_names))}",
-                remedy=f"correct the name, or add the {what} to the library",
+                remedy=f"correct the name, or add the {name_kind} to the library",
             )
 
 
 def _unequal_sums(
-    numbers: PublishedNumbers, coverage: YamlSource, summary_path: Path
+    numbers: PublishedNumbers, coverage_source: YamlSource, summary_path: Path
 ) -> Iterator[MutatorError]:
     """Yield differences between the sums of both tables, which count the same experiments."""
 
-    def total_of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
-        return sum_tallies(tally for (tally_method, _), tally in counts.items() if tally_method == method)
+    def total_of(tallies: dict[tuple[str, str], Tally], method: str) -> Tally:
+        return sum_tallies(tally for (tally_method, _), tally in tallies.items() if tally_method == method)
 
     for method in _METHODS:
         by_fault_type, by_scenario = (
@@ -96,7 +96,7 @@ def _unequal_sums(
         for name in _SUMMED_COUNTS:
             got, expected = getattr(by_fault_type, name), getattr(by_scenario, name)
             if got != expected:
-                yield coverage.error(
+                yield coverage_source.error(
                     ("rows",),
                     f"{got} {method} {name} in total",
                     expected=f"{expected}, the sum in {summary_path.name}",

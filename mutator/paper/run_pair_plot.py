@@ -91,17 +91,17 @@ def _plot_channel(axis: "Axes", pair: RunPair, channel: str, is_visible: np.ndar
     axis.margins(y=0.08)
 
 
-def _shade_steps(axis: "Axes", t: np.ndarray, steps: StepFlags) -> None:
+def _shade_steps(axis: "Axes", times_s: np.ndarray, steps: StepFlags) -> None:
     # zeros at both ends let the first and the last step begin and end a shade
     edges = np.flatnonzero(np.diff(np.concatenate(([0], steps.astype(int), [0]))))
     for begin, end in edges.reshape(-1, 2):
-        axis.axvspan(t[begin], t[end - 1], color=SHADE_COLOUR, alpha=0.45, linewidth=0)
+        axis.axvspan(times_s[begin], times_s[end - 1], color=SHADE_COLOUR, alpha=0.45, linewidth=0)
 
 
-def _draw_marks(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> None:
+def _draw_marks(axes: Sequence["Axes"], marks: Sequence[Mark], time_span_s: float) -> None:
     """Draw a line through all panels for each mark. Its name is above, on the lowest free level."""
     level_ends: list[float] = []  # the end of the last name on each level
-    end, label_width = axes[0].get_xlim()[1], LABEL_WIDTH_SHARE * width
+    end, label_width = axes[0].get_xlim()[1], LABEL_WIDTH_SHARE * time_span_s
     for mark in marks:
         for axis in axes:
             axis.axvline(

@@ -53,7 +53,7 @@ def render_fault_models_page(workspace: Workspace) -> str:
     parts += [
         "## The YAML of a model\n",
         f"The first key is `schema: {fault_model_files.SCHEMA}`.\n",
-        *model_sections("fault-models.md", fault_model_files.FaultModelModel, below=2),
+        *model_sections("fault-models.md", fault_model_files.FaultModelModel, parent_level=2),
     ]
     return "\n".join(parts).rstrip() + "\n"
 

@@ -76,7 +76,7 @@ def render_manifests_page(workspace: Workspace) -> str:
         "The files in `fault_library/severity/` map a delta-v to a class; see [Verdicts](../explanation/"
         "verdicts.md#severity).\nA manifest names one of them in `severity.scale`. The first key is `schema: "
         f"{severity_model.SCHEMA}`.\n",
-        *model_sections("target-manifest.md", severity_model.SeverityScaleModel, below=2),
+        *model_sections("target-manifest.md", severity_model.SeverityScaleModel, parent_level=2),
     )
 
 
@@ -127,7 +127,7 @@ def _readings_section() -> Iterator[str]:
         "replaces readings that a variant does not have. The first key of the file is\n"
         f"`schema: {READINGS_SCHEMA}`.\n"
     )
-    yield from model_sections("fault-spec.md", ReadingsModel, below=2)
+    yield from model_sections("fault-spec.md", ReadingsModel, parent_level=2)
 
 
 def _units_table() -> Iterator[str]:

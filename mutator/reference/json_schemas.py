@@ -58,8 +58,8 @@ _FIXED_FORMATS: tuple[tuple[type[StrictModel], str, str], ...] = (
 )
 
 
-def file_formats(declared: Readings) -> tuple[YamlFormat, ...]:
-    specs = (spec.build_spec_model(declared), spec.SCHEMA, "faults/*/*.yaml")
+def file_formats(declared_readings: Readings) -> tuple[YamlFormat, ...]:
+    specs = (spec.build_spec_model(declared_readings), spec.SCHEMA, "faults/*/*.yaml")
     return (
         *(
             YamlFormat(model=m, schema=s, files_glob=f"fault_library/{files_glob}")
@@ -125,10 +125,10 @@ def _without_generated_texts(value: Any) -> Any:
     return cleaned
 
 
-def build_editor_schema(file_format: YamlFormat, models: FaultModels) -> dict[str, Any]:
+def build_editor_schema(file_format: YamlFormat, fault_models: FaultModels) -> dict[str, Any]:
     schemas = schema_by_model(file_format.model)
     if "Injection" in schemas:
-        _add_fault_models(schemas["Injection"], models)
+        _add_fault_models(schemas["Injection"], fault_models)
     if "Variant" in schemas:  # another library can declare other readings
         schemas["Variant"]["additionalProperties"] = {"$ref": "#/definitions/Reading"}
     for part in schemas.values():
@@ -144,11 +144,11 @@ def build_editor_schema(file_format: YamlFormat, models: FaultModels) -> dict[st
     return head | file_schema | ({"definitions": schemas} if schemas else {})
 
 
-def _add_fault_models(injection: dict[str, Any], models: FaultModels) -> None:
+def _add_fault_models(injection: dict[str, Any], fault_models: FaultModels) -> None:
     properties = injection["properties"]
-    properties["model"]["anyOf"] = [{"enum": [model.name for model in models]}, {"type": "string"}]
+    properties["model"]["anyOf"] = [{"enum": [model.name for model in fault_models]}, {"type": "string"}]
     properties["unit"]["anyOf"] = [{"enum": [*units.UNITS, DIMENSIONLESS]}, {"type": "null"}]
-    injection["allOf"] = [_parameters_rule(model) for model in models]
+    injection["allOf"] = [_parameters_rule(model) for model in fault_models]
 
 
 def _parameters_rule(model: FaultModel) -> dict[str, Any]:

@@ -120,7 +120,7 @@ def _heading_of(cls: type) -> str:
 
 def _function_section(name: str) -> Iterator[str]:
     node, text = _parse_definition(getattr(mutator, name))
-    signature_text = _signature_text(node, f"mutator.{name}", lines=True)
+    signature_text = _signature_text(node, f"mutator.{name}", one_per_line=True)
     yield f"### mutator.{name}\n"
     yield f"```python\n{signature_text}\n```\n"
     yield f"{text}\n"
@@ -247,31 +247,34 @@ def _type_of_value(value: Any) -> str:
     return f'"{value.value}"' if isinstance(value, Enum) else type(value).__name__
 
 
-def _signature_text(node: FunctionNode, name: str, *, lines: bool = False) -> str:
-    """Return the signature as a call; with `lines`, typed and with one argument per line."""
+def _signature_text(node: FunctionNode, name: str, *, one_per_line: bool = False) -> str:
+    """Return the signature as a call; with `one_per_line`, typed and with one argument per line."""
     args = node.args
     positional = [*args.posonlyargs, *args.args]
     defaults: list[ast.expr | None] = [None] * (len(positional) - len(args.defaults))
     texts = [
-        _argument_text(a, d, lines) for a, d in zip(positional, [*defaults, *args.defaults], strict=True)
+        _argument_text(a, d, one_per_line)
+        for a, d in zip(positional, [*defaults, *args.defaults], strict=True)
     ]
     texts = [text for text, arg in zip(texts, positional, strict=True) if arg.arg not in ("self", "cls")]
     if args.vararg:
-        texts.append(f"*{_argument_text(args.vararg, None, lines)}")
+        texts.append(f"*{_argument_text(args.vararg, None, one_per_line)}")
     elif args.kwonlyargs:  # after `*args`, no `*` is needed
         texts.append("*")
-    texts += [_argument_text(a, d, lines) for a, d in zip(args.kwonlyargs, args.kw_defaults, strict=True)]
-    if not lines:
+    texts += [
+        _argument_text(a, d, one_per_line) for a, d in zip(args.kwonlyargs, args.kw_defaults, strict=True)
+    ]
+    if not one_per_line:
         return f"{name}({', '.join(texts)})"
     argument_lines = "".join(f"\n    {text}," for text in texts) + "\n" if texts else ""
     return f"{name}({argument_lines}) -> {_return_type(node)}"
 
 
-def _argument_text(arg: ast.arg, default: ast.expr | None, typed: bool) -> str:
-    text = f"{arg.arg}: {_annotation_text(arg)}" if typed and arg.annotation else arg.arg
+def _argument_text(arg: ast.arg, default: ast.expr | None, with_type: bool) -> str:
+    text = f"{arg.arg}: {_annotation_text(arg)}" if with_type and arg.annotation else arg.arg
     if default is None:
         return text
-    return f"{text} = {ast.unparse(default)}" if typed else f"{text}={ast.unparse(default)}"
+    return f"{text} = {ast.unparse(default)}" if with_type else f"{text}={ast.unparse(default)}"
 
 
 def render_stub() -> str:

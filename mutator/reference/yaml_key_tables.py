@@ -29,10 +29,10 @@ def generated_page_head(title: str) -> str:
     return f"# {title}\n\n<!-- Written by `python -m mutator.reference`; do not edit by hand. -->\n"
 
 
-def model_sections(page: str, *models: type[StrictModel], below: int = 1) -> Iterator[str]:
+def model_sections(page_name: str, *models: type[StrictModel], parent_level: int = 1) -> Iterator[str]:
     """Yield a section for each model in files of `models`, each once, in the order of their keys.
 
-    Headings are one level below `below`; with several `models`, those of their parts are two levels below it.
+    Headings are one level below `parent_level`; with several `models`, those of their parts are two levels below it.
     Models that other pages describe are only linked.
     """
     schema_by_name: dict[str, dict[str, Any]] = {}
@@ -40,27 +40,27 @@ def model_sections(page: str, *models: type[StrictModel], below: int = 1) -> Ite
         schemas = schema_by_model(model)
         schema_by_name |= {name: schemas[name] for name in order_models(schemas)}
     file_models = {next(iter(schema_by_model(model))) for model in models}
-    tables = _KeyTables(page, schema_by_name)
+    tables = _KeyTables(page_name, schema_by_name)
     for name, part in schema_by_name.items():
-        if "enum" in part or _PAGE_BY_SHARED_MODEL.get(name, page) != page:
+        if "enum" in part or _PAGE_BY_SHARED_MODEL.get(name, page_name) != page_name:
             continue
         is_deeper = len(models) > 1 and name not in file_models
-        yield f"{'#' * (below + 1 + is_deeper)} {part['title']}\n"
+        yield f"{'#' * (parent_level + 1 + is_deeper)} {part['title']}\n"
         if part["description"]:
             yield f"{part['description']}\n"
         yield from tables.key_table(part)
 
 
-def order_models(parts: dict[str, dict[str, Any]]) -> list[str]:
+def order_models(schema_by_name: dict[str, dict[str, Any]]) -> list[str]:
     """Return the names of models in reading order: the first, then those that its keys refer to."""
     ordered: dict[str, None] = {}
-    waiting = [next(iter(parts))]
+    waiting = [next(iter(schema_by_name))]
     while waiting:
         name = waiting.pop()
         if name not in ordered:
             ordered[name] = None
             # a stack, so reversed: the first reference comes next
-            waiting += reversed(list(_referenced_models(parts[name])))
+            waiting += reversed(list(_referenced_models(schema_by_name[name])))
     return list(ordered)
 
 
