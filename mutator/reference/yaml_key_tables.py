@@ -32,7 +32,8 @@ def generated_page_head(title: str) -> str:
 def model_sections(page_name: str, *models: type[StrictModel], parent_level: int = 1) -> Iterator[str]:
     """Yield a section for each model in files of `models`, each once, in the order of their keys.
 
-    Headings are one level below `parent_level`; with several `models`, those of their parts are two levels below it.
+    Headings are one level below `parent_level`; with several `models`,
+    those of their parts are two levels below it.
     Models that other pages describe are only linked.
     """
     schema_by_name: dict[str, dict[str, Any]] = {}
