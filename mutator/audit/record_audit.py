@@ -22,8 +22,8 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import RunHead
 from mutator.targets.manifest import TargetManifest
 
-_DIGEST_DIGITS = 64  # hex digits
-_TIME_SLACK_S = 1e-9  # s
+_DIGEST_DIGITS = 64  # hex digits of a SHA-256
+_TIME_SLACK_S = 1e-9  # times are sums of steps, which round
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ SCHEMA = "signed-seal/1"
 SEAL_FILE, SIGNATURE_FILE = "seal.json", "seal.json.sig"
 SIGNATURE_NAMESPACE = "mutator-seal"  # signatures for other purposes do not count
 _SSH_KEYGEN_TIMEOUT_S = 60.0  # somebody may have to type a passphrase or to touch a key
-_MOST_FILE_BYTES = 100_000  # bytes of either file
+_MOST_FILE_BYTES = 100_000  # of either file: a statement has a few hundred, but anybody can write the files
 _SIGN_REMEDY = "`mutator seal RUN --sign KEY` signs the run as it is now"
 
 

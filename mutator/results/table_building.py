@@ -26,7 +26,7 @@ CSV_FILE, PARQUET_FILE, TIMINGS_FILE = "results.csv", "results.parquet", "timing
 PROPAGATION_FILE = "propagation.parquet"
 TABLE_FILES = (CSV_FILE, PARQUET_FILE, PROPAGATION_FILE, TIMINGS_FILE)
 SCHEMA, STAMP_FILE = "results/1", "results.json"
-_EXPERIMENTS_PER_BATCH = 2_000  # experiments read at a time
+_EXPERIMENTS_PER_BATCH = 2_000  # read at a time; a million records as objects take 5 GB
 
 
 def ensure_tables(run: Path) -> Path:

@@ -45,7 +45,7 @@ _ROWS_COMPARED_AT_ONCE, _SPARE_BYTES = (
     1000,
     100_000,
 )  # rows to compare at a time; bytes that other versions of pyarrow may add
-_EXPERIMENTS_PER_BATCH = 2_000  # experiments computed at a time
+_EXPERIMENTS_PER_BATCH = 2_000  # computed at a time; a million records as objects take 5 GB
 _REMEDY = "rebuild it: `mutator report DIR`"
 
 

@@ -17,9 +17,13 @@ from mutator._common.bounded_reading import MOST_DATA_BYTES, read_bounded
 from mutator._common.files import raising_disk_full
 
 _BLOCK_MARK = b"FIB1"
+# 8 bytes find every accident. A forged patch does not match the digest in its record, a forged series not the
+# deviations there.
 _HEAD_STRUCT, _CHECKSUM_BYTES = struct.Struct("<4sBHI"), 8
 _MOST_SEARCH_READS = 8  # how many times the bytes of a file a search may verify
-_MOST_UNSYNCED, _MOST_UNSYNCED_S = 32, 2.0  # at most this many blocks, and seconds, between two syncs
+# A sync waits for the disk, and a power cut loses what was not synced: at most so many blocks, or seconds of
+# work.
+_MOST_UNSYNCED, _MOST_UNSYNCED_S = 32, 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +73,7 @@ class BlockWriter:
                 written = 0
                 while written < len(blocks):
                     written += os.write(self._fd, blocks[written:])
-            except OSError:
+            except OSError:  # half a block would make the next one look damaged
                 os.ftruncate(self._fd, self._end)
                 raise
         self._end += len(blocks)

@@ -19,8 +19,10 @@ from mutator._common.files import check_schema, raising_disk_full, writing_atomi
 from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
 
-_MOST_UNSYNCED = 32  # the most lines between two syncs
-_MOST_UNSYNCED_S = 2.0  # the longest time between two syncs
+# A sync waits for the disk, and a power cut loses what was not synced: at most so many lines, or seconds of
+# work.
+_MOST_UNSYNCED, _MOST_UNSYNCED_S = 32, 2.0
+# 16 digits find every accident. A file whose checksums were computed anew differs from `digests.json`.
 _CHECKSUM_KEY, _CHECKSUM_DIGITS, _AFTER_CHECKSUM = b'{"sum":"', 16, b'",'
 _CHECKSUM_SLICE = slice(len(_CHECKSUM_KEY), len(_CHECKSUM_KEY) + _CHECKSUM_DIGITS)
 _BODY_START = len(_CHECKSUM_KEY) + _CHECKSUM_DIGITS + len(_AFTER_CHECKSUM)
@@ -66,7 +68,7 @@ class LineWriter:
                 written = 0
                 while written < len(data):
                     written += os.write(self._fd, data[written:])
-            except OSError:
+            except OSError:  # half a line would make the next one look damaged
                 os.ftruncate(self._fd, self._end)
                 raise
         self._end += len(data)

@@ -22,7 +22,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, SCHEMA
 
 _MOST_NAMES_SHOWN = 3
-_DELETION_TRIES, _RETRY_PAUSE_S = 50, 0.1
+_DELETION_TRIES, _RETRY_PAUSE_S = 50, 0.1  # 5 s in all: a large run has thousands of files
 
 
 def delete_run(path: Path) -> None:

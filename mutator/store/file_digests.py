@@ -33,10 +33,8 @@ from mutator.store.checksummed_lines import read_segment
 
 SCHEMA, FILE = "digests/1", "digests.json"
 _MIN_BYTES_FOR_THREADS = 20_000_000  # the least number of bytes for which threads save time
-SEGMENT_FOLDERS = (
-    "records",
-    "proof",
-)  # folders of append-only files; digests are added when the files are closed
+# folders of append-only files; digests are added when the files are closed
+SEGMENT_FOLDERS = ("records", "proof")
 _LEDGER_NAME_PATTERN = re.compile(  # what the ledger may name
     r"(run\.json|campaign\.yaml|plan\.csv|plan/(experiments|faults)\.jsonl|(checks|reviewed)\.json"
     r"|golden/.+/.+|(records|proof)/[^/]+\.jsonl)"
@@ -95,6 +93,7 @@ def digests_of_files(run: Path, names: Sequence[str]) -> dict[str, FileDigest | 
     sizes = {name: _size_or_zero(path_below(run, name)) for name in names}
     if sum(sizes.values()) < _MIN_BYTES_FOR_THREADS:
         return {name: FileDigest.of_file_below(run, name) for name in names}
+    # a large file that begins last would keep one thread busy while the others wait
     largest_first = sorted(names, key=lambda name: -sizes[name])
     with ThreadPoolExecutor(usable_cores()) as pool:
         largest_digests = pool.map(partial(FileDigest.of_file_below, run), largest_first)
@@ -277,7 +276,7 @@ def list_segments(run: Path) -> list[str]:
 def _close_segment(run: Path, name: str) -> FileDigest:
     with open_below(run, name) as file:
         data = read_open_file(file, path_below(run, name), MOST_DATA_BYTES)
-        os.fsync(file.fileno())
+        os.fsync(file.fileno())  # the ledger must not name bytes that a power cut can still take
     segment = read_segment(path_below(run, name), data)
     if segment.damaged_lines:
         raise segment.damage_error(segment.damaged_lines[0])

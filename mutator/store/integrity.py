@@ -21,11 +21,8 @@ from mutator.store.records import SCHEMA, parse_ending, second_record_error
 from mutator.store.run_head import CAMPAIGN, HEAD, RunHead
 from mutator.store.shards import Shard
 
-CLOSED_FOLDERS = (
-    "plan",
-    "golden",
-    *file_digests.SEGMENT_FOLDERS,
-)  # folders in which a finished run has no unknown files
+# folders in which a finished run has no unknown files
+CLOSED_FOLDERS = ("plan", "golden", *file_digests.SEGMENT_FOLDERS)
 IRREPLACEABLE_FILES = (
     HEAD,
     CAMPAIGN,
@@ -33,7 +30,7 @@ IRREPLACEABLE_FILES = (
     plan_file.FAULTS,
 )  # files that cannot be recreated
 TOP_FILES = (HEAD, CAMPAIGN, "plan.csv", "checks.json", "reviewed.json")
-_MOST_NAMED_EXPERIMENTS = 5  # at most this many experiments are named in one message
+_MOST_NAMED_EXPERIMENTS = 5  # in one message: the ids of a million experiments would fill it
 
 
 def run_problems(
@@ -297,6 +294,7 @@ def _final_records(
             )
             yield number, problem, "", 0
         elif ending.is_final:
+            # a hash of 8 bytes is enough to tell two records of this process apart, for a million of them
             yield number, ending.experiment_id, ending.patch, hash(segment.without_checksum(line))
 
 

@@ -22,8 +22,8 @@ COMPLETE_BLOCK, DELTA_BLOCK = (
 )  # kinds of blocks: a complete patch, or a difference from the last complete one
 _DEFLATE_WINDOW_BYTES = 32_768  # window size of deflate, in bytes
 _PATCHES_PER_COMPLETE = 256  # patches that depend on one complete patch, and are lost with it
-_DEFLATE_LEVEL = 9
-MOST_PATCH_BYTES = 16_000_000  # bytes
+_DEFLATE_LEVEL = 9  # patches are short, so that the best compression costs little time
+MOST_PATCH_BYTES = 16_000_000  # when unpacked; a forged block can claim any size
 
 
 class _PatchPacker:

@@ -117,6 +117,8 @@ def _parse_canonical(text: bytes) -> Any:
     return value
 
 
+# A plan has few scenarios, methods and seeds, but each random time is another trigger: the caches hold what
+# repeats, and are bounded because a plan can have a million lines.
 _parse_scalar = lru_cache(maxsize=1024)(_parse_canonical)
 
 

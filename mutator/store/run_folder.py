@@ -27,7 +27,7 @@ from mutator.store.work_stretches import Stretch
 from mutator.targets.contact_severity import SeverityScale
 
 STOP_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
-DEFAULT_SERIES_MB = 500  # budget of a run's series, unless the plan sets another
+DEFAULT_SERIES_MB = 500  # budget of a run's series, unless the plan sets another: some 80,000 of 6 kB
 _MOST_READS = 3  # attempts to read a folder that its owner is writing
 
 
@@ -111,6 +111,7 @@ class RunFolder:
             problems = list(
                 integrity.run_problems(self.path, self.head, ledger, self.shard, ignore_cache=ignore_cache)
             )
+            # with another ledger than before, the owner wrote files while they were being compared
             if not problems or file_digests.load_ledger(self.path) == ledger:
                 break
         return problems

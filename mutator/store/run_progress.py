@@ -72,7 +72,7 @@ class RecordTail:
             with open_regular(path) as file:
                 file.seek(offset)
                 data = read_open_file(file, path, MOST_DATA_BYTES)
-            end = data.rfind(b"\n") + 1
+            end = data.rfind(b"\n") + 1  # a line that is still being written is read at the next poll
             self._offset_by_file[path] = offset + end
             for line in data[:end].splitlines():
                 self._count_record(line)

@@ -234,7 +234,7 @@ def load_index(path: Path) -> SeriesIndex:
 
 def save_index(path: Path, index: SeriesIndex) -> None:
     text = canonical_json(index.as_json()).encode()
-    write_script(path, gzip.compress(text, compresslevel=9, mtime=0))
+    write_script(path, gzip.compress(text, compresslevel=9, mtime=0))  # with a time, equal runs would differ
 
 
 def write_kept_series(path: Path, golden: bytes, faulty: bytes) -> None:

@@ -19,7 +19,7 @@ from mutator._common.bounded_reading import unpack_bounded
 from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
 
-MOST_SERIES_BYTES = 32_000_000  # of a run's series
+MOST_SERIES_BYTES = 32_000_000  # of a run; an hour of 100 channels at 20 values a second has 29 MB
 _DECODE_ERRORS = (ValueError, LookupError, TypeError, AttributeError, RecursionError)
 _LENGTH_STRUCT = struct.Struct("<I")
 _GZIP_LEVEL = 4  # gives one percent more bytes than level 6, in two thirds of the time
@@ -88,7 +88,7 @@ def encode_series(series: Series, golden: Series | None = None) -> bytes:
     text = canonical_json(head).encode()
     times = (series.t[shared_steps:].astype("<f8").tobytes(), points.t.astype("<f8").tobytes())
     raw = b"".join((_LENGTH_STRUCT.pack(len(text)), text, *times, planes.tobytes()))
-    return gzip.compress(raw, compresslevel=_GZIP_LEVEL, mtime=0)
+    return gzip.compress(raw, compresslevel=_GZIP_LEVEL, mtime=0)  # with a time, equal runs would differ
 
 
 def decode_series(data: bytes, golden: Series | None = None) -> Series:

@@ -6,7 +6,7 @@ from typing import Any
 from mutator.store.indexed_lines import IndexedLines
 
 TIMINGS_FOLDER, TIMINGS_SCHEMA = "timings", "timings/2"  # the folder of the files of lines
-_LONGEST_RUN_S = 1e9  # of a run; sums of such times are finite
+_LONGEST_RUN_S = 1e9  # 30 years: no run takes longer, and sums of such times are finite
 
 
 def load_timings(run: Path) -> IndexedLines[dict[str, Any]]:
