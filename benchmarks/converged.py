@@ -52,7 +52,7 @@ def last_difference(golden: Series, faulty: Series) -> float:
         if differs.size:
             last = max(last, float(times[differs[-1]]))
     points = faulty.points
-    differs = np.flatnonzero(points.golden.view("<u4") != points.faulty.view("<u4"))
+    differs = np.flatnonzero(points.golden_values.view("<u4") != points.faulty_values.view("<u4"))
     return max(last, float(points.t[differs].max(initial=-math.inf)))
 
 

@@ -128,7 +128,9 @@ def write_series(workspace: Workspace, records: Sequence[Record], out: Path) -> 
         made.append(encode_series(sampler.faulty_series(faulty, one), sampler.golden))
     writer = SeriesWriter(out, "0001-main")
     for number, one in enumerate(records):
-        data = EncodedSeries(golden_key="S1", golden=sampler.encoded_golden, faulty=made[number % len(made)])
+        data = EncodedSeries(
+            golden_key="S1", golden_bytes=sampler.encoded_golden, faulty_bytes=made[number % len(made)]
+        )
         writer.append(one.experiment_id, data)
     writer.close()
     pack_series(out, "plan", {one.experiment_id: number for number, one in enumerate(records)}, 500)

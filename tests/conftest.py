@@ -284,7 +284,7 @@ def put_patches() -> Callable[[Path, Mapping[str, bytes | None]], None]:
     def put(run: Path, given: Mapping[str, bytes | None]) -> None:
         found = PatchFolder(run)
         [path] = found.block_files()
-        patches = {name: found.read(name) for name in found} | given
+        patches = {name: found.read_patch(name) for name in found} | given
         rewrite_patch_file(path, [(name, data) for name, data in patches.items() if data is not None])
 
     return put
@@ -371,7 +371,7 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
         patch = b"diff --git a/a.py b/a.py\n"
         write_run(workspace, out, lambda experiment: {"patch": file_digests.digest(patch)}, **given)
         folder = RunFolder.open_unverified(out)
-        lines = [line for _, line in read_segment(out / "records" / "0001-a.jsonl").objects(SCHEMA)]
+        lines = [line for _, line in read_segment(out / "records" / "0001-a.jsonl").numbered_objects(SCHEMA)]
         patches = PatchWriter(out, "0001-a")
         for line in lines:
             patches.append(line["experiment_id"], patch)

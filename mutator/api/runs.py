@@ -101,7 +101,7 @@ class Run(RunContents):
         frame = self._results_frame
         hazards, counts = (
             outcome_counting.hazard_names(frame),
-            outcome_counting.counts_by_group(frame, outcome_counting.fault_types_of(frame)),
+            outcome_counting.count_outcomes(frame, outcome_counting.fault_types_of(frame)),
         )
         heads, rows = outcome_counting.count_table(
             counts, "fault type", hazards, alerts=self.folder.has_alerts

@@ -41,18 +41,21 @@ def target_fact_problems(folder: RunFolder, workspace: Workspace, manifest: Targ
 
 def seed_and_session_problems(folder: RunFolder) -> Problems:
     """Yield experiments of another seed or reading than run.json states, and records of no session."""
-    path = folder.path / plan_file.EXPERIMENTS
+    path = folder.path / plan_file.EXPERIMENTS_FILE
     for number, experiment in enumerate(plan_file.iterate_experiments(folder.path), start=1):
         if experiment.seed not in folder.seeds:
             yield MutatorError(
-                f"seed {experiment.seed}", where=path, line=number, expected=_as_in_head(folder, "seed")
+                f"seed {experiment.seed}",
+                where=path,
+                line=number,
+                expected=_expected_as_in_head(folder, "seed"),
             )
         if experiment.fault.reading != folder.head.reading:
             got = f"reading {experiment.fault.reading}"
-            yield MutatorError(got, where=path, line=number, expected=_as_in_head(folder, "reading"))
+            yield MutatorError(got, where=path, line=number, expected=_expected_as_in_head(folder, "reading"))
     if folder.head.choices.reading not in (None, folder.head.reading):
         got = f"choice of the reading {folder.head.choices.reading}"
-        yield MutatorError(got, where=folder.path / HEAD, expected=_as_in_head(folder, "reading"))
+        yield MutatorError(got, where=folder.path / HEAD, expected=_expected_as_in_head(folder, "reading"))
     patterns = [stretch.records for stretch in folder.stretches]
     for name in file_digests.list_segments(folder.path):
         stem = name.partition("/")[2].removesuffix(".jsonl")
@@ -66,7 +69,7 @@ def seed_and_session_problems(folder: RunFolder) -> Problems:
 
 def recomputed_chunks(folder: RunFolder) -> tuple[plan_file.Chunk, ...]:
     """Return the offset, length and number of experiments of each chunk, for the numbers in run.json."""
-    lines = plan_file.read_lines(folder.path / plan_file.EXPERIMENTS)
+    lines = plan_file.read_lines(folder.path / plan_file.EXPERIMENTS_FILE)
     chunks, offset = [], 0
     for *_, count in folder.head.chunks:
         length = sum(map(len, islice(lines, count)))
@@ -144,7 +147,7 @@ def unproven_engine_problem(folder: RunFolder, records: Sequence[StoredRecord]) 
         )
 
 
-def _as_in_head(folder: RunFolder, key: str) -> str:
+def _expected_as_in_head(folder: RunFolder, key: str) -> str:
     return f"{key} {getattr(folder.head, key)}, as in {HEAD}"
 
 

@@ -80,7 +80,7 @@ def mutant_problems(
             yield recorded.difference_error(
                 f"patch {recorded.record.patch[:16] or 'none'}", patch[:16] or "none"
             )
-        stored_patch = folder.patches.read(recorded.record.experiment_id)
+        stored_patch = folder.patches.read_patch(recorded.record.experiment_id)
         stored_digest = "" if stored_patch is None else digest(stored_patch)
         if stored_digest != patch:
             name = recorded.record.experiment_id

@@ -32,7 +32,7 @@ from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.file_digests import FileDigest
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import CAMPAIGN, HEAD
+from mutator.store.run_head import CAMPAIGN_FILE, HEAD
 from mutator.workspace import Workspace
 
 Problems = Iterator[MutatorError]
@@ -165,11 +165,11 @@ def _plan_problems(folder: RunFolder) -> Problems:
         canary_hazard=campaign.canary.hazard,
     )
     for key, stored, value in head.differences(expected_head):
-        expected = f"{shortened(value)}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
+        expected = f"{shortened(value)}, which follows from {plan_file.EXPERIMENTS_FILE} and {CAMPAIGN_FILE}"
         yield MutatorError(f"{key} {shortened(stored)}", where=run / HEAD, expected=expected)
     if FileDigest.of_file(run / PLAN_CSV) != FileDigest.of_bytes(plan_csv_bytes(plan)):
         yield MutatorError(
-            "differs from the plan", where=run / PLAN_CSV, expected=f"the rows of {plan_file.EXPERIMENTS}"
+            "differs from the plan", where=run / PLAN_CSV, expected=f"the rows of {plan_file.EXPERIMENTS_FILE}"
         )
 
 

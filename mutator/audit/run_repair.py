@@ -138,7 +138,7 @@ def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
         if block_file.is_damaged:
             sentences.append(f"{name}: damaged blocks set aside")
         intact = (
-            (experiment_id, patches.read(experiment_id))
+            (experiment_id, patches.read_patch(experiment_id))
             for experiment_id in names
             if experiment_id not in lost
         )

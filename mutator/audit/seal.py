@@ -28,7 +28,7 @@ from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_lines import bare_segment, intact_lines
 from mutator.store.records import PROOF_FOLDER, parse_ending
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import CAMPAIGN, HEAD
+from mutator.store.run_head import CAMPAIGN_FILE, HEAD
 from mutator.store.work_stretches import describe_stretches
 
 SCHEMA, RESULTS_SCHEMA = "seal/2", "results-digest/2"
@@ -39,7 +39,7 @@ UNSEALED_KEYS = {
     CHECKS: ("digest", "run_cpu_s"),  # the key of a cache, which depends on the machine; a cost
 }
 KEYS_OUTSIDE_RESULTS_DIGEST = ("schema", "provenance", *UNSEALED_KEYS[HEAD])  # of run.json
-_SEALED_FILES = (CAMPAIGN, PLAN_CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
+_SEALED_FILES = (CAMPAIGN_FILE, PLAN_CSV, plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE)
 _EXCEPTION_TEXT_KEYS, _EMPTY_EXCEPTION_TEXTS = ("detail", "error.message"), (b'"detail":""', b'"error":null')
 _UNSEALED_FILES_NOTE = (
     "times, engines and hosts of the experiments; series, kept traces, plots, stills, films"

@@ -28,7 +28,7 @@ from mutator.store import file_digests, plan_file
 from mutator.store.allowed_contents import check_contents
 from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA, Provenance, RunHead
+from mutator.store.run_head import CAMPAIGN_FILE, HEAD, SCHEMA, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.target_facts import TargetFacts, channel_facts, hazard_facts, metric_facts
 from mutator.workspace import Workspace
@@ -39,7 +39,7 @@ _FILES_OF_KILLED_FREEZE = (
     "workers",
     "plan",
     PLAN_CSV,
-    CAMPAIGN,
+    CAMPAIGN_FILE,
     file_digests.FILE,
 )  # files that a killed freeze can leave
 
@@ -133,11 +133,11 @@ def _write_plan_files(
 ) -> tuple[PlanTally, str, list[plan_file.Chunk], dict[str, FileDigest]]:
     """Write the plan's files part by part; return totals, digest, chunk positions and file digests."""
     plan_file.create_plan_folder(out)
-    write_atomic(out / CAMPAIGN, plan.campaign.file_bytes)
+    write_atomic(out / CAMPAIGN_FILE, plan.campaign.file_bytes)
     with ExitStack() as stack:
         rows, lines, faults = (
             DigestingFile(stack.enter_context(writing_atomic(path)))
-            for path in (out / PLAN_CSV, out / plan_file.EXPERIMENTS, out / plan_file.FAULTS)
+            for path in (out / PLAN_CSV, out / plan_file.EXPERIMENTS_FILE, out / plan_file.FAULTS_FILE)
         )
         writer = plan_file.PlanWriter(lines, faults)
         rows.write(plan_csv_lines([], with_head=True))
@@ -148,10 +148,10 @@ def _write_plan_files(
 
         tally, plan_digest = _count_parts(plan, write)
     files = {
-        CAMPAIGN: FileDigest.of_bytes(plan.campaign.file_bytes),
+        CAMPAIGN_FILE: FileDigest.of_bytes(plan.campaign.file_bytes),
         PLAN_CSV: rows.digest,
-        plan_file.EXPERIMENTS: lines.digest,
-        plan_file.FAULTS: faults.digest,
+        plan_file.EXPERIMENTS_FILE: lines.digest,
+        plan_file.FAULTS_FILE: faults.digest,
     }
     return tally, plan_digest, writer.chunks, files
 

@@ -27,7 +27,7 @@ from mutator.store import plan_file
 from mutator.store.check_results import measured_cpu_s
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import GoldenRun, RunFolder
-from mutator.store.run_head import CAMPAIGN
+from mutator.store.run_head import CAMPAIGN_FILE
 from mutator.store.shards import Shard
 from mutator.targets.stop_code import stop_function_source
 from mutator.workspace import Workspace
@@ -295,7 +295,7 @@ def load_plan(folder: RunFolder, tally: PlanTally | None = None) -> Plan:
     head = folder.head
     large = head.experiments > _MOST_EXPERIMENTS_IN_MEMORY
     plan = Plan(
-        campaign=load_campaign(folder.path / CAMPAIGN),
+        campaign=load_campaign(folder.path / CAMPAIGN_FILE),
         choices=head.choices,
         seed=head.seed,
         reading=head.reading,

@@ -20,7 +20,7 @@ from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden_comparison
 from mutator.outcomes.channel_departures import departures_from_golden
-from mutator.outcomes.failure_cause import run_error, status_by_cause
+from mutator.outcomes.failure_cause import judge_failure, run_error
 from mutator.outcomes.golden_comparison import Trace
 from mutator.outcomes.hazards_and_metrics import RunJudgement, load_judged_run, load_manifest_channels
 from mutator.outcomes.series_sampling import SeriesSampler
@@ -233,8 +233,8 @@ class ExperimentRunner:
         sampler = self.goldens.sampler_of(experiment)
         return EncodedSeries(
             golden_key=self.goldens.key_of(experiment),
-            golden=sampler.encoded_golden,
-            faulty=encode_series(sampler.faulty_series(faulty, record), sampler.golden),
+            golden_bytes=sampler.encoded_golden,
+            faulty_bytes=encode_series(sampler.faulty_series(faulty, record), sampler.golden),
         )
 
     def _injections_that_raise(self, experiment: Experiment, mutant: Mutant) -> set[str]:
@@ -301,7 +301,7 @@ class ExperimentRunner:
         )
 
     def _record_of_failed_run(self, experiment: Experiment, mutant: Mutant, execution: JobResult) -> Record:
-        status, detail = status_by_cause(
+        status, detail = judge_failure(
             execution, mutant.files, self._injections_that_raise(experiment, mutant)
         )
         # the number of activations before a crash is reproducible; before a timeout it is not

@@ -238,7 +238,7 @@ def _copy_patches(folder: RunFolder, out: Path) -> None:
         name, patch_digest = record.experiment_id, record.patch
         for problem in integrity.patch_problems(folder.patches, name, patch_digest):
             raise problem
-        if patch_digest and (data := folder.patches.read(name)) is not None:
+        if patch_digest and (data := folder.patches.read_patch(name)) is not None:
             writer.append(name, data)
     writer.close()
 

@@ -48,7 +48,7 @@ class _ChangedFiles:
         return [name for name, part_line, begin, end in parts if part_line == line and begin <= column < end]
 
 
-def status_by_cause(
+def judge_failure(
     execution: JobResult, changed_files: Mapping[str, bytes], raising_ids: Collection[str]
 ) -> tuple[Status, str]:
     """Return the status and detail of a mutant's run. `changed_files` are those of the mutant.

@@ -46,7 +46,7 @@ class LinkState(StrEnum):
     THROUGH = "through"
     STOPPED = "stopped"
     UNKNOWN = "unknown"  # the end of the link is not recorded
-    NONE = "none"  # the fault did not reach the start of the link
+    NOT_REACHED = "none"  # the fault did not reach the start of the link
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -341,7 +341,7 @@ def _link_state(
     tail: str, tip: str, states: Mapping[str, ComponentState], arrived: Collection[str]
 ) -> LinkState:
     if tail not in arrived or states[tip] is ComponentState.INJECTED:
-        return LinkState.NONE
+        return LinkState.NOT_REACHED
     if states[tip] is ComponentState.UNRECORDED:
         return LinkState.UNKNOWN
     return LinkState.THROUGH if states[tip] in _STATES_REACHED_BY_FAULT else LinkState.STOPPED

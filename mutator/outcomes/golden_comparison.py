@@ -246,7 +246,7 @@ class ChannelDeviation:
 def channel_deviation(golden: Trace, faulty: Trace, channel: Channel, time_channel: str) -> ChannelDeviation:
     times = [times_of(trace, channel.name, time_channel) for trace in (golden, faulty)]
     values = [golden[channel.name], faulty[channel.name]]
-    at, values = _on_same_times(times, values)
+    at, values = _values_at_common_times(times, values)
     differs = values[0] != values[1]
     begin = int(differs.argmax()) if differs.size else 0
     if not differs[begin : begin + 1].any():  # true of most channels
@@ -276,7 +276,9 @@ def end_of_shorter(golden: np.ndarray, faulty: np.ndarray) -> float:
     return float(longer[rows]) if rows < len(longer) else np.inf
 
 
-def _on_same_times(times: list[np.ndarray], values: list[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
+def _values_at_common_times(
+    times: list[np.ndarray], values: list[np.ndarray]
+) -> tuple[np.ndarray, list[np.ndarray]]:
     """Return times and the values of both runs at these times.
 
     If the runs have different times, return the union of their times and each run's newest values.

@@ -143,10 +143,10 @@ def _first_hazard_time(
         if robustness is not None
         else trace_formulas.condition_at_each_step(hazard.when, values)
     )
-    return _first_true_time(_lasting_for(holds, values[TIME], hazard.for_s), values[TIME])
+    return _first_true_time(_has_lasted(holds, values[TIME], hazard.for_s), values[TIME])
 
 
-def _lasting_for(holds: np.ndarray, time: np.ndarray, for_s: float) -> np.ndarray:
+def _has_lasted(holds: np.ndarray, time: np.ndarray, for_s: float) -> np.ndarray:
     if not for_s:
         return holds
     begins = holds & ~np.concatenate(([False], holds[:-1]))

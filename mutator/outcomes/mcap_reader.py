@@ -44,7 +44,7 @@ def read_topics(path: Path, fields: Mapping[str, Iterable[str]]) -> dict[str, Ti
                 messages_by_topic[topic].append(
                     (log_time, _parse_numbers(body[_MESSAGE_HEAD_STRUCT.size :], topic, fields[topic]))
                 )
-    return {topic: _columns_by_time(rows, fields[topic]) for topic, rows in messages_by_topic.items()}
+    return {topic: _timed_columns(rows, fields[topic]) for topic, rows in messages_by_topic.items()}
 
 
 class _RecordReader:
@@ -129,7 +129,7 @@ def _field_value(data: Any, path: str) -> Any:
     return data
 
 
-def _columns_by_time(rows: list[tuple[int, list[Any]]], fields: Iterable[str]) -> TimedValues:
+def _timed_columns(rows: list[tuple[int, list[Any]]], fields: Iterable[str]) -> TimedValues:
     rows.sort(key=lambda row: row[0])
     columns = {field: [values[at] for _, values in rows] for at, field in enumerate(fields)}
     return [time / 1e9 for time, _ in rows], columns

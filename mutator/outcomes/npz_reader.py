@@ -27,12 +27,12 @@ _MEMBER_SUFFIX = ".npy"
 def read_members(data: bytes) -> dict[str, np.ndarray] | None:
     """Return the arrays of a file by name, read-only; None if the file is unusual or damaged."""
     try:
-        return _read_members(data)
+        return _read_usual_members(data)
     except Exception:  # a run can write anything; numpy then reports the error
         return None
 
 
-def _read_members(data: bytes) -> dict[str, np.ndarray] | None:
+def _read_usual_members(data: bytes) -> dict[str, np.ndarray] | None:
     if len(data) < _END_STRUCT.size:
         return None
     magic, *disks, count, total, size, begin, comment = _END_STRUCT.unpack_from(

@@ -64,8 +64,8 @@ class SeriesSampler:
     def faulty_series(self, faulty: Trace, record: Record) -> Series:
         faulty_time = np.asarray(faulty[self._clock], dtype=float)
         last = faulty_time[-1] if len(faulty_time) else -np.inf
-        is_prefix = _share_times(faulty_time, self._time)
-        time, golden, values = self._on_common_times(faulty, faulty_time)
+        is_prefix = _has_same_times(faulty_time, self._time)
+        time, golden, values = self._values_at_common_times(faulty, faulty_time)
         golden_samples = self.golden.t[self.golden.t <= last + _TIME_SLACK_S]
         late_steps = np.flatnonzero(time > self._time[-1] + _TIME_SLACK_S)
         steps = np.concatenate(
@@ -109,13 +109,13 @@ class SeriesSampler:
             np.ascontiguousarray(row[::every]) for row, every in zip(single, self._sample_every, strict=True)
         ]
 
-    def _on_common_times(
+    def _values_at_common_times(
         self, faulty: Trace, faulty_time: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the union of both runs' step times, and each run's values. After its end, a run has no value
         (NaN) or, if the runs have different times, its last one.
         """
-        if _share_times(faulty_time, self._time):
+        if _has_same_times(faulty_time, self._time):
             time = max(faulty_time, self._time, key=len)
             return (
                 time,
@@ -144,7 +144,7 @@ class SeriesSampler:
         return np.where(place >= 0, values[:, np.maximum(place, 0)], np.nan)
 
 
-def _share_times(times: np.ndarray, other_times: np.ndarray) -> bool:
+def _has_same_times(times: np.ndarray, other_times: np.ndarray) -> bool:
     """Whether two runs have the same times up to the end of the shorter one."""
     rows = min(len(times), len(other_times))
     return bool(np.array_equal(times[:rows], other_times[:rows]))
@@ -216,8 +216,8 @@ def _extra_points(
     return ExtraPoints(
         channel_numbers=rows[is_visible],
         t=time[places[is_visible]],
-        golden=golden_points[is_visible],
-        faulty=faulty_points[is_visible],
+        golden_values=golden_points[is_visible],
+        faulty_values=faulty_points[is_visible],
     )
 
 
@@ -247,7 +247,7 @@ def _channel_as_json(channel: Channel, manifest: TargetManifest) -> dict[str, An
     }
 
 
-def traces_of_series(golden: Series, faulty: Series, time: str) -> tuple[Trace, Trace]:
+def traces_of_series(golden: Series, faulty: Series, time_channel: str) -> tuple[Trace, Trace]:
     """Return the runs of a series as traces. Between its samples, a channel holds its value."""
     names = [str(channel["name"]) for channel in golden.facts["channels"]]
 
@@ -256,7 +256,7 @@ def traces_of_series(golden: Series, faulty: Series, time: str) -> tuple[Trace, 
             np.repeat(row, every)[: len(run.t)]
             for row, every in zip(run.channel_values, run.sample_every, strict=True)
         ]
-        return {time: run.t, **dict(zip(names, rows, strict=True))}
+        return {time_channel: run.t, **dict(zip(names, rows, strict=True))}
 
     return trace(golden), trace(faulty)
 

@@ -89,7 +89,7 @@ def fault_types_of(frame: "pd.DataFrame") -> "pd.Series[str]":
     return frame["module"] + "/" + frame["fault_type"]
 
 
-def counts_by_group(frame: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[GroupCount, ...]:
+def count_outcomes(frame: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[GroupCount, ...]:
     """Return a count for each of the `groups`, sorted by name, then the total."""
     import pandas as pd
 

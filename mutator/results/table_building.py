@@ -74,11 +74,11 @@ def write_tables(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     with computing_meanwhile(
         lambda: _write_timings(folder, paths[TIMINGS_FILE]), process_count_for(folder.planned_count)
     ) as end:
-        _write_results(folder, paths)
+        _write_result_tables(folder, paths)
         end()
 
 
-def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
+def _write_result_tables(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     records, planned, columns = (
         folder.records(),
         PlannedExperiments(folder.path),
@@ -139,7 +139,11 @@ def _inputs_digest(folder: RunFolder) -> str:
     """Return the digest of all inputs of the tables, including the version of mutator."""
     run = folder.path
     lines = sorted(path for kind in ("records", "timings") for path in (run / kind).glob("*.jsonl"))
-    files = [plan_file.EXPERIMENTS, plan_file.FAULTS, *(path.relative_to(run).as_posix() for path in lines)]
+    files = [
+        plan_file.EXPERIMENTS_FILE,
+        plan_file.FAULTS_FILE,
+        *(path.relative_to(run).as_posix() for path in lines),
+    ]
     input_digests = list(file_digests.digests_of_files(run, files).items())
     head = folder.head
     head_facts = (head.hazards, head.compared, head.metrics, head.severity, head.channels, head.structure)

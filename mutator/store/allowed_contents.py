@@ -15,13 +15,13 @@ from pathlib import Path
 from mutator._common.confined_files import entries_below, is_file_or_folder, is_too_deep, not_plain_error
 from mutator.errors import Outside
 from mutator.store import file_digests
-from mutator.store.run_head import CAMPAIGN, HEAD
+from mutator.store.run_head import CAMPAIGN_FILE, HEAD
 
 SCRATCH_FOLDER, DAMAGED_FOLDER, TRACES_FOLDER = "work", "damaged", "traces"
 SIGNATURE_FILES = ("seal.json", "seal.json.sig")
 _EXPORTED_TABLES = ("results", "propagation", "timings")
 ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any text, including folders
-    *(HEAD, file_digests.FILE, CAMPAIGN, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
+    *(HEAD, file_digests.FILE, CAMPAIGN_FILE, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *SIGNATURE_FILES,
     *("golden/*/*", "patches/*.blocks"),
     *("records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),

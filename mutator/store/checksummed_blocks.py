@@ -103,16 +103,16 @@ def block_bytes(kind: int, key: str, data: bytes) -> bytes:
 
 
 def read_blocks(path: Path) -> BlockFile:
-    parts = list(_intact_or_none(read_bounded(path, MOST_DATA_BYTES)))
+    parts = list(_blocks_or_none(read_bounded(path, MOST_DATA_BYTES)))
     blocks = tuple(block for block in parts if block is not None)
     return BlockFile(path=path, blocks=blocks, is_damaged=len(blocks) < len(parts))
 
 
 def intact_blocks(path: Path) -> Iterator[Block]:
-    yield from (block for block in _intact_or_none(read_bounded(path, MOST_DATA_BYTES)) if block is not None)
+    yield from (block for block in _blocks_or_none(read_bounded(path, MOST_DATA_BYTES)) if block is not None)
 
 
-def _intact_or_none(data: bytes) -> Iterator[Block | None]:
+def _blocks_or_none(data: bytes) -> Iterator[Block | None]:
     """Yield the intact blocks, and None for each damaged part."""
     at, search = 0, _BlockSearch(data)
     while at < len(data):

@@ -154,7 +154,7 @@ class Segment:
                 remedy="restore its name or its folder",
             )
 
-    def objects(self, schema: str) -> Iterator[tuple[int, dict[str, Any]]]:
+    def numbered_objects(self, schema: str) -> Iterator[tuple[int, dict[str, Any]]]:
         """Yield the number and content of each line after the head.
 
         MutatorError for damage, or another schema or file name.

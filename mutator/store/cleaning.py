@@ -32,7 +32,7 @@ def delete_run(path: Path) -> None:
     list_deletable_files(path)
     with owning_run_folder(path, patience_s=0.0):
         files = list_deletable_files(path)  # check again, because now nobody else can write to the folder
-        _delete(path, sorted(files, key=lambda file: file == path / HEAD))  # run.json is deleted last
+        _delete_files(path, sorted(files, key=lambda file: file == path / HEAD))  # run.json is deleted last
 
 
 def delete_unfinished_run(path: Path) -> None:
@@ -41,7 +41,7 @@ def delete_unfinished_run(path: Path) -> None:
     run.json is deleted first. Half-written files, which show that a command was killed, are deleted last.
     """
     run_files, _ = _split_by_origin(path)
-    _delete(path, sorted(run_files, key=lambda file: (is_half_written(file.name), file != path / HEAD)))
+    _delete_files(path, sorted(run_files, key=lambda file: (is_half_written(file.name), file != path / HEAD)))
 
 
 def finish_deletion(path: Path) -> bool:
@@ -64,7 +64,7 @@ def finish_deletion(path: Path) -> bool:
     return False
 
 
-def _delete(path: Path, files: Iterable[Path]) -> None:
+def _delete_files(path: Path, files: Iterable[Path]) -> None:
     for file in files:
         if is_unchecked_folder(file.relative_to(path).as_posix()):
             remove_folder(file)

@@ -65,8 +65,8 @@ class IndexedLines(Mapping[str, T], Generic[T]):
             self._file_numbers[place], self._line_numbers[place] = file, number
             self._offsets[place], self._lengths[place] = offset, len(data)
 
-    def line_of(self, name: str) -> "IndexedLine":
-        at = self._index[name]
+    def line_of(self, experiment_id: str) -> "IndexedLine":
+        at = self._index[experiment_id]
         file = self._file_numbers[at]
         data = self._files.read_part(file, self._offsets[at], self._lengths[at])
         return IndexedLine(self._files.paths[file], self._line_numbers[at], data)
@@ -77,8 +77,8 @@ class IndexedLines(Mapping[str, T], Generic[T]):
             self._last_parsed = last = name, self._parse_line_of(name)
         return last[1]
 
-    def _parse_line_of(self, name: str) -> T:
-        line = self.line_of(name)
+    def _parse_line_of(self, experiment_id: str) -> T:
+        line = self.line_of(experiment_id)
         try:
             return self._parse(line.content())
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError):

@@ -18,18 +18,18 @@ from mutator.store.checksummed_lines import Segment, bare_segment, intact_lines,
 from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.patch_files import PatchFolder
 from mutator.store.records import SCHEMA, parse_ending, second_record_error
-from mutator.store.run_head import CAMPAIGN, HEAD, RunHead
+from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RunHead
 from mutator.store.shards import Shard
 
 # folders in which a finished run has no unknown files
 CLOSED_FOLDERS = ("plan", "golden", *file_digests.SEGMENT_FOLDERS)
 IRREPLACEABLE_FILES = (
     HEAD,
-    CAMPAIGN,
-    plan_file.EXPERIMENTS,
-    plan_file.FAULTS,
+    CAMPAIGN_FILE,
+    plan_file.EXPERIMENTS_FILE,
+    plan_file.FAULTS_FILE,
 )  # files that cannot be recreated
-TOP_FILES = (HEAD, CAMPAIGN, "plan.csv", "checks.json", "reviewed.json")
+TOP_FILES = (HEAD, CAMPAIGN_FILE, "plan.csv", "checks.json", "reviewed.json")
 _MOST_NAMED_EXPERIMENTS = 5  # in one message: the ids of a million experiments would fill it
 
 
@@ -107,7 +107,7 @@ def planned_positions(run: Path, head: RunHead, shard: Shard | None) -> dict[str
 
     MutatorError if the plan has a duplicate, or if its length does not match its chunks.
     """
-    path = run / plan_file.EXPERIMENTS
+    path = run / plan_file.EXPERIMENTS_FILE
     positions: dict[str, int] = {}
     for place, name in enumerate(plan_file.ids(run)):
         if positions.setdefault(name, place) != place:
@@ -165,7 +165,7 @@ def _changed_file_problems(
         )
         return
     line = None
-    if name in (plan_file.EXPERIMENTS, plan_file.FAULTS):
+    if name in (plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE):
         with suppress(MutatorError):  # a missing file is a separate problem
             line = next(
                 (problem.line for problem in plan_file.plan_problems(run) if problem.where == str(path)), None
@@ -289,7 +289,7 @@ def _final_records(
                 f"a record of {ending.experiment_id}, which is not planned for this run",
                 where=segment.path,
                 line=number,
-                expected=f"experiments of {plan_file.EXPERIMENTS} that belong to this shard",
+                expected=f"experiments of {plan_file.EXPERIMENTS_FILE} that belong to this shard",
                 remedy=_remedy(segment.path.parent.parent, ""),
             )
             yield number, problem, "", 0
@@ -304,7 +304,7 @@ def patch_problems(
     """Yield a problem if a stored patch does not have the `recorded_digest` (empty: no mutant)."""
     if not recorded_digest:
         return
-    data = patches.read(experiment_id)
+    data = patches.read_patch(experiment_id)
     stored_digest = "" if data is None else digest(data)
     if stored_digest != recorded_digest:
         yield MutatorError(

@@ -115,7 +115,7 @@ class PatchFolder:
     def __iter__(self) -> Iterator[str]:
         return iter(sorted(self._patches_by_experiment))
 
-    def read(self, experiment_id: str) -> bytes | None:
+    def read_patch(self, experiment_id: str) -> bytes | None:
         """Return the newest patch of an experiment; None if it is missing or damaged."""
         patch = self._patches_by_experiment.get(experiment_id)
         return None if patch is None else _unpack_patch(patch.block, patch.complete)

@@ -24,8 +24,8 @@ from mutator.store.plan_lines import (
     values_behind_id,
 )
 
-EXPERIMENTS = "plan/experiments.jsonl"
-FAULTS = "plan/faults.jsonl"
+EXPERIMENTS_FILE = "plan/experiments.jsonl"
+FAULTS_FILE = "plan/faults.jsonl"
 
 _T = TypeVar("_T")
 Chunk = tuple[int, int, int]  # offset and length in bytes, number of experiments
@@ -65,7 +65,7 @@ class PlanWriter:
 
 def write_plan(run: Path, experiments: Sequence[Experiment], chunk_lengths: Sequence[int]) -> list[Chunk]:
     create_plan_folder(run)
-    with writing_atomic(run / EXPERIMENTS) as lines, writing_atomic(run / FAULTS) as faults:
+    with writing_atomic(run / EXPERIMENTS_FILE) as lines, writing_atomic(run / FAULTS_FILE) as faults:
         writer = PlanWriter(lines, faults)
         writer.append(experiments, chunk_lengths)
     return writer.chunks
@@ -89,7 +89,7 @@ def _parse_lines(path: Path, lines: _NumberedLines, parse: Callable[[bytes], _T]
         try:
             yield parse(line)
         except MutatorError as err:
-            raise _with_place(err, path, number) from None
+            raise _error_with_place(err, path, number) from None
 
 
 def _parsed_or_error(path: Path, parse: Callable[[bytes], _T]) -> Iterator[_T | MutatorError]:
@@ -98,39 +98,39 @@ def _parsed_or_error(path: Path, parse: Callable[[bytes], _T]) -> Iterator[_T | 
         try:
             yield parse(line)
         except MutatorError as err:
-            yield _with_place(err, path, number)
+            yield _error_with_place(err, path, number)
 
 
-def _with_place(err: MutatorError, path: Path, number: int | None) -> MutatorError:
+def _error_with_place(err: MutatorError, path: Path, number: int | None) -> MutatorError:
     return type(err)(err.got, where=path, line=number, expected=err.expected, remedy=err.remedy)
 
 
 def load_faults(run: Path) -> dict[str, Fault]:
-    path = run / FAULTS
+    path = run / FAULTS_FILE
     return {fault.id: fault for fault in _parse_lines(path, _numbered_lines(path), parse_fault)}
 
 
 def fault_line_by_id(run: Path) -> dict[str, bytes]:
     """Return the unparsed lines of the plan's faults by id, which is the digest of the line."""
-    lines = (line.rstrip(b"\n") for line in read_lines(run / FAULTS))
+    lines = (line.rstrip(b"\n") for line in read_lines(run / FAULTS_FILE))
     return {sha256(line).hexdigest()[:16]: line for line in lines}
 
 
 def experiment_lines(run: Path, selected_ids: Container[str]) -> Iterator[bytes]:
-    lines = read_lines(run / EXPERIMENTS)
+    lines = read_lines(run / EXPERIMENTS_FILE)
     return (line.rstrip(b"\n") for name, line in zip(ids(run), lines, strict=True) if name in selected_ids)
 
 
 def read_chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
     offset, length, _ = chunk
-    with open_regular(run / EXPERIMENTS) as file:
-        check_file_size(file, run / EXPERIMENTS)
+    with open_regular(run / EXPERIMENTS_FILE) as file:
+        check_file_size(file, run / EXPERIMENTS_FILE)
         file.seek(offset)
         return file.read(length).splitlines()
 
 
 def load_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> tuple[Experiment, ...]:
-    path, count = run / EXPERIMENTS, chunk[2]
+    path, count = run / EXPERIMENTS_FILE, chunk[2]
     experiments = tuple(
         _parse_experiments(path, ((None, line) for line in read_chunk_lines(run, chunk)), faults)
     )
@@ -175,7 +175,7 @@ class ExperimentsInOrder(Sequence[Experiment]):
 
 
 def iterate_experiments(run: Path) -> Iterator[Experiment]:
-    path = run / EXPERIMENTS
+    path = run / EXPERIMENTS_FILE
     yield from _parse_experiments(path, _numbered_lines(path), load_faults(run))
 
 
@@ -199,13 +199,13 @@ def _parse_experiments(
 
 
 def ids(run: Path) -> Iterator[str]:
-    path = run / EXPERIMENTS
+    path = run / EXPERIMENTS_FILE
     return _parse_lines(path, _numbered_lines(path), id_on_line)
 
 
 def plan_problems(run: Path) -> Iterator[MutatorError]:
     """Yield a problem for each line that is damaged or does not match its id, and for each unused fault."""
-    experiments_path, faults_path = run / EXPERIMENTS, run / FAULTS
+    experiments_path, faults_path = run / EXPERIMENTS_FILE, run / FAULTS_FILE
     faults_or_errors = list(_parsed_or_error(faults_path, parse_fault))
     faults = {fault.id: fault for fault in faults_or_errors if isinstance(fault, Fault)}
     used = set(_parsed_or_error(experiments_path, lambda line: values_behind_id(line)["fault"]))

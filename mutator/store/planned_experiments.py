@@ -18,7 +18,7 @@ class PlannedExperiments(Mapping[str, Experiment]):
     """
 
     def __init__(self, run: Path) -> None:
-        self._path = run / plan_file.EXPERIMENTS
+        self._path = run / plan_file.EXPERIMENTS_FILE
         self._faults = plan_file.load_faults(run)
         self._files = OpenFiles([self._path])
         self._index: dict[str, int] = {}

@@ -36,20 +36,20 @@ def record_from_json(data: Mapping[str, Any]) -> Record:
         tree=data["tree"],
         activation=Activation(**activation) if activation else None,
         t_manifest=data["t_manifest"],
-        max_dev=_pairs(data["max_dev"]),
-        hazards=_pairs(data["hazards"]),
-        alerts=_pairs(data["alerts"]),
+        max_dev=_name_value_pairs(data["max_dev"]),
+        hazards=_name_value_pairs(data["hazards"]),
+        alerts=_name_value_pairs(data["alerts"]),
         trace_digest=data["trace_digest"],
         error=RunError(**data["error"]) if data.get("error") else None,
         patch=data.get("patch", ""),
         t_end=data.get("t_end"),
-        dev=_pairs(data.get("dev", [])),
-        metrics=_pairs(data.get("metrics", [])),
+        dev=_name_value_pairs(data.get("dev", [])),
+        metrics=_name_value_pairs(data.get("metrics", [])),
         left=tuple([(name, first, largest) for name, first, largest in data.get("left", ())]),
     )
 
 
-def _pairs(items: list[list[Any]]) -> tuple[tuple[str, float], ...]:
+def _name_value_pairs(items: list[list[Any]]) -> tuple[tuple[str, float], ...]:
     return tuple([(name, value) for name, value in items])  # a list is faster than a generator
 
 

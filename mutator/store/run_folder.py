@@ -229,7 +229,7 @@ class RunFolder:
             return None
         for problem in integrity.patch_problems(self.patches, experiment_id, record.patch):
             raise problem
-        return self.patches.read(experiment_id)
+        return self.patches.read_patch(experiment_id)
 
     def records(self, kind: str = "records") -> Mapping[str, Record]:
         """Return the records by experiment id, parsed on access; with kind `proof`, those of the proof."""

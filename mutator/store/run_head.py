@@ -18,7 +18,7 @@ from mutator.store.work_stretches import Stretch
 from mutator.targets.target_facts import TargetFacts
 
 SCHEMA = "run/3"
-HEAD, CAMPAIGN = RUN_HEAD_FILE, "campaign.yaml"
+HEAD, CAMPAIGN_FILE = RUN_HEAD_FILE, "campaign.yaml"
 REMEDY = "the run folder is damaged: restore the file from a copy of it"
 NameTuple = tuple[str, ...]
 StoredGolden = (

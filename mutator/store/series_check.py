@@ -83,4 +83,4 @@ def _paired_values(
     yield golden.times_of(channel)[:shared], golden_row[:shared], faulty_row[:shared]
     points = faulty.points
     is_of_channel = points.channel_numbers == channel
-    yield points.t[is_of_channel], points.golden[is_of_channel], points.faulty[is_of_channel]
+    yield points.t[is_of_channel], points.golden_values[is_of_channel], points.faulty_values[is_of_channel]

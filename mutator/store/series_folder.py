@@ -190,12 +190,12 @@ def run_facts(record: Record) -> dict[str, Any]:
     }
 
 
-def check_same_run(about: Mapping[str, Any], record: Record, where: Path | None = None) -> None:
+def check_same_run(series_facts: Mapping[str, Any], record: Record, where: Path | None = None) -> None:
     """Raise MutatorError if a faulty series belongs to another run than the record."""
     for name, value in run_facts(record).items():
-        if about.get(name) != value:
+        if series_facts.get(name) != value:
             raise MutatorError(
-                f"the series of another run: {name} {about.get(name)}",
+                f"the series of another run: {name} {series_facts.get(name)}",
                 where=where,
                 expected=f"{value}, as in the record of {record.experiment_id}",
             )

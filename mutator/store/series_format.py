@@ -33,8 +33,8 @@ class ExtraPoints:
 
     channel_numbers: np.ndarray = field(default_factory=lambda: _NO_VALUES.astype(int))
     t: np.ndarray = field(default_factory=lambda: _NO_VALUES)
-    golden: np.ndarray = field(default_factory=lambda: _NO_VALUES.astype("<f4"))
-    faulty: np.ndarray = field(default_factory=lambda: _NO_VALUES.astype("<f4"))
+    golden_values: np.ndarray = field(default_factory=lambda: _NO_VALUES.astype("<f4"))
+    faulty_values: np.ndarray = field(default_factory=lambda: _NO_VALUES.astype("<f4"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +83,11 @@ def encode_series(series: Series, golden: Series | None = None) -> bytes:
         "points": points.channel_numbers.tolist(),
         **({"every": list(series.sample_every)} if golden is None else {}),
     }
-    words = [*(_difference_words(differences[channel]) for channel in changed), points.golden, points.faulty]
+    words = [
+        *(_difference_words(differences[channel]) for channel in changed),
+        points.golden_values,
+        points.faulty_values,
+    ]
     planes = np.concatenate([row.view("<u4") for row in words]).view(np.uint8).reshape(-1, 4).T
     text = canonical_json(head).encode()
     times = (series.t[shared_steps:].astype("<f8").tobytes(), points.t.astype("<f8").tobytes())
@@ -129,8 +133,8 @@ def _decode_unpacked(raw: bytes, golden: Series | None) -> Series:
     points = ExtraPoints(
         channel_numbers=np.array(channels, dtype=int),
         t=times[later_steps:],
-        golden=point_values[0],
-        faulty=point_values[1],
+        golden_values=point_values[0],
+        faulty_values=point_values[1],
     )
     return Series(t=t, channel_values=rows, sample_every=every, facts=about, points=points)
 

@@ -26,8 +26,8 @@ class EncodedSeries:
     """The bytes of an experiment's series, and of the series of its golden run `golden_key`."""
 
     golden_key: str
-    golden: bytes
-    faulty: bytes
+    golden_bytes: bytes
+    faulty_bytes: bytes
 
 
 class SeriesWriter:
@@ -39,7 +39,7 @@ class SeriesWriter:
         self._written_golden_keys: set[str] = set()
 
     def append(self, experiment_id: str, series: EncodedSeries) -> None:
-        self.add_golden(series.golden_key, lambda: series.golden)
+        self.add_golden(series.golden_key, lambda: series.golden_bytes)
         self._writer().append(*series_block(experiment_id, series))
 
     def add_golden(self, key: str, golden: Callable[[], bytes]) -> None:
@@ -68,7 +68,7 @@ class SeriesWriter:
 
 def series_block(experiment_id: str, series: EncodedSeries) -> tuple[int, str, bytes]:
     """Return the kind, key and content of the block for an experiment's series."""
-    return EXPERIMENT_BLOCK, f"{experiment_id} {series.golden_key}", series.faulty
+    return EXPERIMENT_BLOCK, f"{experiment_id} {series.golden_key}", series.faulty_bytes
 
 
 ReadBytes = Callable[[], bytes]
@@ -173,7 +173,7 @@ def _names_by_entry(entries: Mapping[str, int]) -> dict[int, list[str]]:
 def _worker_series(path: Path) -> _SeriesToPack:
     to_pack = _SeriesToPack({}, {})
     for block in read_blocks(path).blocks:
-        read = _reader(path, block.offset, len(block.data))
+        read = _part_reader(path, block.offset, len(block.data))
         entry = _build_entry(block.data, read)
         if block.kind == GOLDEN_BLOCK:
             to_pack.goldens[block.key] = entry
@@ -187,7 +187,7 @@ def _build_entry(data: bytes, read: ReadBytes) -> _EntryToPack:
     return _EntryToPack(digest=script_name_of(data), size=size_in_script(data), read=read)
 
 
-def _reader(path: Path, offset: int, length: int) -> ReadBytes:
+def _part_reader(path: Path, offset: int, length: int) -> ReadBytes:
     def read() -> bytes:
         with path.open("rb") as file:
             file.seek(offset)

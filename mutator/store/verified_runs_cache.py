@@ -33,7 +33,7 @@ def cache_key(digests: Sha256ByName) -> str:
 
 def recall_facts(key: str) -> dict[str, Any]:
     """Return what the cache knows about a run; empty for an unknown run."""
-    path = _path(key)
+    path = _entry_path(key)
     try:
         data = json.loads(read_bounded(path))
         if data.pop("sum") == digest([key, data]):
@@ -47,7 +47,7 @@ def recall_facts(key: str) -> dict[str, Any]:
 def remember_facts(key: str, **facts: Any) -> None:
     """Add to what the cache knows about a run. An unwritable cache is ignored."""
     data = recall_facts(key) | facts
-    path = _path(key)
+    path = _entry_path(key)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomic(path, json_bytes({"sum": digest([key, data]), **data}))
@@ -55,5 +55,5 @@ def remember_facts(key: str, **facts: Any) -> None:
         return
 
 
-def _path(key: str) -> Path:
+def _entry_path(key: str) -> Path:
     return path_below(shared_cache.runs_folder(), f"{key}.json")

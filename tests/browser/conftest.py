@@ -104,7 +104,8 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     sampler, writer = SeriesSampler(manifest, golden), SeriesWriter(out.path, "0001-main")
     data = encode_series(sampler.faulty_series(faulty, packed), sampler.golden)
     writer.append(
-        packed.experiment_id, EncodedSeries(golden_key="A", golden=sampler.encoded_golden, faulty=data)
+        packed.experiment_id,
+        EncodedSeries(golden_key="A", golden_bytes=sampler.encoded_golden, faulty_bytes=data),
     )
     writer.close()
     pack_series(out.path, plan.digest, {packed.experiment_id: 0}, 1)

@@ -76,7 +76,7 @@ def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run
     page.page.click("#grid tr[data-at] >> nth=0")
     page.page.wait_for_selector("#experiment .diff")
     name = page.fragment.removeprefix("e=")
-    patch = (PatchFolder(run).read(name) or b"").decode()
+    patch = (PatchFolder(run).read_patch(name) or b"").decode()
     tagged = [line[1:] for line in patch.splitlines() if line.startswith("+") and "# fi:" in line]
     injected = [line for line in tagged if "fi:probe" not in line and "fi:observe" not in line]
     for mode in ("Side by side", "Unified"):

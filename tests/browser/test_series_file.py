@@ -61,7 +61,7 @@ def as_read(run: Path, name: str) -> list[dict[str, Any]]:
         mine = faulty.points.channel_numbers == number
         t = np.concatenate((golden.times_of(number), faulty.points.t[mine]))
         order = np.argsort(t, kind="stable")
-        runs = ((golden, faulty.points.golden), (faulty, faulty.points.faulty))
+        runs = ((golden, faulty.points.golden_values), (faulty, faulty.points.faulty_values))
         one, other = (
             np.concatenate((run.channel_values[number], points[mine]))[order] for run, points in runs
         )
@@ -89,7 +89,10 @@ def test_the_page_reads_the_points_between_the_values(browser: Any, run: Path) -
     golden = Series(t=t[:7], channel_values=rows, sample_every=[1, 2], facts=about)
     single = np.array([7.5, np.inf], dtype="<f4")
     points = ExtraPoints(
-        channel_numbers=np.array([0, 1]), t=np.array([0.11, 0.01]), golden=single, faulty=-single
+        channel_numbers=np.array([0, 1]),
+        t=np.array([0.11, 0.01]),
+        golden_values=single,
+        faulty_values=-single,
     )
     longer = [np.arange(9, dtype="<f4") ** 2, np.array([1, 2, 3, 4, 5], dtype="<f4")]
     happened = {

@@ -216,7 +216,10 @@ def pack_with(name: str, forged: bytes) -> None:
             there.read_entry(number) for number in (index.golden_entries[key], index.experiment_entries[one])
         ]
         writer.append(
-            one, EncodedSeries(golden_key=key, golden=golden, faulty=forged if one == name else faulty)
+            one,
+            EncodedSeries(
+                golden_key=key, golden_bytes=golden, faulty_bytes=forged if one == name else faulty
+            ),
         )
     writer.close()
     for path in Path("run/series").glob("*.js"):

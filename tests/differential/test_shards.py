@@ -59,7 +59,7 @@ def test_merged_shards_equal_the_single_run(runs: Runs, tmp_path: Path) -> None:
     for name in DERIVED:
         assert (tmp_path / "out" / name).read_bytes() == (runs["whole"] / name).read_bytes()
     merged, whole = (
-        {name: found.read(name) for name in found}
+        {name: found.read_patch(name) for name in found}
         for found in map(PatchFolder, (tmp_path / "out", runs["whole"]))
     )
     assert merged == whole and None not in merged.values()

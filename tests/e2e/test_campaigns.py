@@ -116,7 +116,7 @@ def test_a_run_leaves_its_results_and_no_scratch_files(finished_once: Finished) 
     assert {p.name for p in (out / "golden").iterdir()} == {"A", "A+alone"}
     for row in rows_of(out):
         name = row["experiment_id"]
-        assert (PatchFolder(out).read(name) or b"").startswith(b"diff --git a/")
+        assert (PatchFolder(out).read_patch(name) or b"").startswith(b"diff --git a/")
 
 
 def test_the_next_command_deletes_half_written_files(toy: Workspace, finished: Path) -> None:
@@ -137,7 +137,7 @@ def test_a_stored_patch_produces_the_mutant(toy: Workspace, finished: Path, tmp_
     tree = tmp_path / "patched"
     shutil.copytree(toy.library.parent / "tree", tree, ignore=shutil.ignore_patterns("__pycache__"))
     subprocess.run(
-        ["patch", "-p1", "-s", "-d", str(tree)], input=PatchFolder(finished).read(name), check=True
+        ["patch", "-p1", "-s", "-d", str(tree)], input=PatchFolder(finished).read_patch(name), check=True
     )
     single, same = rerun_experiment(toy, finished, name)
     assert same

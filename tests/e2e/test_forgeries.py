@@ -96,7 +96,7 @@ def a_time(run: Path, deep: bool) -> None:
 def a_patch(run: Path, deep: bool) -> None:
     _, _, record = hazardous(run)
     name = record["experiment_id"]
-    forged = (PatchFolder(run).read(name) or b"").replace(b"# fi:", b"# by hand fi:", 1)
+    forged = (PatchFolder(run).read_patch(name) or b"").replace(b"# fi:", b"# by hand fi:", 1)
     put_patch(run, name, forged)
     if deep:
         change(run, patch=digest(forged))
@@ -105,7 +105,7 @@ def a_patch(run: Path, deep: bool) -> None:
 def put_patch(run: Path, name: str, data: bytes) -> None:
     found = PatchFolder(run)
     path = found.file_of(name) if name in set(found) else found.block_files()[0]  # each worker has one
-    kept = {other: found.read(other) or b"" for other in found if found.file_of(other) == path}
+    kept = {other: found.read_patch(other) or b"" for other in found if found.file_of(other) == path}
     patches = kept | {name: data}
     rewrite_patches(path, patches.items())
 
@@ -148,7 +148,7 @@ def an_added_record(run: Path, deep: bool) -> None:
 
 
 def copy_patch(run: Path, name: str, other: str) -> None:
-    put_patch(run, other, PatchFolder(run).read(name) or b"")
+    put_patch(run, other, PatchFolder(run).read_patch(name) or b"")
 
 
 def a_plan_condition(run: Path, deep: bool) -> None:
@@ -156,7 +156,7 @@ def a_plan_condition(run: Path, deep: bool) -> None:
     name = record["experiment_id"]
     old = next(e for e in plan_file.load_experiments(run) if e.id == name)
     new = replace(old, trigger=replace(old.trigger, armed_after_s=old.trigger.armed_after_s + 1.0))
-    path = run / plan_file.EXPERIMENTS
+    path = run / plan_file.EXPERIMENTS_FILE
     if not deep:
         one = canonical_json(plan_file.experiment_as_json(old))
         assert one in path.read_text()

@@ -142,7 +142,7 @@ class Content:
         topics: tuple[list[Topic], list[Topic]] = ([], [])
         for row, about in enumerate(golden.facts["channels"]):
             own = points.channel_numbers == row
-            runs = ((golden, points.golden), (faulty, points.faulty))
+            runs = ((golden, points.golden_values), (faulty, points.faulty_values))
             for told, (run, more) in zip(topics, runs, strict=True):
                 pairs = [
                     *_pairs(run.times_of(row), run.channel_values[row]),

@@ -8,7 +8,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note, fault_free_table
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
-from mutator.results.outcome_counting import count_table, counts_by_group, fault_types_of, hazard_names
+from mutator.results.outcome_counting import count_outcomes, count_table, fault_types_of, hazard_names
 from mutator.statistics.metric_tables import fault_tolerant_times_sheet, metrics_sheet, severity_sheet
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.sheet_selection import run_sheets
@@ -113,7 +113,7 @@ def _counts(run: ReportedRun) -> list[tuple[str, TextTable]]:
     hazards = hazard_names(run.results)
     made = []
     for title, head, groups in _GROUPS:
-        counts = counts_by_group(run.results, groups(run.results))
+        counts = count_outcomes(run.results, groups(run.results))
         heads, lines = count_table(counts, head, hazards, alerts=run.folder.has_alerts)
         made.append((title, TextTable(heads=heads, rows=lines, right_aligned=range(1, len(heads)))))
     return made

@@ -169,7 +169,7 @@ def test_a_damaged_campaign_file_or_plan_is_not_repaired(run: Path) -> None:
     (run / "campaign.yaml").write_text("other")
     assert repair_run(RunFolder.open_unverified(run)) == []
     assert (run / "campaign.yaml").read_text() == "other"
-    edit(run / plan_file.EXPERIMENTS, lambda x: x[:-1])
+    edit(run / plan_file.EXPERIMENTS_FILE, lambda x: x[:-1])
     with pytest.raises(MutatorError, match="23 experiments"):
         repair_run(RunFolder.open_unverified(run))
 

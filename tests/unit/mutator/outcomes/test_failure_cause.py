@@ -6,7 +6,7 @@ import pytest
 
 from mutator.engines.engine_jobs import JobResult, RaisedException, TargetStack
 from mutator.model import RunError, Status
-from mutator.outcomes.failure_cause import run_error, status_by_cause
+from mutator.outcomes.failure_cause import judge_failure, run_error
 
 FILES = {
     "car/radar.py": b"""from car import _fi  # fi:probe
@@ -60,7 +60,7 @@ def execution(
     ],
 )
 def test_the_lines_on_the_stack_determine_the_blame(stack: TargetStack, status: Status) -> None:
-    assert status_by_cause(execution(stack), FILES, ())[0] is status
+    assert judge_failure(execution(stack), FILES, ())[0] is status
 
 
 CHANGED = {
@@ -87,7 +87,7 @@ CHANGED = {
 def test_the_mutant_is_blamed_only_for_the_injected_part_of_a_line(
     stack: TargetStack, status: Status
 ) -> None:
-    assert status_by_cause(execution(stack), CHANGED, ())[0] is status
+    assert judge_failure(execution(stack), CHANGED, ())[0] is status
 
 
 IN_A_STRING = b"""def say(low):
@@ -114,7 +114,7 @@ def test_columns_of_the_injected_part_are_counted_in_utf_8_bytes(data: bytes, of
     begin = len(line[: line.index(of_fault)].encode())
     end = len(line[: line.index(" if _fi", line.index(of_fault))].encode())
     told = {
-        column: status_by_cause(execution((("car/radar.py", number, column),)), {"car/radar.py": data}, ())[0]
+        column: judge_failure(execution((("car/radar.py", number, column),)), {"car/radar.py": data}, ())[0]
         for column in (begin - 2, begin, end - 1, len(line[: line.index(" else ")].encode()))
     }
     assert list(told.values()) == [
@@ -126,7 +126,7 @@ def test_an_intended_exception_excuses_no_other_injection() -> None:
     line = TWO.splitlines()[1]
     columns = [line.index(b"no()"), line.index(b"1 / 0")]
     told = [
-        status_by_cause(execution((("car/radar.py", 2, column),)), {"car/radar.py": TWO}, ("a0",))[0]
+        judge_failure(execution((("car/radar.py", 2, column),)), {"car/radar.py": TWO}, ("a0",))[0]
         for column in columns
     ]
     assert told == [Status.CRASHED, Status.INVALID_MUTANT]
@@ -134,7 +134,7 @@ def test_an_intended_exception_excuses_no_other_injection() -> None:
 
 def test_the_message_names_the_line_or_the_reason() -> None:
     told = [
-        status_by_cause(execution(stack), FILES, ()) for stack in ((TARGET,), (ELSEWHERE, INJECTED), (PROBE,))
+        judge_failure(execution(stack), FILES, ()) for stack in ((TARGET,), (ELSEWHERE, INJECTED), (PROBE,))
     ]
     assert [detail for _, detail in told] == [
         "ValueError: no (car/radar.py:6)",
@@ -145,43 +145,43 @@ def test_the_message_names_the_line_or_the_reason() -> None:
 
 
 def test_an_intended_exception_is_a_crash() -> None:
-    assert status_by_cause(execution((INJECTED,)), FILES, ("0a1b2c3d",))[0] is Status.CRASHED
-    assert status_by_cause(execution((INJECTED,)), FILES, ("ffffffff",))[0] is Status.INVALID_MUTANT
-    assert status_by_cause(execution((PROBE, GUARD)), FILES, ("0a1b2c3d",))[0] is Status.HARNESS_ERROR
+    assert judge_failure(execution((INJECTED,)), FILES, ("0a1b2c3d",))[0] is Status.CRASHED
+    assert judge_failure(execution((INJECTED,)), FILES, ("ffffffff",))[0] is Status.INVALID_MUTANT
+    assert judge_failure(execution((PROBE, GUARD)), FILES, ("0a1b2c3d",))[0] is Status.HARNESS_ERROR
 
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
 @pytest.mark.parametrize("stacks", [(), ((TARGET,),), ((INJECTED,),)])
 def test_a_fault_is_not_blamed_before_its_activation(status: Status, stacks: tuple[TargetStack, ...]) -> None:
-    told = status_by_cause(execution(*stacks, status=status, active=False), FILES, ("0a1b2c3d",))
+    told = judge_failure(execution(*stacks, status=status, active=False), FILES, ("0a1b2c3d",))
     assert told[0] is Status.HARNESS_ERROR
     assert told[1].endswith(", before the fault was active")
 
 
 def test_a_run_without_an_exception_keeps_its_status() -> None:
     for status in (Status.CRASHED, Status.TIMEOUT):
-        assert status_by_cause(execution(status=status, probe=False), FILES, ()) == (status, "why")
-    told = status_by_cause(execution(status=Status.HARNESS_ERROR, active=False), FILES, ())
+        assert judge_failure(execution(status=status, probe=False), FILES, ()) == (status, "why")
+    told = judge_failure(execution(status=Status.HARNESS_ERROR, active=False), FILES, ())
     assert told == (Status.HARNESS_ERROR, "why")
 
 
 def test_the_first_of_chained_exceptions_is_blamed() -> None:
-    assert status_by_cause(execution((TARGET,), (ELSEWHERE,)), FILES, ())[0] is Status.CRASHED
-    assert status_by_cause(execution((TARGET,), (INJECTED,)), FILES, ())[0] is Status.INVALID_MUTANT
-    assert status_by_cause(execution((INJECTED,), (OBSERVES,)), FILES, ())[0] is Status.HARNESS_ERROR
+    assert judge_failure(execution((TARGET,), (ELSEWHERE,)), FILES, ())[0] is Status.CRASHED
+    assert judge_failure(execution((TARGET,), (INJECTED,)), FILES, ())[0] is Status.INVALID_MUTANT
+    assert judge_failure(execution((INJECTED,), (OBSERVES,)), FILES, ())[0] is Status.HARNESS_ERROR
 
 
 def test_endless_recursion_in_the_targets_code_is_blamed_on_the_target() -> None:
     """The last call before the recursion limit can be in an injected line."""
     for top in ((INJECTED,), (PROBE, INJECTED), (GUARD,), (PROBE, GUARD)):
         deep = execution((*top, TARGET, ELSEWHERE), kind="RecursionError")
-        assert status_by_cause(deep, FILES, ())[0] is Status.CRASHED
+        assert judge_failure(deep, FILES, ())[0] is Status.CRASHED
     inside = execution((TARGET, INJECTED, ELSEWHERE), kind="RecursionError")
-    assert status_by_cause(inside, FILES, ())[0] is Status.INVALID_MUTANT
+    assert judge_failure(inside, FILES, ())[0] is Status.INVALID_MUTANT
 
 
 def test_a_missing_report_is_a_harness_error() -> None:
-    assert status_by_cause(execution((TARGET,), probe=False), FILES, ())[0] is Status.HARNESS_ERROR
+    assert judge_failure(execution((TARGET,), probe=False), FILES, ())[0] is Status.HARNESS_ERROR
 
 
 def test_the_reported_position_is_the_targets_innermost_line() -> None:

@@ -142,9 +142,9 @@ def test_an_estimator_that_did_not_change_stopped_the_fault() -> None:
     assert (found.reached, found.stopped_at) == ("", ("finder",))
     assert link_states(found) == {
         "picture": LinkState.STOPPED,
-        "lead": LinkState.NONE,
-        "gas": LinkState.NONE,
-        "force": LinkState.NONE,
+        "lead": LinkState.NOT_REACHED,
+        "gas": LinkState.NOT_REACHED,
+        "force": LinkState.NOT_REACHED,
     }
 
 
@@ -198,7 +198,7 @@ def test_a_component_that_changed_after_the_car_only_received_feedback() -> None
         "car": ComponentState.REACHED,
     }
     assert link_states(found)["lead"] is LinkState.STOPPED
-    assert link_states(found)["gas"] is LinkState.NONE
+    assert link_states(found)["gas"] is LinkState.NOT_REACHED
 
 
 def test_the_only_input_of_a_reached_component_passed_the_fault_on() -> None:

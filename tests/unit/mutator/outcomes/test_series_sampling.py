@@ -65,7 +65,7 @@ def test_internal_channels_have_ten_values_per_second(
     golden, faulty = stored(one, trace(speed=speed), record())
     assert golden.times_of(SPEED).tolist() == [*T[::10], 4.99]
     assert faulty.channel_values[SPEED].tolist() == rounded(np.sin(golden.times_of(SPEED)))
-    assert (faulty.points.t.tolist(), faulty.points.faulty.tolist()) == ([0.05], [3.0])
+    assert (faulty.points.t.tolist(), faulty.points.faulty_values.tolist()) == ([0.05], [3.0])
 
 
 def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: Callable[..., Record]) -> None:
@@ -76,7 +76,7 @@ def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: C
     one = SeriesSampler(manifest, trace())
     points = stored(one, trace(gas=gas), record(t_end=3.5))[1].points
     assert points.t.tolist() == [2.02, 3.03, 4.04]
-    assert points.faulty.tolist() == rounded([0.1, -7.0, 9.0])
+    assert points.faulty_values.tolist() == rounded([0.1, -7.0, 9.0])
     assert set(points.channel_numbers.tolist()) == {GAS}
     assert len(stored(one, trace(), record())[1].points.t) == 0
 
@@ -99,8 +99,8 @@ def test_all_channels_are_stored_at_a_hazard(manifest: TargetManifest, record: C
     points = stored(one, trace(speed=speed, gap=gap), record(hazards=hazards))[1].points
     there = points.t == 2.52
     assert points.channel_numbers[there].tolist() == [0, 1, 2, 3, SPEED]
-    assert points.faulty[there] == pytest.approx([0, 0, 0, 6.48, 5.04], rel=1e-6)
-    assert points.golden[there] == pytest.approx([0, 0, 0, 6.48, 2.52], rel=1e-6)
+    assert points.faulty_values[there] == pytest.approx([0, 0, 0, 6.48, 5.04], rel=1e-6)
+    assert points.golden_values[there] == pytest.approx([0, 0, 0, 6.48, 2.52], rel=1e-6)
     assert not np.isin(points.t, [3.0, 7.0]).any()
 
 
@@ -112,7 +112,7 @@ def test_a_run_that_ends_early_keeps_its_last_step(
     faulty = stored(one, trace(T[:303], speed=T[:303] ** 2), record())[1]
     assert faulty.t[-1] == 3.0
     assert faulty.facts["end"] == 4.99
-    assert (faulty.points.t[-1], faulty.points.faulty[-1]) == (3.02, rounded([3.02**2])[0])
+    assert (faulty.points.t[-1], faulty.points.faulty_values[-1]) == (3.02, rounded([3.02**2])[0])
 
 
 def test_a_run_without_a_step_has_no_values(manifest: TargetManifest, record: Callable[..., Record]) -> None:

@@ -191,7 +191,7 @@ def test_runs_of_an_unneeded_check_are_deleted(threaded: Workspace, tmp_path: Pa
     folder = RunFolder.open(run)
     (path,) = (run / "records").iterdir()
     (run / "proof").mkdir()
-    lines = list(read_segment(path).objects(SCHEMA))
+    lines = list(read_segment(path).numbered_objects(SCHEMA))
     writer = LineWriter(run / "proof" / path.name, {"schema": SCHEMA, "plan": folder.head.plan})
     for _, line in lines[:1]:
         writer.append(line)

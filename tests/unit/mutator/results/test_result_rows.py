@@ -8,8 +8,8 @@ import pytest
 from mutator.model import Outcome, Status
 from mutator.results.outcome_counting import (
     count_endings,
+    count_outcomes,
     count_table,
-    counts_by_group,
     fault_types_of,
     hazard_names,
 )
@@ -50,7 +50,7 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
     masked = SEEN | {"outcome": "masked", "t_manifest": ""}
     rows = results(tmp_path, SEEN, hazard, warned, idle, masked).frame()
 
-    [chaff, total] = counts_by_group(rows, fault_types_of(rows))
+    [chaff, total] = count_outcomes(rows, fault_types_of(rows))
 
     assert (chaff.injected, chaff.activated, chaff.manifested) == (5, 4, 3)
     assert chaff.hazards == (2, 0, 1)
@@ -64,7 +64,7 @@ def test_unusable_experiments_are_counted_separately(tmp_path: Path, status: Sta
     bad = SEEN | {"status": status.value, "outcome": "", "t_h1": "3.0", "alerts": "fcw"}
     rows = results(tmp_path, SEEN, bad).frame()
 
-    [count, _] = counts_by_group(rows, fault_types_of(rows))
+    [count, _] = count_outcomes(rows, fault_types_of(rows))
 
     assert (count.injected, count.activated, count.any_hazard, count.alerts) == (1, 1, 0, 0)
     assert count.unusable == 1
@@ -76,7 +76,7 @@ def test_a_crash_is_counted_as_injected_and_in_its_own_column(tmp_path: Path, st
     bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
     rows = results(tmp_path, SEEN, bad).frame()
 
-    heads, lines = count_table(counts_by_group(rows, fault_types_of(rows)), "fault type", hazard_names(rows))
+    heads, lines = count_table(count_outcomes(rows, fault_types_of(rows)), "fault type", hazard_names(rows))
 
     assert heads[-1] == status.value
     assert lines[-1][heads.index("injected")] == "2"
@@ -85,7 +85,7 @@ def test_a_crash_is_counted_as_injected_and_in_its_own_column(tmp_path: Path, st
 
 def test_failure_columns_appear_only_if_a_run_failed(tmp_path: Path) -> None:
     rows = results(tmp_path, SEEN).frame()
-    heads, _ = count_table(counts_by_group(rows, fault_types_of(rows)), "fault type", hazard_names(rows))
+    heads, _ = count_table(count_outcomes(rows, fault_types_of(rows)), "fault type", hazard_names(rows))
     assert heads[-1] == "hazard, no alert"
 
 

@@ -29,14 +29,14 @@ def path(tmp_path: Path) -> Path:
 
 
 def values(segment: Segment) -> list[object]:
-    return [line["value"] for _, line in segment.objects(SCHEMA)]
+    return [line["value"] for _, line in segment.numbered_objects(SCHEMA)]
 
 
 def test_lines_are_read_as_appended(tmp_path: Path) -> None:
     given = [1.5, float("inf"), None, 'ü\n"sum"', {"sum": "0" * 16}, [[], {}]]
     segment = read_segment(write(tmp_path / "records" / "a.jsonl", *given))
     assert values(segment) == given
-    assert [number for number, _ in segment.objects(SCHEMA)] == [2, 3, 4, 5, 6, 7]
+    assert [number for number, _ in segment.numbered_objects(SCHEMA)] == [2, 3, 4, 5, 6, 7]
     assert (segment.damaged_lines, segment.end_offset) == ((), segment.path.stat().st_size)
 
 

@@ -72,8 +72,8 @@ def test_a_patch_that_unpacks_to_too_much_is_damaged(tmp_path: Path) -> None:
     data = b"".join(packer.compress(bytes(10**6)) for _ in range(100)) + packer.flush()
     (tmp_path / "patches").mkdir()
     (tmp_path / "patches" / "1-1.blocks").write_bytes(block_bytes(COMPLETE_BLOCK, "a" * 16, data))
-    is_cheap(lambda: PatchFolder(tmp_path).read("a" * 16))
-    assert PatchFolder(tmp_path).read("a" * 16) is None
+    is_cheap(lambda: PatchFolder(tmp_path).read_patch("a" * 16))
+    assert PatchFolder(tmp_path).read_patch("a" * 16) is None
 
 
 def test_series_that_unpack_to_too_much_or_claim_many_values_are_damaged() -> None:

@@ -47,7 +47,7 @@ SEALED = (
     "plan.csv",
     "checks.json",
     "digests.json",
-    *(plan_file.EXPERIMENTS, plan_file.FAULTS),
+    *(plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE),
     *("golden/A/log.npz", "golden/A/said.json"),
     *("records/0001-a.jsonl", "proof/0001-a.jsonl"),
 )
@@ -88,7 +88,7 @@ def test_every_damaged_file_is_reported(run: Path, name: str) -> None:
     assert "not a run folder" in str(problem(run)) if name == "run.json" else problem(run).where == str(path)
 
 
-@pytest.mark.parametrize("name", ["records/0001-a.jsonl", plan_file.EXPERIMENTS, plan_file.FAULTS])
+@pytest.mark.parametrize("name", ["records/0001-a.jsonl", plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE])
 def test_a_changed_line_is_reported_with_its_number(run: Path, name: str) -> None:
     path = run / name
     lines = path.read_bytes().splitlines(keepends=True)
@@ -178,7 +178,7 @@ def test_a_missing_record_of_a_finished_run_is_reported(run: Path, reseal: Calla
 def test_a_plan_with_duplicates_or_missing_experiments_is_refused(
     run: Path, reseal: Callable[[Path], None]
 ) -> None:
-    path = run / plan_file.EXPERIMENTS
+    path = run / plan_file.EXPERIMENTS_FILE
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:-1], lines[0]]))
     reseal(run)

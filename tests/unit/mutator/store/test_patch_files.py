@@ -26,7 +26,7 @@ def test_the_error_for_a_lost_patch_names_its_file(run: Path) -> None:
     data[-1] ^= 1
     path.write_bytes(data)
     patches = PatchFolder(run)
-    assert patches.read("b" * 16) is None
+    assert patches.read_patch("b" * 16) is None
     assert patches.file_of("b" * 16) == path
 
 

@@ -25,6 +25,6 @@ def test_a_plan_is_read_as_written(experiment: Make, tmp_path: Path) -> None:
 def test_a_pipe_in_place_of_a_plan_is_refused(tmp_path: Path) -> None:
     """Opening a pipe would wait forever for a writer."""
     (tmp_path / "plan").mkdir()
-    os.mkfifo(tmp_path / plan_file.EXPERIMENTS)
+    os.mkfifo(tmp_path / plan_file.EXPERIMENTS_FILE)
     with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read"):
         list(plan_file.ids(tmp_path))

@@ -50,11 +50,13 @@ def test_values_equal_to_the_golden_run_take_no_space() -> None:
 
 def test_points_round_trip() -> None:
     single = np.array([np.inf], dtype="<f4")
-    points = ExtraPoints(channel_numbers=np.array([2]), t=np.array([0.013]), golden=single, faulty=-single)
+    points = ExtraPoints(
+        channel_numbers=np.array([2]), t=np.array([0.013]), golden_values=single, faulty_values=-single
+    )
     values = np.zeros((3, 6), dtype="<f4")
     found = decode_series(encode_series(series(values, points), series(values)), series(values)).points
     assert (found.channel_numbers.tolist(), found.t.tolist()) == ([2], [0.013])
-    assert (found.golden.tolist(), found.faulty.tolist()) == ([np.inf], [-np.inf])
+    assert (found.golden_values.tolist(), found.faulty_values.tolist()) == ([np.inf], [-np.inf])
 
 
 @pytest.mark.parametrize("place", [0, 15, -12, -1])

@@ -44,8 +44,8 @@ GOLDEN = replace(series(150), facts={"channels": []})
 MADE = {
     name: EncodedSeries(
         golden_key="A" if number % 2 else "B+alone",
-        golden=encode_series(GOLDEN),
-        faulty=encode_series(series(number), GOLDEN),
+        golden_bytes=encode_series(GOLDEN),
+        faulty_bytes=encode_series(series(number), GOLDEN),
     )
     for number, name in enumerate(IDS)
 }
@@ -159,7 +159,9 @@ def test_experiments_of_a_damaged_chunk_can_be_rerun(tmp_path: Path) -> None:
     (tmp_path / "series" / "index.js").write_bytes(data)
     with pytest.raises(MutatorError, match="damaged"):
         SeriesFolder(tmp_path).load_series(IDS[0], RECORD)
-    write_kept_series(SeriesFolder(tmp_path).kept_path(IDS[0]), MADE[IDS[0]].golden, MADE[IDS[0]].faulty)
+    write_kept_series(
+        SeriesFolder(tmp_path).kept_path(IDS[0]), MADE[IDS[0]].golden_bytes, MADE[IDS[0]].faulty_bytes
+    )
     found = SeriesFolder(tmp_path).load_series(IDS[0], RECORD)
     assert found is not None
     assert found[1].facts == {"n": 0, **run_facts(RECORD)}

@@ -76,7 +76,7 @@ def test_a_change_after_verification_is_found(made: tuple[Workspace, Path], cach
     RunFolder.open(run)
     patches = PatchFolder(run)
     [path] = patches.block_files()
-    before, kept = path.read_bytes(), {name: patches.read(name) or b"" for name in patches}
+    before, kept = path.read_bytes(), {name: patches.read_patch(name) or b"" for name in patches}
     try:
         name = next(iter(kept))
         rewrite_patches(path, [*(kept | {name: kept[name] + b"\n"}).items()])

@@ -49,8 +49,8 @@ FAULTY = Series(  # the run ended after 0.5 s; gas was 1 for one step in between
     points=ExtraPoints(
         channel_numbers=np.array([0]),
         t=np.array([0.35]),
-        golden=np.array([0.125], dtype="<f4"),
-        faulty=np.array([1.0], dtype="<f4"),
+        golden_values=np.array([0.125], dtype="<f4"),
+        faulty_values=np.array([1.0], dtype="<f4"),
     ),
 )
 
