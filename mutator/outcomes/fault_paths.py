@@ -142,6 +142,7 @@ class FaultPaths:
         self._links_back = [
             (tip, tail) for tail, tip in self._links.values() if tip not in self._role_by_component
         ]
+        # a million experiments have few different inputs
         self._cached_untimed_path = lru_cache(maxsize=None)(self._build_untimed_path)
         self._injected_by_fault: dict[str, frozenset[str]] = {}  # the components of each fault, by fault id
 

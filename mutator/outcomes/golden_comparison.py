@@ -24,9 +24,9 @@ from mutator.targets.manifest import TargetManifest
 Trace = Mapping[str, np.ndarray]  # channel name -> a value for each step or for each of its own times
 
 
-_LARGEST_TIME_S = sys.float_info.max
-_MEMORY_TRIAL_BYTES = 64 << 20  # bytes
-_TIME_SLACK_S = 1e-9  # s
+_LARGEST_TIME_S = sys.float_info.max  # JSON can have whole numbers that no float holds
+_MEMORY_TRIAL_BYTES = 64 << 20  # if these can be had, mutator is not short of memory
+_TIME_SLACK_S = 1e-9  # times are sums of steps, which round
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ from mutator.errors import BadTrace
 
 _FILE_MAGIC = b"\x89MCAP0\r\n"
 _CHANNEL_RECORD, _MESSAGE_RECORD, _CHUNK_RECORD = 4, 5, 6  # kinds of records; others are skipped
-_MOST_RECORDS = 300_000
+_MOST_RECORDS = 300_000  # bounds the time that a file of tiny records takes
 _RECORD_HEAD_STRUCT = struct.Struct("<BQ")  # kind, size of the content
 _MESSAGE_HEAD_STRUCT = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _CHUNK_HEAD_STRUCT = struct.Struct("<QQQI")  # first and last time, size when unpacked, checksum

@@ -11,14 +11,12 @@ from zlib import crc32
 import numpy as np
 from numpy.lib import format as npy
 
-_END_STRUCT = Struct("<4sHHHHIIH")
-_ENTRY_STRUCT = Struct("<4sBBHHHHHIIIHHHHHII")
-_LOCAL_HEAD_STRUCT = Struct("<4sHHHHHIIIHH")
+_END_STRUCT = Struct("<4sHHHHIIH")  # the end of the directory, which ends the file
+_ENTRY_STRUCT = Struct("<4sBBHHHHHIIIHHHHHII")  # a member in the directory
+_LOCAL_HEAD_STRUCT = Struct("<4sHHHHHIIIHH")  # before the bytes of a member
 _NPY_MAGIC = b"\x93NUMPY\x01\x00"
-ARRAY_MAGIC, ENTRY_MAGIC = (
-    _NPY_MAGIC[:6],
-    b"PK\1\2",
-)  # what a single array, and a member's directory entry, begin with
+# what a single array, and a member's directory entry, begin with
+ARRAY_MAGIC, ENTRY_MAGIC = _NPY_MAGIC[:6], b"PK\1\2"
 _BYTES_BEFORE_HEADER = len(_NPY_MAGIC) + 2  # bytes before the header of a .npy file
 _ZIP64_SIZE_MARKER = 0xFFFFFFFF  # marks a size that is stored in a ZIP64 field
 _MEMBER_SUFFIX = ".npy"
@@ -104,7 +102,7 @@ def _read_member(data: bytes, view: memoryview, at: int) -> tuple[str, np.ndarra
     )
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=256)  # all runs of a campaign have the same few headers
 def _parse_header(text: bytes) -> tuple[np.dtype, tuple[int, ...]]:
     """Read type and shape from a .npy header. ValueError unless the array is numeric and in C order."""
     shape, fortran, dtype = npy.read_array_header_1_0(io.BytesIO(text))

@@ -21,11 +21,8 @@ from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
 
 MOST_SAMPLES_PER_S = 20.0  # maximum number of samples per second
-_SAMPLE_EVERY_BY_ROLE = {
-    Role.ACTUATOR: 1,
-    Role.TRUTH: 1,
-    Role.INTERNAL: 2,
-}  # a channel keeps every n-th sample
+# a channel keeps every n-th sample
+_SAMPLE_EVERY_BY_ROLE = {Role.ACTUATOR: 1, Role.TRUTH: 1, Role.INTERNAL: 2}
 _HALF_OF_LAST_BIT = np.uint32(8)  # half of the lowest bit that is kept
 _TIME_SLACK_S = 1e-9  # s; times are sums of steps
 
@@ -200,9 +197,8 @@ def _extra_points(
     for row, differs in enumerate((golden != faulty).any(axis=1).tolist()):
         steps = set(hazards)
         if differs:
-            gap = _absolute_difference(
-                golden[row], faulty[row]
-            )  # row by row: all rows would not fit into the CPU cache
+            # row by row: all rows would not fit into the CPU cache
+            gap = _absolute_difference(golden[row], faulty[row])
             apart = gap > 0.0
             peaks = {int(np.argmax(apart)), int(np.argmax(gap[: max(drive, 1)])), int(np.argmax(gap)), end}
             steps |= {step for step in peaks if apart[step]}

@@ -42,7 +42,7 @@ def ranks_of_rows(frame: "pd.DataFrame") -> "np.ndarray":
     speed = (
         frame[DELTA_V_NAME].fillna(-1.0).to_numpy() if DELTA_V_NAME in frame else np.full(len(frame), -1.0)
     )
-    delta_v = np.where(has_class, -speed, 0.0)
+    delta_v = np.where(has_class, -speed, 0.0)  # without a class, the rank does not depend on it
     order = np.lexsort((id_rank, margin_rank, ending_rank, delta_v, -severity_rank, ~has_class))
     ranks = np.empty(len(frame), dtype=np.int64)
     ranks[order] = np.arange(len(frame))

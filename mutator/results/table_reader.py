@@ -36,15 +36,12 @@ _CATEGORY_COLUMNS = (
     "aim",
 )
 _ORDERED_VALUES = {"status": [s.value for s in Status], "outcome": [o.value for o in Outcome]}
-MOST_SMALL_FILE_CELLS, MOST_SMALL_FILE_TEXT_BYTES = (
-    10_000_000,
-    100_000_000,
-)  # cells and bytes of text of a small Parquet file
-_MOST_CLAIMED_PER_BYTE = 20  # further ones for each byte of a large file
-_ROWS_COMPARED_AT_ONCE, _SPARE_BYTES = (
-    1000,
-    100_000,
-)  # rows to compare at a time; bytes that other versions of pyarrow may add
+# Cells and bytes of text that a small Parquet file may claim, and how many more for each byte of a large one:
+# equal values are stored once, so that a forged file could claim more than the memory holds.
+MOST_SMALL_FILE_CELLS, MOST_SMALL_FILE_TEXT_BYTES = 10_000_000, 100_000_000
+_MOST_CLAIMED_PER_BYTE = 20
+# rows to compare at a time; bytes that other versions of pyarrow may add
+_ROWS_COMPARED_AT_ONCE, _SPARE_BYTES = 1000, 100_000
 _EXPERIMENTS_PER_BATCH = 2_000  # computed at a time; a million records as objects take 5 GB
 _REMEDY = "rebuild it: `mutator report DIR`"
 

@@ -133,10 +133,6 @@ class Segment:
         value.pop("sum", None)
         return value
 
-    def body(self, number: int) -> bytes:
-        """Return a line without its checksum."""
-        return self.without_checksum(self.lines[number])
-
     def without_checksum(self, line: bytes) -> bytes:
         return line[_BODY_START:]
 

@@ -16,9 +16,8 @@ from mutator.errors import MutatorError
 from mutator.store.checksummed_lines import bare_segment, verified_lines
 
 _MOST_OPEN_FILES = 16  # each worker of each session wrote a file: all open could exceed a process's limit
-_EXPERIMENT_ID_PATTERN = re.compile(
-    rb'"experiment_id":"([^"\\]+)"'
-)  # matches once in a line of canonical JSON
+# In a line of canonical JSON, this matches once: quotation marks inside a string are escaped.
+_EXPERIMENT_ID_PATTERN = re.compile(rb'"experiment_id":"([^"\\]+)"')
 
 T = TypeVar("T")
 

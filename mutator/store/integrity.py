@@ -23,12 +23,8 @@ from mutator.store.shards import Shard
 
 # folders in which a finished run has no unknown files
 CLOSED_FOLDERS = ("plan", "golden", *file_digests.SEGMENT_FOLDERS)
-IRREPLACEABLE_FILES = (
-    HEAD,
-    CAMPAIGN_FILE,
-    plan_file.EXPERIMENTS_FILE,
-    plan_file.FAULTS_FILE,
-)  # files that cannot be recreated
+# files that cannot be recreated
+IRREPLACEABLE_FILES = (HEAD, CAMPAIGN_FILE, plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE)
 TOP_FILES = (HEAD, CAMPAIGN_FILE, "plan.csv", "checks.json", "reviewed.json")
 _MOST_NAMED_EXPERIMENTS = 5  # in one message: the ids of a million experiments would fill it
 

@@ -16,10 +16,8 @@ from mutator._common.hashing import digest
 from mutator.store.checksummed_blocks import Block, BlockWriter, block_bytes, intact_blocks, read_blocks
 
 FOLDER, SUFFIX = "patches", ".blocks"
-COMPLETE_BLOCK, DELTA_BLOCK = (
-    0,
-    1,
-)  # kinds of blocks: a complete patch, or a difference from the last complete one
+# kinds of blocks: a complete patch, or a difference from the last complete one
+COMPLETE_BLOCK, DELTA_BLOCK = 0, 1
 _DEFLATE_WINDOW_BYTES = 32_768  # window size of deflate, in bytes
 _PATCHES_PER_COMPLETE = 256  # patches that depend on one complete patch, and are lost with it
 _DEFLATE_LEVEL = 9  # patches are short, so that the best compression costs little time

@@ -21,9 +21,8 @@ SCHEMA = "run/3"
 HEAD, CAMPAIGN_FILE = RUN_HEAD_FILE, "campaign.yaml"
 REMEDY = "the run folder is damaged: restore the file from a copy of it"
 NameTuple = tuple[str, ...]
-StoredGolden = (
-    tuple[str, NameTuple] | tuple[str, NameTuple, int]
-)  # scenario, changes; seed, if the plan has several
+# scenario, changes; seed, if the plan has several
+StoredGolden = tuple[str, NameTuple] | tuple[str, NameTuple, int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

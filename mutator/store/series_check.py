@@ -9,7 +9,7 @@ from mutator.errors import MutatorError
 from mutator.model import Record
 from mutator.store.series_format import Series
 
-_TIME_SLACK_S = 1e-9  # s
+_TIME_SLACK_S = 1e-9  # times are sums of steps, which round
 _RELATIVE_ROUNDING = 2.0**-19  # relative; values have 20 bits
 _SMALLEST_SINGLE, _LARGEST_SINGLE = 1e-37, 3e38  # in single precision
 

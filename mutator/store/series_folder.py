@@ -23,10 +23,8 @@ from mutator.store.series_script import read_script, script_name_of, write_scrip
 
 SCHEMA, FOLDER, KEPT_FOLDER = "series/1", "series", "kept"
 INDEX_NAME = "index"
-_MOST_INDEX_RATIO, _MOST_INDEX_BYTES = (
-    30,
-    1_000_000,
-)  # an index unpacks to at most this many times its size, and bytes
+# An index unpacks to at most this many times its size, and bytes: a forged one could fill the memory.
+_MOST_INDEX_RATIO, _MOST_INDEX_BYTES = 30, 1_000_000
 _ID_DIGITS = 16  # hex digits of an experiment id
 _LENGTH_STRUCT = struct.Struct("<I")
 

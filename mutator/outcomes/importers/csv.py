@@ -20,6 +20,7 @@ def _read_csv(request: TraceRequest) -> Arrays:
     import pandas as pd
 
     data = read_bounded(request.path, MOST_CSV_BYTES)
+    # without the end of a line, the file is one line
     commas = data.count(b",", 0, data.find(b"\n") + 1 or None)
     if commas >= MOST_COLUMNS:
         raise BadTrace(f"{commas + 1} columns", f"at most {MOST_COLUMNS}")

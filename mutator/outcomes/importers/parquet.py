@@ -22,6 +22,7 @@ def _read_parquet(request: TraceRequest) -> Arrays:
     from pyarrow import parquet  # type: ignore[import-untyped]
 
     data = read_bounded(request.path, MOST_TRACE_BYTES)
+    # reading ahead starts threads of pyarrow, and one of them could abort the process at its exit
     file = parquet.ParquetFile(io.BytesIO(data), pre_buffer=False)
     names = list(request.choose_names(file.schema_arrow.names))
     check_size(file.metadata.num_rows * min(len(names), file.metadata.num_columns) * 8)
