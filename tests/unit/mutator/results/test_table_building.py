@@ -148,7 +148,7 @@ def test_tables_built_in_batches_have_the_same_bytes(
     lines.append(asdict(record(last.id, left=left, detail='a "b",\nc', t_manifest=2.05)))
     lines.close()
     monkeypatch.setattr(table_building, "_EXPERIMENTS_PER_BATCH", batch)
-    monkeypatch.setattr(table_building, "processes_for", lambda experiments: processes)
+    monkeypatch.setattr(table_building, "process_count_for", lambda experiments: processes)
     for _ in range(2):
         table_building.build_tables(folder.path)
         made = {name: (folder.path / name).read_bytes() for name in table_building.TABLE_FILES}
@@ -261,7 +261,7 @@ def test_an_interrupted_build_is_not_reported_as_an_edited_table(
                     raise KeyboardInterrupt
 
         with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-            patch.setattr(table_building, "half_written", written)
+            patch.setattr(table_building, "writing_temporary_path", written)
             table_building.ensure_tables(folder.path)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -19,14 +19,14 @@ from mutator.workspace import Workspace
 HOLDER = """
 import sys, time
 from pathlib import Path
-from mutator._common import locks
+from mutator._common import folder_locks
 run = Path(sys.argv[1])
 if sys.argv[2] == "owner":
-    with locks.owned(run):
+    with folder_locks.owning_run_folder(run):
         print("held", flush=True)
         time.sleep(60)
 else:
-    locks.register_worker(run)
+    folder_locks.register_worker(run)
     print("held", flush=True)
     time.sleep(float(sys.argv[3]))
 """
