@@ -169,7 +169,9 @@ def _plan_problems(folder: RunFolder) -> Problems:
         yield MutatorError(f"{key} {shortened(stored)}", where=run / HEAD, expected=expected)
     if FileDigest.of_file(run / PLAN_CSV) != FileDigest.of_bytes(plan_csv_bytes(plan)):
         yield MutatorError(
-            "differs from the plan", where=run / PLAN_CSV, expected=f"the rows of {plan_file.EXPERIMENTS_FILE}"
+            "differs from the plan",
+            where=run / PLAN_CSV,
+            expected=f"the rows of {plan_file.EXPERIMENTS_FILE}",
         )
 
 
