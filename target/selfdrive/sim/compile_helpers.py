@@ -34,7 +34,7 @@ OPTIONS = (
     "-s",
     "-lm",
 )
-EXIT_INPUT = 2
+EXIT_INVALID_INPUT = 2
 
 
 def compiler() -> list[str]:
@@ -97,7 +97,7 @@ def main() -> int:
             print(path)
     except ConfigError as error:
         print(f"error: {error}", file=sys.stderr)
-        return EXIT_INPUT
+        return EXIT_INVALID_INPUT
     return 0
 
 

@@ -11,48 +11,56 @@ from pathlib import Path
 
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.compare import finished_runs
-from selfdrive.sim.compare.maneuvers_page import Maneuver, page
+from selfdrive.sim.compare.maneuvers_page import ManeuverResult, render_maneuvers_page
 from selfdrive.sim.compare.tolerances import Tolerances, load_tolerances
-from selfdrive.sim.compare.trace_comparison import compare
-from selfdrive.sim.compare.trace_csv import Reference, read_reference
-from selfdrive.sim.replay import TOLERANCES, reference_names
-from selfdrive.sim.run import EXIT_INPUT
+from selfdrive.sim.compare.trace_comparison import compare_trace
+from selfdrive.sim.compare.trace_csv import ReferenceTrace, load_reference_trace
+from selfdrive.sim.replay import TOLERANCES_PATH, list_reference_names
+from selfdrive.sim.run import EXIT_INVALID_INPUT
 from selfdrive.sim.scenario import PLANTS, STANDARD, Scenario, on_plant
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    options = _parse(arguments)
+    options = _parse_arguments(arguments)
     try:
         tolerances = load_tolerances(options.tolerances)
-        known = [] if options.references is None else reference_names(options.references)
-        scenarios = _scenarios(options, known)
+        referenced_names = [] if options.references is None else list_reference_names(options.references)
+        scenarios = _load_scenarios(options, referenced_names)
         references = {
-            name: read_reference(options.references / f"{name}.csv") for name in scenarios if name in known
+            name: load_reference_trace(options.references / f"{name}.csv")
+            for name in scenarios
+            if name in referenced_names
         }
         maneuvers = []
         for name, scenario in scenarios.items():
             print(f"{len(maneuvers) + 1}/{len(scenarios)} {name}", flush=True)
-            maneuvers.append(_maneuver(finished_runs.drive(name, scenario), references.get(name), tolerances))
-        path = _write(options.out, page(maneuvers, options.plant))
+            maneuvers.append(
+                _compare_with_reference(
+                    finished_runs.simulate_run(name, scenario), references.get(name), tolerances
+                )
+            )
+        path = _write_page(options.out, render_maneuvers_page(maneuvers, options.plant))
     except ConfigError as error:
         print(f"error: {error}", file=sys.stderr)
-        return EXIT_INPUT
+        return EXIT_INVALID_INPUT
     print(f"page: {path}")
     return 0
 
 
-def _maneuver(run: finished_runs.Run, reference: Reference | None, tolerances: Tolerances) -> Maneuver:
+def _compare_with_reference(
+    run: finished_runs.FinishedRun, reference: ReferenceTrace | None, tolerances: Tolerances
+) -> ManeuverResult:
     if reference is None:
-        return Maneuver(run=run, reference=None, comparison=None)
-    comparison = compare(reference, run.trace, tolerances, free_road=run.free_road)
-    return Maneuver(run=run, reference=reference, comparison=comparison)
+        return ManeuverResult(run=run, reference=None, comparison=None)
+    comparison = compare_trace(reference, run.trace, tolerances, free_road=run.free_road)
+    return ManeuverResult(run=run, reference=reference, comparison=comparison)
 
 
-def _scenarios(options: argparse.Namespace, known: list[str]) -> dict[str, Scenario]:
-    names = options.names or _all_names(options.scenarios, known)
+def _load_scenarios(options: argparse.Namespace, referenced_names: list[str]) -> dict[str, Scenario]:
+    names = options.names or _list_run_names(options.scenarios, referenced_names)
     scenarios = {}
     for name in names:
-        scenario = finished_runs.find(name, options.scenarios)
+        scenario = finished_runs.load_scenario_of_run(name, options.scenarios)
         try:
             scenarios[name] = on_plant(scenario, options.plant)
         except ConfigError as error:
@@ -62,20 +70,22 @@ def _scenarios(options: argparse.Namespace, known: list[str]) -> dict[str, Scena
     return scenarios
 
 
-def _all_names(scenarios: Path, known: list[str]) -> list[str]:
-    found = {path.stem for path in scenarios.glob("*.yaml")}
-    if not found:
+def _list_run_names(scenarios: Path, referenced_names: list[str]) -> list[str]:
+    scenario_names = {path.stem for path in scenarios.glob("*.yaml")}
+    if not scenario_names:
         raise ConfigError(
             "no scenario",
             where=str(scenarios),
             expected="a folder of scenario files",
             remedy="choose another --scenarios",
         )
-    variants = {name for name in known if name.removesuffix(finished_runs.NO_LEAD) in found}
-    return sorted(found | variants, key=lambda name: (not name.startswith("S"), name))
+    names_without_lead = {
+        name for name in referenced_names if name.removesuffix(finished_runs.NO_LEAD_SUFFIX) in scenario_names
+    }
+    return sorted(scenario_names | names_without_lead, key=lambda name: (not name.startswith("S"), name))
 
 
-def _write(folder: Path, text: str) -> Path:
+def _write_page(folder: Path, text: str) -> Path:
     path = folder / "index.html"
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -90,7 +100,7 @@ def _write(folder: Path, text: str) -> Path:
     return path
 
 
-def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="selfdrive.sim.maneuvers", description="Run all maneuvers and plot them on one page."
     )
@@ -99,8 +109,14 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--out", type=Path, required=True, metavar="DIR", help="folder for index.html")
     add("--plant", choices=PLANTS, default=STANDARD, help="the plant to run on (%(default)s)")
     add("--references", type=Path, metavar="DIR", help="reference traces as CSV, drawn beneath the runs")
-    add("--scenarios", type=Path, default=finished_runs.SCENARIOS, metavar="DIR", help="the scenario files")
-    add("--tolerances", type=Path, default=TOLERANCES, metavar="FILE", help="the tolerance table")
+    add(
+        "--scenarios",
+        type=Path,
+        default=finished_runs.SCENARIOS_FOLDER,
+        metavar="DIR",
+        help="the scenario files",
+    )
+    add("--tolerances", type=Path, default=TOLERANCES_PATH, metavar="FILE", help="the tolerance table")
     return parser.parse_args(arguments)
 
 

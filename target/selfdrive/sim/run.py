@@ -20,11 +20,11 @@ from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, on_plant
 from selfdrive.sim.simulator import SimulationResult, Simulator
 from selfdrive.sim.trace_file import pieces
 
-EXIT_INPUT = 2
+EXIT_INVALID_INPUT = 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    options = _parse(arguments)
+    options = _parse_arguments(arguments)
     try:
         run = _open(options)
         while not run.done:
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         run.write(options.out)
     except ConfigError as error:
         print(f"error: {error}", file=sys.stderr)
-        return EXIT_INPUT
+        return EXIT_INVALID_INPUT
     return 0
 
 
@@ -61,7 +61,7 @@ def open_run(arguments: Sequence[str]) -> Run:
 
     `--out` is ignored: `write` takes the folder. Raises ConfigError for invalid input.
     """
-    return _open(_parse(arguments))
+    return _open(_parse_arguments(arguments))
 
 
 def _open(options: argparse.Namespace) -> Run:
@@ -101,7 +101,7 @@ def write(result: SimulationResult, folder: Path) -> None:
         part.replace(final)
 
 
-def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="selfdrive.sim.run", description="Run one scenario of the simulator."
     )

@@ -11,7 +11,7 @@ from selfdrive.manager import Manager
 from selfdrive.messages import Actuators, CanFrame
 from selfdrive.sim.actuators import ActuatorReceiver
 from selfdrive.sim.camera_and_detector import build_vision
-from selfdrive.sim.film.film_recorder import Film
+from selfdrive.sim.film.film_recorder import FilmRecorder
 from selfdrive.sim.hazards import HazardMonitor
 from selfdrive.sim.lead import LeadVehicle
 from selfdrive.sim.picture_options import Pictures
@@ -64,7 +64,7 @@ class Simulator:
         self._radar = RadarSensor(self._road)
         self._vision = build_vision(pictures, self._road, seed)
         self._camera, self._takes_pictures = self._vision.camera, pictures is not None
-        self._film = Film(film, self._vision.model) if film else None
+        self._film = FilmRecorder(film, self._vision.model) if film else None
         self._receiver = ActuatorReceiver()
         self._actuators = Actuators()
         car = CarInterface()

@@ -25,7 +25,7 @@ from selfdrive.visiond.detector import LaneDetector, LaneLines
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
 
-EXIT_INPUT = 2
+EXIT_INVALID_INPUT = 2
 WIDTH, ROWS, HORIZON = 640, 480, 200  # of the canonical frame
 ROW = 278  # where lines are compared
 TOLERANCE = 0.3 / 3.7  # of the lines' true spacing
@@ -170,7 +170,7 @@ def draw(finding: Finding) -> np.ndarray:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    options = _parse(arguments)
+    options = _parse_arguments(arguments)
     cv2.setNumThreads(1)
     try:
         frames = read_frames(options.frames, options.truth)
@@ -181,7 +181,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 _write_overlays(options.overlays, detector, findings)
     except ConfigError as error:
         print(f"error: {error}", file=sys.stderr)
-        return EXIT_INPUT
+        return EXIT_INVALID_INPUT
     return 0
 
 
@@ -264,7 +264,7 @@ def _write_overlays(folder: Path, detector: str, findings: list[Finding]) -> Non
             path.write_bytes(cv2.imencode(".png", draw(finding))[1])
 
 
-def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="selfdrive.visiond_lab.evaluate",
         description="Compare detected lanes of real frames with the truth.",

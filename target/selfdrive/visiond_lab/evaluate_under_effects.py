@@ -22,7 +22,16 @@ from selfdrive.sim.effects.effects_page import panel
 from selfdrive.sim.effects.levels import LEVELS
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
-from selfdrive.visiond_lab.evaluate import EXIT_INPUT, PAPER, ROBUST, Finding, Frame, build, look, read_frames
+from selfdrive.visiond_lab.evaluate import (
+    EXIT_INVALID_INPUT,
+    PAPER,
+    ROBUST,
+    Finding,
+    Frame,
+    build,
+    look,
+    read_frames,
+)
 
 SEEDS = 20
 MOMENT = Moment(2.0, 50.0, 26.82)
@@ -83,7 +92,7 @@ def strip(frame: Frame, kind: type[Effect]) -> np.ndarray:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    options = _parse(arguments)
+    options = _parse_arguments(arguments)
     cv2.setNumThreads(1)
     kinds = [kind for kind in LEVELS if not options.effect or kind.__name__ in options.effect]
     try:
@@ -96,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 _write_csv(options.csv, rows)
     except ConfigError as error:
         print(f"error: {error}", file=sys.stderr)
-        return EXIT_INPUT
+        return EXIT_INVALID_INPUT
     return 0
 
 
@@ -126,7 +135,7 @@ def _write_strips(folder: Path, frames: Sequence[Frame], kinds: Sequence[type[Ef
                 path.write_bytes(cv2.imencode(".png", strip(frame, kind))[1])
 
 
-def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="selfdrive.visiond_lab.evaluate_under_effects",
         description="Count the real frames in which detectors miss a line behind image effects.",

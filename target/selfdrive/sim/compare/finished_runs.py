@@ -12,12 +12,12 @@ from selfdrive.sim.recorder import CHANNELS
 from selfdrive.sim.run import simulate
 from selfdrive.sim.scenario import Scenario, load_scenario
 
-SCENARIOS = Path(__file__).parents[4] / "fault_library" / "scenarios"  # of the surrounding project
-NO_LEAD = "_nolead"  # suffix of a run's name if the lead was left out
+SCENARIOS_FOLDER = Path(__file__).parents[4] / "fault_library" / "scenarios"  # of the surrounding project
+NO_LEAD_SUFFIX = "_nolead"  # suffix of a run's name if the lead was left out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
+class FinishedRun:
     """A finished run, with the contents of record.json and trace.npz."""
 
     name: str
@@ -30,9 +30,9 @@ class Run:
         return self.record["no_lead"]
 
 
-def find(name: str, scenarios: Path) -> Scenario:
+def load_scenario_of_run(name: str, scenarios: Path) -> Scenario:
     """The scenario of a run. Raises ConfigError if it is missing or invalid."""
-    path = scenarios / f"{name.removesuffix(NO_LEAD)}.yaml"
+    path = scenarios / f"{name.removesuffix(NO_LEAD_SUFFIX)}.yaml"
     if not path.is_file():
         raise ConfigError(
             f"no scenario for {name!r}",
@@ -41,23 +41,23 @@ def find(name: str, scenarios: Path) -> Scenario:
             remedy="correct the name, or choose another --scenarios",
         )
     scenario = load_scenario(path)
-    if name.endswith(NO_LEAD):
+    if name.endswith(NO_LEAD_SUFFIX):
         return replace(scenario, lead=None, title=f"{scenario.title}; without the lead")
     return scenario
 
 
-def drive(name: str, scenario: Scenario) -> Run:
+def simulate_run(name: str, scenario: Scenario) -> FinishedRun:
     result = simulate(scenario, seed=0)
-    return Run(name=name, title=scenario.title, record=result.record, trace=result.trace)
+    return FinishedRun(name=name, title=scenario.title, record=result.record, trace=result.trace)
 
 
-def load(folder: Path, plant: str) -> Run:
+def load_run(folder: Path, plant: str) -> FinishedRun:
     """Load a finished run. Raises ConfigError if it is missing, or of another scenario or plant."""
     try:
         record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
         with np.load(folder / "trace.npz", allow_pickle=False) as arrays:
             trace = {name: arrays[name] for name in CHANNELS}
-        name = record["scenario"] + (NO_LEAD if record["no_lead"] else "")
+        name = record["scenario"] + (NO_LEAD_SUFFIX if record["no_lead"] else "")
         got = f"a run of {name} on the {record['plant']} plant"
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
         reason = error.strerror if isinstance(error, OSError) else f"unreadable: {error}"
@@ -67,8 +67,11 @@ def load(folder: Path, plant: str) -> Run:
             expected="record.json and trace.npz of a finished run",
             remedy="run the scenario with this folder as --out",
         ) from None
-    if got != (wanted := f"a run of {folder.name} on the {plant} plant"):
+    if got != (expected_run := f"a run of {folder.name} on the {plant} plant"):
         raise ConfigError(
-            got, where=str(folder), expected=wanted, remedy="run that with this --out, or correct --plant"
+            got,
+            where=str(folder),
+            expected=expected_run,
+            remedy="run that with this --out, or correct --plant",
         )
-    return Run(name=name, title=record["scenario"], record=record, trace=trace)
+    return FinishedRun(name=name, title=record["scenario"], record=record, trace=trace)

@@ -7,7 +7,7 @@ import numpy as np
 from selfdrive.common.conversions import MS_TO_KPH
 from selfdrive.sim.compare.trace_csv import STEPS_PER_SECOND
 
-FIGURES = {
+FIGURE_MEANINGS = {
     "engaged_s": "the time of engaging in s; for a trace with gaps, the span that contains it",
     "set_speeds_kph": "the set speeds while engaged in km/h, in order",
     "min_hwt_s": "the smallest headway time while moving, in s",
@@ -15,7 +15,7 @@ FIGURES = {
     "max_brake": "the hardest braking command",
 }
 
-CHANNELS = {  # the channels of each figure
+CHANNELS_BY_FIGURE = {  # the channels of each figure
     "engaged_s": ("engaged",),
     "set_speeds_kph": ("engaged", "v_cruise"),
     "min_hwt_s": ("v_ego", "hwt"),
@@ -23,45 +23,45 @@ CHANNELS = {  # the channels of each figure
     "max_brake": ("brake",),
 }
 
-_STANDSTILL = 0.3  # m/s; below this the headway is meaningless
+_STANDSTILL_SPEED = 0.3  # m/s; below this the headway is meaningless
 
-Value = float | tuple[float, ...] | None
+FigureValue = float | tuple[float, ...] | None
 
 
-def key_figures(steps: np.ndarray, channels: dict[str, np.ndarray]) -> dict[str, Value]:
-    """The key figures (`FIGURES`) of channels with rows at `steps`; None for missing events."""
-    read = {
-        "engaged_s": lambda engaged: _engaging(steps, engaged),
+def compute_key_figures(steps: np.ndarray, channels: dict[str, np.ndarray]) -> dict[str, FigureValue]:
+    """The key figures (`FIGURE_MEANINGS`) of channels with rows at `steps`; None for missing events."""
+    function_by_figure = {
+        "engaged_s": lambda engaged: _engaging_span(steps, engaged),
         "set_speeds_kph": _set_speeds,
-        "min_hwt_s": lambda v_ego, hwt: _least(hwt[v_ego >= _STANDSTILL]),
-        "min_d_rel_m": _least,
-        "max_brake": _greatest,
+        "min_hwt_s": lambda v_ego, hwt: _least_finite(hwt[v_ego >= _STANDSTILL_SPEED]),
+        "min_d_rel_m": _least_finite,
+        "max_brake": _greatest_finite,
     }
     return {
-        name: read[name](*(channels[channel] for channel in needed))
-        for name, needed in CHANNELS.items()
-        if all(channel in channels for channel in needed)
+        name: function_by_figure[name](*(channels[channel] for channel in channel_names))
+        for name, channel_names in CHANNELS_BY_FIGURE.items()
+        if all(channel in channels for channel in channel_names)
     }
 
 
-def difference(name: str, reference: Value, ours: Value) -> float:
+def figure_difference(name: str, reference_value: FigureValue, run_value: FigureValue) -> float:
     """The difference of two values of figure `name`; infinite if only one exists.
 
     Engaging: the distance between the two spans. Set speeds: 0 if the lists are equal, else the largest
     difference of a pair, infinite if one list is longer.
     """
-    if reference is None or ours is None:
-        return 0.0 if reference is ours else inf
+    if reference_value is None or run_value is None:
+        return 0.0 if reference_value is run_value else inf
     if name == "engaged_s":
-        return max(0.0, reference[0] - ours[1], ours[0] - reference[1])
+        return max(0.0, reference_value[0] - run_value[1], run_value[0] - reference_value[1])
     if name == "set_speeds_kph":
-        if len(reference) != len(ours):
+        if len(reference_value) != len(run_value):
             return inf
-        return max((abs(a - b) for a, b in zip(reference, ours, strict=True)), default=0.0)
-    return abs(ours - reference)
+        return max((abs(a - b) for a, b in zip(reference_value, run_value, strict=True)), default=0.0)
+    return abs(run_value - reference_value)
 
 
-def text(name: str, value: Value) -> str:
+def figure_text(name: str, value: FigureValue) -> str:
     if value is None:
         return "never"
     if name == "engaged_s":
@@ -72,7 +72,7 @@ def text(name: str, value: Value) -> str:
     return f"{value:.3f}"
 
 
-def _engaging(steps: np.ndarray, engaged: np.ndarray) -> tuple[float, float] | None:
+def _engaging_span(steps: np.ndarray, engaged: np.ndarray) -> tuple[float, float] | None:
     """The span from the row before the first engaged one to that row; empty for a single step."""
     rows = np.flatnonzero(engaged == 1.0)
     if not rows.size:
@@ -87,17 +87,17 @@ def _engaging(steps: np.ndarray, engaged: np.ndarray) -> tuple[float, float] | N
 def _set_speeds(engaged: np.ndarray, set_speed: np.ndarray) -> tuple[float, ...]:
     speeds: list[float] = []
     for speed in set_speed[engaged == 1.0]:
-        shown = round(float(speed) * MS_TO_KPH, 2)
-        if not isnan(shown) and (not speeds or shown != speeds[-1]):
-            speeds.append(shown)
+        speed_kph = round(float(speed) * MS_TO_KPH, 2)
+        if not isnan(speed_kph) and (not speeds or speed_kph != speeds[-1]):
+            speeds.append(speed_kph)
     return tuple(speeds)
 
 
-def _least(values: np.ndarray) -> float | None:
+def _least_finite(values: np.ndarray) -> float | None:
     finite = values[np.isfinite(values)]
     return float(finite.min()) if finite.size else None
 
 
-def _greatest(values: np.ndarray) -> float | None:
+def _greatest_finite(values: np.ndarray) -> float | None:
     finite = values[np.isfinite(values)]
     return float(finite.max()) if finite.size else None

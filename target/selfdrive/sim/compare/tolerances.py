@@ -4,18 +4,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.compare.key_figures import FIGURES
-from selfdrive.sim.compare.trace_csv import BY_CHANNEL
+from selfdrive.sim.compare.key_figures import FIGURE_MEANINGS
+from selfdrive.sim.compare.trace_csv import COLUMN_BY_CHANNEL
 from selfdrive.sim.yaml_section import Section, read_yaml
 
 SCHEMA = "replay-tolerances/1"
 
-_KEYS = {
+_KEY_MEANINGS = {
     "schema": f"the format of this file, {SCHEMA}",
     "channels": "the limits of a channel over the whole run",
     "figures": "the limits of key figures",
 }
-_LIMIT_KEYS = {
+_LIMIT_MEANINGS = {
     "rms": "the root mean square of the difference, in the channel's unit",
     "max": "the largest difference, in the channel's unit",
     "lag_s": "the delay between the traces in seconds",
@@ -23,23 +23,23 @@ _LIMIT_KEYS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
+class ChannelLimits:
     """Limits of one channel; None: no limit. `rms` and `max` in the channel's SI unit, `lag` in s."""
 
     rms: float | None = None
     max: float | None = None
-    lag: float | None = None
+    lag_s: float | None = None
 
     @property
-    def band(self) -> float | None:
+    def listing_threshold(self) -> float | None:
         """The smallest difference worth listing."""
         return self.rms if self.max is None else self.max
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
-    channels: dict[str, Limits]
-    figures: dict[str, float]
+    channel_limits: dict[str, ChannelLimits]
+    figure_limits: dict[str, float]
 
 
 def load_tolerances(path: Path) -> Tolerances:
@@ -51,24 +51,26 @@ def load_tolerances(path: Path) -> Tolerances:
         raise ConfigError(
             str(reason), where=str(path), expected="a readable tolerance table", remedy="check the path"
         ) from None
-    root = read_yaml(text, str(path), _KEYS)
+    root = read_yaml(text, str(path), _KEY_MEANINGS)
     root.text("schema", (SCHEMA,))
-    channels = root.section("channels", dict.fromkeys(BY_CHANNEL, "limits of this channel"))
-    figures = root.section("figures", FIGURES)
+    channels = root.section("channels", dict.fromkeys(COLUMN_BY_CHANNEL, "limits of this channel"))
+    figures = root.section("figures", FIGURE_MEANINGS)
     return Tolerances(
-        channels={
-            name: _limits(channels.section(name, _LIMIT_KEYS)) for name in BY_CHANNEL if name in channels
+        channel_limits={
+            name: _parse_limits(channels.section(name, _LIMIT_MEANINGS))
+            for name in COLUMN_BY_CHANNEL
+            if name in channels
         },
-        figures={name: figures.number(name, 0.0, 1e9) for name in FIGURES if name in figures},
+        figure_limits={name: figures.number(name, 0.0, 1e9) for name in FIGURE_MEANINGS if name in figures},
     )
 
 
-def _limits(section: Section) -> Limits:
+def _parse_limits(section: Section) -> ChannelLimits:
     rms, largest, lag = (
         section.number(key, 0.0, 1e9) if key in section else None for key in ("rms", "max", "lag_s")
     )
     if rms is None and largest is None and lag is None:
         section.fail(
-            "no limit", f"at least one of {', '.join(_LIMIT_KEYS)}", "give one, or leave out the channel"
+            "no limit", f"at least one of {', '.join(_LIMIT_MEANINGS)}", "give one, or leave out the channel"
         )
-    return Limits(rms=rms, max=largest, lag=lag)
+    return ChannelLimits(rms=rms, max=largest, lag_s=lag)

@@ -13,29 +13,31 @@ import cv2
 
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.film.encode import write_still, write_video
-from selfdrive.sim.film.film_events import read_events
-from selfdrive.sim.film.recorded_film import read_reel
-from selfdrive.sim.film.side_by_side import Sheet
+from selfdrive.sim.film.film_events import load_film_events
+from selfdrive.sim.film.recorded_film import load_film
+from selfdrive.sim.film.side_by_side import SideBySideView
 
-EXIT_INPUT = 2
+EXIT_INVALID_INPUT = 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    options = _parse(arguments)
+    options = _parse_arguments(arguments)
     cv2.setNumThreads(1)
     try:
-        sheet = Sheet(read_reel(options.golden), read_reel(options.faulty), read_events(options.events))
+        sheet = SideBySideView(
+            load_film(options.golden), load_film(options.faulty), load_film_events(options.events)
+        )
         if options.at is not None:
-            write_still(sheet.draw(sheet.nearest(options.at)), options.out)
+            write_still(sheet.draw(sheet.nearest_index(options.at)), options.out)
         else:
-            write_video((sheet.draw(index) for index in range(sheet.count)), options.out)
+            write_video((sheet.draw(index) for index in range(sheet.picture_count)), options.out)
     except ConfigError as error:
         print(f"error: {error}", file=sys.stderr)
-        return EXIT_INPUT
+        return EXIT_INVALID_INPUT
     return 0
 
 
-def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="selfdrive.sim.film", description="Show the films of two runs side by side."
     )

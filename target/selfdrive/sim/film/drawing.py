@@ -12,90 +12,92 @@ DIM = (160, 150, 142)
 INK = (238, 234, 230)
 GOLDEN = (224, 160, 76)  # blue and vermilion, distinguishable in grey and by colour-blind people
 FAULTY = (62, 122, 240)
-SEEN = (120, 232, 96)  # lane lines, as detected
-DOUBTED = (60, 190, 250)  # lines with a low probability
+DETECTED = (120, 232, 96)  # lane lines, as detected
+UNCERTAIN = (60, 190, 250)  # lines with a low probability
 PATH = (190, 200, 70)
 TRIGGER = (200, 196, 192)
 MANIFESTED = (150, 190, 60)
 ALERT = (40, 178, 245)
 HAZARD = (62, 52, 225)
 COLOURS = (
-    *(PAPER, PANEL, RULE, DIM, INK, GOLDEN, FAULTY, SEEN, DOUBTED),
+    *(PAPER, PANEL, RULE, DIM, INK, GOLDEN, FAULTY, DETECTED, UNCERTAIN),
     *(PATH, TRIGGER, MANIFESTED, ALERT, HAZARD),
 )
 
-DOUBTFUL = 0.5  # below this probability, lines are drawn as doubted
-SMALL, NORMAL, LARGE = 0.42, 0.5, 0.66  # of text
-SHIFT = 4  # fractional bits of OpenCV's coordinates
-FAR = 1 << 14  # pixels; points further out are clipped
+MIN_CERTAIN_PROBABILITY = 0.5  # below this probability, lines are drawn as doubted
+SMALL_TEXT, NORMAL_TEXT, LARGE_TEXT = 0.42, 0.5, 0.66  # of text
+FRACTION_BITS = 4  # fractional bits of OpenCV's coordinates
+MOST_PIXELS_AWAY = 1 << 14  # pixels; points further out are clipped
 
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 def line_colour(prob: float) -> Colour:
-    return SEEN if prob >= DOUBTFUL else DOUBTED
+    return DETECTED if prob >= MIN_CERTAIN_PROBABILITY else UNCERTAIN
 
 
-def grey(canvas: np.ndarray) -> None:
+def grey_out(canvas: np.ndarray) -> None:
     if canvas.size:
         canvas[:] = (0.7 * cv2.cvtColor(canvas, cv2.COLOR_BGR2GRAY)).astype(np.uint8)[..., None]
 
 
-def write(
+def write_text(
     canvas: np.ndarray,
     text: str,
     at: tuple[int, int],
     colour: Colour = INK,
-    size: float = NORMAL,
+    size: float = NORMAL_TEXT,
     *,
     bold: bool = False,
 ) -> None:
     cv2.putText(canvas, text, at, _FONT, size, colour, 2 if bold else 1, cv2.LINE_AA)
 
 
-def width(text: str, size: float = NORMAL, *, bold: bool = False) -> int:
+def text_width(text: str, size: float = NORMAL_TEXT, *, bold: bool = False) -> int:
     (columns, _), _ = cv2.getTextSize(text, _FONT, size, 2 if bold else 1)
     return columns
 
 
-def shortened(text: str, room: int, size: float = NORMAL, *, bold: bool = False) -> str:
-    if width(text, size, bold=bold) <= room:
+def shorten_text(text: str, most_pixels: int, size: float = NORMAL_TEXT, *, bold: bool = False) -> str:
+    if text_width(text, size, bold=bold) <= most_pixels:
         return text
-    while text and width(text + "...", size, bold=bold) > room:
+    while text and text_width(text + "...", size, bold=bold) > most_pixels:
         text = text[:-1]
     return text.rstrip() + "..."
 
 
-def tag(canvas: np.ndarray, text: str, at: tuple[int, int], colour: Colour) -> None:
+def draw_tag(canvas: np.ndarray, text: str, at: tuple[int, int], colour: Colour) -> None:
     """Small text on a dark plate, with its baseline starting at `at`; readable on any picture."""
     x, y = at
-    cv2.rectangle(canvas, (x - 4, y - 13), (x + width(text, SMALL) + 4, y + 5), PAPER, cv2.FILLED)
-    write(canvas, text, at, colour, SMALL)
+    cv2.rectangle(canvas, (x - 4, y - 13), (x + text_width(text, SMALL_TEXT) + 4, y + 5), PAPER, cv2.FILLED)
+    write_text(canvas, text, at, colour, SMALL_TEXT)
 
 
-def chip(canvas: np.ndarray, text: str, at: tuple[int, int], fill: Colour, ink: Colour = PAPER) -> None:
+def draw_chip(canvas: np.ndarray, text: str, at: tuple[int, int], fill: Colour, ink: Colour = PAPER) -> None:
     x, y = at
-    cv2.rectangle(canvas, at, (x + width(text, bold=True) + 16, y + 22), fill, cv2.FILLED)
-    write(canvas, text, (x + 8, y + 16), ink, bold=True)
+    cv2.rectangle(canvas, at, (x + text_width(text, bold=True) + 16, y + 22), fill, cv2.FILLED)
+    write_text(canvas, text, (x + 8, y + 16), ink, bold=True)
 
 
 def chip_width(text: str) -> int:
-    return width(text, bold=True) + 16
+    return text_width(text, bold=True) + 16
 
 
-def fill(canvas: np.ndarray, points: np.ndarray, colour: Colour) -> None:
-    cv2.fillPoly(canvas, [_fixed(points)], colour, cv2.LINE_AA, SHIFT)
+def fill_polygon(canvas: np.ndarray, points: np.ndarray, colour: Colour) -> None:
+    cv2.fillPoly(canvas, [_to_fixed_point(points)], colour, cv2.LINE_AA, FRACTION_BITS)
 
 
-def stroke(canvas: np.ndarray, points: np.ndarray, colour: Colour, thickness: int = 1) -> None:
-    cv2.polylines(canvas, [_fixed(points)], False, colour, thickness, cv2.LINE_AA, SHIFT)
+def draw_polyline(canvas: np.ndarray, points: np.ndarray, colour: Colour, thickness: int = 1) -> None:
+    cv2.polylines(canvas, [_to_fixed_point(points)], False, colour, thickness, cv2.LINE_AA, FRACTION_BITS)
 
 
-def glaze(canvas: np.ndarray, points: np.ndarray, colour: Colour, share: float) -> None:
+def fill_translucent(canvas: np.ndarray, points: np.ndarray, colour: Colour, opacity: float) -> None:
     layer = canvas.copy()
-    fill(layer, points, colour)
-    cv2.addWeighted(layer, share, canvas, 1.0 - share, 0.0, dst=canvas)
+    fill_polygon(layer, points, colour)
+    cv2.addWeighted(layer, opacity, canvas, 1.0 - opacity, 0.0, dst=canvas)
 
 
-def _fixed(points: np.ndarray) -> np.ndarray:
-    return np.round(np.clip(points, -FAR, FAR) * (1 << SHIFT)).astype(np.int32)
+def _to_fixed_point(points: np.ndarray) -> np.ndarray:
+    return np.round(np.clip(points, -MOST_PIXELS_AWAY, MOST_PIXELS_AWAY) * (1 << FRACTION_BITS)).astype(
+        np.int32
+    )

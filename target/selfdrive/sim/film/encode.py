@@ -12,11 +12,11 @@ from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.film import drawing
 
 PICTURES_PER_S = 20
-GIF_EVERY = 4  # a GIF has only every fourth picture, to limit its size
+PICTURES_PER_GIF_FRAME = 4  # a GIF has only every fourth picture, to limit its size
 GIF_WIDTH = 800
 GIF_COLOURS = 128
-H264 = {"crf": "25", "preset": "veryfast"}
-STILLS = ".png", ".jpg"
+H264_OPTIONS = {"crf": "25", "preset": "veryfast"}
+STILL_SUFFIXES = ".png", ".jpg"
 
 
 def write_video(pictures: Iterable[np.ndarray], path: Path) -> None:
@@ -32,24 +32,24 @@ def write_video(pictures: Iterable[np.ndarray], path: Path) -> None:
             remedy="choose another --out",
         )
     with writing(path, expected="a writable file", remedy="choose another --out"):
-        _make_room(path)
+        _create_empty_file(path)
         writers[path.suffix](pictures, path)
 
 
 def write_still(picture: np.ndarray, path: Path) -> None:
     """Write one BGR picture to `path`, a .png or .jpg. Raises ConfigError."""
-    if path.suffix not in STILLS:
+    if path.suffix not in STILL_SUFFIXES:
         raise ConfigError(
             f"a still {path.name}",
-            expected=f"a name that ends in {' or '.join(STILLS)}",
+            expected=f"a name that ends in {' or '.join(STILL_SUFFIXES)}",
             remedy="choose another --out",
         )
     with writing(path, expected="a writable file", remedy="choose another --out"):
-        _make_room(path)
+        _create_empty_file(path)
         path.write_bytes(cv2.imencode(path.suffix, picture)[1])
 
 
-def _make_room(path: Path) -> None:
+def _create_empty_file(path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.touch()
 
@@ -59,7 +59,7 @@ def _write_mp4(pictures: Iterable[np.ndarray], path: Path) -> None:
         stream = None
         for picture in pictures:
             if stream is None:
-                stream = file.add_stream("libx264", rate=PICTURES_PER_S, options=H264)
+                stream = file.add_stream("libx264", rate=PICTURES_PER_S, options=H264_OPTIONS)
                 stream.height, stream.width = picture.shape[:2]
                 stream.pix_fmt = "yuv420p"
             file.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
@@ -71,14 +71,14 @@ def _write_gif(pictures: Iterable[np.ndarray], path: Path) -> None:
     """Write fewer pictures with one palette: the sheet's own colours, then those of the middle picture."""
     small = []
     for index, picture in enumerate(pictures):
-        if index % GIF_EVERY == 0:
+        if index % PICTURES_PER_GIF_FRAME == 0:
             rows = round(picture.shape[0] * GIF_WIDTH / picture.shape[1])
             scaled = cv2.resize(picture, (GIF_WIDTH, rows), interpolation=cv2.INTER_AREA)
             small.append(Image.fromarray(cv2.cvtColor(scaled, cv2.COLOR_BGR2RGB)))
-    own = [part for colour in drawing.COLOURS for part in reversed(colour)]
+    sheet_colours = [part for colour in drawing.COLOURS for part in reversed(colour)]
     middle = small[len(small) // 2].quantize(GIF_COLOURS - len(drawing.COLOURS))
     palette = Image.new("P", (1, 1))
-    palette.putpalette([*own, *middle.getpalette()])
+    palette.putpalette([*sheet_colours, *middle.getpalette()])
     indexed = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in small]
-    duration = round(1000 * GIF_EVERY / PICTURES_PER_S)
+    duration = round(1000 * PICTURES_PER_GIF_FRAME / PICTURES_PER_S)
     indexed[0].save(path, save_all=True, append_images=indexed[1:], duration=duration, loop=0, optimize=False)

@@ -10,7 +10,7 @@ SCHEMA = "film-events/1"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mark:
+class TimelineMark:
     """An event at `t` (s): `kind` is trigger, manifest, alert or hazard."""
 
     kind: str
@@ -19,7 +19,7 @@ class Mark:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Events:
+class FilmEvents:
     """Data on the faulty run. Times in s; `active` spans the fault's activations, if any.
 
     `names` are short hazard names by id. `end` is the end of the drive; the run can continue after it.
@@ -27,25 +27,25 @@ class Events:
 
     title: str
     outcome: str
-    active: tuple[float, float] | None
-    marks: tuple[Mark, ...]
-    names: dict[str, str]
-    end: float | None = None
+    active_span: tuple[float, float] | None
+    marks: tuple[TimelineMark, ...]
+    hazard_names: dict[str, str]
+    drive_end: float | None = None
 
 
-def read_events(path: Path) -> Events:
+def load_film_events(path: Path) -> FilmEvents:
     """Read events from a JSON file. Raises ConfigError for any other file."""
     try:
         data = json.loads(path.read_text())
         if data["schema"] != SCHEMA:
             raise ValueError(f"schema {data['schema']}")
-        return Events(
+        return FilmEvents(
             title=data["title"],
             outcome=data["outcome"],
-            active=tuple(data["active"]) if data["active"] else None,
-            marks=tuple(Mark(**mark) for mark in data["marks"]),
-            names=data["names"],
-            end=data.get("end"),
+            active_span=tuple(data["active"]) if data["active"] else None,
+            marks=tuple(TimelineMark(**mark) for mark in data["marks"]),
+            hazard_names=data["names"],
+            drive_end=data.get("end"),
         )
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(

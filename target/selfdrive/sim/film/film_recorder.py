@@ -19,12 +19,12 @@ from selfdrive.messages import VIEW_LENGTH, CameraView, ModelData
 from selfdrive.sim.truth import GroundTruth
 
 SCHEMA = "film/1"
-INDEX = "film.jsonl"
-KNOTS = tuple(range(0, VIEW_LENGTH, 7))  # m ahead, where lines are recorded
+INDEX_FILE = "film.jsonl"
+SAMPLE_DISTANCES = tuple(range(0, VIEW_LENGTH, 7))  # m ahead, where lines are recorded
 JPEG_QUALITY = 95  # high, to preserve noise from effects
 
 
-class Film:
+class FilmRecorder:
     """A film being recorded in `folder`. If recording fails, the run ends with ConfigError."""
 
     def __init__(self, folder: Path, camera: CameraModel) -> None:
@@ -32,7 +32,7 @@ class Film:
         self._count = 0
         with self._writing():
             folder.mkdir(parents=True, exist_ok=True)
-            (folder / INDEX).write_text(_line({"schema": SCHEMA, "camera": asdict(camera)}))
+            (folder / INDEX_FILE).write_text(_json_line({"schema": SCHEMA, "camera": asdict(camera)}))
 
     def take(
         self, truth: GroundTruth, view: CameraView, manager: Manager, hazards: Mapping[str, float | None]
@@ -47,20 +47,20 @@ class Film:
             "middle": view.path_y,
             "v_ego": truth.v_ego,
             "d_rel": None if truth.free_road else truth.d_rel,
-            "bend": _at_knots(view.bend),
-            "picture": self._keep(view),
-            "seen": _seen(manager.visiond.latest, truth.t),
-            "plan": [_height(manager.controlsd.plan.d_poly, x) for x in KNOTS],
+            "bend": _sample(view.bend),
+            "picture": self._save_picture(view),
+            "seen": _detections_as_json(manager.visiond.latest, truth.t),
+            "plan": [_polynomial_value(manager.controlsd.plan.d_poly, x) for x in SAMPLE_DISTANCES],
             "radar": lead.d_rel if lead and lead.status else None,
             "alerts": list(state.alerts),
             "text": state.alert_text1,
             "hazards": [name for name, t in hazards.items() if t is not None],
         }
-        with self._writing(), (self._folder / INDEX).open("a") as file:
-            file.write(_line(entry))
+        with self._writing(), (self._folder / INDEX_FILE).open("a") as file:
+            file.write(_json_line(entry))
         self._count += 1
 
-    def _keep(self, view: CameraView) -> str | None:
+    def _save_picture(self, view: CameraView) -> str | None:
         if view.picture is None:
             return None
         import cv2  # not needed in runs without pictures
@@ -75,26 +75,26 @@ class Film:
         return writing(self._folder, expected="a writable folder", remedy="choose another --film")
 
 
-def _seen(model: ModelData | None, t: float) -> dict | None:
+def _detections_as_json(model: ModelData | None, t: float) -> dict | None:
     if model is None or model.t != t:
         return None
     lines = {"left": model.left_lane, "right": model.right_lane}
     return {
-        **{name: {"y": _at_knots(line.points), "prob": line.prob} for name, line in lines.items()},
+        **{name: {"y": _sample(line.points), "prob": line.prob} for name, line in lines.items()},
         "lead": model.lead.d_rel,
     }
 
 
-def _height(polynomial: Sequence[float], x: float) -> float:
+def _polynomial_value(polynomial: Sequence[float], x: float) -> float:
     total = 0.0
     for factor in polynomial:
         total = total * x + float(factor)
     return total
 
 
-def _at_knots(values: Sequence[float]) -> list[float]:
-    return [float(values[x]) for x in KNOTS]
+def _sample(values: Sequence[float]) -> list[float]:
+    return [float(values[x]) for x in SAMPLE_DISTANCES]
 
 
-def _line(entry: dict) -> str:
+def _json_line(entry: dict) -> str:
     return json.dumps(entry) + "\n"

@@ -11,29 +11,29 @@ import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.film.film_recorder import INDEX, SCHEMA
+from selfdrive.sim.film.film_recorder import INDEX_FILE, SCHEMA
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SeenLine:
-    """A line as visiond published it: `y` (m, left positive) at the recorder's KNOTS."""
+class DetectedLine:
+    """A line as visiond published it: `y` (m, left positive) at SAMPLE_DISTANCES."""
 
     y: Sequence[float]
     prob: float
 
     @property
-    def drawable(self) -> bool:
+    def is_drawable(self) -> bool:
         """Whether the line was seen and is finite; faults can produce any numbers."""
         return self.prob > 0.0 and isfinite(self.prob) and all(isfinite(y) for y in self.y)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Frame:
+class FilmFrame:
     """The moment of one picture: the world, the controller's view and its messages to the driver. SI units.
 
     `d_rel` is None on a free road, `lines` if visiond published nothing, `radar` if radard has no lead.
-    `plan` is the planned path, y at KNOTS. In the camera's view, the lane centre is at `middle` beside the
-    car, shifted by `bend` at KNOTS.
+    `plan` is the planned path, y at SAMPLE_DISTANCES. In the camera's view, the lane centre is at `middle` beside the
+    car, shifted by `bend` at SAMPLE_DISTANCES.
     """
 
     t: float
@@ -45,7 +45,7 @@ class Frame:
     d_rel: float | None
     bend: Sequence[float]
     picture: Path | None
-    lines: dict[str, SeenLine] | None  # left, right
+    lines: dict[str, DetectedLine] | None  # left, right
     plan: Sequence[float]
     camera_lead: float | None
     radar: float | None
@@ -53,7 +53,7 @@ class Frame:
     text: str
     hazards: tuple[str, ...]
 
-    def image(self) -> np.ndarray | None:
+    def load_picture(self) -> np.ndarray | None:
         """The grey picture; None if the run has none. Raises ConfigError if it cannot be read."""
         if self.picture is None:
             return None
@@ -66,25 +66,25 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reel:
+class RecordedFilm:
     """A film: its camera and its frames, 50 ms apart."""
 
     camera: CameraModel
-    frames: tuple[Frame, ...]
+    frames: tuple[FilmFrame, ...]
 
-    def at(self, index: int) -> Frame:
+    def frame_at(self, index: int) -> FilmFrame:
         return self.frames[min(index, len(self.frames) - 1)]
 
 
-def read_reel(folder: Path) -> Reel:
+def load_film(folder: Path) -> RecordedFilm:
     """Read the film in `folder`. Raises ConfigError if it is missing or damaged."""
-    index = folder / INDEX
+    index = folder / INDEX_FILE
     try:
         head, *lines = [json.loads(line) for line in index.read_text().splitlines()]
         if head["schema"] != SCHEMA or not lines:
             raise ValueError(f"schema {head['schema']}, {len(lines)} pictures")
-        frames = tuple(_frame(line, folder) for line in lines)
-        return Reel(camera=CameraModel(**head["camera"]), frames=frames)
+        frames = tuple(_parse_frame(line, folder) for line in lines)
+        return RecordedFilm(camera=CameraModel(**head["camera"]), frames=frames)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(
             f"unreadable ({error})",
@@ -94,12 +94,12 @@ def read_reel(folder: Path) -> Reel:
         ) from None
 
 
-def _frame(entry: dict, folder: Path) -> Frame:
-    seen, picture = entry.pop("seen"), entry.pop("picture")
+def _parse_frame(entry: dict, folder: Path) -> FilmFrame:
+    detections, picture = entry.pop("seen"), entry.pop("picture")
     entry["alerts"], entry["hazards"] = tuple(entry["alerts"]), tuple(entry["hazards"])
-    return Frame(
+    return FilmFrame(
         **entry,
         picture=folder / picture if picture else None,
-        lines={name: SeenLine(**seen[name]) for name in ("left", "right")} if seen else None,
-        camera_lead=seen["lead"] if seen else None,
+        lines={name: DetectedLine(**detections[name]) for name in ("left", "right")} if detections else None,
+        camera_lead=detections["lead"] if detections else None,
     )

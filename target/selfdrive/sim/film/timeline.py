@@ -7,136 +7,152 @@ import cv2
 import numpy as np
 
 from selfdrive.sim.film import drawing
-from selfdrive.sim.film.film_events import Events, Mark
-from selfdrive.sim.film.recorded_film import Frame, Reel
+from selfdrive.sim.film.film_events import FilmEvents, TimelineMark
+from selfdrive.sim.film.recorded_film import FilmFrame, RecordedFilm
 from selfdrive.sim.hazards import LANE_OFFSET
 
-KINDS = {
+MARK_COLOURS = {
     "trigger": drawing.TRIGGER,
     "manifest": drawing.MANIFESTED,
     "alert": drawing.ALERT,
     "hazard": drawing.HAZARD,
 }
-GUTTER = 86  # pixels left of the plots, for their names
-FOOT, HEAD = 18, 18  # pixels below the plots (seconds) and above them (marks)
+LABELS_WIDTH = 86  # pixels left of the plots, for their names
+FOOT_HEIGHT, HEAD_HEIGHT = 18, 18  # pixels below the plots (seconds) and above them (marks)
 GAP = 6  # pixels between plots and between labels
-TICKS = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)  # s
+TICK_STEPS = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)  # s
 MOST_TICKS = 16
-LEAST_OFFSET, MOST_OFFSET = 0.3, 4.0  # m; limits of the plot's range
-LEAST_DISTANCE, LEAST_GAP = 10.0, -10.0  # m; the plot reaches at least the first, and not below the second
+MIN_OFFSET_SPAN, MOST_OFFSET_SPAN = 0.3, 4.0  # m; limits of the plot's range
+MIN_DISTANCE_SPAN, MIN_DISTANCE_SHOWN = (
+    10.0,
+    -10.0,
+)  # m; the plot reaches at least the first, and not below the second
 
 
 class Timeline:
-    def __init__(self, width: int, height: int, golden: Reel, faulty: Reel, events: Events) -> None:
+    def __init__(
+        self, width: int, height: int, golden: RecordedFilm, faulty: RecordedFilm, events: FilmEvents
+    ) -> None:
         self._size = width, height
         self._end = max(reel.frames[-1].t for reel in (golden, faulty)) or 1.0
         self._canvas = np.full((height, width, 3), drawing.PAPER, np.uint8)
         self._draw_seconds()
-        rows = (height - FOOT - HEAD - GAP) // 2
+        rows = (height - FOOT_HEIGHT - HEAD_HEIGHT - GAP) // 2
         reels = ((golden, drawing.GOLDEN, 2), (faulty, drawing.FAULTY, 1))
-        self._driven = self._end if events.end is None else events.end
-        self._plot("offset [m]", HEAD, rows, _offset, reels, LANE_OFFSET)
-        self._plot("lead [m]", HEAD + rows + GAP, rows, _distance, reels, None)
-        if events.active:
-            self._shade(*events.active)
+        self._drive_end = self._end if events.drive_end is None else events.drive_end
+        self._plot_runs("offset [m]", HEAD_HEIGHT, rows, _offset, reels, LANE_OFFSET)
+        self._plot_runs("lead [m]", HEAD_HEIGHT + rows + GAP, rows, _distance, reels, None)
+        if events.active_span:
+            self._shade_span(*events.active_span)
         self._draw_marks(events.marks)
-        drawing.grey(self._canvas[:, round(self._x(self._driven)) + 2 :])
+        drawing.grey_out(self._canvas[:, round(self._time_to_x(self._drive_end)) + 2 :])
 
     def draw(self, t: float) -> np.ndarray:
         canvas = self._canvas.copy()
-        x = round(self._x(t))
-        cv2.line(canvas, (x, HEAD - 2), (x, self._size[1] - FOOT), drawing.INK, 1)
-        cv2.circle(canvas, (x, HEAD - 2), 4, drawing.INK, cv2.FILLED, cv2.LINE_AA)
+        x = round(self._time_to_x(t))
+        cv2.line(canvas, (x, HEAD_HEIGHT - 2), (x, self._size[1] - FOOT_HEIGHT), drawing.INK, 1)
+        cv2.circle(canvas, (x, HEAD_HEIGHT - 2), 4, drawing.INK, cv2.FILLED, cv2.LINE_AA)
         return canvas
 
-    def _x(self, t: float) -> float:
-        return GUTTER + (self._size[0] - GUTTER - 10) * t / self._end
+    def _time_to_x(self, t: float) -> float:
+        return LABELS_WIDTH + (self._size[0] - LABELS_WIDTH - 10) * t / self._end
 
     def _draw_seconds(self) -> None:
-        step = next((tick for tick in TICKS if self._end / tick <= MOST_TICKS), TICKS[-1])
-        foot = self._size[1] - FOOT
+        step = next((tick for tick in TICK_STEPS if self._end / tick <= MOST_TICKS), TICK_STEPS[-1])
+        foot = self._size[1] - FOOT_HEIGHT
         for i in range(ceil(self._end / step + 1e-9)):
-            x = round(self._x(i * step))
-            cv2.line(self._canvas, (x, HEAD), (x, foot + 3), drawing.RULE, 1)
+            x = round(self._time_to_x(i * step))
+            cv2.line(self._canvas, (x, HEAD_HEIGHT), (x, foot + 3), drawing.RULE, 1)
             label = f"{i * step:g}"
-            drawing.write(
+            drawing.write_text(
                 self._canvas,
                 label,
-                (x - drawing.width(label, drawing.SMALL) // 2, foot + 16),
+                (x - drawing.text_width(label, drawing.SMALL_TEXT) // 2, foot + 16),
                 drawing.DIM,
-                drawing.SMALL,
+                drawing.SMALL_TEXT,
             )
-        drawing.write(self._canvas, "time [s]", (8, foot + 16), drawing.DIM, drawing.SMALL)
+        drawing.write_text(self._canvas, "time [s]", (8, foot + 16), drawing.DIM, drawing.SMALL_TEXT)
 
-    def _plot(
+    def _plot_runs(
         self,
         name: str,
         top: int,
         rows: int,
-        value: Callable[[Frame], float],
-        reels: Sequence[tuple[Reel, drawing.Colour, int]],
+        value: Callable[[FilmFrame], float],
+        reels: Sequence[tuple[RecordedFilm, drawing.Colour, int]],
         limit: float | None,
     ) -> None:
         """Plot both runs; `limit` is drawn on either side of zero if a value comes near it."""
         cv2.rectangle(
-            self._canvas, (GUTTER, top), (self._size[0] - 10, top + rows), drawing.PANEL, cv2.FILLED
+            self._canvas, (LABELS_WIDTH, top), (self._size[0] - 10, top + rows), drawing.PANEL, cv2.FILLED
         )
         series = [(np.array([value(frame) for frame in reel.frames]), reel) for reel, _, _ in reels]
-        driven = [values[[f.t <= self._driven for f in reel.frames]] for values, reel in series]
-        low, high = _span(np.concatenate(driven), symmetric=limit is not None)
+        driven = [values[[f.t <= self._drive_end for f in reel.frames]] for values, reel in series]
+        low, high = _value_range(np.concatenate(driven), symmetric=limit is not None)
 
-        def y(values: np.ndarray) -> np.ndarray:
+        def to_row(values: np.ndarray) -> np.ndarray:
             return top + 3 + (rows - 6) * (high - np.clip(values, low, high)) / (high - low)
 
         for level in () if limit is None or high < limit else (limit, -limit):
-            row = round(float(y(np.array(level))))
-            for x in range(GUTTER, self._size[0] - 10, 8):
+            row = round(float(to_row(np.array(level))))
+            for x in range(LABELS_WIDTH, self._size[0] - 10, 8):
                 cv2.line(self._canvas, (x, row), (x + 3, row), drawing.HAZARD, 1)
         for (values, reel), (_, colour, thickness) in zip(series, reels, strict=True):
-            x = self._x(np.array([frame.t for frame in reel.frames]))
-            for part in _pieces(np.isfinite(values)):
-                drawing.stroke(self._canvas, np.stack([x[part], y(values[part])], axis=1), colour, thickness)
-        drawing.write(self._canvas, name, (8, top + rows // 2 + 5), drawing.DIM, drawing.SMALL)
+            x = self._time_to_x(np.array([frame.t for frame in reel.frames]))
+            for part in _slices_of_true(np.isfinite(values)):
+                drawing.draw_polyline(
+                    self._canvas, np.stack([x[part], to_row(values[part])], axis=1), colour, thickness
+                )
+        drawing.write_text(self._canvas, name, (8, top + rows // 2 + 5), drawing.DIM, drawing.SMALL_TEXT)
         for level, row in ((high, top + 9), (low, top + rows)):
             label = f"{level:.3g}"
-            drawing.write(
-                self._canvas, label, (GUTTER - 6 - drawing.width(label, 0.34), row), drawing.DIM, 0.34
+            drawing.write_text(
+                self._canvas,
+                label,
+                (LABELS_WIDTH - 6 - drawing.text_width(label, 0.34), row),
+                drawing.DIM,
+                0.34,
             )
 
-    def _shade(self, first: float, last: float) -> None:
-        part = self._canvas[HEAD : self._size[1] - FOOT, round(self._x(first)) : round(self._x(last)) + 1]
+    def _shade_span(self, first: float, last: float) -> None:
+        part = self._canvas[
+            HEAD_HEIGHT : self._size[1] - FOOT_HEIGHT,
+            round(self._time_to_x(first)) : round(self._time_to_x(last)) + 1,
+        ]
         cv2.addWeighted(part, 0.85, np.full_like(part, drawing.FAULTY), 0.15, 0.0, dst=part)
 
-    def _draw_marks(self, marks: Sequence[Mark]) -> None:
-        taken = 0
+    def _draw_marks(self, marks: Sequence[TimelineMark]) -> None:
+        labels_end = 0
         for mark in sorted(marks, key=lambda mark: mark.t):
-            x, colour = round(self._x(mark.t)), KINDS.get(mark.kind, drawing.DIM)
-            cv2.line(self._canvas, (x, HEAD - 4), (x, self._size[1] - FOOT), colour, 1)
+            x, colour = round(self._time_to_x(mark.t)), MARK_COLOURS.get(mark.kind, drawing.DIM)
+            cv2.line(self._canvas, (x, HEAD_HEIGHT - 4), (x, self._size[1] - FOOT_HEIGHT), colour, 1)
             label = f"{mark.label} {mark.t:.2f}"
-            columns = drawing.width(label, drawing.SMALL)
-            left = max(taken, min(x - 2, self._size[0] - columns - 4))
-            if left + columns <= self._size[0]:
-                drawing.write(self._canvas, label, (left, HEAD - 7), colour, drawing.SMALL)
-                taken = left + columns + 2 * GAP
+            columns = drawing.text_width(label, drawing.SMALL_TEXT)
+            label_left = max(labels_end, min(x - 2, self._size[0] - columns - 4))
+            if label_left + columns <= self._size[0]:
+                drawing.write_text(
+                    self._canvas, label, (label_left, HEAD_HEIGHT - 7), colour, drawing.SMALL_TEXT
+                )
+                labels_end = label_left + columns + 2 * GAP
 
 
-def _offset(frame: Frame) -> float:
+def _offset(frame: FilmFrame) -> float:
     return frame.offset
 
 
-def _distance(frame: Frame) -> float:
+def _distance(frame: FilmFrame) -> float:
     return float("nan") if frame.d_rel is None else frame.d_rel
 
 
-def _span(values: np.ndarray, *, symmetric: bool) -> tuple[float, float]:
+def _value_range(values: np.ndarray, *, symmetric: bool) -> tuple[float, float]:
     finite = values[np.isfinite(values)]
     if symmetric:
-        most = min(max(LEAST_OFFSET, 1.1 * float(np.abs(finite).max(initial=0.0))), MOST_OFFSET)
+        most = min(max(MIN_OFFSET_SPAN, 1.1 * float(np.abs(finite).max(initial=0.0))), MOST_OFFSET_SPAN)
         return -most, most
-    most = float(finite.max(initial=LEAST_DISTANCE))
-    return max(LEAST_GAP, float(finite.min(initial=0.0))), most
+    most = float(finite.max(initial=MIN_DISTANCE_SPAN))
+    return max(MIN_DISTANCE_SHOWN, float(finite.min(initial=0.0))), most
 
 
-def _pieces(there: np.ndarray) -> list[slice]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
+def _slices_of_true(mask: np.ndarray) -> list[slice]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     return [slice(first, last) for first, last in zip(edges[::2], edges[1::2], strict=True)]

@@ -5,7 +5,7 @@ from pathlib import Path
 import cv2
 import pytest
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.sim.film.recorded_film import Frame, Reel, SeenLine
+from selfdrive.sim.film.recorded_film import DetectedLine, FilmFrame, RecordedFilm
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import main
 
@@ -62,7 +62,7 @@ def frame():
         "d_rel": 30.0,
         "bend": (0.0,) * 8,
         "picture": None,
-        "lines": {name: SeenLine(y=(at,) * 8, prob=1.0) for name, at in y.items()},
+        "lines": {name: DetectedLine(y=(at,) * 8, prob=1.0) for name, at in y.items()},
         "plan": (0.0,) * 8,
         "camera_lead": 30.0,
         "radar": 30.0,
@@ -70,7 +70,7 @@ def frame():
         "text": "",
         "hazards": (),
     }
-    return lambda **given: Frame(**usual | given)
+    return lambda **given: FilmFrame(**usual | given)
 
 
 @pytest.fixture
@@ -79,6 +79,6 @@ def reel(frame):
 
     def make(*given):
         frames = tuple(frame(**{"t": 0.05 * i} | values) for i, values in enumerate(given))
-        return Reel(camera=CameraModel(), frames=frames)
+        return RecordedFilm(camera=CameraModel(), frames=frames)
 
     return make

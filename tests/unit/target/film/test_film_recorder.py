@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.film.recorded_film import read_reel
+from selfdrive.sim.film.recorded_film import load_film
 from selfdrive.sim.run import main
 from selfdrive.visiond.visiond import Visiond
 
@@ -27,7 +27,7 @@ def test_a_run_on_frames_is_the_same_with_a_film(drive, seeing):
 
 def test_the_film_has_one_frame_for_each_camera_frame(drive):
     folder = drive()
-    reel, trace = read_reel(folder / "film"), np.load(folder / "trace.npz")
+    reel, trace = load_film(folder / "film"), np.load(folder / "trace.npz")
     assert [frame.t for frame in reel.frames] == list(trace["t"][::5])
     assert [frame.v_ego for frame in reel.frames] == list(trace["v_ego"][::5])
     assert [frame.d_rel for frame in reel.frames] == list(trace["d_rel"][::5])
@@ -35,26 +35,26 @@ def test_the_film_has_one_frame_for_each_camera_frame(drive):
 
 
 def test_the_film_has_the_detected_lines_and_lead(drive):
-    frame = read_reel(drive() / "film").frames[-1]
+    frame = load_film(drive() / "film").frames[-1]
     assert (frame.lines["left"].y[0], frame.lines["right"].y[0]) == (1.85, -1.85)
     assert frame.lines["left"].prob == 1.0
     assert frame.camera_lead == frame.d_rel
 
 
 def test_the_film_has_the_frames_that_the_detector_got(drive, seeing):
-    frame = read_reel(drive(*seeing) / "film").frames[0]
+    frame = load_film(drive(*seeing) / "film").frames[0]
     own = cv2.imread(f"{seeing[2]}/0.png", cv2.IMREAD_GRAYSCALE)
-    assert np.abs(frame.image().astype(int) - own).mean() < 1.0
+    assert np.abs(frame.load_picture().astype(int) - own).mean() < 1.0
 
 
 def test_a_film_of_a_free_road_has_no_lead(drive):
-    assert read_reel(drive("--no-lead") / "film").frames[-1].d_rel is None
+    assert load_film(drive("--no-lead") / "film").frames[-1].d_rel is None
 
 
 def test_without_a_camera_message_the_film_shows_no_lines(drive, monkeypatch):
     publish = Visiond.publish
     monkeypatch.setattr(Visiond, "publish", lambda own, model: model.t < 0.2 and publish(own, model))
-    frames = read_reel(drive() / "film").frames
+    frames = load_film(drive() / "film").frames
     assert [frame.lines is not None for frame in frames] == [True] * 4 + [False] * 6
     assert frames[-1].camera_lead is None
 
@@ -70,7 +70,7 @@ def test_a_crashed_run_leaves_the_frames_before_the_crash(tmp_path, monkeypatch)
     words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path)]
     with pytest.raises(AssertionError):
         main([*words, "--film", str(tmp_path / "film")])
-    assert len(read_reel(tmp_path / "film").frames) == 4
+    assert len(load_film(tmp_path / "film").frames) == 4
 
 
 def test_a_film_folder_that_cannot_be_created_is_an_error(tmp_path, capsys):
@@ -93,4 +93,4 @@ def test_a_full_disk_ends_the_run_with_an_error(tmp_path, seeing, capsys):
 def test_an_invalid_film_file_is_an_error(tmp_path, text):
     (tmp_path / "film.jsonl").write_text(text)
     with pytest.raises(ConfigError, match=r"film\.jsonl: unreadable"):
-        read_reel(tmp_path)
+        load_film(tmp_path)

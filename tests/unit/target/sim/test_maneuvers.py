@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from selfdrive.sim.compare.svg_plots import Line, Mark, Panel, draw, simplify
+from selfdrive.sim.compare.svg_plots import PlotLine, PlotMark, PlotPanel, draw_panel, simplify_line
 from selfdrive.sim.maneuvers import main
 from selfdrive.sim.replay import main as replay
 
@@ -77,7 +77,7 @@ def test_user_errors_exit_with_code_2(folder, tmp_path, capsys):
 def test_a_simplified_line_stays_within_the_tolerance():
     x = np.linspace(0.0, 1000.0, 600)
     y = 300.0 * np.sin(x / 60.0) + 200.0 * (x > 500.0)
-    few = simplify(np.column_stack((x, y)), 2.5)
+    few = simplify_line(np.column_stack((x, y)), 2.5)
     assert len(few) < 150
     assert np.abs(np.interp(x, few[:, 0], few[:, 1]) - y).max() <= 2.5
     assert (few[0, 0], few[-1, 0]) == (0.0, 1000.0)
@@ -86,8 +86,10 @@ def test_a_simplified_line_stays_within_the_tolerance():
 def test_gaps_and_constants_are_drawn():
     t = np.arange(10) / 20
     broken = np.where(np.arange(10) == 5, np.inf, 1.0)
-    panel = Panel(title="a", unit="m", lines=(Line("b", 0, t, broken), Line("c", 1, t, np.full(10, np.nan))))
-    svg = draw(panel, (Mark("alert", "fcw", 0.25),), 0.5)
+    panel = PlotPanel(
+        title="a", unit="m", lines=(PlotLine("b", 0, t, broken), PlotLine("c", 1, t, np.full(10, np.nan)))
+    )
+    svg = draw_panel(panel, (PlotMark("alert", "fcw", 0.25),), 0.5)
     paths = dict(re.findall(r'<path class="(c\d)" d="([^"]*)"/>', svg))
     assert paths["c0"].count("M") == 2
     assert paths["c1"] == ""

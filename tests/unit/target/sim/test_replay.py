@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from selfdrive.common.conversions import KPH_TO_MS
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.compare.key_figures import difference, key_figures
+from selfdrive.sim.compare.key_figures import compute_key_figures, figure_difference
 from selfdrive.sim.compare.tolerances import Tolerances, load_tolerances
-from selfdrive.sim.compare.trace_comparison import compare, crossings, time_lag
-from selfdrive.sim.compare.trace_csv import COLUMNS, read_reference, write_reference
+from selfdrive.sim.compare.trace_comparison import compare_trace, find_crossings, time_lag_s
+from selfdrive.sim.compare.trace_csv import COLUMNS, load_reference_trace, save_reference_trace
 from selfdrive.sim.recorder import CHANNELS, INTEGER_CHANNELS, PLAN_SOURCES
-from selfdrive.sim.replay import TOLERANCES, main
+from selfdrive.sim.replay import TOLERANCES_PATH, main
 
 REPO = Path(__file__).parents[4]
 TRACES = Path(os.environ.get("OPENPILOT_TRACES", REPO.parent / "shared/reference/openpilot_v0.4.2/traces"))
 
 STEPS = 1000
-NO_LIMITS = Tolerances(channels={}, figures={})
+NO_LIMITS = Tolerances(channel_limits={}, figure_limits={})
 TABLE = "schema: replay-tolerances/1\nchannels:\n  v_ego: {v_ego}\nfigures:\n  engaged_s: 0.02\n"
 
 
@@ -40,8 +40,8 @@ def trace():
 
 @pytest.fixture
 def reference(trace, tmp_path):
-    write_reference(tmp_path / "made" / "S1.csv", trace)
-    return read_reference(tmp_path / "made" / "S1.csv")
+    save_reference_trace(tmp_path / "made" / "S1.csv", trace)
+    return load_reference_trace(tmp_path / "made" / "S1.csv")
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def finished(trace, tmp_path):
 
 
 def channel(comparison, name):
-    return next(result for result in comparison.channels if result.column.channel == name)
+    return next(result for result in comparison.channel_comparisons if result.column.channel == name)
 
 
 def replay(reference, runs, *arguments):
@@ -70,37 +70,37 @@ def test_a_written_reference_is_read_back(trace, reference):
     for column in COLUMNS:
         if column.channel != "fcw":
             assert reference.channels[column.channel] == pytest.approx(trace[column.channel][::5], rel=1e-5)
-    comparison = compare(reference, trace, NO_LIMITS)
-    assert all(result.rms < 1e-4 for result in comparison.channels)
+    comparison = compare_trace(reference, trace, NO_LIMITS)
+    assert all(result.rms < 1e-4 for result in comparison.channel_comparisons)
 
 
 def test_rms_and_largest_difference(trace, reference):
     trace["v_ego"] = trace["v_ego"].copy()
     trace["v_ego"][300:400] -= 0.5
     trace["v_ego"][350] -= 0.1
-    found = channel(compare(reference, trace, NO_LIMITS), "v_ego")
+    found = channel(compare_trace(reference, trace, NO_LIMITS), "v_ego")
     assert found.rms == pytest.approx(np.sqrt((19 * 0.5**2 + 0.6**2) / 200), abs=1e-4)
-    assert found.largest == pytest.approx(-0.6, abs=1e-4)
-    assert found.at == 3.5
+    assert found.peak_difference == pytest.approx(-0.6, abs=1e-4)
+    assert found.peak_at_s == 3.5
 
 
 @pytest.mark.parametrize("late", [0, 3, 50, -20])
 def test_the_lag_of_a_delayed_wave(trace, late):
     steps = np.arange(0, STEPS, 5)
     wave = 3.0 * np.sin((np.arange(STEPS) - late) / 100)
-    assert time_lag(steps, 3.0 * np.sin(steps / 100), wave) == pytest.approx(late / 100, abs=0.011)
+    assert time_lag_s(steps, 3.0 * np.sin(steps / 100), wave) == pytest.approx(late / 100, abs=0.011)
 
 
 def test_a_constant_has_no_lag_and_a_slope_has_lag_zero():
     steps = np.arange(0, STEPS, 5)
-    assert time_lag(steps, np.ones(len(steps)), np.ones(STEPS)) is None
-    assert time_lag(steps, steps / 100, np.arange(STEPS) / 100) == 0.0
+    assert time_lag_s(steps, np.ones(len(steps)), np.ones(STEPS)) is None
+    assert time_lag_s(steps, steps / 100, np.arange(STEPS) / 100) == 0.0
 
 
 def test_crossings_of_a_band():
     seconds = np.arange(8) / 20
-    found = crossings(seconds, np.array([0.2, 0.5, 0.6, -0.9, 0.5, 0.0, 0.0, 0.7]), 0.5)
-    assert [(one.begin, one.end, one.worst, one.at) for one in found] == [
+    found = find_crossings(seconds, np.array([0.2, 0.5, 0.6, -0.9, 0.5, 0.0, 0.0, 0.7]), 0.5)
+    assert [(one.begin_s, one.end_s, one.largest_difference, one.largest_at_s) for one in found] == [
         (0.1, 0.15, -0.9, 0.15),
         (0.35, 0.35, 0.7, 0.35),
     ]
@@ -110,8 +110,8 @@ def test_a_message_can_be_a_cycle_late(trace, reference):
     reference.channels["v_ego_est"] = np.concatenate(([0.0], trace["v_ego"][4::5][: STEPS // 5 - 1]))
     trace["v_ego_est"] = trace["v_ego"]
     reference.channels["v_ego"] = reference.channels["v_ego_est"]
-    comparison = compare(reference, trace, NO_LIMITS)
-    assert abs(channel(comparison, "v_ego_est").largest) == pytest.approx(
+    comparison = compare_trace(reference, trace, NO_LIMITS)
+    assert abs(channel(comparison, "v_ego_est").peak_difference) == pytest.approx(
         20.0
     )  # the first row has no earlier cycle
     assert channel(comparison, "v_ego_est").rms < channel(comparison, "v_ego").rms
@@ -120,20 +120,23 @@ def test_a_message_can_be_a_cycle_late(trace, reference):
 def test_leads_are_compared_only_while_both_runs_have_one(trace, reference):
     trace["lead_status"] = np.where(np.arange(STEPS) < 500, 0, 1)
     trace["lead_d_rel"] = np.where(np.arange(STEPS) < 500, 99.0, 0.0)
-    comparison = compare(reference, trace, NO_LIMITS)
+    comparison = compare_trace(reference, trace, NO_LIMITS)
     assert channel(comparison, "lead_d_rel").rms == 0.0
     assert channel(comparison, "lead_status").rms == pytest.approx(np.sqrt(0.5))
 
 
 def test_nan_exceeds_any_limit(trace, reference):
     trace["v_ego"] = np.where(np.arange(STEPS) == 500, np.nan, trace["v_ego"])
-    assert channel(compare(reference, trace, NO_LIMITS), "v_ego").rms == np.inf
+    assert channel(compare_trace(reference, trace, NO_LIMITS), "v_ego").rms == np.inf
 
 
 def test_leads_are_not_compared_on_a_free_road(trace, reference):
-    with_lead = {result.column.channel for result in compare(reference, trace, NO_LIMITS).channels}
+    with_lead = {
+        result.column.channel for result in compare_trace(reference, trace, NO_LIMITS).channel_comparisons
+    }
     without = {
-        result.column.channel for result in compare(reference, trace, NO_LIMITS, free_road=True).channels
+        result.column.channel
+        for result in compare_trace(reference, trace, NO_LIMITS, free_road=True).channel_comparisons
     }
     assert with_lead - without == {"v_lead"}
 
@@ -143,7 +146,7 @@ def test_key_figures(trace):
     rows["v_ego"] = np.where(np.arange(200) > 190, 0.0, rows["v_ego"])
     rows["v_cruise"] = np.where(np.arange(200) < 100, 97, 104) * KPH_TO_MS
     rows["brake"] = np.linspace(0.0, 0.4, 200)
-    figures = key_figures(np.arange(0, STEPS, 5), rows)
+    figures = compute_key_figures(np.arange(0, STEPS, 5), rows)
     assert figures["engaged_s"] == (1.25, 1.3)
     assert figures["set_speeds_kph"] == (97.0, 104.0)
     assert figures["min_hwt_s"] == pytest.approx(rows["hwt"][:191].min())
@@ -170,7 +173,7 @@ def test_difference_of_figures(name, reference, ours, expected):
 
     The difference is infinite if only one side has the figure.
     """
-    assert difference(name, reference, ours) == pytest.approx(expected)
+    assert figure_difference(name, reference, ours) == pytest.approx(expected)
 
 
 def test_a_run_compared_with_itself_is_within_tolerance(reference, finished, capsys):
@@ -255,7 +258,7 @@ def test_the_error_for_a_wrong_reference_file_gives_its_line(
 def test_a_reference_saved_by_a_spreadsheet_is_read(reference, finished):
     """A byte order mark before the first column's name is ignored."""
     reference.path.write_bytes(b"\xef\xbb\xbf" + reference.path.read_bytes())
-    assert list(read_reference(reference.path).channels) == list(reference.channels)
+    assert list(load_reference_trace(reference.path).channels) == list(reference.channels)
     assert replay(reference, finished()) == 0
 
 
@@ -263,17 +266,17 @@ def test_a_reference_of_another_length_is_refused(trace, reference):
     for steps in (STEPS - 100, STEPS + 100):
         cut = {name: np.resize(values, steps) for name, values in trace.items()}
         with pytest.raises(ConfigError, match="the last row is at"):
-            compare(reference, cut, NO_LIMITS)
+            compare_trace(reference, cut, NO_LIMITS)
 
 
 def test_a_channel_with_a_limit_must_exist(trace, reference):
-    tolerances = load_tolerances(TOLERANCES)
+    tolerances = load_tolerances(TOLERANCES_PATH)
     reference.channels["d_rel"][:] = np.nan
     with pytest.raises(ConfigError, match="nothing in column 'd_rel'"):
-        compare(reference, trace, tolerances)
+        compare_trace(reference, trace, tolerances)
     del reference.channels["d_rel"]
     with pytest.raises(ConfigError, match="no column 'd_rel'"):
-        compare(reference, trace, tolerances)
+        compare_trace(reference, trace, tolerances)
 
 
 @pytest.mark.parametrize(
@@ -305,10 +308,10 @@ def test_wrong_folders_and_names_are_refused(reference, finished, tmp_path, caps
 
 
 def test_the_projects_table_has_the_agreed_limits():
-    tolerances = load_tolerances(TOLERANCES)
-    assert tolerances.channels["v_ego"].rms == 0.15
-    assert tolerances.channels["d_rel"].rms == 0.5
-    assert tolerances.figures == {
+    tolerances = load_tolerances(TOLERANCES_PATH)
+    assert tolerances.channel_limits["v_ego"].rms == 0.15
+    assert tolerances.channel_limits["d_rel"].rms == 0.5
+    assert tolerances.figure_limits == {
         "engaged_s": 0.02,
         "set_speeds_kph": 0.0,
         "min_hwt_s": 0.05,

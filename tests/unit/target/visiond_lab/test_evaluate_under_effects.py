@@ -9,7 +9,7 @@ import pytest
 from selfdrive.sim.effects.effects_page import SMALL, TITLE
 from selfdrive.sim.effects.levels import LEVELS
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond_lab.evaluate import EXIT_INPUT, SOURCES, UDACITY
+from selfdrive.visiond_lab.evaluate import EXIT_INVALID_INPUT, SOURCES, UDACITY
 from selfdrive.visiond_lab.evaluate_under_effects import HEADS, IN_A_ROW, main
 
 
@@ -56,5 +56,5 @@ def test_strips_show_all_levels(frames, tmp_path):
 
 
 def test_the_error_names_a_missing_frame(frames, tmp_path, capsys):
-    assert main([str(tmp_path), frames[1]]) == EXIT_INPUT
+    assert main([str(tmp_path), frames[1]]) == EXIT_INVALID_INPUT
     assert "p1_one" in capsys.readouterr().err
