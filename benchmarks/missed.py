@@ -22,10 +22,10 @@ from selfdrive.sim.effects.effect import Effect, Moment  # noqa: E402
 from selfdrive.sim.picture import Picture  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 from selfdrive.visiond.robust_detector import RobustDetector  # noqa: E402
-from selfdrive.visiond_lab.evaluate import TUSIMPLE, UDACITY  # noqa: E402
+from selfdrive.visiond_lab.evaluate import TUSIMPLE_MODEL, UDACITY_MODEL  # noqa: E402
 from selfdrive.visiond_lab.random_looks import random_look  # noqa: E402
 
-CAMERAS = CameraModel(), UDACITY, TUSIMPLE
+CAMERAS = CameraModel(), UDACITY_MODEL, TUSIMPLE_MODEL
 EFFECTS: tuple[type[Effect], ...] = PaperRain, PaperSnow, PaperOcclusion
 AHEAD, ERROR = 10.0, 0.3  # m
 ROAD_SEED = 11

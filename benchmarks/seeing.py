@@ -29,7 +29,7 @@ from selfdrive.common.camera_model import CameraModel  # noqa: E402
 from selfdrive.messages import CameraView  # noqa: E402
 from selfdrive.sim import effects, simulator  # noqa: E402
 from selfdrive.sim.effects.effect import Effect, Moment  # noqa: E402
-from selfdrive.sim.effects.levels import LEVELS  # noqa: E402
+from selfdrive.sim.effects.levels import LEVEL_AMOUNTS  # noqa: E402
 from selfdrive.sim.moved_picture import CodedView  # noqa: E402
 from selfdrive.sim.picture import Picture  # noqa: E402
 from selfdrive.sim.picture_camera import PictureCamera  # noqa: E402
@@ -175,7 +175,7 @@ class FaultyCamera(PictureCamera):
 def drawing(name: str, level: int, coded: bool, number: int, camera: CameraModel) -> Effect:
     """Return the effect at a level of 1 to 10, drawn with one of its seeds."""
     kind = KINDS[name][coded]
-    amounts = LEVELS[kind]
+    amounts = LEVEL_AMOUNTS[kind]
     return kind(amounts[-(-level * len(amounts) // 10) - 1], 1 + number, camera)
 
 

@@ -17,7 +17,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim import camera_and_detector
 from selfdrive.sim.effects.effect import Moment
-from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
 from selfdrive.sim.moved_picture import CodedView, GroundView, ShiftedView
 from selfdrive.sim.picture import Picture
 from selfdrive.sim.picture_options import AS_CODED, CODED, DASHED, DETECTORS, Pictures
@@ -74,7 +74,7 @@ def seen(detector: str, level: int) -> Iterator[tuple[str, str]]:
     model = CameraModel()
     road = RoadRenderer(model, WORN, seed=3)
     frames = [road.grey(m.position, 0.3, 0.01) for m in MOMENTS]
-    for effect, amounts in LEVELS.items():
+    for effect, amounts in LEVEL_AMOUNTS.items():
         made = effect(amounts[min(level, len(amounts) - 1)], 3, model)
         shown = [made.apply(frame, moment) for frame, moment in zip(frames, MOMENTS, strict=True)]
         eyes = camera_and_detector.build_detector(detector, model)

@@ -26,16 +26,16 @@ from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
 
 EXIT_INVALID_INPUT = 2
-WIDTH, ROWS, HORIZON = 640, 480, 200  # of the canonical frame
-ROW = 278  # where lines are compared
-TOLERANCE = 0.3 / 3.7  # of the lines' true spacing
-IMAGES = (".jpg", ".png", ".jpeg")
+CANONICAL_WIDTH, CANONICAL_ROWS, CANONICAL_HORIZON = 640, 480, 200  # of the canonical frame
+COMPARED_ROW = 278  # where lines are compared
+SPACING_TOLERANCE = 0.3 / 3.7  # of the lines' true spacing
+IMAGE_SUFFIXES = (".jpg", ".png", ".jpeg")
 ROBUST, PAPER, BOTH = "robust", "paper", "both"
-GREEN, RED = (0, 255, 0), (0, 0, 255)
+DETECTED_COLOUR, TRUE_COLOUR = (0, 255, 0), (0, 0, 255)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Source:
+class CameraSource:
     """A camera: the row of `rows` where straight roads vanish, and its canonical model."""
 
     vanishing_row: float
@@ -44,29 +44,31 @@ class Source:
 
 
 def _canonical_model(focal: float, height: float) -> CameraModel:
-    return CameraModel.from_view(width=WIDTH, rows=ROWS, horizon=HORIZON, focal=focal, height=height)
+    return CameraModel.from_view(
+        width=CANONICAL_WIDTH, rows=CANONICAL_ROWS, horizon=CANONICAL_HORIZON, focal=focal, height=height
+    )
 
 
-UDACITY = _canonical_model(focal=579.0, height=1.21)  # lines 3.7 m apart diverge by 3.05 px per row
-TUSIMPLE = _canonical_model(focal=500.0, height=1.68)  # 2.2 px per row
-SOURCES = {
-    "p1": Source(vanishing_row=318, rows=540, model=UDACITY),
-    "vid": Source(vanishing_row=318, rows=540, model=UDACITY),
-    "adv": Source(vanishing_row=425, rows=720, model=UDACITY),
-    "tus": Source(vanishing_row=238, rows=720, model=TUSIMPLE),
-    "tust": Source(vanishing_row=238, rows=720, model=TUSIMPLE),
+UDACITY_MODEL = _canonical_model(focal=579.0, height=1.21)  # lines 3.7 m apart diverge by 3.05 px per row
+TUSIMPLE_MODEL = _canonical_model(focal=500.0, height=1.68)  # 2.2 px per row
+SOURCE_BY_KEY = {
+    "p1": CameraSource(vanishing_row=318, rows=540, model=UDACITY_MODEL),
+    "vid": CameraSource(vanishing_row=318, rows=540, model=UDACITY_MODEL),
+    "adv": CameraSource(vanishing_row=425, rows=720, model=UDACITY_MODEL),
+    "tus": CameraSource(vanishing_row=238, rows=720, model=TUSIMPLE_MODEL),
+    "tust": CameraSource(vanishing_row=238, rows=720, model=TUSIMPLE_MODEL),
 }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Frame:
+class LabelledFrame:
     """A frame to examine, in colour in the canonical frame, and its lines' true columns in row 278."""
 
     key: str
     colour: np.ndarray
     model: CameraModel
-    left: float
-    right: float
+    left_column: float
+    right_column: float
 
     @property
     def grey(self) -> np.ndarray:
@@ -74,98 +76,106 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class DetectionResult:
     """A detector's result for a frame: errors (px, right positive) in row 278, None for a line not found."""
 
-    frame: Frame
+    frame: LabelledFrame
     lines: LaneLines
-    left: float | None
-    right: float | None
+    left_error: float | None
+    right_error: float | None
 
     @property
-    def good(self) -> bool:
-        limit = TOLERANCE * (self.frame.right - self.frame.left)
-        return all(error is not None and abs(error) <= limit for error in (self.left, self.right))
+    def has_both_lines(self) -> bool:
+        limit = SPACING_TOLERANCE * (self.frame.right_column - self.frame.left_column)
+        return all(error is not None and abs(error) <= limit for error in (self.left_error, self.right_error))
 
 
-def canonical(colour: np.ndarray, source: Source) -> np.ndarray:
+def to_canonical_frame(colour: np.ndarray, source: CameraSource) -> np.ndarray:
     """The frame scaled to 640 and moved so that its vanishing row is 200, padded with black to 640 x 480."""
     rows, width = colour.shape[:2]
-    scale = WIDTH / width
-    small = cv2.resize(colour, (WIDTH, round(rows * scale)), interpolation=cv2.INTER_AREA)
-    down = HORIZON - source.vanishing_row * (rows / source.rows) * scale
-    return cv2.warpAffine(small, np.float32([[1, 0, 0], [0, 1, down]]), (WIDTH, ROWS))
+    scale = CANONICAL_WIDTH / width
+    small = cv2.resize(colour, (CANONICAL_WIDTH, round(rows * scale)), interpolation=cv2.INTER_AREA)
+    down = CANONICAL_HORIZON - source.vanishing_row * (rows / source.rows) * scale
+    return cv2.warpAffine(small, np.float32([[1, 0, 0], [0, 1, down]]), (CANONICAL_WIDTH, CANONICAL_ROWS))
 
 
-def read_frames(folder: Path, truth: Path) -> list[Frame]:
+def load_labelled_frames(folder: Path, truth: Path) -> list[LabelledFrame]:
     """Read the frames that the truth file names. Raises ConfigError if one is missing or unreadable."""
-    images = [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in IMAGES]
-    own = _source_of(camera_of(folder)) if (folder / CALIBRATION).exists() else None
+    images = [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in IMAGE_SUFFIXES]
+    folder_source = _source_from_model(camera_of(folder)) if (folder / CALIBRATION).exists() else None
     frames = []
-    for key, entry in _read_truth(truth).items():
-        source = own or SOURCES.get(key.partition("_")[0])
+    for key, entry in _load_truth(truth).items():
+        source = folder_source or SOURCE_BY_KEY.get(key.partition("_")[0])
         if source is None:
             raise ConfigError(
                 f"no camera for {key!r}",
                 where=str(truth),
-                expected=f"a key that starts with one of {', '.join(SOURCES)}",
+                expected=f"a key that starts with one of {', '.join(SOURCE_BY_KEY)}",
                 remedy=f"rename it, or add a {CALIBRATION} to the frames",
             )
-        left, right = _centres(key, entry, truth)
-        path = _image(key, images, folder)
+        left, right = _true_columns(key, entry, truth)
+        path = _image_of_key(key, images, folder)
         colour = cv2.imread(str(path), cv2.IMREAD_COLOR)
         if colour is None:
             raise ConfigError(
                 "unreadable image", where=str(path), expected="a JPEG or PNG file", remedy="replace it"
             )
         frames.append(
-            Frame(key=key, colour=canonical(colour, source), model=source.model, left=left, right=right)
+            LabelledFrame(
+                key=key,
+                colour=to_canonical_frame(colour, source),
+                model=source.model,
+                left_column=left,
+                right_column=right,
+            )
         )
     return frames
 
 
-def evaluate(detector: str, frames: list[Frame]) -> list[Finding]:
-    return [look(build(detector, frame.model), frame, frame.grey) for frame in frames]
+def evaluate_detector(detector: str, frames: list[LabelledFrame]) -> list[DetectionResult]:
+    return [detect_lines(build_lane_detector(detector, frame.model), frame, frame.grey) for frame in frames]
 
 
-def look(detector: LaneDetector, frame: Frame, picture: np.ndarray) -> Finding:
+def detect_lines(detector: LaneDetector, frame: LabelledFrame, picture: np.ndarray) -> DetectionResult:
     view = CameraView(left_lane_y=0.0, right_lane_y=0.0, path_y=0.0, bend=(), lead_d_rel=0.0, picture=picture)
     lines = detector.detect(view)
     errors = []
-    for line, true in ((lines.left, frame.left), (lines.right, frame.right)):
+    for line, true in ((lines.left, frame.left_column), (lines.right, frame.right_column)):
         a, b = frame.model.line_in_picture(line.y, line.slope)
-        errors.append(a * ROW + b - true if line.prob > 0.0 else None)
-    return Finding(frame=frame, lines=lines, left=errors[0], right=errors[1])
+        errors.append(a * COMPARED_ROW + b - true if line.prob > 0.0 else None)
+    return DetectionResult(frame=frame, lines=lines, left_error=errors[0], right_error=errors[1])
 
 
-def build(name: str, model: CameraModel) -> PaperDetector | RobustDetector:
+def build_lane_detector(name: str, model: CameraModel) -> PaperDetector | RobustDetector:
     return PaperDetector(model) if name == PAPER else RobustDetector(model)
 
 
-def report(detector: str, findings: list[Finding]) -> str:
-    rows = [f"{detector}: errors in row {ROW} (px), limit {TOLERANCE:.4f} of the spacing"]
+def render_report(detector: str, findings: list[DetectionResult]) -> str:
+    rows = [f"{detector}: errors in row {COMPARED_ROW} (px), limit {SPACING_TOLERANCE:.4f} of the spacing"]
     for finding in findings:
         frame = finding.frame
         errors = "  ".join(
             f"{side} {'not found' if error is None else f'{error:+9.1f}':>9}"
-            for side, error in (("left", finding.left), ("right", finding.right))
+            for side, error in (("left", finding.left_error), ("right", finding.right_error))
         )
-        limit = TOLERANCE * (frame.right - frame.left)
-        rows.append(f"  {frame.key:32} {errors}  limit {limit:5.1f}  {'ok' if finding.good else 'MISSED'}")
-    good = sum(finding.good for finding in findings)
+        limit = SPACING_TOLERANCE * (frame.right_column - frame.left_column)
+        rows.append(
+            f"  {frame.key:32} {errors}  limit {limit:5.1f}  {'ok' if finding.has_both_lines else 'MISSED'}"
+        )
+    good = sum(finding.has_both_lines for finding in findings)
     rows.append(f"{detector}: both lines found in {good} of {len(findings)} = {good / len(findings):.1%}")
     return "\n".join(rows)
 
 
-def draw(finding: Finding) -> np.ndarray:
+def draw_overlay(finding: DetectionResult) -> np.ndarray:
     canvas, frame = finding.frame.colour.copy(), finding.frame
     for line in (finding.lines.left, finding.lines.right):
         if line.prob > 0.0:
             a, b = frame.model.line_in_picture(line.y, line.slope)
-            ends = [(round(a * row + b), row) for row in (HORIZON + 15, ROWS - 1)]
-            cv2.line(canvas, *ends, GREEN, 1, cv2.LINE_AA)
-    for column in (frame.left, frame.right):
-        cv2.circle(canvas, (round(column), ROW), 4, RED, 1, cv2.LINE_AA)
+            ends = [(round(a * row + b), row) for row in (CANONICAL_HORIZON + 15, CANONICAL_ROWS - 1)]
+            cv2.line(canvas, *ends, DETECTED_COLOUR, 1, cv2.LINE_AA)
+    for column in (frame.left_column, frame.right_column):
+        cv2.circle(canvas, (round(column), COMPARED_ROW), 4, TRUE_COLOUR, 1, cv2.LINE_AA)
     return canvas
 
 
@@ -173,10 +183,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parse_arguments(arguments)
     cv2.setNumThreads(1)
     try:
-        frames = read_frames(options.frames, options.truth)
+        frames = load_labelled_frames(options.frames, options.truth)
         for detector in (PAPER, ROBUST) if options.detector == BOTH else (options.detector,):
-            findings = evaluate(detector, frames)
-            print(report(detector, findings))
+            findings = evaluate_detector(detector, frames)
+            print(render_report(detector, findings))
             if options.overlays:
                 _write_overlays(options.overlays, detector, findings)
     except ConfigError as error:
@@ -185,23 +195,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _source_of(model: CameraModel) -> Source:
-    scale = WIDTH / model.width
+def _source_from_model(model: CameraModel) -> CameraSource:
+    scale = CANONICAL_WIDTH / model.width
     fy = model.fy * scale
-    seen = CameraModel(
-        width=WIDTH,
-        rows=ROWS,
+    canonical_model = CameraModel(
+        width=CANONICAL_WIDTH,
+        rows=CANONICAL_ROWS,
         fx=model.fx * scale,
         fy=fy,
         cx=(model.cx + 0.5) * scale - 0.5,
-        cy=HORIZON + fy * tan(model.pitch),
+        cy=CANONICAL_HORIZON + fy * tan(model.pitch),
         height=model.height,
         pitch=model.pitch,
     )
-    return Source(vanishing_row=model.horizon, rows=model.rows, model=seen)
+    return CameraSource(vanishing_row=model.horizon, rows=model.rows, model=canonical_model)
 
 
-def _read_truth(path: Path) -> dict:
+def _load_truth(path: Path) -> dict:
     try:
         lines = json.loads(path.read_text(encoding="utf-8"))["lines"]
     except OSError as error:
@@ -217,10 +227,10 @@ def _read_truth(path: Path) -> dict:
     )
 
 
-def _centres(key: str, entry: dict, truth: Path) -> tuple[float, float]:
+def _true_columns(key: str, entry: dict, truth: Path) -> tuple[float, float]:
     try:
         if entry.get("L") and entry.get("R"):
-            left, right = (entry[side][0] * ROW + entry[side][1] for side in "LR")
+            left, right = (entry[side][0] * COMPARED_ROW + entry[side][1] for side in "LR")
         else:
             centres = entry["gt"]
             left, right = (centres[side] for side in ("LR" if isinstance(centres, dict) else (0, 1)))
@@ -237,7 +247,7 @@ def _centres(key: str, entry: dict, truth: Path) -> tuple[float, float]:
     )
 
 
-def _image(key: str, images: list[Path], folder: Path) -> Path:
+def _image_of_key(key: str, images: list[Path], folder: Path) -> Path:
     """The key's file: `KEY.jpg`, or without the key's first word. Raises ConfigError if it is missing.
 
     Of several files, the one in a folder named after the key's first word is used.
@@ -256,12 +266,12 @@ def _image(key: str, images: list[Path], folder: Path) -> Path:
     )
 
 
-def _write_overlays(folder: Path, detector: str, findings: list[Finding]) -> None:
+def _write_overlays(folder: Path, detector: str, findings: list[DetectionResult]) -> None:
     for finding in findings:
         path = folder / f"{detector}_{finding.frame.key}.png"
         with writing(path, expected="a writable folder", remedy="choose another --overlays"):
             folder.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(cv2.imencode(".png", draw(finding))[1])
+            path.write_bytes(cv2.imencode(".png", draw_overlay(finding))[1])
 
 
 def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:

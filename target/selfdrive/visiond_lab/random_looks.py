@@ -7,7 +7,7 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.road_look import Look, OtherCar, Paint
 
-LEAST_CONTRAST = 14.0  # grey levels between paint and asphalt
+MIN_PAINT_CONTRAST = 14.0  # grey levels between paint and asphalt
 
 
 def random_camera(rng: np.random.Generator) -> CameraModel:
@@ -28,8 +28,8 @@ def random_camera(rng: np.random.Generator) -> CameraModel:
 
 
 def random_look(rng: np.random.Generator) -> Look:
-    asphalt = _either(rng, (45.0, 120.0), (110.0, 185.0))
-    paints = [_paint(asphalt, rng) for _ in range(4)]
+    asphalt = _draw_from_either(rng, (45.0, 120.0), (110.0, 185.0))
+    paints = [_draw_paint(asphalt, rng) for _ in range(4)]
     return Look(
         lane_width=rng.uniform(3.0, 4.1),
         left=paints[0],
@@ -46,22 +46,22 @@ def random_look(rng: np.random.Generator) -> Look:
         kerb=rng.uniform(40.0, 220.0) if rng.random() < 0.3 else None,
         patches=rng.uniform(0.0, 8.0),
         cracks=rng.uniform(0.0, 16.0),
-        seams=_sometimes(rng, 0.4, 0.5, 6.0),
+        seams=_draw_sometimes(rng, 0.4, 0.5, 6.0),
         joints=rng.uniform(4.0, 12.0) if rng.random() < 0.25 else None,
-        joint_tone=_either(rng, (-65.0, -10.0), (5.0, 20.0)),
-        shadows=_sometimes(rng, 0.6, 0.05, 0.6),
+        joint_tone=_draw_from_either(rng, (-65.0, -10.0), (5.0, 20.0)),
+        shadows=_draw_sometimes(rng, 0.6, 0.05, 0.6),
         shadow_depth=rng.uniform(0.2, 0.7),
         sky=rng.uniform(150.0, 250.0),
         trees=rng.uniform(30.0, 130.0),
         exposure=rng.uniform(0.65, 1.25),
-        cars=tuple(_car(rng) for _ in range(int(rng.integers(0, 4)))),
+        cars=tuple(_draw_car(rng) for _ in range(int(rng.integers(0, 4)))),
     )
 
 
-def _paint(asphalt: float, rng: np.random.Generator) -> Paint:
+def _draw_paint(asphalt: float, rng: np.random.Generator) -> Paint:
     room = 245.0 - asphalt
     tone = asphalt + room * rng.uniform(0.25, 1.0)
-    most = max(0.0, 1.0 - LEAST_CONTRAST / (tone - asphalt))
+    most = max(0.0, 1.0 - MIN_PAINT_CONTRAST / (tone - asphalt))
     return Paint(
         tone=tone,
         width=rng.uniform(0.09, 0.20),
@@ -70,12 +70,12 @@ def _paint(asphalt: float, rng: np.random.Generator) -> Paint:
         period=rng.uniform(8.0, 13.0),
         phase=rng.uniform(0.0, 12.0),
         double=rng.random() < 0.12,
-        wear=_sometimes(rng, 0.6, 0.02, 0.5),
+        wear=_draw_sometimes(rng, 0.6, 0.02, 0.5),
         fade=most * rng.uniform(0.0, 0.9) ** 2,
     )
 
 
-def _car(rng: np.random.Generator) -> OtherCar:
+def _draw_car(rng: np.random.Generator) -> OtherCar:
     lane = rng.choice([-3.7, 0.0, 3.7], p=[0.42, 0.16, 0.42])
     return OtherCar(
         x=rng.uniform(14.0, 60.0) if lane == 0.0 else rng.uniform(5.0, 60.0),
@@ -86,9 +86,11 @@ def _car(rng: np.random.Generator) -> OtherCar:
     )
 
 
-def _either(rng: np.random.Generator, first: tuple[float, float], second: tuple[float, float]) -> float:
+def _draw_from_either(
+    rng: np.random.Generator, first: tuple[float, float], second: tuple[float, float]
+) -> float:
     return rng.uniform(*(first if rng.random() < 0.6 else second))
 
 
-def _sometimes(rng: np.random.Generator, share: float, least: float, most: float) -> float:
+def _draw_sometimes(rng: np.random.Generator, share: float, least: float, most: float) -> float:
     return rng.uniform(least, most) if rng.random() < share else 0.0

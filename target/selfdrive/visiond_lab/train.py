@@ -17,18 +17,18 @@ from sklearn.neural_network import MLPClassifier
 from threadpoolctl import threadpool_limits
 
 from selfdrive.visiond.lane_net import HIDDEN, WEIGHTS, LaneNet
-from selfdrive.visiond_lab.training_windows import labelled_windows
+from selfdrive.visiond_lab.training_windows import draw_labelled_windows
 
-FULL, SMALL = (600, 60), (12, 4)  # roads for training and testing
+FULL_ROADS, SMALL_ROADS = (600, 60), (12, 4)  # roads for training and testing
 EPOCHS = 25
-DECAY = 3e-3  # penalty on large weights
+WEIGHT_DECAY = 3e-3  # penalty on large weights
 
 
-def train(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
+def train_net(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
     model = MLPClassifier(
         hidden_layer_sizes=(HIDDEN,),
         activation="tanh",
-        alpha=DECAY,
+        alpha=WEIGHT_DECAY,
         batch_size=256,
         max_iter=EPOCHS,
         n_iter_no_change=EPOCHS,
@@ -47,17 +47,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=WEIGHTS, help="the file to write")
     parser.add_argument("--small", action="store_true", help="few roads, for a trial")
-    chosen = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     cv2.setNumThreads(1)
-    scenes, others = SMALL if chosen.small else FULL
-    learn, test = (np.random.default_rng([chosen.seed, purpose]) for purpose in (0, 1))
-    net = train(*labelled_windows(scenes, learn), chosen.seed)
-    features, labels = labelled_windows(others, test)
+    scenes, others = SMALL_ROADS if options.small else FULL_ROADS
+    learn, test = (np.random.default_rng([options.seed, purpose]) for purpose in (0, 1))
+    net = train_net(*draw_labelled_windows(scenes, learn), options.seed)
+    features, labels = draw_labelled_windows(others, test)
     marked = net.score(features) > 0.0
-    net.save(chosen.out)
-    right, found, false = (np.mean(part) for part in (marked == labels, marked[labels], marked[~labels]))
-    print(f"{scenes} roads; {right:.1%} of {len(labels)} windows of others are classified correctly")
-    print(f"with a mark: {found:.1%} found; without: {false:.1%} mistaken for marks")
+    net.save(options.out)
+    right_share, found_share, mistaken_share = (
+        np.mean(part) for part in (marked == labels, marked[labels], marked[~labels])
+    )
+    print(f"{scenes} roads; {right_share:.1%} of {len(labels)} windows of others are classified correctly")
+    print(f"with a mark: {found_share:.1%} found; without: {mistaken_share:.1%} mistaken for marks")
     return 0
 
 

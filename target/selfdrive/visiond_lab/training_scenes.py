@@ -9,15 +9,15 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.lead_picture import draw_car
 from selfdrive.sim.road_look import Look, Paint
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond_lab.picture_flaws import Ground, bent, taken
+from selfdrive.visiond_lab.picture_flaws import RoadsideFlaws, bend_images, simulate_camera
 from selfdrive.visiond_lab.random_looks import random_camera, random_look
 
-PERIODS = 4  # of 12.2 m, length of a scene's road
-VIEWS = 6  # pictures of each scene
+SCENE_PERIODS = 4  # of 12.2 m, length of a scene's road
+VIEWS_PER_SCENE = 6  # pictures of each scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class View:
+class TrainingView:
     """A picture (uint8) and the share of lane paint in each pixel (uint8, 255 is all)."""
 
     model: CameraModel
@@ -25,22 +25,22 @@ class View:
     paint: np.ndarray
 
 
-def views(scenes: int, rng: np.random.Generator) -> Iterator[View]:
+def generate_views(scenes: int, rng: np.random.Generator) -> Iterator[TrainingView]:
     for _ in range(scenes):
         look, model, seed = random_look(rng), random_camera(rng), int(rng.integers(2**31))
-        road = RoadRenderer(model, look, seed, periods=PERIODS)
-        marks = RoadRenderer(model, _only_paint(look), seed, periods=PERIODS)
-        hidden = _hidden(look, model)
-        ground = Ground(model, look.lane_width, rng)
-        for _ in range(VIEWS):
+        road = RoadRenderer(model, look, seed, periods=SCENE_PERIODS)
+        marks = RoadRenderer(model, _only_paint(look), seed, periods=SCENE_PERIODS)
+        hidden = _pixels_behind_cars(look, model)
+        ground = RoadsideFlaws(model, look.lane_width, rng)
+        for _ in range(VIEWS_PER_SCENE):
             pose = rng.uniform(0.0, 50.0), rng.normal(0.0, 0.45), rng.normal(0.0, 0.02)
             paint = np.where(hidden, np.uint8(0), marks.grey(*pose))
-            picture, paint = ground.changed(road.grey(*pose), paint, offset=pose[1], heading=pose[2])
-            picture, paint = bent(model, (picture, paint), rng)
-            yield View(model=model, picture=taken(picture, rng), paint=paint)
+            picture, paint = ground.apply(road.grey(*pose), paint, offset=pose[1], heading=pose[2])
+            picture, paint = bend_images(model, (picture, paint), rng)
+            yield TrainingView(model=model, picture=simulate_camera(picture, rng), paint=paint)
 
 
-def _hidden(look: Look, model: CameraModel) -> np.ndarray:
+def _pixels_behind_cars(look: Look, model: CameraModel) -> np.ndarray:
     picture = np.zeros((model.rows, model.width), np.uint8)
     for car in look.cars:
         draw_car(picture, model, car)

@@ -11,7 +11,7 @@ _TABLE_HEAD = f"  {'channel':<16}{'unit':<6}{'rms':>10}{'largest':>11}{'at [s]':
 
 
 def comparison_lines(comparison: TraceComparison, *, all_channels: bool) -> list[str]:
-    """Key figures and limited channels; `long` adds all other channels and all crossings."""
+    """Key figures and limited channels; `all_channels` adds the other channels and all crossings."""
     verdict = "within tolerance" if comparison.is_within_tolerance else "BEYOND TOLERANCE"
     out = [f"{comparison.name}: {verdict}"]
     out += [f"  {key_figure_line(result)}" for result in comparison.figure_comparisons]
@@ -31,7 +31,8 @@ def key_figure_line(result: KeyFigureComparison) -> str:
     limit = "" if result.limit is None else f", limit {result.limit:g}"
     difference = f"{result.difference:.3f}" if isfinite(result.difference) else "not comparable"
     flag = "  <-- beyond" if result.is_beyond_limit else ""
-    return f"{result.name:<15} {run_text:>12}   reference {reference_text:>12}   difference {difference}{limit}{flag}"
+    values = f"{run_text:>12}   reference {reference_text:>12}   difference {difference}"
+    return f"{result.name:<15} {values}{limit}{flag}"
 
 
 def _channel_line(result: ChannelComparison) -> str:
@@ -58,7 +59,8 @@ def _channel_line(result: ChannelComparison) -> str:
 
 def _crossing_lines(result: ChannelComparison) -> list[str]:
     return [
-        f"    beyond {result.limits.listing_threshold:g} from {crossing.begin_s:.2f} to {crossing.end_s:.2f} s,"
+        f"    beyond {result.limits.listing_threshold:g}"
+        f" from {crossing.begin_s:.2f} to {crossing.end_s:.2f} s,"
         f" most at {crossing.largest_at_s:.2f} s: {crossing.largest_difference:+.4f}"
         for crossing in result.crossings
     ]

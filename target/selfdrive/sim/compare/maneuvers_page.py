@@ -72,6 +72,7 @@ class ManeuverResult:
 
 def render_maneuvers_page(maneuvers: list[ManeuverResult], plant: str) -> str:
     rows = "".join(_overview_row(maneuver) for maneuver in maneuvers)
+    sections = "".join(_maneuver_section(maneuver) for maneuver in maneuvers)
     head = "".join(f"<th>{_FIGURE_TITLES[name]}</th>" for name in key_figures.FIGURE_MEANINGS)
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
@@ -81,7 +82,7 @@ def render_maneuvers_page(maneuvers: list[ManeuverResult], plant: str) -> str:
         "pale lines beneath them the references; time in seconds. Dashed: engaging.</p>"
         f'<div class="scroll"><table><tr><th class="t">run</th><th class="t">what happens</th>'
         f'<th class="t">reference</th><th class="t">hazards and alerts</th>{head}</tr>'
-        f"{rows}</table></div>{''.join(_maneuver_section(one) for one in maneuvers)}</body></html>\n"
+        f"{rows}</table></div>{sections}</body></html>\n"
     )
 
 
@@ -108,7 +109,8 @@ def _maneuver_section(maneuver: ManeuverResult) -> str:
     run = maneuver.run
     end = len(run.trace["t"]) / STEPS_PER_SECOND
     plots = "".join(
-        f"<div><h3>{panel.title} [{panel.unit}]</h3>{_plot_legend(panel)}{draw_panel(panel, _event_marks(run), end)}</div>"
+        f"<div><h3>{panel.title} [{panel.unit}]</h3>{_plot_legend(panel)}"
+        f"{draw_panel(panel, _event_marks(run), end)}</div>"
         for panel in _plot_panels(maneuver)
     )
     return (
@@ -151,7 +153,8 @@ def _comparison_table(comparison: TraceComparison | None) -> str:
     limit_cells = "".join(f"<td>{'-' if limit is None else f'{limit:g}'}</td>" for *_, limit, _ in rows)
     return (
         f'<div class="scroll"><table><tr><th></th>{head}</tr><tr><td class="t">run</td>{run_cells}</tr>'
-        f'<tr><td class="t">reference</td>{reference_cells}</tr><tr><td class="t">tolerance</td>{limit_cells}</tr>'
+        f'<tr><td class="t">reference</td>{reference_cells}</tr>'
+        f'<tr><td class="t">tolerance</td>{limit_cells}</tr>'
         "</table></div>"
     )
 

@@ -24,7 +24,7 @@ _LIMIT_MEANINGS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChannelLimits:
-    """Limits of one channel; None: no limit. `rms` and `max` in the channel's SI unit, `lag` in s."""
+    """Limits of one channel; None: no limit. `rms` and `max` in the channel's SI unit."""
 
     rms: float | None = None
     max: float | None = None

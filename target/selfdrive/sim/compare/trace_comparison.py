@@ -24,7 +24,7 @@ _NO_LIMITS = ChannelLimits()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BandCrossing:
-    """An interval (s) with differences outside the band; `worst` is the largest, at `at` s."""
+    """An interval with differences outside the band."""
 
     begin_s: float
     end_s: float
@@ -34,7 +34,7 @@ class BandCrossing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChannelComparison:
-    """One channel's difference, ours minus reference, in its unit; `lag` (s) is positive if ours is late."""
+    """One channel's difference, run minus reference, in its unit; `lag_s` is positive if the run is late."""
 
     column: TraceColumn
     limits: ChannelLimits
@@ -145,7 +145,7 @@ def _check_limited_channels(reference: ReferenceTrace, tolerances: Tolerances) -
 def _compare_key_figures(
     reference: ReferenceTrace, run_channels: dict[str, np.ndarray], limits: dict[str, float]
 ) -> tuple[KeyFigureComparison, ...]:
-    """Use the reference's rows for both; only our time of engaging uses every step."""
+    """Use the reference's rows for both; only the run's time of engaging uses every step."""
     reference_values = key_figures.compute_key_figures(reference.steps, reference.channels)
     run_rows = {name: values[reference.steps] for name, values in run_channels.items()}
     run_values = key_figures.compute_key_figures(reference.steps, run_rows)
@@ -203,7 +203,7 @@ def _rows_where_both_have_a_lead(
 def _differences_at_steps(
     column: TraceColumn, reference_values: np.ndarray, run_channel: np.ndarray, steps: np.ndarray
 ) -> np.ndarray:
-    """Ours at `steps` minus the reference: 0 or 1 for exclusive values, infinite if ours is NaN.
+    """The run at `steps` minus the reference: 0 or 1 for categories, infinite if the run has NaN.
 
     Only the headway can be infinite, at standstill; then it is not compared.
     """

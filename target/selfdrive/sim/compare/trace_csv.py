@@ -23,7 +23,7 @@ _FCW_BIT = 1 << COUNTED_ALERTS.index("fcw")
 
 
 class TraceColumn(NamedTuple):
-    """One column. `factor` converts its numbers to SI; a column with `words` has these instead of numbers."""
+    """One column. `si_factor` converts its numbers to SI; a column with `value_names` has no numbers."""
 
     name: str
     channel: str

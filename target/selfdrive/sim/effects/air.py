@@ -15,15 +15,15 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.effect import Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
-THRESHOLD = 0.05
-LAYER = 100.0  # m; above this height, the sky is clear
+VISIBILITY_CONTRAST = 0.05
+LAYER_HEIGHT = 100.0  # m; above this height, the sky is clear
 
 
-def extinction(visibility: float) -> float:
-    return -log(THRESHOLD) / visibility
+def extinction_coefficient(visibility: float) -> float:
+    return -log(VISIBILITY_CONTRAST) / visibility
 
 
-def ways(camera: CameraModel) -> np.ndarray:
+def light_path_lengths(camera: CameraModel) -> np.ndarray:
     """Path of each pixel's light (m) through the layer of air, from the road or from the layer's top.
 
     Float32 (rows, width); infinite at the horizon. The road is flat and empty.
@@ -32,13 +32,13 @@ def ways(camera: CameraModel) -> np.ndarray:
     down = ((np.arange(camera.rows) - camera.cy) / camera.fy)[:, None]
     fall = (sin(camera.pitch) + down * cos(camera.pitch)) / np.sqrt(1.0 + right**2 + down**2)
     with np.errstate(divide="ignore"):
-        way = np.where(fall > 0.0, camera.height / fall, (LAYER - camera.height) / np.abs(fall))
-    return way.astype(np.float32)
+        path = np.where(fall > 0.0, camera.height / fall, (LAYER_HEIGHT - camera.height) / np.abs(fall))
+    return path.astype(np.float32)
 
 
-def clearness(coefficient: float, camera: CameraModel) -> np.ndarray:
+def transmitted_share(coefficient: float, camera: CameraModel) -> np.ndarray:
     """Share of each pixel's light, float32, that air of this extinction coefficient (1/m) transmits."""
-    return each(exp, np.float32(-coefficient) * ways(camera)).astype(np.float32)
+    return each(exp, np.float32(-coefficient) * light_path_lengths(camera)).astype(np.float32)
 
 
 def airlight(picture: np.ndarray | Picture, camera: CameraModel) -> float:
@@ -48,14 +48,16 @@ def airlight(picture: np.ndarray | Picture, camera: CameraModel) -> float:
     return cv2.mean(picture[:rows, :])[0]
 
 
-def veiled(picture: np.ndarray, veil: np.ndarray, taken: np.ndarray, air: float) -> np.ndarray:
+def veil_picture(
+    picture: np.ndarray, veil: np.ndarray, particle_shares: np.ndarray, air: float
+) -> np.ndarray:
     """The picture after attenuation by a veil and by particles; `air` replaces the lost light.
 
     Arrays are uint8 of the same shape, shares in units of 1/255; `air` is a grey level.
     """
-    kept = cv2.multiply(veil, cv2.bitwise_not(taken), scale=1.0 / 255.0)
-    lost = cv2.convertScaleAbs(kept, alpha=-air / 255.0, beta=air)  # air * (1 - kept / 255)
-    return cv2.add(cv2.multiply(picture, kept, scale=1.0 / 255.0), lost)
+    transmitted = cv2.multiply(veil, cv2.bitwise_not(particle_shares), scale=1.0 / 255.0)
+    airlight_part = cv2.convertScaleAbs(transmitted, alpha=-air / 255.0, beta=air)  # air * (1 - kept / 255)
+    return cv2.add(cv2.multiply(picture, transmitted, scale=1.0 / 255.0), airlight_part)
 
 
 class Fog(Effect):
@@ -64,10 +66,10 @@ class Fog(Effect):
     UNIT, LEAST, MOST, MOVING = "m", 5.0, 20000.0, False
 
     def _prepare(self, random: np.random.Generator) -> None:
-        self._kept = clearness(extinction(self.amount), self.camera)
-        self._lost = 1.0 - self._kept
+        self._transmitted = transmitted_share(extinction_coefficient(self.amount), self.camera)
+        self._airlight_share = 1.0 - self._transmitted
 
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
         part = region.part
         air = np.full(region.shape, round(airlight(picture, self.camera)), np.uint8)
-        return cv2.blendLinear(picture[part], air, self._kept[part], self._lost[part])
+        return cv2.blendLinear(picture[part], air, self._transmitted[part], self._airlight_share[part])

@@ -16,9 +16,9 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim.effects import PaperFog, PaperOcclusion, PaperRain, PaperSnow, weather_of_levels
-from selfdrive.sim.effects.degradation import RoadGauge, Severity
+from selfdrive.sim.effects.degradation import Degradation, DegradationGauge
 from selfdrive.sim.effects.effect import Effect, Moment
-from selfdrive.sim.effects.levels import CODED, PAPER, PHYSICAL
+from selfdrive.sim.effects.levels import CODED_AMOUNTS, PAPER_AMOUNTS, PHYSICAL_AMOUNTS
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.coded_detector import CodedDetector
 from selfdrive.visiond.detector import LaneDetector, LaneLines
@@ -26,18 +26,20 @@ from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
 
 SEEDS = 1, 2, 3, 4, 5
-PICTURES = 6  # per seed
-STEP, SPEED = 0.05, 26.82  # s, m/s
-DETECTORS: dict[str, tuple[type, tuple[int, int, int], int]] = {  # with colour (BGR) and width (px)
+PICTURES_PER_SEED = 6  # per seed
+PICTURE_STEP, CAR_SPEED = 0.05, 26.82  # s, m/s
+DETECTOR_STYLES: dict[str, tuple[type, tuple[int, int, int], int]] = {  # with colour (BGR) and width (px)
     "paper": (PaperDetector, (60, 60, 255), 7),
     "robust": (RobustDetector, (255, 200, 0), 2),
     "as_coded": (CodedDetector, (80, 220, 80), 1),
 }
-AHEAD, ERROR = 10.0, 0.3  # m: a line is found if it is at most this far off
-SMALL, TITLE = (320, 240), 20  # px
-GREY = 100  # grey level of the picture in which coverage is measured
-REAL = "real-frames.csv"  # in the folder of pictures; counted by `visiond_lab.evaluate_under_effects`
-TEXT = """\
+CHECK_DISTANCE, MOST_LINE_ERROR = 10.0, 0.3  # m: a line is found if it is at most this far off
+PANEL_SIZE, TITLE_HEIGHT = (320, 240), 20  # px
+COVERAGE_GREY = 100  # grey level of the picture in which coverage is measured
+REAL_FRAMES_CSV = (
+    "real-frames.csv"  # in the folder of pictures; counted by `visiond_lab.evaluate_under_effects`
+)
+PAGE_TEXT = """\
 # Image effects
 
 This page shows the weather, dirt and light that a fault can put between the road and the camera. The fault
@@ -56,7 +58,7 @@ strongest. Lines show what the detectors find: **broad red** for `paper`, **narr
 
 * PSNR: similarity to the clean picture; a higher value means a smaller difference.
 * Mark contrast: difference in grey levels between the lane's lines and the road beside them, 5 to 30 m ahead.
-  Clean pictures have {clean.contrast:.0f}.
+  Clean pictures have {clean.mark_contrast:.0f}.
 * False edges: share of the lane's inside, away from its lines, where the horizontal gradient (Sobel) is at
   least that of a step of 8 grey levels, and at least half that of a mark's edge at the remaining contrast.
   Clean pictures have {clean.false_edges:.1%}.
@@ -100,104 +102,117 @@ text:
 PRESETS = (
     (
         "The paper's effects",
-        PAPER,
+        PAPER_AMOUNTS,
         "These effects have the paper's parameters. An amount is a level, a gain, a bias or a kernel.",
     ),
     (
         "The paper's effects as coded",
-        CODED,
+        CODED_AMOUNTS,
         "These effects follow the code of the paper's authors and are redrawn in every picture. Contrast, "
         "brightness and blur are the same as above.",
     ),
     (
         "Physical effects",
-        PHYSICAL,
+        PHYSICAL_AMOUNTS,
         "These effects have physical units and follow published laws, which the modules cite.",
     ),
 )
 
 
-class Row(NamedTuple):
+class LevelRow(NamedTuple):
     amount: float
-    severity: Severity
-    covered: float
-    found: tuple[float, ...]  # share of pictures, per detector
+    degradation: Degradation
+    covered_share: float
+    found_shares: tuple[float, ...]  # share of pictures, per detector
     picture: np.ndarray  # the last one, in colour, with lines
 
 
-class Studio:
+class EffectStudio:
     def __init__(self) -> None:
         self.model = CameraModel()
         renderer = RoadRenderer(self.model, "solid", SEEDS[0])
-        self._moments = [Moment(2.0 + STEP * k, 50.0 + STEP * SPEED * k, SPEED) for k in range(PICTURES)]
-        self._clean = [renderer.grey(moment.position) for moment in self._moments]
-        self._gauge = RoadGauge(self.model, renderer.truth())
+        self._moments = [
+            Moment(2.0 + PICTURE_STEP * k, 50.0 + PICTURE_STEP * CAR_SPEED * k, CAR_SPEED)
+            for k in range(PICTURES_PER_SEED)
+        ]
+        self._clean_pictures = [renderer.grey(moment.position) for moment in self._moments]
+        self._gauge = DegradationGauge(self.model, renderer.truth())
         self._truth = renderer.truth()
 
-    def clean(self) -> Severity:
-        return _mean([self._gauge.measure(clean, clean) for clean in self._clean])
+    def measure_clean(self) -> Degradation:
+        return _mean_degradation([self._gauge.measure(clean, clean) for clean in self._clean_pictures])
 
-    def take(self, kind: type[Effect], amount: float) -> Row:
-        measures: list[Severity] = []
-        found: list[list[bool]] = []
-        shown, covered = np.empty(0), []
-        grey = np.full_like(self._clean[0], GREY)
+    def measure_level(self, kind: type[Effect], amount: float) -> LevelRow:
+        measures: list[Degradation] = []
+        lines_found: list[list[bool]] = []
+        picture, covered_shares = np.empty(0), []
+        grey = np.full_like(self._clean_pictures[0], COVERAGE_GREY)
         for seed in reversed(SEEDS):  # the first seed's picture is shown
             effect = kind(amount, seed, self.model)
-            seen = [effect.apply(*pair) for pair in zip(self._clean, self._moments, strict=True)]
-            measures += [self._gauge.measure(*pair) for pair in zip(self._clean, seen, strict=True)]
-            covered.append(self._gauge.covered(effect.apply(grey, self._moments[-1])))
-            shown = cv2.cvtColor(seen[-1], cv2.COLOR_GRAY2BGR)
-            lines = [list(_detected(detector(self.model), seen)) for detector, _, _ in DETECTORS.values()]
-            found += [[self._is_found(each) for each in pair] for pair in zip(*lines, strict=True)]
-            for each, (_, colour, width) in zip(lines, DETECTORS.values(), strict=True):
-                draw_lines(shown, self.model, each[-1], colour, width)
-        share = float(np.mean(covered))
-        return Row(amount, _mean(measures), share, tuple(np.mean(found, axis=0)), shown)
+            affected = [effect.apply(*pair) for pair in zip(self._clean_pictures, self._moments, strict=True)]
+            measures += [
+                self._gauge.measure(*pair) for pair in zip(self._clean_pictures, affected, strict=True)
+            ]
+            covered_shares.append(self._gauge.covered_share(effect.apply(grey, self._moments[-1])))
+            picture = cv2.cvtColor(affected[-1], cv2.COLOR_GRAY2BGR)
+            lines = [
+                list(_detect_all(detector(self.model), affected))
+                for detector, _, _ in DETECTOR_STYLES.values()
+            ]
+            lines_found += [
+                [self._has_found_both(each) for each in pair] for pair in zip(*lines, strict=True)
+            ]
+            for each, (_, colour, width) in zip(lines, DETECTOR_STYLES.values(), strict=True):
+                draw_lines(picture, self.model, each[-1], colour, width)
+        share = float(np.mean(covered_shares))
+        return LevelRow(
+            amount, _mean_degradation(measures), share, tuple(np.mean(lines_found, axis=0)), picture
+        )
 
-    def _is_found(self, lines: LaneLines) -> bool:
+    def _has_found_both(self, lines: LaneLines) -> bool:
         return all(
-            line.prob > 0.0 and abs(line.y + line.slope * AHEAD - y - slope * AHEAD) <= ERROR
+            line.prob > 0.0
+            and abs(line.y + line.slope * CHECK_DISTANCE - y - slope * CHECK_DISTANCE) <= MOST_LINE_ERROR
             for line, (y, slope) in zip((lines.left, lines.right), self._truth, strict=True)
         )
 
 
-def _detected(detector: LaneDetector, pictures: list[np.ndarray]) -> Iterator[LaneLines]:
+def _detect_all(detector: LaneDetector, pictures: list[np.ndarray]) -> Iterator[LaneLines]:
     for picture in pictures:
         yield detector.detect(CameraView(0.0, 0.0, 0.0, (), 0.0, picture))
 
 
-def _mean(measures: list[Severity]) -> Severity:
-    return Severity(*np.mean(measures, axis=0))
+def _mean_degradation(measures: list[Degradation]) -> Degradation:
+    return Degradation(*np.mean(measures, axis=0))
 
 
 def draw_lines(
-    shown: np.ndarray, model: CameraModel, lines: LaneLines, colour: tuple[int, int, int], width: int
+    picture: np.ndarray, model: CameraModel, lines: LaneLines, colour: tuple[int, int, int], width: int
 ) -> None:
     """Draw the detected lines, from 4 to 40 m ahead, into a BGR picture."""
     for line in (lines.left, lines.right):
         if line.prob > 0.0:
             ends = [(x, line.y + line.slope * x) for x in (4.0, 40.0)]
             start, end = ((round(model.column(x, y)), round(model.row(x))) for x, y in ends)
-            cv2.line(shown, start, end, colour, width, cv2.LINE_AA)
+            cv2.line(picture, start, end, colour, width, cv2.LINE_AA)
 
 
-def strip(rows: list[Row], unit: str) -> np.ndarray:
-    shown = sorted({0, (len(rows) - 1) // 2, len(rows) - 1})
-    return np.hstack([panel(rows[k].picture, k + 1, rows[k].amount, unit) for k in shown])
+def draw_strip(rows: list[LevelRow], unit: str) -> np.ndarray:
+    level_indices = sorted({0, (len(rows) - 1) // 2, len(rows) - 1})
+    return np.hstack([draw_level_panel(rows[k].picture, k + 1, rows[k].amount, unit) for k in level_indices])
 
 
-def panel(picture: np.ndarray, level: int, amount: float, unit: str) -> np.ndarray:
-    small = cv2.resize(picture, SMALL, interpolation=cv2.INTER_AREA)
-    title = np.zeros((TITLE, *small.shape[1:]), dtype=np.uint8)
+def draw_level_panel(picture: np.ndarray, level: int, amount: float, unit: str) -> np.ndarray:
+    small = cv2.resize(picture, PANEL_SIZE, interpolation=cv2.INTER_AREA)
+    title = np.zeros((TITLE_HEIGHT, *small.shape[1:]), dtype=np.uint8)
     text, white = f"level {level}: {amount:g} {unit}", (255, 255, 255)
     cv2.putText(title, text, (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, white, 1, cv2.LINE_AA)
     return np.vstack([title, small])
 
 
-def table(rows: list[Row], unit: str, real: list[dict[str, str]]) -> str:
+def level_table(rows: list[LevelRow], unit: str, real: list[dict[str, str]]) -> str:
     """The levels' measurements as Markdown; `real` are their rows of the table of real frames, if any."""
-    names = ["covered", *(f"found by `{name}`" for name in DETECTORS)]
+    names = ["covered", *(f"found by `{name}`" for name in DETECTOR_STYLES)]
     missed = [head for head in (real[0] if real else ()) if head.startswith("missed_")]
     names += [f"missed on real frames by `{head.removeprefix('missed_')}`" for head in missed]
     lines = [
@@ -205,9 +220,9 @@ def table(rows: list[Row], unit: str, real: list[dict[str, str]]) -> str:
         "|---|---|---|---|---|" + "---|" * len(names),
     ]
     for level, row in enumerate(rows, 1):
-        psnr, contrast, false_edges = row.severity
+        psnr, contrast, false_edges = row.degradation
         cells = [f"{level}", f"{row.amount:g}", f"{psnr:.1f}", f"{contrast:.0f}", f"{false_edges:.1%}"]
-        cells += [f"{row.covered:.0%}", *(f"{share:.0%}" for share in row.found)]
+        cells += [f"{row.covered_share:.0%}", *(f"{share:.0%}" for share in row.found_shares)]
         if real:
             counted = real[level - 1]
             cells += [f"{counted[head]} of {counted['pictures']}" for head in missed]
@@ -215,52 +230,60 @@ def table(rows: list[Row], unit: str, real: list[dict[str, str]]) -> str:
     return "\n".join(lines)
 
 
-def stands_for(measured: dict[type[Effect], list[Row]], model: CameraModel) -> str:
+def weather_table(measured: dict[type[Effect], list[LevelRow]], model: CameraModel) -> str:
     heads = ("rain (mm/h)", "range (m)", "road covered", "fog: contrast left", "range (m)")
     heads += ("snow (mm/h)", "range (m)", "road covered", "occlusion: road covered")
     lines = [f"| level | {' | '.join(heads)} |", "|---|" + "---|" * len(heads)]
     for level in range(1, 11):
-        rain, snow = weather_of_levels.rain(level, model), weather_of_levels.snow(level, model)
+        rain, snow = (
+            weather_of_levels.rain_of_level(level, model),
+            weather_of_levels.snow_of_level(level, model),
+        )
         contrast = PaperFog(level, 0, model).contrast
-        shown = (PaperRain, PaperSnow, PaperOcclusion)
-        covered = {kind: f"{measured[kind][level - 1].covered:.0%}" for kind in shown}
-        cells = [f"{rain.rate:.0f}", f"{rain.range:.0f}", covered[PaperRain]]
-        cells += [f"{contrast:.2f}", f"{weather_of_levels.fog(contrast).range:.0f}"]
-        cells += [f"{snow.rate:.1f}", f"{snow.range:.0f}", covered[PaperSnow], covered[PaperOcclusion]]
+        effects_with_coverage = (PaperRain, PaperSnow, PaperOcclusion)
+        covered = {kind: f"{measured[kind][level - 1].covered_share:.0%}" for kind in effects_with_coverage}
+        cells = [f"{rain.rate:.0f}", f"{rain.visible_range:.0f}", covered[PaperRain]]
+        cells += [f"{contrast:.2f}", f"{weather_of_levels.fog_of_contrast(contrast).visible_range:.0f}"]
+        cells += [
+            f"{snow.rate:.1f}",
+            f"{snow.visible_range:.0f}",
+            covered[PaperSnow],
+            covered[PaperOcclusion],
+        ]
         lines.append(f"| {level} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
-def write(out: Path) -> None:
-    studio = Studio()
+def write_page(out: Path) -> None:
+    studio = EffectStudio()
     folder = out / "image-effects"
     folder.mkdir(parents=True, exist_ok=True)
-    measured: dict[type[Effect], list[Row]] = {}
+    measured: dict[type[Effect], list[LevelRow]] = {}
     parts = []
     for title, levels, about in PRESETS:
         parts.append(f"## {title}\n\n{about}\n")
         for kind, amounts in levels.items():
-            rows = measured[kind] = [studio.take(kind, amount) for amount in amounts]
+            rows = measured[kind] = [studio.measure_level(kind, amount) for amount in amounts]
             file = folder / f"{kind.__name__}.jpg"
-            cv2.imwrite(str(file), strip(rows, kind.UNIT), [cv2.IMWRITE_JPEG_QUALITY, 80])
+            cv2.imwrite(str(file), draw_strip(rows, kind.UNIT), [cv2.IMWRITE_JPEG_QUALITY, 80])
             about = " ".join((kind.__doc__ or "").split())
             limits = f"{kind.LEAST:g} to {kind.MOST:g}"
             parts.append(
                 f"### {kind.__name__}\n\n{about} Amount: {limits} ({kind.UNIT}).\n\n"
                 f"![{kind.__name__} at three levels](image-effects/{file.name})\n\n"
-                f"{table(rows, kind.UNIT, _real(folder, kind))}\n"
+                f"{level_table(rows, kind.UNIT, _real_frame_rows(folder, kind))}\n"
             )
-    text = TEXT.format(
-        clean=studio.clean(),
+    text = PAGE_TEXT.format(
+        clean=studio.measure_clean(),
         seeds=len(SEEDS),
-        pictures=PICTURES,
-        stands_for=stands_for(measured, studio.model),
+        pictures=PICTURES_PER_SEED,
+        stands_for=weather_table(measured, studio.model),
     )
     (out / "image-effects.md").write_text("\n".join([text, *parts]), encoding="utf-8")
 
 
-def _real(folder: Path, kind: type[Effect]) -> list[dict[str, str]]:
-    path = folder / REAL
+def _real_frame_rows(folder: Path, kind: type[Effect]) -> list[dict[str, str]]:
+    path = folder / REAL_FRAMES_CSV
     if not path.exists():
         return []
     with path.open(encoding="utf-8") as file:
@@ -271,7 +294,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("docs/reference"), help="folder of reference pages")
     cv2.setNumThreads(1)
-    write(parser.parse_args().out)
+    write_page(parser.parse_args().out)
 
 
 if __name__ == "__main__":

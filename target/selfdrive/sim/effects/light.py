@@ -15,14 +15,14 @@ SUN_HEIGHT = radians(6.0), radians(12.0)  # drawn from this range
 SUN_SIDE = radians(8.0)  # at most, to either side
 SUN_RADIUS = radians(0.27)
 ASPHALT_SLOPES = 0.25  # rms slope of surface facets
-MIRROR = 0.04  # reflectance at normal incidence, for a refractive index of 1.5
-POLISHED = 0.004  # share of a dry road's surface that mirrors; similar to the CIE's road table R3
+NORMAL_REFLECTANCE = 0.04  # reflectance at normal incidence, for a refractive index of 1.5
+MIRRORING_SHARE = 0.004  # share of a dry road's surface that mirrors; similar to the CIE's road table R3
 
-ELECTRONS = 14.0  # freed in a pixel by white light of 1 lux in the longest exposure (10 ms)
-FULL_WELL = 10000.0
-LARGEST_GAIN = 64.0  # 36 dB
+ELECTRONS_PER_LUX = 14.0  # freed in a pixel by white light of 1 lux in the longest exposure (10 ms)
+FULL_WELL_ELECTRONS = 10000.0
+MOST_GAIN = 64.0  # 36 dB
 READ_NOISE = 5.0  # electrons
-QUANTILES = 256
+QUANTILE_COUNT = 256
 
 
 class SunGlare(Effect):
@@ -39,21 +39,21 @@ class SunGlare(Effect):
         height = random.uniform(*SUN_HEIGHT)
         side = random.uniform(-SUN_SIDE, SUN_SIDE)
         sun = np.array([sin(side) * cos(height), -sin(height), cos(side) * cos(height)])
-        rays = level_rays(self.camera)
+        rays = pixel_rays(self.camera)
         beam = 127500.0 * exp(-0.21 / sin(height))  # lux, across the beam
         ground = beam * sin(height) + 800.0 + 15500.0 * sqrt(sin(height))  # lux, on the road
         white = WHITE_REFLECTANCE * ground / pi  # cd/m^2
         angle = each(acos, np.clip((rays * sun).sum(axis=-1), -1.0, 1.0))
-        seen = self.amount * 10.0 * beam / np.degrees(np.maximum(angle, SUN_RADIUS)) ** 2
-        seen += mirrored(rays, sun) * beam
-        light = WHITE * seen / white + 2.0 * WHITE * (angle < SUN_RADIUS)
+        luminance = self.amount * 10.0 * beam / np.degrees(np.maximum(angle, SUN_RADIUS)) ** 2
+        luminance += mirrored_sun_luminance(rays, sun) * beam
+        light = WHITE * luminance / white + 2.0 * WHITE * (angle < SUN_RADIUS)
         self._light = np.clip(np.rint(light), 0, WHITE).astype(np.uint8)
 
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
         return cv2.add(picture[region.part], self._light[region.part])
 
 
-def level_rays(camera: CameraModel) -> np.ndarray:
+def pixel_rays(camera: CameraModel) -> np.ndarray:
     """Direction of each pixel's ray (rows, width, 3): right, down and ahead of a level car."""
     right = np.broadcast_to((np.arange(camera.width) - camera.cx) / camera.fx, (camera.rows, camera.width))
     low = np.broadcast_to(((np.arange(camera.rows) - camera.cy) / camera.fy)[:, None], right.shape)
@@ -63,7 +63,7 @@ def level_rays(camera: CameraModel) -> np.ndarray:
     return rays / length(rays)
 
 
-def mirrored(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
+def mirrored_sun_luminance(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
     """Luminance (cd/m^2) of the sun's reflection in rough asphalt per lux of its beam.
 
     Facets with Beckmann's distribution of slopes, Fresnel reflectance after Schlick; 0 above the horizon.
@@ -75,10 +75,10 @@ def mirrored(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
     upright = np.maximum(-half[..., 1], 1e-3)
     slope = (1.0 / upright**2 - 1.0) / ASPHALT_SLOPES**2
     facets = each(exp, -slope) / (pi * ASPHALT_SLOPES**2 * (upright * upright) ** 2)
-    mirror = MIRROR + (1.0 - MIRROR) * (1.0 - across) * ((1.0 - across) ** 2) ** 2
+    mirror = NORMAL_REFLECTANCE + (1.0 - NORMAL_REFLECTANCE) * (1.0 - across) * ((1.0 - across) ** 2) ** 2
     # Rough surfaces shadow themselves at grazing angles of view or light.
     shadow = np.minimum(1.0, 2.0 * upright * np.minimum(down, -sun[1]) / np.maximum(across, 1e-3))
-    return np.where(rays[..., 1] > 0.0, POLISHED * mirror * facets * shadow / (4.0 * down), 0.0)
+    return np.where(rays[..., 1] > 0.0, MIRRORING_SHARE * mirror * facets * shadow / (4.0 * down), 0.0)
 
 
 class LowLight(Effect):
@@ -91,25 +91,30 @@ class LowLight(Effect):
     UNIT, LEAST, MOST = "lux", 0.05, 100000.0
 
     def _prepare(self, random: np.random.Generator) -> None:
-        white = min(FULL_WELL, ELECTRONS * self.amount)
-        shown = max(white, FULL_WELL / LARGEST_GAIN)  # electrons for white
-        self._table = np.stack([_noisy(white * level / WHITE, shown) for level in range(WHITE + 1)]).ravel()
+        white = min(FULL_WELL_ELECTRONS, ELECTRONS_PER_LUX * self.amount)
+        electrons_of_white = max(white, FULL_WELL_ELECTRONS / MOST_GAIN)  # electrons for white
+        self._level_table = np.stack(
+            [_noisy_levels(white * level / WHITE, electrons_of_white) for level in range(WHITE + 1)]
+        ).ravel()
         rows, columns = self.camera.rows, self.camera.width
-        self._chance = random.integers(0, QUANTILES, size=(2 * rows, 2 * columns), dtype=np.uint16)
+        self._noise_quantiles = random.integers(
+            0, QUANTILE_COUNT, size=(2 * rows, 2 * columns), dtype=np.uint16
+        )
 
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
-        moment = np.random.Generator(np.random.PCG64([self.seed, round(1000.0 * abs(scene.t))]))
+        random = np.random.Generator(np.random.PCG64([self.seed, round(1000.0 * abs(scene.t))]))
         rows, columns = picture.shape
-        top, left = moment.integers(0, (rows, columns))
-        place = picture[region.part].astype(np.intp)
-        place *= QUANTILES
-        place += self._chance[
-            top + region.top : top + region.bottom, left + region.left : left + region.right
+        noise_row, noise_column = random.integers(0, (rows, columns))
+        index = picture[region.part].astype(np.intp)
+        index *= QUANTILE_COUNT
+        index += self._noise_quantiles[
+            noise_row + region.top : noise_row + region.bottom,
+            noise_column + region.left : noise_column + region.right,
         ]
-        return np.take(self._table, place)
+        return np.take(self._level_table, index)
 
 
-def _noisy(electrons: float, shown: float) -> np.ndarray:
+def _noisy_levels(electrons: float, electrons_of_white: float) -> np.ndarray:
     """Grey levels (uint8) of a pixel with this mean number of electrons, one per quantile of its noise."""
     reach = 8.0 * sqrt(electrons) + 10.0
     numbers = np.arange(max(0, int(electrons - reach)), int(electrons + reach))
@@ -119,15 +124,15 @@ def _noisy(electrons: float, shown: float) -> np.ndarray:
     chance = each(exp, chance - chance.max())
     reach = int(6.0 * READ_NOISE)
     reading = each(exp, -0.5 * (np.arange(-reach, reach + 1) / READ_NOISE) ** 2)
-    summed = np.cumsum(_spread(chance, reading))
+    summed = np.cumsum(_convolve(chance, reading))
     counts = np.arange(summed.size) + 0.5 + numbers[0] - reach
-    share = (np.arange(QUANTILES) + 0.5) / QUANTILES
+    share = (np.arange(QUANTILE_COUNT) + 0.5) / QUANTILE_COUNT
     values = np.interp(share, summed / summed[-1], counts)
-    return np.clip(np.rint(WHITE * values / shown), 0, WHITE).astype(np.uint8)
+    return np.clip(np.rint(WHITE * values / electrons_of_white), 0, WHITE).astype(np.uint8)
 
 
-def _spread(chances: np.ndarray, by: np.ndarray) -> np.ndarray:
-    summed = np.zeros(chances.size + by.size - 1)
-    for k, share in enumerate(by.tolist()):
+def _convolve(chances: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+    summed = np.zeros(chances.size + kernel.size - 1)
+    for k, share in enumerate(kernel.tolist()):
         summed[k : k + chances.size] += share * chances
     return summed

@@ -16,14 +16,14 @@ from selfdrive.sim.effects.canvas import splat, strokes
 from selfdrive.sim.effects.effect import Scene
 from selfdrive.sim.picture import Region
 
-NEAREST = 0.25  # m; anything closer is out of focus
-FAINTEST = 0.03  # share of a pixel's light; streaks that take less are invisible
-SOFT = 1.5, 3.0  # px; wider particles are drawn at half, or a quarter, of the resolution
-SPACING = 1.3  # px between the points of a streak
-MARGIN = 2  # px around a grid
+NEAREST_DISTANCE = 0.25  # m; anything closer is out of focus
+FAINTEST_SHARE = 0.03  # share of a pixel's light; streaks that take less are invisible
+SOFT_WIDTHS = 1.5, 3.0  # px; wider particles are drawn at half, or a quarter, of the resolution
+POINT_SPACING = 1.3  # px between the points of a streak
+GRID_MARGIN = 2  # px around a grid
 
 
-class Box(NamedTuple):
+class AirBox(NamedTuple):
     """n particles in a box of air."""
 
     reach: float  # m, depth
@@ -40,7 +40,7 @@ class Streaks(NamedTuple):
 
 
 class Particles:
-    def __init__(self, random: np.random.Generator, camera: CameraModel, boxes: list[Box]) -> None:
+    def __init__(self, random: np.random.Generator, camera: CameraModel, boxes: list[AirBox]) -> None:
         self._camera = camera
         self._reaches = np.array([box.reach for box in boxes])
         self._counts = [box.size.size for box in boxes]
@@ -55,40 +55,44 @@ class Particles:
         """Streaks of all visible particles in `exposure` seconds from the scene's moment."""
         camera, lean, upright = self._camera, sin(self._camera.pitch), cos(self._camera.pitch)
         # While the car drives, everything comes nearer and, as the camera looks down, moves down.
-        ahead = self._moved(self._ahead, scene, 1.0, -upright, lean) * self._reach
+        ahead = self._positions(self._ahead, scene, 1.0, -upright, lean) * self._reach
         ahead = np.maximum(ahead, 1e-3)
-        left = camera.cx + self._across * self._reach / ahead
-        seen = np.flatnonzero((ahead > NEAREST) & (left > -40.0) & (left < camera.width + 40.0))
-        ahead, left, speed = ahead[seen], left[seen], self._speed[seen]
-        down = self._moved(self._down, scene, camera.rows / camera.fy, lean, upright)[seen]
-        down = (down * camera.rows - camera.cy) * (self._reach[seen] / camera.fy)
+        column = camera.cx + self._across * self._reach / ahead
+        in_view = np.flatnonzero(
+            (ahead > NEAREST_DISTANCE) & (column > -40.0) & (column < camera.width + 40.0)
+        )
+        ahead, column, speed = ahead[in_view], column[in_view], self._speed[in_view]
+        down = self._positions(self._down, scene, camera.rows / camera.fy, lean, upright)[in_view]
+        down = (down * camera.rows - camera.cy) * (self._reach[in_view] / camera.fy)
         v_ego = float(scene.v_ego)
-        later_ahead = np.maximum(ahead + exposure * (lean * speed - upright * v_ego), 0.5 * NEAREST)
+        later_ahead = np.maximum(ahead + exposure * (lean * speed - upright * v_ego), 0.5 * NEAREST_DISTANCE)
         later_down = down + exposure * (upright * speed + lean * v_ego)
-        later_left = camera.cx + (left - camera.cx) * ahead / later_ahead
-        start = np.stack([left, camera.cy + camera.fy * down / ahead])
-        end = np.stack([later_left, camera.cy + camera.fy * later_down / later_ahead])
-        width = camera.fx * self._size[seen] / ahead
-        inside = (end[1] > -MARGIN) & (start[1] < camera.rows + MARGIN)
+        later_column = camera.cx + (column - camera.cx) * ahead / later_ahead
+        start = np.stack([column, camera.cy + camera.fy * down / ahead])
+        end = np.stack([later_column, camera.cy + camera.fy * later_down / later_ahead])
+        width = camera.fx * self._size[in_view] / ahead
+        inside = (end[1] > -GRID_MARGIN) & (start[1] < camera.rows + GRID_MARGIN)
         # A particle covers pi / 4 * width^2 pixels at a time, spread over its streak.
-        visible = 0.25 * np.pi * width**2 > FAINTEST * (_lengths(end - start) + 1.0)
+        visible = 0.25 * np.pi * width**2 > FAINTEST_SHARE * (_vector_lengths(end - start) + 1.0)
         chosen = np.flatnonzero(inside & visible)
         return Streaks(start[:, chosen], end[:, chosen], width[chosen])
 
-    def _moved(self, first: np.ndarray, scene: Scene, tall: float, along: float, fall: float) -> np.ndarray:
+    def _positions(
+        self, first: np.ndarray, scene: Scene, tall: float, along: float, fall: float
+    ) -> np.ndarray:
         """Positions, as shares of boxes `tall` times as long as their reach, after the particles moved by
         `along` per metre driven and by `fall` per metre fallen."""
         moved = self._speed * float(fall / tall * scene.t) / self._reach
         moved += first
-        moved += np.repeat(self._driven(scene, tall, along), self._counts)
+        moved += np.repeat(self._driven_shares(scene, tall, along), self._counts)
         return moved - np.floor(moved)
 
-    def _driven(self, scene: Scene, tall: float, along: float) -> np.ndarray:
+    def _driven_shares(self, scene: Scene, tall: float, along: float) -> np.ndarray:
         driven = (along / tall * scene.position / self._reaches) % 1.0  # in double precision at any distance
         return driven.astype(np.float32)
 
 
-class Cover:
+class ParticleCover:
     """The share of each pixel's light that streaks take.
 
     Wide particles are drawn on coarser grids and enlarged, which makes them soft. All grids are on one sheet,
@@ -96,48 +100,51 @@ class Cover:
     """
 
     def __init__(self, camera: CameraModel) -> None:
-        sizes = [(-(-camera.rows // s) + 2 * MARGIN, -(-camera.width // s) + 2 * MARGIN) for s in (1, 2, 4)]
+        sizes = [
+            (-(-camera.rows // s) + 2 * GRID_MARGIN, -(-camera.width // s) + 2 * GRID_MARGIN)
+            for s in (1, 2, 4)
+        ]
         corners = [(0, 0), (sizes[0][0], 0), (sizes[0][0], sizes[1][1])]
         self._sizes, self._places = sizes, corners
         self._sheet = np.zeros((sizes[0][0] + sizes[1][0], sizes[0][1]), dtype=np.float32)
         self._corners = np.array(corners, dtype=np.float32).T[::-1]  # columns, then rows
         self._ends = self._corners + np.array(sizes, dtype=np.float32).T[::-1] - 1.0
 
-    def taken(self, streaks: Streaks, region: Region) -> np.ndarray:
+    def covered_shares(self, streaks: Streaks, region: Region) -> np.ndarray:
         """Shares in units of 1/255, uint8, in a region of the picture."""
-        full, half, quarter = windows(region, self._sizes)
+        full, half, quarter = windows_of_grids(region, self._sizes)
         grids = self._grids((full, half, quarter))
         for grid in grids:
             grid.fill(0.0)
         self._draw(streaks, (full, half, quarter))
-        grids[1] += _enlarged(grids[2], quarter, half)
-        coarse = _enlarged(cv2.convertScaleAbs(grids[1], alpha=255.0), half, full)
+        grids[1] += _enlarge(grids[2], quarter, half)
+        coarse = _enlarge(cv2.convertScaleAbs(grids[1], alpha=255.0), half, full)
         return cv2.add(cv2.convertScaleAbs(grids[0], alpha=255.0), coarse)
 
-    def half(self, region: Region) -> np.ndarray:
+    def half_grid(self, region: Region) -> np.ndarray:
         """The half grid's values in a region, including the quarter grid's, after the last picture."""
-        return self._grids(windows(region, self._sizes))[1]
+        return self._grids(windows_of_grids(region, self._sizes))[1]
 
-    def _grids(self, seen: tuple[Region, ...]) -> list[np.ndarray]:
+    def _grids(self, grid_windows: tuple[Region, ...]) -> list[np.ndarray]:
         return [
             self._sheet[row + window.top : row + window.bottom, column + window.left : column + window.right]
-            for (row, column), window in zip(self._places, seen, strict=True)
+            for (row, column), window in zip(self._places, grid_windows, strict=True)
         ]
 
-    def _draw(self, streaks: Streaks, windows: tuple[Region, ...]) -> None:
-        grid = np.searchsorted((*SOFT, inf), streaks.width)
+    def _draw(self, streaks: Streaks, grid_windows: tuple[Region, ...]) -> None:
+        grid = np.searchsorted((*SOFT_WIDTHS, inf), streaks.width)
         scale = np.float32([1.0, 2.0, 4.0])[grid]
         # Pixel k of a coarse grid has its centre at scale * k + (scale - 1) / 2 of the full one.
-        corner = self._corners[:, grid] + MARGIN - 0.5
+        corner = self._corners[:, grid] + GRID_MARGIN - 0.5
         start, end = ((place + 0.5) / scale + corner for place in (streaks.start, streaks.end))
         # A point affects the pixels around it.
-        least = np.float32([(window.left - 1, window.top - 1) for window in windows]).T + self._corners
-        most = np.float32([(window.right, window.bottom) for window in windows]).T + self._corners
+        least = np.float32([(window.left - 1, window.top - 1) for window in grid_windows]).T + self._corners
+        most = np.float32([(window.right, window.bottom) for window in grid_windows]).T + self._corners
         least, most = np.maximum(least, self._corners), np.minimum(most, self._ends)
         there = (np.maximum(start, end) >= least[:, grid]) & (np.minimum(start, end) < most[:, grid])
         near = np.flatnonzero(there[0] & there[1])
         start, end, grid = start[:, near], end[:, near], grid[near]
-        counts = (_lengths(end - start) / SPACING).astype(np.intp) + 1
+        counts = (_vector_lengths(end - start) / POINT_SPACING).astype(np.intp) + 1
         share = (0.25 * np.pi) * (streaks.width[near] / scale[near]) ** 2 / counts.astype(np.float32)
         _, columns, rows = strokes(start, end, counts)
         grid = np.repeat(grid, counts)
@@ -148,26 +155,26 @@ class Cover:
         splat(self._sheet, columns[inside], rows[inside], np.repeat(share, counts)[inside])
 
 
-def windows(region: Region, sizes: list[tuple[int, int]]) -> tuple[Region, Region, Region]:
+def windows_of_grids(region: Region, sizes: list[tuple[int, int]]) -> tuple[Region, Region, Region]:
     """The parts of the full, half and quarter grids that determine a region."""
-    full = Region(*(end + MARGIN for end in region))
-    half = _seen_through(full, sizes[1])
-    return full, half, _seen_through(half, sizes[2])
+    full = Region(*(end + GRID_MARGIN for end in region))
+    half = _window_of_coarser_grid(full, sizes[1])
+    return full, half, _window_of_coarser_grid(half, sizes[2])
 
 
-def _seen_through(fine: Region, size: tuple[int, int]) -> Region:
+def _window_of_coarser_grid(fine: Region, size: tuple[int, int]) -> Region:
     """The part of a grid of this size that determines `fine` in the grid of twice its resolution."""
-    top, bottom, left, right = ((end + MARGIN) // 2 for end in fine)
+    top, bottom, left, right = ((end + GRID_MARGIN) // 2 for end in fine)
     return Region(max(top - 1, 0), min(bottom + 2, size[0]), max(left - 1, 0), min(right + 2, size[1]))
 
 
-def _enlarged(coarse: np.ndarray, seen: Region, fine: Region) -> np.ndarray:
-    """The region `fine` of a grid, from the region `seen` of the grid of half its size; both with margins."""
+def _enlarge(coarse: np.ndarray, window: Region, fine: Region) -> np.ndarray:
+    """The region `fine` of a grid, from the `window` of the grid of half its size; both with margins."""
     twice = cv2.resize(coarse, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_LINEAR)
-    down, right = fine.top + MARGIN - 2 * seen.top, fine.left + MARGIN - 2 * seen.left
+    down, right = fine.top + GRID_MARGIN - 2 * window.top, fine.left + GRID_MARGIN - 2 * window.left
     return twice[down : down + fine.shape[0], right : right + fine.shape[1]]
 
 
-def _lengths(ways: np.ndarray) -> np.ndarray:
+def _vector_lengths(ways: np.ndarray) -> np.ndarray:
     across, down = ways
     return np.sqrt(across * across + down * down)

@@ -20,9 +20,9 @@ class TimelineMark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FilmEvents:
-    """Data on the faulty run. Times in s; `active` spans the fault's activations, if any.
+    """Data on the faulty run. Times in s; `active_span` covers the fault's activations, if any.
 
-    `names` are short hazard names by id. `end` is the end of the drive; the run can continue after it.
+    `hazard_names` are short names by id. The run can continue after `drive_end`.
     """
 
     title: str

@@ -32,8 +32,8 @@ class FilmFrame:
     """The moment of one picture: the world, the controller's view and its messages to the driver. SI units.
 
     `d_rel` is None on a free road, `lines` if visiond published nothing, `radar` if radard has no lead.
-    `plan` is the planned path, y at SAMPLE_DISTANCES. In the camera's view, the lane centre is at `middle` beside the
-    car, shifted by `bend` at SAMPLE_DISTANCES.
+    `plan` is the planned path, `bend` the shift of the lane centre, both as y at SAMPLE_DISTANCES. In the
+    camera's view, the lane centre is at `middle` beside the car.
     """
 
     t: float

@@ -25,7 +25,7 @@ from selfdrive.sim.effects import (
 from selfdrive.sim.effects.compiled_gaussian import CompiledGaussian, build_gaussian
 from selfdrive.sim.effects.effect import Moment
 from selfdrive.sim.effects.gaussian import Gaussian
-from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
 from selfdrive.sim.picture import Picture, Region
 from selfdrive.sim.picture_camera import PictureCamera
 from selfdrive.sim.picture_options import AS_CODED, PAPER, Pictures
@@ -97,7 +97,7 @@ def pictures(random, shape):
 @pytest.mark.parametrize("kind", COMPILED)
 def test_compiled_effects_have_the_same_bits(both, kind, size):
     camera, random = CAMERAS[size], np.random.default_rng(7)
-    amounts = LEVELS[kind]
+    amounts = LEVEL_AMOUNTS[kind]
     for seed, amount in enumerate({amounts[0], amounts[len(amounts) // 2], amounts[-1]}):
         plain, fast = both(kind, amount, 123456789 * seed, camera)
         for picture in pictures(random, (camera.rows, camera.width)):
@@ -119,7 +119,7 @@ def test_results_do_not_depend_on_wide_vector_instructions(folder, tmp_path, cam
     noise = np.random.default_rng(2).integers(0, 256, (camera.rows, camera.width), np.uint8)
     for libraries in (folder, compile_effects(tmp_path, "-DIS_FAST=0")):
         compiled.use(libraries)
-        drawn.append(kind(LEVELS[kind][-1], 1, camera))
+        drawn.append(kind(LEVEL_AMOUNTS[kind][-1], 1, camera))
     compiled.use(None)
     if any(effect._key[-1] == "" for effect in drawn):
         pytest.skip("OpenCV computes different bits from the C code")
@@ -184,15 +184,17 @@ def test_the_library_is_not_used_if_opencv_computes_other_bits(folder, monkeypat
     compiled.use(folder)
     darker = Gaussian.__call__
     monkeypatch.setattr(Gaussian, "__call__", lambda blur, picture: darker(blur, picture) // 2)
-    plain = compiled_precipitation.PLAIN
+    plain = compiled_precipitation.PYTHON_PARTS
     monkeypatch.setattr(
-        compiled_precipitation, "PLAIN", plain._replace(veiled=lambda *of: air.veiled(*of) // 2)
+        compiled_precipitation,
+        "PYTHON_PARTS",
+        plain._replace(veil_picture=lambda *of: air.veil_picture(*of) // 2),
     )
-    caches = compiled_gaussian.agrees, compiled_precipitation.agrees
+    caches = compiled_gaussian.agrees, compiled_precipitation.is_bit_identical
     for kept in caches:
         kept.cache_clear()
     assert type(build_gaussian(1.5)) is gaussian.Gaussian
-    parts, by = compiled_precipitation.build_parts(CameraModel())
+    parts, by = compiled_precipitation.build_precipitation_parts(CameraModel())
     assert parts.particles is particles.Particles and by == ""
     for kept in caches:
         kept.cache_clear()
@@ -203,7 +205,7 @@ def test_a_camera_with_numpy_scalars_uses_python(folder):
     """With NumPy scalars in the camera, NumPy computes in double precision."""
     compiled.use(folder)
     camera = replace(CameraModel(), cx=np.float64(317.9))
-    assert precipitation.build_parts(camera)[1] == ""
+    assert precipitation.build_precipitation_parts(camera)[1] == ""
     compiled.use(None)
 
 
@@ -221,7 +223,7 @@ def test_runs_in_weather_as_coded_have_the_same_bytes(folder, tmp_path, monkeypa
 
 def same_runs(folder, tmp_path, monkeypatch, kind, detector):
     look, scenario = PictureCamera.look, load_scenario(SCENARIO)
-    amount = LEVELS[kind][4]
+    amount = LEVEL_AMOUNTS[kind][4]
 
     def driven(libraries):
         compiled.use(libraries)

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from selfdrive.sim.effects import effects_page
-from selfdrive.sim.effects.degradation import RoadGauge
-from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.effects.degradation import DegradationGauge
+from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
 
 REFERENCE = Path(__file__).parents[4] / "docs" / "reference"
 
 
 @pytest.fixture
 def gauge(camera):
-    return RoadGauge(camera, ((1.85, 0.0), (-1.85, 0.0)))
+    return DegradationGauge(camera, ((1.85, 0.0), (-1.85, 0.0)))
 
 
 def test_a_clean_image_has_no_error_full_contrast_and_no_false_edges(gauge, road):
@@ -48,17 +48,17 @@ def test_weak_edges_are_false_edges_only_between_weak_lines(gauge, road):
 
 def test_pixels_are_covered_if_an_even_grey_changes_by_8_levels(gauge, road):
     grey = np.full_like(road, 100)
-    assert gauge.covered(grey // 2) == 0.0
+    assert gauge.covered_share(grey // 2) == 0.0
     half = grey.copy()
     half[:, :300] = 107
-    assert gauge.covered(half) == 0.0
+    assert gauge.covered_share(half) == 0.0
     half[:, :300] = 108
-    assert 0.2 < gauge.covered(half) < 0.5
+    assert 0.2 < gauge.covered_share(half) < 0.5
 
 
 def test_the_page_has_every_effect_and_level():
     text = (REFERENCE / "image-effects.md").read_text(encoding="utf-8")
-    for effect, amounts in LEVELS.items():
+    for effect, amounts in LEVEL_AMOUNTS.items():
         part = re.search(rf"^### {effect.__name__}$(.*?)(?=^##|\Z)", text, re.MULTILINE | re.DOTALL)
         assert part and (REFERENCE / "image-effects" / f"{effect.__name__}.jpg").is_file()
         found = re.findall(r"^\| \d+ \| (\S+) \|", part[1], re.MULTILINE)
@@ -68,6 +68,6 @@ def test_the_page_has_every_effect_and_level():
 @pytest.mark.slow
 def test_the_page_is_what_the_command_writes(tmp_path):
     """After a change of effects or detectors, run `python -m selfdrive.sim.effects.effects_page`."""
-    effects_page.write(tmp_path)
+    effects_page.write_page(tmp_path)
     made, kept = (folder / "image-effects.md" for folder in (tmp_path, REFERENCE))
     assert made.read_text(encoding="utf-8") == kept.read_text(encoding="utf-8")

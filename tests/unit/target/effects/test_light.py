@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from selfdrive.sim.effects import LowLight, SunGlare
-from selfdrive.sim.effects.light import level_rays
+from selfdrive.sim.effects.light import pixel_rays
 
 
 def test_rays_meet_the_horizon(camera):
     """Below the horizon, the slope of a ray is the camera's height divided by the distance to the road."""
-    rays = level_rays(camera)
+    rays = pixel_rays(camera)
     fall = rays[:, round(camera.cx), 1] / rays[:, round(camera.cx), 2]
     assert np.interp(camera.horizon, np.arange(camera.rows), fall) == pytest.approx(0.0, abs=1e-4)
     row = camera.row(15.0)
@@ -21,7 +21,7 @@ def test_glare_falls_off_with_the_square_of_the_angle(camera):
     sky = veil[: int(camera.horizon)]
     row, column = np.unravel_index(sky.argmax(), sky.shape)
     assert abs(column - camera.cx) < 70 and sky[row, column] == 255
-    rays = level_rays(camera)
+    rays = pixel_rays(camera)
     lit = (sky > 8) & (sky < 255)
     bright = sky == 255
     sun = rays[: int(camera.horizon)][bright].mean(axis=0)

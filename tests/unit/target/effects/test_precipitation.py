@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from selfdrive.sim.effects import Rain, Snow
-from selfdrive.sim.effects.particles import Box, Cover, Particles, Streaks
+from selfdrive.sim.effects.particles import AirBox, ParticleCover, Particles, Streaks
 from selfdrive.sim.picture import whole
 
 
 def alone(camera, *, size=0.004, speed=0.0, reach=8.0, number=400):
-    boxes = [Box(reach, np.full(number, size), np.full(number, speed))]
+    boxes = [AirBox(reach, np.full(number, size), np.full(number, speed))]
     return Particles(np.random.default_rng(2), camera, boxes)
 
 
@@ -31,12 +31,12 @@ def test_rain_has_marshall_and_palmers_spectrum(camera):
 
 def test_drops_fall_at_their_terminal_speed(camera):
     """A drop of 2 mm falls at 6.5 m/s and one of 5 mm at 9.1 m/s (measured by Gunn and Kinzer, 1949)."""
-    _, speeds = Rain(10.0, 0, camera).flown(np.array([2.0, 5.0]))
+    _, speeds = Rain(10.0, 0, camera).sizes_and_speeds(np.array([2.0, 5.0]))
     assert speeds == pytest.approx([6.5, 9.1], rel=0.02)
 
 
 def test_flakes_are_slow_and_large(camera):
-    sizes, speeds = Snow(1.0, 0, camera).flown(np.array([1.0]))
+    sizes, speeds = Snow(1.0, 0, camera).sizes_and_speeds(np.array([1.0]))
     assert 0.7 < speeds[0] < 1.1 and 0.002 < sizes[0] < 0.003
 
 
@@ -94,7 +94,10 @@ def test_boxes_repeat_without_gaps(camera, moment):
 def test_streaks_block_the_light_of_their_area(width, camera):
     start = np.array([[100.3, 300.0, 500.7], [200.1, 240.5, 300.9]], np.float32)
     streaks = Streaks(start, start + np.float32(6.3), np.full(3, width, np.float32))
-    taken = Cover(camera).taken(streaks, whole((camera.rows, camera.width))).astype(float) / 255.0
+    taken = (
+        ParticleCover(camera).covered_shares(streaks, whole((camera.rows, camera.width))).astype(float)
+        / 255.0
+    )
     assert taken.sum() == pytest.approx(3 * np.pi / 4 * width**2, rel=0.06)
     rows, columns = np.nonzero(taken[:, :200])
     assert np.average(columns, weights=taken[rows, columns]) == pytest.approx(103.45, abs=0.25)

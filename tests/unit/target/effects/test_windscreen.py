@@ -3,19 +3,24 @@
 import numpy as np
 import pytest
 from selfdrive.sim.effects.gaussian import Gaussian
-from selfdrive.sim.effects.windscreen import BLUR, WIPE, Windscreen, shrunk
+from selfdrive.sim.effects.windscreen import VIEW_BLUR, WIPE_PERIOD, Windscreen, shrink_picture
 from selfdrive.sim.picture import whole
 
 
 @pytest.fixture
 def glass(camera):
-    return Windscreen(np.random.default_rng(5), camera, 1000.0, np.full(50, 0.002), shrunk, Gaussian(BLUR))
+    return Windscreen(
+        np.random.default_rng(5), camera, 1000.0, np.full(50, 0.002), shrink_picture, Gaussian(VIEW_BLUR)
+    )
 
 
 def wet(glass, picture, moment, share, wipe=3):
     """Return the pixels that show drops at this fraction of the time between two wipes."""
-    start = wipe * WIPE - glass._start
-    return glass.seen(picture, whole(picture.shape), moment._replace(t=start + share * WIPE)) != picture
+    start = wipe * WIPE_PERIOD - glass._start
+    return (
+        glass.look_through(picture, whole(picture.shape), moment._replace(t=start + share * WIPE_PERIOD))
+        != picture
+    )
 
 
 def test_drops_gather_until_the_wipe(glass, road, moment):
@@ -36,8 +41,8 @@ def test_a_faster_car_meets_more_drops(glass, road, moment):
 def test_drops_show_the_scene_upside_down(glass, camera, moment):
     picture = np.full((camera.rows, camera.width), 60, np.uint8)
     picture[:200] = 200
-    start = 3 * WIPE - glass._start
-    seen = glass.seen(picture, whole(picture.shape), moment()._replace(t=start + 0.9))
+    start = 3 * WIPE_PERIOD - glass._start
+    seen = glass.look_through(picture, whole(picture.shape), moment()._replace(t=start + 0.9))
     change = seen.astype(int) - picture
     assert change[:190].max() <= 0 and change[:190].min() < -60
     assert change[210:].min() >= 0 and change[210:].max() > 60

@@ -11,7 +11,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim import compile_helpers
 from selfdrive.sim.effects.effect import Moment
-from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond import compiled_robust, compiled_view, compiled_windows
 from selfdrive.visiond.band_filter import EDGE, STRONGEST
@@ -70,7 +70,7 @@ def pictures():
     chance, found = np.random.default_rng(3), []
     roads = [RoadRenderer(MODEL, marks, 1, periods=3) for marks in ("solid", "dashed")]
     changes = [None] * 8 + [
-        kind(amount, 1, MODEL) for kind, each in LEVELS.items() for amount in (each[0], each[-1])
+        kind(amount, 1, MODEL) for kind, each in LEVEL_AMOUNTS.items() for amount in (each[0], each[-1])
     ]
     for k, effect in enumerate(changes):
         picture = roads[k % 2].grey(9.0 * k, 1.5 * sin(k), 0.03 * sin(1.7 * k))

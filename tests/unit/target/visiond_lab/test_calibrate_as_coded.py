@@ -7,13 +7,13 @@ from selfdrive.visiond_lab import calibrate_as_coded
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(calibrate_as_coded, "PICTURES", 3)
-    monkeypatch.setattr(calibrate_as_coded, "TRIED", [-50.0, 3.5, 4.0, 4.5, 50.0])
+    monkeypatch.setattr(calibrate_as_coded, "PICTURE_COUNT", 3)
+    monkeypatch.setattr(calibrate_as_coded, "TRIED_THRESHOLDS", [-50.0, 3.5, 4.0, 4.5, 50.0])
 
 
 def test_the_lowest_threshold_marks_all_windows_and_the_highest_none() -> None:
-    found = calibrate_as_coded.thresholds()
-    assert [row[0] for row in found] == calibrate_as_coded.TRIED
+    found = calibrate_as_coded.evaluate_thresholds()
+    assert [row[0] for row in found] == calibrate_as_coded.TRIED_THRESHOLDS
     marked = [row[1] for row in found]
     assert marked == sorted(marked, reverse=True)
     assert (marked[0], marked[-1]) == (1.0, 0.0)
@@ -27,7 +27,7 @@ def test_the_middle_of_the_acceptable_thresholds_is_printed(
     misreads more lines than others.
     """
     rows = [(1.0, 0.004, 0.0), (2.0, 0.003, 0.1), (3.0, 0.002, 0.02), (4.0, 0.001, 0.02), (5.0, 0.0, 0.02)]
-    monkeypatch.setattr(calibrate_as_coded, "thresholds", lambda: rows)
+    monkeypatch.setattr(calibrate_as_coded, "evaluate_thresholds", lambda: rows)
     calibrate_as_coded.main()
     *told, chosen = capsys.readouterr().out.splitlines()
     assert (len(told), chosen) == (5, "4.00")

@@ -7,7 +7,13 @@ import cv2
 import numpy as np
 import pytest
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond_lab.evaluate import SOURCES, TUSIMPLE, UDACITY, canonical, main
+from selfdrive.visiond_lab.evaluate import (
+    SOURCE_BY_KEY,
+    TUSIMPLE_MODEL,
+    UDACITY_MODEL,
+    main,
+    to_canonical_frame,
+)
 
 
 @cache
@@ -21,10 +27,13 @@ def frames(tmp_path):
     folder = tmp_path / "frames"
     (folder / "deep").mkdir(parents=True)
     lines = {}
-    for key, name, model in (("p1_one", "one.png", UDACITY), ("tus_two", "deep/tus_two.png", TUSIMPLE)):
+    for key, name, model in (
+        ("p1_one", "one.png", UDACITY_MODEL),
+        ("tus_two", "deep/tus_two.png", TUSIMPLE_MODEL),
+    ):
         road = _road(model)
         left, right = (model.line_in_picture(y, slope) for y, slope in road.truth(0.2, 0.01))
-        source = SOURCES[key.partition("_")[0]]
+        source = SOURCE_BY_KEY[key.partition("_")[0]]
         down = source.vanishing_row * 640 / (960 if key.startswith("p1") else 1280) - 200
         frame = cv2.warpAffine(road.grey(2.0, 0.2, 0.01), np.float32([[1, 0, 0], [0, 1, down]]), (640, 360))
         width = 960 if key.startswith("p1") else 1280
@@ -166,7 +175,7 @@ def test_the_canonical_frame_has_its_vanishing_row_at_200(width):
     frame = np.zeros((rows, width, 3), np.uint8)
     row = round(425 / 720 * rows)
     frame[row - width // 640 : row + width // 640] = 255
-    seen = canonical(frame, SOURCES["adv"])
+    seen = to_canonical_frame(frame, SOURCE_BY_KEY["adv"])
     assert seen.shape == (480, 640, 3)
     weight = seen[:, 320, 0].astype(float)
     assert (weight @ np.arange(480)) / weight.sum() == pytest.approx(200, abs=1.0)

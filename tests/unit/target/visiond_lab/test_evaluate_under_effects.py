@@ -6,22 +6,22 @@ import json
 import cv2
 import numpy as np
 import pytest
-from selfdrive.sim.effects.effects_page import SMALL, TITLE
-from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.effects.effects_page import PANEL_SIZE, TITLE_HEIGHT
+from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond_lab.evaluate import EXIT_INVALID_INPUT, SOURCES, UDACITY
-from selfdrive.visiond_lab.evaluate_under_effects import HEADS, IN_A_ROW, main
+from selfdrive.visiond_lab.evaluate import EXIT_INVALID_INPUT, SOURCE_BY_KEY, UDACITY_MODEL
+from selfdrive.visiond_lab.evaluate_under_effects import CSV_HEADER, PANELS_PER_ROW, main
 
 
 @pytest.fixture(scope="module")
 def frames(tmp_path_factory):
     folder = tmp_path_factory.mktemp("frames")
-    road = RoadRenderer(UDACITY, "solid", 1, periods=2)
-    down = SOURCES["p1"].vanishing_row * 640 / 960 - 200
+    road = RoadRenderer(UDACITY_MODEL, "solid", 1, periods=2)
+    down = SOURCE_BY_KEY["p1"].vanishing_row * 640 / 960 - 200
     frame = cv2.warpAffine(road.grey(2.0), np.float32([[1, 0, 0], [0, 1, down]]), (640, 360))
     frame = cv2.resize(frame, (960, 540), interpolation=cv2.INTER_CUBIC)
     cv2.imwrite(str(folder / "p1_one.png"), cv2.merge([frame] * 3))
-    left, right = (UDACITY.line_in_picture(*line) for line in road.truth())
+    left, right = (UDACITY_MODEL.line_in_picture(*line) for line in road.truth())
     (folder / "truth.json").write_text(json.dumps({"lines": {"p1_one": {"L": left, "R": right}}}))
     return [str(folder), str(folder / "truth.json")]
 
@@ -32,7 +32,7 @@ def test_misses_are_counted_by_level(frames, tmp_path, capsys):
     printed = capsys.readouterr().out.splitlines()
     with (tmp_path / "found.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == HEADS
+    assert tuple(rows[0]) == CSV_HEADER
     assert [(row["effect"], row["pictures"]) for row in rows] == [("PaperOcclusion", "3")] * 10 + [
         ("MedianBlur", "1")
     ] * 2
@@ -47,12 +47,12 @@ def test_more_lines_are_missed_in_heavier_rain(frames, tmp_path):
 
 
 def test_strips_show_all_levels(frames, tmp_path):
-    kinds = {kind.__name__: kind for kind in LEVELS}
+    kinds = {kind.__name__: kind for kind in LEVEL_AMOUNTS}
     for name in ("PaperRain", "GaussianBlur"):
         assert main([*frames, "--effect", name, "--strips", str(tmp_path)]) == 0
         strip = cv2.imread(str(tmp_path / f"{name}_p1_one.png"), cv2.IMREAD_GRAYSCALE)
-        rows = -(-len(LEVELS[kinds[name]]) // IN_A_ROW)
-        assert strip.shape == (rows * (SMALL[1] + TITLE), IN_A_ROW * SMALL[0])
+        rows = -(-len(LEVEL_AMOUNTS[kinds[name]]) // PANELS_PER_ROW)
+        assert strip.shape == (rows * (PANEL_SIZE[1] + TITLE_HEIGHT), PANELS_PER_ROW * PANEL_SIZE[0])
 
 
 def test_the_error_names_a_missing_frame(frames, tmp_path, capsys):

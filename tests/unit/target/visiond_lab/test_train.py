@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from selfdrive.visiond.lane_net import LaneNet
 from selfdrive.visiond_lab import train
-from selfdrive.visiond_lab.training_windows import EACH, labelled_windows
+from selfdrive.visiond_lab.training_windows import MOST_WINDOWS_PER_LABEL, draw_labelled_windows
 
 
 @pytest.fixture(scope="module")
 def sample() -> tuple[np.ndarray, np.ndarray]:
-    return labelled_windows(2, np.random.default_rng(99))
+    return draw_labelled_windows(2, np.random.default_rng(99))
 
 
 def test_windows_are_balanced_and_reproducible(sample):
     features, labels = sample
     assert 0.4 < labels.mean() < 0.6
-    assert len(labels) <= 2 * 6 * 2 * EACH
-    again = labelled_windows(1, np.random.default_rng(99))
+    assert len(labels) <= 2 * 6 * 2 * MOST_WINDOWS_PER_LABEL
+    again = draw_labelled_windows(1, np.random.default_rng(99))
     number = len(again[1])
     assert np.array_equal(again[0], features[:number])
     assert np.array_equal(again[1], labels[:number])
