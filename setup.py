@@ -18,7 +18,7 @@ sys.path.insert(0, str(CLONE / "target"))
 sys.dont_write_bytecode = True  # keep bytecode out of the target's sources
 from selfdrive.common import compiled  # noqa: E402
 from selfdrive.common.errors import ConfigError  # noqa: E402
-from selfdrive.sim.compile_helpers import FOLDER, compile_helpers, compiler  # noqa: E402
+from selfdrive.sim.compile_helpers import COMPILED_FOLDER, compile_helpers, compiler_command  # noqa: E402
 
 
 class BuildWithShipped(build_py):
@@ -26,7 +26,7 @@ class BuildWithShipped(build_py):
 
     def run(self) -> None:
         try:
-            list(compile_helpers(FOLDER))
+            list(compile_helpers(COMPILED_FOLDER))
         except ConfigError as error:
             print(f"warning: {error}", file=sys.stderr)
         if not self.editable_mode:
@@ -42,7 +42,7 @@ class WheelOfOneMachine(bdist_wheel):
     """A wheel for any Python 3, but only for this platform if helpers were compiled."""
 
     def get_tag(self) -> tuple[str, str, str]:
-        if not any(FOLDER.glob(f"*{compiled.SUFFIX}")):
+        if not any(COMPILED_FOLDER.glob(f"*{compiled.SUFFIX}")):
             return super().get_tag()
         self.root_is_pure = False
         return "py3", "none", super().get_tag()[2]
@@ -60,5 +60,5 @@ def write_archive(path: Path) -> None:
 
 setup(
     cmdclass={"build_py": BuildWithShipped, "bdist_wheel": WheelOfOneMachine},
-    setup_requires=[] if compiler() else [COMPILER],
+    setup_requires=[] if compiler_command() else [COMPILER],
 )

@@ -18,24 +18,24 @@ sys.path.insert(0, str(ROOT / "target"))
 import cv2  # noqa: E402
 from selfdrive.common import compiled  # noqa: E402
 from selfdrive.sim.compile_helpers import compile_helpers  # noqa: E402
-from selfdrive.sim.detection_memory import FILE  # noqa: E402
-from selfdrive.sim.picture_options import DETECTORS, Pictures  # noqa: E402
+from selfdrive.sim.detection_memory import FILE_NAME  # noqa: E402
+from selfdrive.sim.picture_options import DETECTORS, PictureOptions  # noqa: E402
 from selfdrive.sim.run import simulate  # noqa: E402
 from selfdrive.sim.scenario import load_scenario  # noqa: E402
-from selfdrive.sim.trace_file import pieces  # noqa: E402
+from selfdrive.sim.trace_file import npz_pieces  # noqa: E402
 
 KINDS = (None, *DETECTORS)
 
 
 def run(kind: str | None, cache: Path, helpers: Path | None) -> tuple[float, bytes]:
     """Return CPU seconds and the trace of one run with frames that no other run has used."""
-    (cache / FILE).unlink(missing_ok=True)
+    (cache / FILE_NAME).unlink(missing_ok=True)
     compiled.use(helpers)
-    pictures = Pictures(detector=kind, cache=cache) if kind else None
+    pictures = PictureOptions(detector=kind, cache=cache) if kind else None
     scenario = load_scenario(ROOT / "fault_library/scenarios/S1.yaml")
     start = process_time()
     result = simulate(scenario, 0, pictures)
-    return process_time() - start, b"".join(pieces(result.trace))
+    return process_time() - start, b"".join(npz_pieces(result.trace))
 
 
 def main() -> int:

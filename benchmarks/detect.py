@@ -25,7 +25,7 @@ sys.path.insert(0, str(ROOT / "target"))
 from selfdrive.common import compiled  # noqa: E402
 from selfdrive.common.camera_model import CameraModel  # noqa: E402
 from selfdrive.messages import CameraView  # noqa: E402
-from selfdrive.sim.compile_helpers import FOLDER  # noqa: E402
+from selfdrive.sim.compile_helpers import COMPILED_FOLDER  # noqa: E402
 from selfdrive.sim.effects import PaperRain, PaperSnow  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 from selfdrive.visiond.compiled_paper import build_paper_detector  # noqa: E402
@@ -50,7 +50,7 @@ def median_ms(work: Callable[[], object], repeat: int) -> float:
 
 
 def pictures(model: CameraModel) -> dict[str, np.ndarray]:
-    clean = RoadRenderer(model, "solid", 0).grey(3.0)
+    clean = RoadRenderer(model, "solid", 0).render_grey(3.0)
     moment = SimpleNamespace(t=2.0, position=3.0, v_ego=26.8)
     found = {"clean": clean}
     for level in (1, 3, 5, 10):
@@ -87,7 +87,7 @@ def main() -> int:
     parser.add_argument("--repeat", type=int, default=300, help="detections for each median")
     repeat = parser.parse_args().repeat
     cv2.setNumThreads(1)
-    compiled.use(FOLDER)
+    compiled.use(COMPILED_FOLDER)
     model = CameraModel()
     print(f"{'':10}" + "".join(f"{column:>12}" for column in COLUMNS))
     late = False

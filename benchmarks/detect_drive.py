@@ -24,7 +24,7 @@ from selfdrive.common import compiled  # noqa: E402
 from selfdrive.common.camera_model import CameraModel  # noqa: E402
 from selfdrive.messages import CameraView  # noqa: E402
 from selfdrive.sim import effects  # noqa: E402
-from selfdrive.sim.compile_helpers import FOLDER  # noqa: E402
+from selfdrive.sim.compile_helpers import COMPILED_FOLDER  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 from selfdrive.visiond.coded_detector import CodedDetector  # noqa: E402
 from selfdrive.visiond.compiled_coded import build_coded_detector  # noqa: E402
@@ -48,7 +48,7 @@ def drive(marks: str, weather: str | None, amount: float) -> list[np.ndarray]:
     """Return two seconds of frames."""
     camera = CameraModel()
     road = RoadRenderer(camera, marks, 0)
-    pictures = [road.grey(STEP * k) for k in range(DIFFERENT)]
+    pictures = [road.render_grey(STEP * k) for k in range(DIFFERENT)]
     if weather is None:
         return pictures
     effect = getattr(effects, weather)(amount, 1, camera)
@@ -82,7 +82,7 @@ def main() -> int:
     parser.add_argument("--plain", action="store_true", help="without compiled code")
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    compiled.use(None if options.plain else FOLDER)
+    compiled.use(None if options.plain else COMPILED_FOLDER)
     slow = False
     columns = "".join(f"{name:>10}" for name in ("first", "median", "slowest", "goal"))
     print(f"{'detector':<10}{'marks':<8}{'weather':<18}{columns}{'ratio':>8}  in")

@@ -21,7 +21,7 @@ sys.path.insert(0, str(ROOT / "target"))
 
 from selfdrive.common import compiled  # noqa: E402
 from selfdrive.common.camera_model import CameraModel  # noqa: E402
-from selfdrive.sim.compile_helpers import FOLDER  # noqa: E402
+from selfdrive.sim.compile_helpers import COMPILED_FOLDER  # noqa: E402
 from selfdrive.sim.effects.levels import LEVEL_AMOUNTS  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 
@@ -47,9 +47,9 @@ def main() -> int:
     parser.add_argument("--plain", action="store_true", help="without compiled code")
     given = parser.parse_args()
     cv2.setNumThreads(1)
-    compiled.use(None if given.plain else FOLDER)
+    compiled.use(None if given.plain else COMPILED_FOLDER)
     camera = CameraModel()
-    picture = RoadRenderer(camera, "solid", 0).grey(10.0)
+    picture = RoadRenderer(camera, "solid", 0).render_grey(10.0)
     slow = []
     print(f"{'effect':<16}{'amount':>8}{'made in':>12}{'median':>12}{'fastest':>12}{'of the goal':>13}  in")
     for kind, amounts in LEVEL_AMOUNTS.items():

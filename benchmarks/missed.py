@@ -53,7 +53,7 @@ def main() -> int:
         for number in range(options.roads):
             road = RoadRenderer(model, random_look(rng), number, periods=4)
             pose = rng.normal(0.0, 0.3), rng.normal(0.0, 0.01)
-            clean, truth = road.grey(rng.uniform(0.0, 40.0), *pose), road.truth(*pose)
+            clean, truth = road.render_grey(rng.uniform(0.0, 40.0), *pose), road.true_lines(*pose)
             if not is_found(model, clean, truth):
                 unfit += 1
                 continue

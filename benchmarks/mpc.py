@@ -21,7 +21,7 @@ from selfdrive.common import compiled  # noqa: E402
 from selfdrive.controls.lib.lateral_mpc import Lanes, LateralMpc  # noqa: E402
 from selfdrive.controls.lib.long_mpc import LongitudinalMpc  # noqa: E402
 from selfdrive.messages import LeadData  # noqa: E402
-from selfdrive.sim.compile_helpers import FOLDER  # noqa: E402
+from selfdrive.sim.compile_helpers import COMPILED_FOLDER  # noqa: E402
 
 UPDATES = 200  # in each round
 GOALS = {  # microseconds of CPU
@@ -88,7 +88,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--json", type=Path, help="file for the figures")
     options = parser.parse_args()
-    compiled.use(None if options.plain else FOLDER)
+    compiled.use(None if options.plain else COMPILED_FOLDER)
     times = measure(options.rounds)
     print(f"{'CPU, microseconds':28}{'median':>10}{'best':>10}{'goal':>10}{'ratio':>8}")
     missed = False

@@ -109,9 +109,12 @@ class Drive:
         from selfdrive.sim.road import Road
 
         coded = detector == "as_coded"
-        move = "as_coded" if coded else choices().GROUND
-        pictures = choices().Pictures(detector=detector, cache=cache, translation=move)
-        self._seen = first_module("camera_and_detector", "vision").build_vision(pictures, Road(None, None), 0)
+        move = "as_coded" if coded else "ground"
+        options = getattr(choices(), "PictureOptions", None) or choices().Pictures  # as in older versions
+        pictures = options(detector=detector, cache=cache, translation=move)
+        module = first_module("camera_and_detector", "vision")
+        build = getattr(module, "build_camera_and_detector", None) or module.build_vision
+        self._seen = build(pictures, Road(None, None), 0)
         self._offset = 0.1 * list(EFFECTS).index(effect)  # cases share no poses
         self._number = 0
         self._effect = None

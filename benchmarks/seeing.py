@@ -30,12 +30,12 @@ from selfdrive.messages import CameraView  # noqa: E402
 from selfdrive.sim import effects, simulator  # noqa: E402
 from selfdrive.sim.effects.effect import Effect, Moment  # noqa: E402
 from selfdrive.sim.effects.levels import LEVEL_AMOUNTS  # noqa: E402
-from selfdrive.sim.moved_picture import CodedView  # noqa: E402
+from selfdrive.sim.moved_picture import CodedShiftMover  # noqa: E402
 from selfdrive.sim.picture import Picture  # noqa: E402
 from selfdrive.sim.picture_camera import PictureCamera  # noqa: E402
-from selfdrive.sim.picture_options import Pictures  # noqa: E402
+from selfdrive.sim.picture_options import PictureOptions  # noqa: E402
 from selfdrive.sim.reference_plant import ReferencePlant  # noqa: E402
-from selfdrive.sim.scenario import REFERENCE, load_scenario, on_plant  # noqa: E402
+from selfdrive.sim.scenario import REFERENCE_PLANT, load_scenario, on_plant  # noqa: E402
 from selfdrive.sim.truth import GroundTruth  # noqa: E402
 from selfdrive.visiond import coded_detector  # noqa: E402
 from selfdrive.visiond.coded_detector import CodedDetector  # noqa: E402
@@ -141,7 +141,7 @@ class FaultyCamera(PictureCamera):
         self._case, self._parts = case, case.row.parts
         self._active, self.reached = False, frozenset[str]()
         if MOVE in self._parts:
-            self._move = CodedView()
+            self._move = CodedShiftMover()
 
     def look(self, truth: GroundTruth) -> CameraView:
         self._update(truth)
@@ -215,10 +215,10 @@ class MixedDetector:
 def drive(case: Case) -> tuple[Case, Ending]:
     cv2.setNumThreads(1)
     labels = LABELS in case.row.parts
-    simulator.PLANTS[REFERENCE] = ReferencePlant if labels else TrueLabels
+    simulator.PLANT_CLASSES[REFERENCE_PLANT] = ReferencePlant if labels else TrueLabels
     scenario = load_scenario(ROOT / "fault_library" / "scenarios" / f"{case.scenario}.yaml")
     run = simulator.Simulator()
-    run.reset(on_plant(scenario, REFERENCE), 1, Pictures(cache=Path(os.environ[FRAMES])))
+    run.reset(on_plant(scenario, REFERENCE_PLANT), 1, PictureOptions(cache=Path(os.environ[FRAMES])))
     assert isinstance(run._camera, PictureCamera)
     run._camera = camera = FaultyCamera(run._camera, case)
     detector = MixedDetector(case.row, camera.model)

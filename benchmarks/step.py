@@ -35,12 +35,12 @@ from selfdrive.controls.lib.longcontrol import LongControl  # noqa: E402
 from selfdrive.controls.plannerd import Planner  # noqa: E402
 from selfdrive.controls.radard import Radard  # noqa: E402
 from selfdrive.sim.actuators import ActuatorReceiver  # noqa: E402
-from selfdrive.sim.camera import Camera  # noqa: E402
-from selfdrive.sim.compile_helpers import FOLDER  # noqa: E402
+from selfdrive.sim.camera import GeometryCamera  # noqa: E402
+from selfdrive.sim.compile_helpers import COMPILED_FOLDER  # noqa: E402
 from selfdrive.sim.hazards import HazardMonitor  # noqa: E402
 from selfdrive.sim.plant import Plant  # noqa: E402
 from selfdrive.sim.radar import RadarSensor  # noqa: E402
-from selfdrive.sim.recorder import Recorder  # noqa: E402
+from selfdrive.sim.recorder import TraceRecorder  # noqa: E402
 from selfdrive.sim.scenario import Scenario, load_scenario  # noqa: E402
 from selfdrive.sim.sensors import CarSensors  # noqa: E402
 from selfdrive.sim.simulator import Simulator  # noqa: E402
@@ -49,7 +49,7 @@ from selfdrive.visiond.visiond import Visiond  # noqa: E402
 GROUPS: dict[str, tuple[tuple[type, str], ...]] = {
     "plant and ground truth": ((Plant, "step"), (Simulator, "_observe"), (HazardMonitor, "update")),
     "sensors and CAN out": (
-        *((CarSensors, "measure"), (RadarSensor, "measure"), (Camera, "look")),
+        *((CarSensors, "measure"), (RadarSensor, "measure"), (GeometryCamera, "look")),
         *((CarInterface, "apply"), (Packer, "pack")),
     ),
     "CAN in": (
@@ -64,7 +64,7 @@ GROUPS: dict[str, tuple[tuple[type, str], ...]] = {
     "lateral MPC": ((LatControl, "plan"),),
     "lateral control": ((LatControl, "update"),),
     "controlsd, the rest": ((Controlsd, "update"),),
-    "recorder": ((Recorder, "append"),),
+    "recorder": ((TraceRecorder, "append"),),
     "the loop itself": ((Simulator, "step"),),
 }
 PARTS = tuple(part for parts in GROUPS.values() for part in parts)
@@ -206,7 +206,7 @@ def main() -> None:
     options = parser.parse_args()
     if options.against:
         sys.exit(0 if against(options.against, options.scenario, options.rounds) else 1)
-    compiled.use(None if options.plain else FOLDER)
+    compiled.use(None if options.plain else COMPILED_FOLDER)
     scenario = load_scenario(options.scenario)
     times = [run(scenario) for _ in range(options.repeat)]
     first_build = times[0][0]

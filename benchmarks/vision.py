@@ -18,11 +18,11 @@ sys.path.insert(0, str(ROOT / "target"))
 
 import cv2  # noqa: E402
 from selfdrive.common.camera_model import CameraModel  # noqa: E402
-from selfdrive.sim.detection_memory import FILE  # noqa: E402
-from selfdrive.sim.image_library import SPACING, open_library  # noqa: E402
-from selfdrive.sim.moved_picture import GroundView, ShiftedView  # noqa: E402
+from selfdrive.sim.detection_memory import FILE_NAME  # noqa: E402
+from selfdrive.sim.image_library import RENDERED_SPACING, open_frame_library  # noqa: E402
+from selfdrive.sim.moved_picture import HomographyMover, ShiftMover  # noqa: E402
 from selfdrive.sim.picture import Picture  # noqa: E402
-from selfdrive.sim.picture_options import DETECTORS, Pictures  # noqa: E402
+from selfdrive.sim.picture_options import DETECTORS, PictureOptions  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 from selfdrive.sim.run import simulate  # noqa: E402
 from selfdrive.sim.scenario import load_scenario  # noqa: E402
@@ -48,8 +48,8 @@ def show(name: str, spent: list[float], goal: float | None = None) -> bool:
 def render(repeat: int) -> bool:
     """Draw consecutive frames of the standard road, from mid-lane and from an offset, turned pose."""
     renderer = RoadRenderer(CameraModel(), "dashed", 0)
-    straight = times(lambda number: renderer.grey(number * SPACING), repeat)
-    aside = times(lambda number: renderer.grey(number * SPACING, 0.5, 0.02), repeat)
+    straight = times(lambda number: renderer.render_grey(number * RENDERED_SPACING), repeat)
+    aside = times(lambda number: renderer.render_grey(number * RENDERED_SPACING, 0.5, 0.02), repeat)
     build = times(lambda number: RoadRenderer(CameraModel(), "dashed", number), 5)
     good = show("render: grey frame", straight, GOALS["render"])
     good &= show("render: offset and turned", aside, GOALS["render"])
@@ -59,9 +59,9 @@ def render(repeat: int) -> bool:
 
 def view(repeat: int) -> bool:
     model = CameraModel()
-    drawn = RoadRenderer(model, "dashed", 0, periods=1).grey(0.0)
+    drawn = RoadRenderer(model, "dashed", 0, periods=1).render_grey(0.0)
     frame = Picture(("drawn",), drawn.shape, lambda region: drawn[region.part])
-    ground, shifted = GroundView(model), ShiftedView(model)
+    ground, shifted = HomographyMover(model), ShiftMover(model)
     whole = times(lambda number: ground.seen(frame, 0.01 * number, 0.02).pixels(), repeat)
     part = RoadRegion(model).part
     looked_at = times(lambda number: ground.seen(frame, 0.01 * number, 0.02)[part], repeat)
@@ -73,10 +73,10 @@ def view(repeat: int) -> bool:
 
 def library(repeat: int) -> bool:
     with TemporaryDirectory() as folder:
-        pictures = Pictures(cache=Path(folder))
-        made = [spent_in(partial(open_library, pictures, seed)) for seed in range(2)]
+        pictures = PictureOptions(cache=Path(folder))
+        made = [spent_in(partial(open_frame_library, pictures, seed)) for seed in range(2)]
         show("library: cold, 600 frames", made)
-        show("library: warm", times(lambda number: open_library(pictures, 0), 5))
+        show("library: warm", times(lambda number: open_frame_library(pictures, 0), 5))
     return True
 
 
@@ -86,12 +86,12 @@ def runs(repeat: int) -> bool:
     show("runs: without pictures", times(lambda number: simulate(scenario, 0), 2))
     with TemporaryDirectory() as folder:
         for detector in DETECTORS:
-            pictures = Pictures(detector=detector, cache=Path(folder))
+            pictures = PictureOptions(detector=detector, cache=Path(folder))
             work = partial(simulate, scenario, 0, pictures)
             work()
             unknown = []
             for _ in range(3):
-                (Path(folder) / FILE).unlink()
+                (Path(folder) / FILE_NAME).unlink()
                 unknown.append(spent_in(work))
             good &= show(f"runs: {detector}, uncached", unknown, RUN_GOAL)
             show(f"runs: {detector}, cached", [spent_in(work) for _ in range(3)])

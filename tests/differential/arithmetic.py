@@ -18,24 +18,30 @@ from selfdrive.messages import CameraView
 from selfdrive.sim import camera_and_detector
 from selfdrive.sim.effects.effect import Moment
 from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
-from selfdrive.sim.moved_picture import CodedView, GroundView, ShiftedView
+from selfdrive.sim.moved_picture import CodedShiftMover, HomographyMover, ShiftMover
 from selfdrive.sim.picture import Picture
-from selfdrive.sim.picture_options import AS_CODED, CODED, DASHED, DETECTORS, Pictures
-from selfdrive.sim.road_look import Look, Paint
+from selfdrive.sim.picture_options import (
+    CODED_DETECTOR,
+    CODED_TRANSLATION,
+    DASHED_MARKS,
+    DETECTORS,
+    PictureOptions,
+)
+from selfdrive.sim.road_look import LinePaint, RoadLook
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import simulate
 from selfdrive.sim.scenario import PLANTS, load_scenario, on_plant
-from selfdrive.sim.trace_file import pieces
+from selfdrive.sim.trace_file import npz_pieces
 
 SCENARIOS = Path(__file__).parents[2] / "fault_library" / "scenarios"
-WORN = Look(  # with every feature of a road
-    left=Paint(dashed=True, wear=0.4, fade=0.2),
-    right=Paint(double=True, wear=0.2),
-    cracks=30.0,
-    seams=10.0,
-    patches=10.0,
-    shadows=0.3,
-    joints=5.0,
+WORN = RoadLook(  # with every feature of a road
+    left=LinePaint(dashed=True, wear=0.4, fade=0.2),
+    right=LinePaint(double=True, wear=0.2),
+    cracks_per_100_m=30.0,
+    seams_per_100_m=10.0,
+    patches_per_100_m=10.0,
+    shadow_share=0.3,
+    joint_spacing=5.0,
 )
 MOMENTS = [Moment(1.5 + 0.05 * k, 40.0 + 1.34 * k, 26.8) for k in range(20)]
 
@@ -49,21 +55,21 @@ def digests() -> Iterator[tuple[str, str]]:
         for plant in PLANTS if path.stem[0] != "L" else PLANTS[:1]:  # the other has only straight roads
             yield f"{path.stem} on the {plant} plant", trace(path, plant, None)
     for detector in DETECTORS:
-        pictures = Pictures(detector=detector, marks=DASHED)
+        pictures = PictureOptions(detector=detector, marks=DASHED_MARKS)
         yield f"S1 through {detector}", trace(SCENARIOS / "S1.yaml", "standard", pictures)
-    coded = Pictures(detector=AS_CODED, translation=CODED)
+    coded = PictureOptions(detector=CODED_DETECTOR, translation=CODED_TRANSLATION)
     yield "S1 on the reference plant, as coded", trace(SCENARIOS / "S1.yaml", "reference", coded)
 
 
 def roads() -> dict[str, np.ndarray]:
     model = CameraModel()
     found = {
-        name: RoadRenderer(model, look, seed=3).grey(31.0, 0.4, 0.02)
+        name: RoadRenderer(model, look, seed=3).render_grey(31.0, 0.4, 0.02)
         for name, look in (("solid", "solid"), ("dashed", "dashed"), ("worn", WORN))
     }
     solid = found["solid"]
     frame = Picture(("frame",), solid.shape, lambda region: solid[region.part])
-    for mover in (GroundView(model), ShiftedView(model), CodedView()):
+    for mover in (HomographyMover(model), ShiftMover(model), CodedShiftMover()):
         found[type(mover).__name__] = mover.seen(frame, 0.7, -0.015).pixels()
     return found
 
@@ -73,7 +79,7 @@ def seen(detector: str, level: int) -> Iterator[tuple[str, str]]:
     detections in them."""
     model = CameraModel()
     road = RoadRenderer(model, WORN, seed=3)
-    frames = [road.grey(m.position, 0.3, 0.01) for m in MOMENTS]
+    frames = [road.render_grey(m.position, 0.3, 0.01) for m in MOMENTS]
     for effect, amounts in LEVEL_AMOUNTS.items():
         made = effect(amounts[min(level, len(amounts) - 1)], 3, model)
         shown = [made.apply(frame, moment) for frame, moment in zip(frames, MOMENTS, strict=True)]
@@ -89,11 +95,11 @@ def view(picture: np.ndarray) -> CameraView:
     return CameraView(**there, picture=picture)
 
 
-def trace(path: Path, plant: str, pictures: Pictures | None) -> str:
+def trace(path: Path, plant: str, pictures: PictureOptions | None) -> str:
     scenario = on_plant(load_scenario(path), plant)
     if pictures:
         scenario = replace(scenario, steps=1500)
-    return sha256(b"".join(pieces(simulate(scenario, 0, pictures).trace))).hexdigest()
+    return sha256(b"".join(npz_pieces(simulate(scenario, 0, pictures).trace))).hexdigest()
 
 
 def digest(picture: np.ndarray) -> str:

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from selfdrive.sim.compile_helpers import compile_helpers, compiler
+from selfdrive.sim.compile_helpers import compile_helpers, compiler_command
 
 pytestmark = pytest.mark.slow
 
@@ -26,7 +26,7 @@ def test_digests_equal_the_recorded_ones(processor: str, code: str, tmp_path: Pa
     """After an intended change of results, record them with `python tests/differential/arithmetic.py`."""
     command = [sys.executable, str(HERE / "arithmetic.py")]
     if code == "compiled":
-        if not compiler():
+        if not compiler_command():
             pytest.skip("there is no C compiler")
         list(compile_helpers(tmp_path))
         command.append(str(tmp_path))

@@ -5,7 +5,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from selfdrive.sim.detection_memory import FILE
+from selfdrive.sim.detection_memory import FILE_NAME
 
 from mutator.execution.campaign_running import run_campaign
 from mutator.store.plan_choices import Choices
@@ -50,7 +50,7 @@ def test_the_frame_cache_changes_no_byte(
     for out in runs:
         assert not (out.name == "cold" and cache.exists())
         assert run_campaign(workspace, "vision_levels_paper", out, workers=2, choices=FEW).exit_code == 0
-    assert (cache / "mutator" / "targets" / "openpilot" / FILE).exists()
+    assert (cache / "mutator" / "targets" / "openpilot" / FILE_NAME).exists()
     cold, warm = runs
     assert len(load_records(cold)) == 2
     assert load_records(cold) == load_records(warm)

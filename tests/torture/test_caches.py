@@ -10,7 +10,7 @@ import cv2
 import pytest
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim import detection_memory
-from selfdrive.sim.image_library import SPACING
+from selfdrive.sim.image_library import RENDERED_SPACING
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import main
 
@@ -40,7 +40,7 @@ cx_px: 317.9
 cy_px: 256.5
 height_m: 2.18
 pitch_deg: 14
-spacing_m: {SPACING}
+spacing_m: {RENDERED_SPACING}
 """
 
 
@@ -114,7 +114,7 @@ def pictures(toy: Workspace, folder: Path) -> Cache:
     (frames / "camera.yaml").write_text(CAMERA)
     renderer = RoadRenderer(CameraModel(), "solid", 0, periods=1)
     for number in range(FRAMES):
-        cv2.imwrite(str(frames / f"{number}.png"), renderer.grey(number * SPACING))
+        cv2.imwrite(str(frames / f"{number}.png"), renderer.grey(number * RENDERED_SPACING))
     words = ["--scenario", str(CLONE / "fault_library" / "scenarios" / "S1.yaml"), "--seed", "0"]
     words += ["--pictures", "--frames", str(frames), "--detector", "robust", "--max-steps", "12"]
     kept = at / "mutator" / "targets" / "openpilot"
@@ -140,7 +140,7 @@ def test_a_damaged_cache_changes_no_result(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(detection_memory, "BUCKETS", 16)
+    monkeypatch.setattr(detection_memory, "BUCKET_COUNT", 16)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     cache = CACHES[name](toy, tmp_path)
     tally = Tally(f"damages to caches: {name}")

@@ -9,10 +9,10 @@ from selfdrive.sim.truth import GroundTruth
 LANE_WIDTH = 3.7  # m
 
 _STRAIGHT = (0.0,) * VIEW_LENGTH
-_AHEAD = tuple(float(x) for x in range(VIEW_LENGTH))
+_METRES_AHEAD = tuple(float(x) for x in range(VIEW_LENGTH))
 
 
-class Camera:
+class GeometryCamera:
     def __init__(self, road: Road) -> None:
         self._road = road
 
@@ -32,5 +32,5 @@ class Camera:
             return road or _STRAIGHT
         slope = -tan(truth.heading)
         if road is None:
-            return tuple([slope * x for x in _AHEAD])
-        return tuple([y + slope * x for x, y in zip(_AHEAD, road, strict=True)])
+            return tuple([slope * x for x in _METRES_AHEAD])
+        return tuple([y + slope * x for x, y in zip(_METRES_AHEAD, road, strict=True)])

@@ -10,8 +10,8 @@ from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
-from selfdrive.sim.camera import Camera
-from selfdrive.sim.picture_options import AS_CODED, PAPER, Pictures
+from selfdrive.sim.camera import GeometryCamera
+from selfdrive.sim.picture_options import CODED_DETECTOR, PAPER_DETECTOR, PictureOptions
 from selfdrive.sim.road import Road
 from selfdrive.sim.truth import GroundTruth
 from selfdrive.visiond.detector import IdealDetector, LaneDetector
@@ -24,7 +24,7 @@ class RoadCamera(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Vision:
+class CameraAndDetector:
     """Camera and detector of one run; `description` is for its record.
 
     `model` is the camera's geometry, for drawing the view if there are no pictures.
@@ -32,16 +32,18 @@ class Vision:
 
     camera: RoadCamera
     detector: LaneDetector
-    description: dict | None
+    for_record: dict | None
     model: CameraModel
 
 
-def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
+def build_camera_and_detector(pictures: PictureOptions | None, road: Road, seed: int) -> CameraAndDetector:
     """Return camera and detector for a run. Raises ConfigError for unusable frames, and for pictures of a
     road that is not straight."""
     if pictures is None:
-        return Vision(camera=Camera(road), detector=IdealDetector(), description=None, model=CameraModel())
-    from selfdrive.sim.image_library import open_library
+        return CameraAndDetector(
+            camera=GeometryCamera(road), detector=IdealDetector(), for_record=None, model=CameraModel()
+        )
+    from selfdrive.sim.image_library import open_frame_library
     from selfdrive.sim.picture_camera import PictureCamera
 
     if road.bend(0.0, 1) is not None:
@@ -50,30 +52,30 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
             expected="a straight road for runs with pictures",
             remedy="run it without pictures",
         )
-    if pictures.forget:
+    if pictures.ignore_stored:
         compiled.use(None)
-    library = open_library(pictures, seed)
-    camera = PictureCamera(Camera(road), library, pictures.translation)
+    library = open_frame_library(pictures, seed)
+    camera = PictureCamera(GeometryCamera(road), library, pictures.translation)
     description = {
         "detector": pictures.detector,
         "frames": library.name,
         "frames_digest": library.digest,
         "translation": pictures.translation,
     }
-    return Vision(
+    return CameraAndDetector(
         camera=camera,
-        detector=_detector(pictures, camera),
-        description=description,
+        detector=_build_detector_with_memory(pictures, camera),
+        for_record=description,
         model=library.model,
     )
 
 
 def build_detector(name: str, model: CameraModel):
-    if name == PAPER:
+    if name == PAPER_DETECTOR:
         from selfdrive.visiond.compiled_paper import build_paper_detector
 
         return build_paper_detector(model)
-    if name == AS_CODED:
+    if name == CODED_DETECTOR:
         from selfdrive.visiond.compiled_coded import build_coded_detector
 
         return build_coded_detector(model)
@@ -82,12 +84,12 @@ def build_detector(name: str, model: CameraModel):
     return build_robust_detector(model)
 
 
-def _detector(pictures: Pictures, camera) -> LaneDetector:
+def _build_detector_with_memory(pictures: PictureOptions, camera) -> LaneDetector:
     from selfdrive.sim.detection_memory import DetectionMemory
     from selfdrive.sim.remembering_detector import RememberingDetector
 
     detector = build_detector(pictures.detector, camera.model)
-    if pictures.forget or pictures.cache is None:
+    if pictures.ignore_stored or pictures.cache is None:
         return detector
     memory = DetectionMemory(pictures.cache)
     made_of = (pictures.detector, camera.model, detector.calculated_by, camera.calculated_by)

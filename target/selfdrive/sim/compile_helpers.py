@@ -18,11 +18,11 @@ from tempfile import TemporaryDirectory
 from selfdrive.common import compiled
 from selfdrive.common.errors import ConfigError, writing
 
-PACKAGE = Path(__file__).resolve().parents[1]
-FOLDER = PACKAGE.with_name("compiled")
+PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
+COMPILED_FOLDER = PACKAGE_FOLDER.with_name("compiled")
 # Strict IEEE arithmetic: no fused multiply-add, no reordering. Without symbols, a library's bytes do not
 # depend on the folder in which it is compiled.
-OPTIONS = (
+COMPILER_OPTIONS = (
     "-O3",
     "-ffp-contract=off",
     "-fno-fast-math",
@@ -37,7 +37,7 @@ OPTIONS = (
 EXIT_INVALID_INPUT = 2
 
 
-def compiler() -> list[str]:
+def compiler_command() -> list[str]:
     """The C compiler and its first options: CC, else cc, else that of the package ziglang, else []."""
     if os.environ.get("CC"):
         return shlex.split(os.environ["CC"])
@@ -52,25 +52,25 @@ def compile_helpers(folder: Path) -> Iterator[Path]:
     """Compile every C file of the package into `folder` and remove outdated libraries. Raises ConfigError."""
     with writing(folder, expected="a folder for compiled helpers", remedy="choose another --out"):
         folder.mkdir(parents=True, exist_ok=True)
-        sources = {compiled.file_name(source): source for source in sorted(PACKAGE.rglob("*.c"))}
+        sources = {compiled.file_name(source): source for source in sorted(PACKAGE_FOLDER.rglob("*.c"))}
         for old in folder.glob(f"*{compiled.SUFFIX}"):
             if old.name not in sources:
                 old.unlink()
         with TemporaryDirectory(dir=folder) as scratch:
             for name, source in sources.items():
-                made = Path(scratch, name)
-                _compile(source, made, scratch)
-                data = made.read_bytes()
-                made.write_bytes(data + sha256(data).digest())
-                yield made.replace(folder / name)
+                library = Path(scratch, name)
+                _compile(source, library, scratch)
+                data = library.read_bytes()
+                library.write_bytes(data + sha256(data).digest())
+                yield library.replace(folder / name)
 
 
-def _compile(source: Path, made: Path, scratch: str) -> None:
-    kept = {"ZIG_LOCAL_CACHE_DIR": scratch, "ZIG_GLOBAL_CACHE_DIR": scratch}
+def _compile(source: Path, library: Path, scratch: str) -> None:
+    cache_folders = {"ZIG_LOCAL_CACHE_DIR": scratch, "ZIG_GLOBAL_CACHE_DIR": scratch}
     try:
-        words = compiler()
-        command = [*words, source, "-o", made, *OPTIONS]
-        subprocess.run(command, check=True, capture_output=True, text=True, env=os.environ | kept)
+        compiler_words = compiler_command()
+        command = [*compiler_words, source, "-o", library, *COMPILER_OPTIONS]
+        subprocess.run(command, check=True, capture_output=True, text=True, env=os.environ | cache_folders)
     except (OSError, ValueError) as error:
         raise ConfigError(
             f"CC is {os.environ.get('CC', 'not set')!r}: {getattr(error, 'strerror', None) or error}",
@@ -78,9 +78,9 @@ def _compile(source: Path, made: Path, scratch: str) -> None:
             remedy="install one or set CC; without one, runs only take longer",
         ) from None
     except subprocess.CalledProcessError as error:
-        said = error.stderr.strip().splitlines() or [f"exit status {error.returncode}"]
+        messages = error.stderr.strip().splitlines() or [f"exit status {error.returncode}"]
         raise ConfigError(
-            f"{words[0]} says {said[0]!r}",
+            f"{compiler_words[0]} says {messages[0]!r}",
             where=str(source),
             expected="a working C compiler",
             remedy="set CC to another one; without one, runs only take longer",
@@ -91,7 +91,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="selfdrive.sim.compile_helpers", description="Compile the slowest steps of a run's arithmetic."
     )
-    parser.add_argument("--out", type=Path, default=FOLDER, metavar="DIR", help="folder for the libraries")
+    parser.add_argument(
+        "--out", type=Path, default=COMPILED_FOLDER, metavar="DIR", help="folder for the libraries"
+    )
     try:
         for path in compile_helpers(parser.parse_args().out):
             print(path)

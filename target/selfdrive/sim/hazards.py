@@ -5,9 +5,9 @@ from selfdrive.sim.sensors import STANDSTILL_SPEED
 from selfdrive.sim.truth import GroundTruth
 
 CAR_WIDTH = 1.8  # m
-OVERLAP_OFFSET = 0.5 * (LANE_WIDTH + CAR_WIDTH)  # m, half a lane and half a car
+CONTACT_OFFSET = 0.5 * (LANE_WIDTH + CAR_WIDTH)  # m, half a lane and half a car
 FREE_DISTANCE = 100.0  # m
-LANE_OFFSET = 0.5 * (LANE_WIDTH - CAR_WIDTH)  # m; beyond this, a side of the car leaves the lane
+LANE_DEPARTURE_OFFSET = 0.5 * (LANE_WIDTH - CAR_WIDTH)  # m; beyond this, a side of the car leaves the lane
 
 
 class HazardMonitor:
@@ -23,15 +23,15 @@ class HazardMonitor:
 
     def update(self, truth: GroundTruth) -> None:
         offset = abs(truth.lateral_offset)
-        if truth.d_rel <= 0.0 and offset <= OVERLAP_OFFSET:
-            self._note("H1", truth.t)
+        if truth.d_rel <= 0.0 and offset <= CONTACT_OFFSET:
+            self._record_first("H1", truth.t)
         if truth.v_ego >= STANDSTILL_SPEED:
             self._has_moved = True
         elif self._has_moved and (truth.free_road or truth.d_rel >= FREE_DISTANCE):
-            self._note("H2", truth.t)
-        if offset > LANE_OFFSET:
-            self._note("H3", truth.t)
+            self._record_first("H2", truth.t)
+        if offset > LANE_DEPARTURE_OFFSET:
+            self._record_first("H3", truth.t)
 
-    def _note(self, hazard: str, t: float) -> None:
+    def _record_first(self, hazard: str, t: float) -> None:
         if self.first[hazard] is None:
             self.first[hazard] = t

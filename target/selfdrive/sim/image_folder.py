@@ -12,11 +12,11 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.conversions import DEG_TO_RAD
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.yaml_section import Section, read_yaml
+from selfdrive.sim.yaml_section import YamlSection, read_yaml
 
-CALIBRATION = "camera.yaml"
+CALIBRATION_FILE = "camera.yaml"
 SCHEMA = "camera/1"
-_KEYS = {
+_KEY_MEANINGS = {
     "schema": f"{SCHEMA!r}, the format of this file",
     "name": "the frames' name in a run's record",
     "files": 'the pattern of the frames\' file names, such as "*.png"; frames are ordered by their numbers',
@@ -34,8 +34,8 @@ _KEYS = {
     "fps": "the number of frames per second, if frames follow the time of a run",
     "spacing_m": "the distance between frames in metres, if frames follow the distance driven",
 }
-_LARGEST = 8192  # pixels
-_NUMBER = re.compile(r"(\d+)(?!.*\d)")  # the last number in a file name
+_MOST_PIXELS = 8192  # pixels
+_LAST_NUMBER_PATTERN = re.compile(r"(\d+)(?!.*\d)")  # the last number in a file name
 
 
 class ImageFolder:
@@ -45,23 +45,25 @@ class ImageFolder:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._calibration = folder / CALIBRATION
-        text, root = _calibration(folder)
+        self._calibration = folder / CALIBRATION_FILE
+        text, root = _load_calibration(folder)
         self.name = root.text("name")
-        self._width, self._rows = _size(root)
-        self.model = _camera(root)
+        self._width, self._rows = _parse_frame_size(root)
+        self.model = _parse_camera(root)
         if ("fps" in root) == ("spacing_m" in root):
-            root.fail("both or none of fps, spacing_m", "exactly one of them", f"fps is {_KEYS['fps']}")
+            root.fail(
+                "both or none of fps, spacing_m", "exactly one of them", f"fps is {_KEY_MEANINGS['fps']}"
+            )
         self.fps = root.number("fps", 0.1, 1000.0) if "fps" in root else None
         self.spacing = None if self.fps else root.number("spacing_m", 0.01, 1000.0)
-        self.files = _listed(folder, root)
-        parts = [text, *(_bytes(file, "a frame", "put it there") for file in self.files)]
+        self.frame_paths = _list_frames(folder, root)
+        parts = [text, *(_read_file(file, "a frame", "put it there") for file in self.frame_paths)]
         self.digest = sha256(b"".join(sha256(part).digest() for part in parts)).hexdigest()
 
-    def read(self) -> Iterator[np.ndarray]:
+    def decode_frames(self) -> Iterator[np.ndarray]:
         """Yield the frames (uint8, rows x width). Raises ConfigError at the first invalid one."""
-        for path in self.files:
-            frame = _decoded(_bytes(path, "a frame", "put it there"))
+        for path in self.frame_paths:
+            frame = _decode(_read_file(path, "a frame", "put it there"))
             if frame is None:
                 raise ConfigError(
                     "not readable as a picture",
@@ -83,56 +85,62 @@ class ImageFolder:
             yield frame
 
 
-def camera_of(folder: Path) -> CameraModel:
-    return _camera(_calibration(folder)[1])
+def load_camera(folder: Path) -> CameraModel:
+    return _parse_camera(_load_calibration(folder)[1])
 
 
-def _calibration(folder: Path) -> tuple[bytes, Section]:
-    path = folder / CALIBRATION
+def _load_calibration(folder: Path) -> tuple[bytes, YamlSection]:
+    path = folder / CALIBRATION_FILE
     remedy = "write it as docs/how-to/use-your-own-frames.md says"
-    text = _bytes(path, "the calibration of the frames in this folder", remedy)
-    root = read_yaml(text.decode(errors="replace"), str(path), _KEYS)
+    text = _read_file(path, "the calibration of the frames in this folder", remedy)
+    root = read_yaml(text.decode(errors="replace"), str(path), _KEY_MEANINGS)
     root.text("schema", (SCHEMA,))
     return text, root
 
 
-def _size(root: Section) -> tuple[int, int]:
-    return _pixels(root, "width", _LARGEST), _pixels(root, "rows", _LARGEST)
+def _parse_frame_size(root: YamlSection) -> tuple[int, int]:
+    return _parse_pixels(root, "width", _MOST_PIXELS), _parse_pixels(root, "rows", _MOST_PIXELS)
 
 
-def _pixels(root: Section, key: str, most: int) -> int:
+def _parse_pixels(root: YamlSection, key: str, most: int) -> int:
     value = root.number(key, 16, most)
-    root.check(key, value == int(value), "a whole number of pixels", f"{key} is {_KEYS[key]}")
+    root.check(key, value == int(value), "a whole number of pixels", f"{key} is {_KEY_MEANINGS[key]}")
     return int(value)
 
 
-def _camera(root: Section) -> CameraModel:
-    width, rows = _size(root)
-    model = _model(root, width, rows)
-    return _resized(model, _pixels(root, "resize_width", width)) if "resize_width" in root else model
+def _parse_camera(root: YamlSection) -> CameraModel:
+    width, rows = _parse_frame_size(root)
+    model = _parse_full_size_camera(root, width, rows)
+    return (
+        _scale_camera(model, _parse_pixels(root, "resize_width", width)) if "resize_width" in root else model
+    )
 
 
-def _model(root: Section, width: int, rows: int) -> CameraModel:
+def _parse_full_size_camera(root: YamlSection, width: int, rows: int) -> CameraModel:
     height = root.number("height_m", 0.2, 10.0)
-    whole = ("fx_px", "fy_px", "cx_px", "cy_px", "pitch_deg")
+    calibration_keys = ("fx_px", "fy_px", "cx_px", "cy_px", "pitch_deg")
     if "horizon_row" in root or "focal_px" in root:
-        if given := [key for key in whole if key in root]:
+        if redundant_keys := [key for key in calibration_keys if key in root]:
             root.fail(
-                " and ".join(given), "horizon_row, focal_px and height_m alone", "remove one or the other"
+                " and ".join(redundant_keys),
+                "horizon_row, focal_px and height_m alone",
+                "remove one or the other",
             )
         horizon = root.number("horizon_row", -rows, rows - 16.0)
-        focal = root.number("focal_px", 16.0, _LARGEST)
+        focal = root.number("focal_px", 16.0, _MOST_PIXELS)
         return CameraModel.from_view(width=width, rows=rows, horizon=horizon, focal=focal, height=height)
-    fx, fy = (root.number(key, 16.0, _LARGEST) for key in whole[:2])
-    cx, cy = (root.number(key, -_LARGEST, _LARGEST) for key in whole[2:4])
+    fx, fy = (root.number(key, 16.0, _MOST_PIXELS) for key in calibration_keys[:2])
+    cx, cy = (root.number(key, -_MOST_PIXELS, _MOST_PIXELS) for key in calibration_keys[2:4])
     pitch = root.number("pitch_deg", -30.0, 60.0) * DEG_TO_RAD
     model = CameraModel(width=width, rows=rows, fx=fx, fy=fy, cx=cx, cy=cy, height=height, pitch=pitch)
-    good = model.horizon < rows - 16.0
-    root.check("pitch_deg", good, "road in the picture", f"the horizon would be at row {model.horizon:.0f}")
+    sees_road = model.horizon < rows - 16.0
+    root.check(
+        "pitch_deg", sees_road, "road in the picture", f"the horizon would be at row {model.horizon:.0f}"
+    )
     return model
 
 
-def _resized(model: CameraModel, width: int) -> CameraModel:
+def _scale_camera(model: CameraModel, width: int) -> CameraModel:
     rows = round(model.rows * width / model.width)
     across, down = width / model.width, rows / model.rows
     return CameraModel(
@@ -147,7 +155,7 @@ def _resized(model: CameraModel, width: int) -> CameraModel:
     )
 
 
-def _listed(folder: Path, root: Section) -> list[Path]:
+def _list_frames(folder: Path, root: YamlSection) -> list[Path]:
     """The frames in order of the numbers in their names. Raises ConfigError if one is missing."""
     pattern = root.text("files")
     root.check(
@@ -164,9 +172,9 @@ def _listed(folder: Path, root: Section) -> list[Path]:
         "a pattern such as *.png, */*.png or **/*.png",
         "correct the pattern",
     )
-    files = sorted((path for path in folder.glob(pattern) if path.is_file()), key=_order)
+    files = sorted((path for path in folder.glob(pattern) if path.is_file()), key=_sort_key)
     root.check("files", bool(files), f"a pattern that matches files in {folder}", "correct the pattern")
-    for missing in _gaps(files):
+    for missing in _missing_frames(files):
         raise ConfigError(
             "missing",
             where=str(missing),
@@ -176,35 +184,35 @@ def _listed(folder: Path, root: Section) -> list[Path]:
     return files
 
 
-def _order(path: Path) -> list[tuple[int, str]]:
+def _sort_key(path: Path) -> list[tuple[int, str]]:
     parts = re.split(r"(\d+)", str(path))
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]
 
 
-def _gaps(files: list[Path]) -> Iterator[Path]:
+def _missing_frames(files: list[Path]) -> Iterator[Path]:
     numbered: list[tuple[Path, re.Match[str], int]] = []
     for path in files:
-        match = _NUMBER.search(path.name)
+        match = _LAST_NUMBER_PATTERN.search(path.name)
         if match is None:
             return
         numbered.append((path, match, int(match[1])))
     pairs = [
         (before, after)
         for before, after in pairwise(numbered)
-        if _frame(*before[:2], 0) == _frame(*after[:2], 0)  # only the number differs
+        if _path_with_number(*before[:2], 0) == _path_with_number(*after[:2], 0)  # only the number differs
     ]
     step = min((after[2] - before[2] for before, after in pairs), default=1)
     for (path, match, number), after in pairs:
         if after[2] - number != step:
-            yield _frame(path, match, number + step)
+            yield _path_with_number(path, match, number + step)
 
 
-def _frame(path: Path, match: re.Match[str], number: int) -> Path:
+def _path_with_number(path: Path, match: re.Match[str], number: int) -> Path:
     name, digits = path.name, len(match[1])
     return path.with_name(f"{name[: match.start()]}{number:0{digits}}{name[match.end() :]}")
 
 
-def _decoded(data: bytes) -> np.ndarray | None:
+def _decode(data: bytes) -> np.ndarray | None:
     # OpenCV fills in the rest of a truncated JPEG file, so check that the last scan is complete.
     if data[:2] == b"\xff\xd8" and data.rfind(b"\xff\xda") > data.rfind(b"\xff\xd9"):
         return None
@@ -217,7 +225,7 @@ def _decoded(data: bytes) -> np.ndarray | None:
     return frame
 
 
-def _bytes(path: Path, expected: str, remedy: str) -> bytes:
+def _read_file(path: Path, expected: str, remedy: str) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:

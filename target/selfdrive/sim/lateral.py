@@ -21,12 +21,12 @@ FULL_TORQUE = 10.0  # N m at the steering wheel, for a command of 1
 COLUMN_INERTIA = 0.1  # kg m^2, wheel, column and motor
 COLUMN_DAMPING = 20.0  # N m s/rad
 TRAIL = 0.053  # m, caster and pneumatic trail
-LARGEST_ANGLE = 8.7  # rad, mechanical stop
-CREEP = 0.1  # m/s; tyres take no side force below this
-NEAREST_TO_CENTRE = 0.1  # of a bend's radius; at its centre, `along` is undefined
+MOST_STEER_ANGLE = 8.7  # rad, mechanical stop
+MIN_TYRE_SPEED = 0.1  # m/s; tyres take no side force below this
+MIN_SHARE_OF_BEND_RADIUS = 0.1  # of a bend's radius; at its centre, `along` is undefined
 
 
-class Lateral(Protocol):
+class LateralMotion(Protocol):
     """Position in the lane (m, rad) and state of the steering wheel (rad, rad/s)."""
 
     offset: float
@@ -56,11 +56,11 @@ class LateralDynamics:
             car.mass,
             car.rotational_inertia,
         )
-        self._sum = DT_CTRL * (c_front + c_rear) / mass
-        self._difference = DT_CTRL * (rear * c_rear - front * c_front)
-        self._moment = DT_CTRL * (front * front * c_front + rear * rear * c_rear) / inertia
-        self._push = DT_CTRL * c_front / mass
-        self._turn = DT_CTRL * front * c_front / inertia
+        self._side_damping = DT_CTRL * (c_front + c_rear) / mass
+        self._coupling = DT_CTRL * (rear * c_rear - front * c_front)
+        self._yaw_damping = DT_CTRL * (front * front * c_front + rear * rear * c_rear) / inertia
+        self._side_gain = DT_CTRL * c_front / mass
+        self._yaw_gain = DT_CTRL * front * c_front / inertia
 
     def step(self, torque: float, speed: float, curvature: float) -> float:
         """Advance 10 ms with `torque` (left positive, 1 is full); return the speed along the road (m/s)."""
@@ -68,7 +68,7 @@ class LateralDynamics:
         self._move(speed)
         offset, v_lat = self.offset, self.lateral_speed
         cosine, sine = cos(self.heading), sin(self.heading)
-        along = (speed * cosine - v_lat * sine) / max(1.0 - curvature * offset, NEAREST_TO_CENTRE)
+        along = (speed * cosine - v_lat * sine) / max(1.0 - curvature * offset, MIN_SHARE_OF_BEND_RADIUS)
         self.offset = offset + DT_CTRL * (speed * sine + v_lat * cosine)
         self.heading += DT_CTRL * (self.yaw_rate - curvature * along)
         return along
@@ -79,13 +79,13 @@ class LateralDynamics:
         momentum = COLUMN_INERTIA * self.steer_rate + DT_CTRL * drive
         self.steer_rate = momentum / (COLUMN_INERTIA + DT_CTRL * COLUMN_DAMPING)
         angle = self.steer_angle + DT_CTRL * self.steer_rate
-        self.steer_angle = clip(angle, -LARGEST_ANGLE, LARGEST_ANGLE)
+        self.steer_angle = clip(angle, -MOST_STEER_ANGLE, MOST_STEER_ANGLE)
         if self.steer_angle != angle:
             self.steer_rate = 0.0
 
     def _front_force(self, speed: float) -> float:
         """Lateral force of the front axle (N), left positive."""
-        if speed < CREEP:
+        if speed < MIN_TYRE_SPEED:
             return 0.0
         car = self._car
         slip = self.steer_angle / car.steer_ratio
@@ -96,12 +96,12 @@ class LateralDynamics:
         """Implicit Euler step of the bicycle model, with both equations multiplied by the speed."""
         car = self._car
         wheel = self.steer_angle / car.steer_ratio
-        a11 = v + self._sum
-        a12 = DT_CTRL * v * v - self._difference / car.mass
-        a21 = -self._difference / car.rotational_inertia
-        a22 = v + self._moment
-        b1 = v * (self.lateral_speed + self._push * wheel)
-        b2 = v * (self.yaw_rate + self._turn * wheel)
+        a11 = v + self._side_damping
+        a12 = DT_CTRL * v * v - self._coupling / car.mass
+        a21 = -self._coupling / car.rotational_inertia
+        a22 = v + self._yaw_damping
+        b1 = v * (self.lateral_speed + self._side_gain * wheel)
+        b2 = v * (self.yaw_rate + self._yaw_gain * wheel)
         determinant = a11 * a22 - a12 * a21
         self.lateral_speed = (b1 * a22 - a12 * b2) / determinant
         self.yaw_rate = (a11 * b2 - a21 * b1) / determinant

@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.sim.road_look import Look, OtherCar
+from selfdrive.sim.road_look import OtherCar, RoadLook
 
-LENGTH = 4.4  # m of a car
+CAR_LENGTH = 4.4  # m of a car
 CAMERA_TO_BUMPER = 1.5  # m from the camera to the front bumper, from which the lead's distance is measured
-NEAREST, FURTHEST = 4.0, 400.0  # m ahead; a car can be drawn between them
-SHIFT = 4  # fractional bits of OpenCV's coordinates
+NEAREST_DRAWN, FARTHEST_DRAWN = 4.0, 400.0  # m ahead; a car can be drawn between them
+FRACTION_BITS = 4  # fractional bits of OpenCV's coordinates
 
 LEAD_PAINT = (70.0, 45.0, 130.0)  # BGR, a dark red
 SKY_TINT, ROAD_TINT, VERGE_TINT = (
@@ -26,31 +26,31 @@ Tone = float | tuple[float, float, float]
 
 def draw_car(picture: np.ndarray, model: CameraModel, car: OtherCar) -> None:
     tone = car.tone
-    _draw(picture, model, car, (tone, 0.75 * tone, 0.4 * tone + 20.0, min(255.0, tone + 70.0), 24.0))
+    _draw_vehicle(picture, model, car, (tone, 0.75 * tone, 0.4 * tone + 20.0, min(255.0, tone + 70.0), 24.0))
 
 
 def draw_lead(picture: np.ndarray, model: CameraModel, lead: float, offset: float, heading: float) -> None:
     """Draw a car into a BGR picture, in the lane centre, with its rear `lead` m ahead of the front bumper."""
     ahead = lead + CAMERA_TO_BUMPER
-    if not NEAREST <= ahead <= FURTHEST:
+    if not NEAREST_DRAWN <= ahead <= FARTHEST_DRAWN:
         return
     car = OtherCar(
         x=ahead * cos(heading) - offset * sin(heading), y=-offset * cos(heading) - ahead * sin(heading)
     )
     side = tuple(0.7 * part for part in LEAD_PAINT)
-    _draw(
+    _draw_vehicle(
         picture, model, car, (LEAD_PAINT, side, (70.0, 62.0, 55.0), (40.0, 40.0, 230.0), (24.0, 24.0, 24.0))
     )
 
 
-def tinted(
-    grey: np.ndarray, model: CameraModel, look: Look, offset: float = 0.0, heading: float = 0.0
+def tint_picture(
+    grey: np.ndarray, model: CameraModel, look: RoadLook, offset: float = 0.0, heading: float = 0.0
 ) -> np.ndarray:
     """Tint a grey picture in the colours of sky, verge and paint; grey levels stay the same."""
     tints = [SKY_TINT, VERGE_TINT, ROAD_TINT, YELLOW_TINT]
     levels = np.arange(256, dtype=np.float32)
     colours = np.clip(levels[:, None] * np.array(tints, np.float32)[:, None], 0.0, 255.0).astype(np.uint8)
-    worn = levels <= look.exposure * (0.6 * look.asphalt + 0.4 * 182.0)  # where paint is worn off
+    worn = levels <= look.exposure * (0.6 * look.asphalt_tone + 0.4 * 182.0)  # where paint is worn off
     colours[3, worn] = colours[2, worn]
     parts = np.zeros(grey.shape, np.uint8)  # the tint of each pixel
     parts[max(0, floor(model.horizon) + 1) :] = 1
@@ -71,17 +71,17 @@ def _mark_strip(
     for y in sides:
         a, b = model.line_in_picture(y / cos(heading), -tan(heading))
         ends.append([(a * row + b, row) for row in rows])
-    cv2.fillConvexPoly(parts, _fixed([*ends[0], *ends[1][::-1]]), part, cv2.LINE_8, SHIFT)
+    cv2.fillConvexPoly(parts, _to_fixed_point([*ends[0], *ends[1][::-1]]), part, cv2.LINE_8, FRACTION_BITS)
 
 
-def _draw(picture: np.ndarray, model: CameraModel, car: OtherCar, tones: tuple[Tone, ...]) -> None:
+def _draw_vehicle(picture: np.ndarray, model: CameraModel, car: OtherCar, tones: tuple[Tone, ...]) -> None:
     """Draw a box with window, lights and wheels. `tones`: body, side, glass, lights, dark parts."""
     body, flank, glass, lamps, dark = tones
-    left, right, near, far = car.y + 0.5 * car.width, car.y - 0.5 * car.width, car.x, car.x + LENGTH
+    left, right, near, far = car.y + 0.5 * car.width, car.y - 0.5 * car.width, car.x, car.x + CAR_LENGTH
     waist, floor_z = 0.62 * car.height, 0.17 * car.height
 
     def fill(corners: list[tuple[float, float, float]], tone: Tone) -> None:
-        _fill(picture, [model.project(*corner) for corner in corners], tone)
+        _fill_polygon(picture, [model.project(*corner) for corner in corners], tone)
 
     def back(y1: float, y2: float, z1: float, z2: float, tone: Tone) -> None:
         fill([(near, y1, z2), (near, y2, z2), (near, y2, z1), (near, y1, z1)], tone)
@@ -103,9 +103,9 @@ def _draw(picture: np.ndarray, model: CameraModel, car: OtherCar, tones: tuple[T
         back(outer, inner, 0.75 * waist, 0.95 * waist, lamps)
 
 
-def _fill(picture: np.ndarray, points: list[tuple[float, float]], tone: Tone) -> None:
-    cv2.fillConvexPoly(picture, _fixed(points), tone, cv2.LINE_AA, SHIFT)
+def _fill_polygon(picture: np.ndarray, points: list[tuple[float, float]], tone: Tone) -> None:
+    cv2.fillConvexPoly(picture, _to_fixed_point(points), tone, cv2.LINE_AA, FRACTION_BITS)
 
 
-def _fixed(points: list[tuple[float, float]]) -> np.ndarray:
-    return np.round(np.array(points) * 2**SHIFT).clip(-(2**20), 2**20).astype(np.int32)
+def _to_fixed_point(points: list[tuple[float, float]]) -> np.ndarray:
+    return np.round(np.array(points) * 2**FRACTION_BITS).clip(-(2**20), 2**20).astype(np.int32)

@@ -17,7 +17,7 @@ from selfdrive.sim.compare.trace_comparison import compare_trace
 from selfdrive.sim.compare.trace_csv import ReferenceTrace, load_reference_trace
 from selfdrive.sim.replay import TOLERANCES_PATH, list_reference_names
 from selfdrive.sim.run import EXIT_INVALID_INPUT
-from selfdrive.sim.scenario import PLANTS, STANDARD, Scenario, on_plant
+from selfdrive.sim.scenario import PLANTS, STANDARD_PLANT, Scenario, on_plant
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -107,7 +107,7 @@ def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     add = parser.add_argument
     add("names", nargs="*", metavar="NAME", help="a scenario, such as S1 or S1_nolead (default: all)")
     add("--out", type=Path, required=True, metavar="DIR", help="folder for index.html")
-    add("--plant", choices=PLANTS, default=STANDARD, help="the plant to run on (%(default)s)")
+    add("--plant", choices=PLANTS, default=STANDARD_PLANT, help="the plant to run on (%(default)s)")
     add("--references", type=Path, metavar="DIR", help="reference traces as CSV, drawn beneath the runs")
     add(
         "--scenarios",

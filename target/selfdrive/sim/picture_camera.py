@@ -2,10 +2,10 @@
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.sim.camera import Camera
-from selfdrive.sim.image_library import ImageLibrary
-from selfdrive.sim.moved_picture import CodedView, GroundView, ShiftedView
-from selfdrive.sim.picture_options import GROUND, SHIFT
+from selfdrive.sim.camera import GeometryCamera
+from selfdrive.sim.image_library import FrameLibrary
+from selfdrive.sim.moved_picture import CodedShiftMover, HomographyMover, ShiftMover
+from selfdrive.sim.picture_options import GROUND_TRANSLATION, SHIFT_TRANSLATION
 from selfdrive.sim.truth import GroundTruth
 
 
@@ -15,10 +15,10 @@ class PictureCamera:
     `calculated_by` identifies the compiled code that moves frames, if any. `translation` is as in `Pictures`.
     """
 
-    def __init__(self, geometry: Camera, library: ImageLibrary, translation: str) -> None:
+    def __init__(self, geometry: GeometryCamera, library: FrameLibrary, translation: str) -> None:
         self._geometry, self._library = geometry, library
         self.model = library.model
-        self._move = _mover(translation, self.model)
+        self._move = _build_mover(translation, self.model)
         self.calculated_by = self._move.calculated_by
 
     def look(self, truth: GroundTruth) -> CameraView:
@@ -28,7 +28,7 @@ class PictureCamera:
         return view._replace(picture=picture)
 
 
-def _mover(translation: str, model: CameraModel) -> GroundView | ShiftedView | CodedView:
-    if translation == GROUND:
-        return GroundView(model)
-    return ShiftedView(model) if translation == SHIFT else CodedView()
+def _build_mover(translation: str, model: CameraModel) -> HomographyMover | ShiftMover | CodedShiftMover:
+    if translation == GROUND_TRANSLATION:
+        return HomographyMover(model)
+    return ShiftMover(model) if translation == SHIFT_TRANSLATION else CodedShiftMover()

@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-DETECTORS = PAPER, ROBUST, AS_CODED = "paper", "robust", "as_coded"
-MARKS = SOLID, DASHED = "solid", "dashed"
-TRANSLATIONS = GROUND, SHIFT, CODED = "ground", "shift", "as_coded"
+DETECTORS = PAPER_DETECTOR, ROBUST_DETECTOR, CODED_DETECTOR = "paper", "robust", "as_coded"
+MARKS = SOLID_MARKS, DASHED_MARKS = "solid", "dashed"
+TRANSLATIONS = GROUND_TRANSLATION, SHIFT_TRANSLATION, CODED_TRANSLATION = "ground", "shift", "as_coded"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pictures:
+class PictureOptions:
     """The pictures of a run, and their detector.
 
     `frames` is a folder of user frames; None: a rendered road with these `marks` (both solid, or the right
@@ -19,9 +19,9 @@ class Pictures:
     detection code that depends on time.
     """
 
-    detector: str = PAPER
-    marks: str = SOLID
+    detector: str = PAPER_DETECTOR
+    marks: str = SOLID_MARKS
     frames: Path | None = None
-    translation: str = GROUND
+    translation: str = GROUND_TRANSLATION
     cache: Path | None = None
-    forget: bool = False
+    ignore_stored: bool = False

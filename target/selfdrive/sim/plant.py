@@ -4,49 +4,49 @@ from selfdrive.common.car import CarParams
 from selfdrive.common.interp import interp
 from selfdrive.common.realtime import DT_CTRL
 from selfdrive.messages import Actuators
-from selfdrive.sim.lateral import Lateral, LateralDynamics
+from selfdrive.sim.lateral import LateralDynamics, LateralMotion
 from selfdrive.sim.truth import GroundTruth
 
-MASS = 1700.0  # kg, for the longitudinal motion
+LONGITUDINAL_MASS = 1700.0  # kg, for the longitudinal motion
 GRAVITY = 9.81
 ROLLING_RESISTANCE = 0.01
 DRAG = 0.5 * 1.225 * 0.3  # N s^2/m^2
-PEAK_FORCE = 3.0 * MASS
+PEAK_FORCE = 3.0 * LONGITUDINAL_MASS
 PEAK_POWER = 100_000.0  # W
 GAS_SLOPE = 3.33
-BRAKE_FORCE = 10.0 * MASS
+BRAKE_FORCE = 10.0 * LONGITUDINAL_MASS
 BRAKE_SLOPE = 0.3
 BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s; above this, power, not force, limits acceleration
 CREEP_BP = (0.0, 1.5)  # m/s
 CREEP_V = (1.0, 0.0)  # m/s^2 from an idling automatic gearbox
 
 
-def acceleration(speed: float, gas: float, brake: float, grade: float) -> float:
+def longitudinal_acceleration(speed: float, gas: float, brake: float, grade: float) -> float:
     """Return the longitudinal acceleration (m/s^2); pedals in 0..1, `grade` in m/s^2, uphill positive."""
     force = gas * GAS_SLOPE * (PEAK_FORCE if speed < BASE_SPEED else PEAK_POWER / speed)
     force -= brake * BRAKE_FORCE * BRAKE_SLOPE
-    force -= ROLLING_RESISTANCE * MASS * GRAVITY + DRAG * speed * speed
-    force += (interp(speed, CREEP_BP, CREEP_V) - grade) * MASS
-    return force / MASS
+    force -= ROLLING_RESISTANCE * LONGITUDINAL_MASS * GRAVITY + DRAG * speed * speed
+    force += (interp(speed, CREEP_BP, CREEP_V) - grade) * LONGITUDINAL_MASS
+    return force / LONGITUDINAL_MASS
 
 
 class Plant:
     """The host car. `position` (m) is along the road; the gearbox reports `gearbox_scale` times the speed."""
 
     gearbox_scale = 1.0
-    mirrors = False  # whether messages mirror left and right
+    has_mirrored_messages = False  # whether messages mirror left and right
 
     def __init__(self, car: CarParams, *, speed: float, offset: float = 0.0) -> None:
         self.speed = speed
         self.acceleration = 0.0
         self.position = 0.0
-        self.lateral: Lateral = LateralDynamics(car, offset)
+        self.lateral: LateralMotion = LateralDynamics(car, offset)
 
     def step(self, actuators: Actuators, grade: float, curvature: float) -> None:
         """Advance 10 ms by Euler's method: the position with the old speed, then the speed."""
         old = self.speed
         self.position += DT_CTRL * self.lateral.step(actuators.steer, old, curvature)
-        self.acceleration = acceleration(old, actuators.gas, actuators.brake, grade)
+        self.acceleration = longitudinal_acceleration(old, actuators.gas, actuators.brake, grade)
         self.speed = old + DT_CTRL * self.acceleration
         if self.speed <= 0.0:
             self.speed = self.acceleration = 0.0

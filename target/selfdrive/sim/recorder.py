@@ -16,8 +16,8 @@ COUNTED_ALERTS = (
 )
 PLAN_SOURCES = ("cruise", "mpc1", "mpc2")
 LONG_STATES = ("off", "pid", "stopping", "starting")
-_PLAN_SOURCE = {name: float(code) for code, name in enumerate(PLAN_SOURCES)}
-_LONG_STATE = {name: float(code) for code, name in enumerate(LONG_STATES)}
+_PLAN_SOURCE_CODES = {name: float(code) for code, name in enumerate(PLAN_SOURCES)}
+_LONG_STATE_CODES = {name: float(code) for code, name in enumerate(LONG_STATES)}
 
 # Ground truth and actuators, then the controller's perception and demands. SI units, radians.
 CHANNELS = (
@@ -30,11 +30,11 @@ CHANNELS = (
 INTEGER_CHANNELS = ("lead_status", "plan_source", "long_state", "engaged", "alert")
 
 _NO_LEAD = LeadData()
-_FOLD = 64 * len(CHANNELS)  # numbers buffered by row before they move to channels
-_ROOM = 4096  # initial capacity in rows
+_MOST_BUFFERED_NUMBERS = 64 * len(CHANNELS)  # numbers buffered by row before they move to channels
+_FIRST_CAPACITY = 4096  # initial capacity in rows
 
 
-class Recorder:
+class TraceRecorder:
     """The rows of `CHANNELS` and the alerts. Row k is the state after step k."""
 
     def __init__(self) -> None:
@@ -42,23 +42,23 @@ class Recorder:
         self.engaged_from: float | None = None
         self.engaged_to: float | None = None
         self._rows = array("d")  # the newest rows, at least one
-        self._table = np.empty((len(CHANNELS), _ROOM))  # earlier rows, by channel
-        self._folded = 0  # rows in the table
-        self._shown: tuple[str, ...] = ()
+        self._earlier_rows = np.empty((len(CHANNELS), _FIRST_CAPACITY))  # earlier rows, by channel
+        self._rows_in_table = 0  # rows in the table
+        self._alerts_before: tuple[str, ...] = ()
         self._alert_bits = 0
 
     def append(self, truth: GroundTruth, actuators: Actuators, manager: Manager) -> None:
         state, plan, radar_state = manager.controlsd.state, manager.controlsd.plan, manager.radar_state
         lead = radar_state.lead_one if radar_state else _NO_LEAD
         t, d_rel, v_ego, v_lead = truth.t, truth.d_rel, truth.v_ego, truth.v_lead
-        if state.alerts != self._shown:
+        if state.alerts != self._alerts_before:
             self._note_alerts(state.alerts, t)
         if state.enabled:
             self.engaged_to = t
             if self.engaged_from is None:
                 self.engaged_from = t
-        if len(self._rows) >= _FOLD:
-            self._fold()
+        if len(self._rows) >= _MOST_BUFFERED_NUMBERS:
+            self._move_rows_to_table()
         self._rows.fromlist(
             [
                 *(t, v_ego, truth.a_ego, d_rel, v_lead - v_ego, v_lead),
@@ -67,38 +67,40 @@ class Recorder:
                 *(lead.status, lead.d_rel, lead.v_rel, lead.v_lead_k, lead.a_lead_k),
                 *(state.v_ego, state.a_ego, state.v_cruise, state.v_pid),
                 *(plan.v_target, plan.a_target, state.angle_desired),
-                *(_PLAN_SOURCE[plan.source], _LONG_STATE[state.long_state]),
+                *(_PLAN_SOURCE_CODES[plan.source], _LONG_STATE_CODES[state.long_state]),
                 *(state.enabled, self._alert_bits),
             ]
         )
 
-    def newest(self) -> dict[str, float]:
+    def newest_row(self) -> dict[str, float]:
         return dict(zip(CHANNELS, self._rows[-len(CHANNELS) :], strict=True))
 
     def trace(self) -> dict[str, np.ndarray]:
         """The arrays by channel. Later rows do not change them."""
-        count = self._folded + len(self._rows) // len(CHANNELS)
+        count = self._rows_in_table + len(self._rows) // len(CHANNELS)
         table = self._with_newest()[:, :count]
         return {
             name: column.astype(np.int32) if name in INTEGER_CHANNELS else column
             for name, column in zip(CHANNELS, table, strict=True)
         }
 
-    def _fold(self) -> None:
-        self._table = self._with_newest()
-        self._folded += len(self._rows) // len(CHANNELS)
+    def _move_rows_to_table(self) -> None:
+        self._earlier_rows = self._with_newest()
+        self._rows_in_table += len(self._rows) // len(CHANNELS)
         del self._rows[:]
 
     def _with_newest(self) -> np.ndarray:
         newest = np.array(self._rows).reshape(-1, len(CHANNELS)).T
-        table, end = self._table, self._folded + newest.shape[1]
+        table, end = self._earlier_rows, self._rows_in_table + newest.shape[1]
         if end > table.shape[1]:
             table = np.empty((len(CHANNELS), 2 * table.shape[1]))
-            table[:, : self._folded] = self._table[:, : self._folded]
-        table[:, self._folded : end] = newest
+            table[:, : self._rows_in_table] = self._earlier_rows[:, : self._rows_in_table]
+        table[:, self._rows_in_table : end] = newest
         return table
 
-    def _note_alerts(self, shown: tuple[str, ...], t: float) -> None:
-        self.alerts += [(name, t) for name in COUNTED_ALERTS if name in shown and name not in self._shown]
-        self._alert_bits = sum(1 << bit for bit, name in enumerate(COUNTED_ALERTS) if name in shown)
-        self._shown = shown
+    def _note_alerts(self, alerts: tuple[str, ...], t: float) -> None:
+        self.alerts += [
+            (name, t) for name in COUNTED_ALERTS if name in alerts and name not in self._alerts_before
+        ]
+        self._alert_bits = sum(1 << bit for bit, name in enumerate(COUNTED_ALERTS) if name in alerts)
+        self._alerts_before = alerts

@@ -49,7 +49,7 @@ class ReferencePlant(Plant):
     """
 
     gearbox_scale = MS_TO_KPH
-    mirrors = True
+    has_mirrored_messages = True
 
     def __init__(self, car: CarParams, *, speed: float, offset: float = 0.0) -> None:
         super().__init__(car, speed=speed, offset=offset)

@@ -12,13 +12,13 @@ import numpy as np
 
 import selfdrive
 from selfdrive.messages import CameraView
-from selfdrive.sim.detection_memory import KEY, DetectionMemory
+from selfdrive.sim.detection_memory import KEY_BYTES, DetectionMemory
 from selfdrive.sim.picture import Picture
 from selfdrive.visiond.detector import LaneDetector, LaneLines, RoadLine
 
 # All files that determine what is seen in a picture with a given key. visiond.py only uses the result, and
 # picture_camera.py's choice of picture is in the key.
-SEEING = (
+DETECTION_FILES = (
     "common/array_math.py",
     "common/camera_model.py",
     "common/compiled.py",
@@ -42,10 +42,10 @@ SEEING = (
     "visiond/*.[ch]",
     "visiond/lane_net.npz",
 )
-_NUMBERS = 9  # for three lines
+_NUMBERS_OF_LINES = 9  # for three lines
 
 
-class StatedDetector(LaneDetector, Protocol):
+class DetectorWithState(LaneDetector, Protocol):
     """A detector whose lines depend only on the picture and on the detector's own `state`."""
 
     state: tuple[float, ...]
@@ -58,9 +58,9 @@ class RememberingDetector:
     distinguishes detectors with the same code.
     """
 
-    def __init__(self, detector: StatedDetector, made_of: object, memory: DetectionMemory) -> None:
+    def __init__(self, detector: DetectorWithState, made_of: object, memory: DetectionMemory) -> None:
         self._detector, self._memory = detector, memory
-        self._seeing = seeing_digest(Path(selfdrive.__path__[0])) + repr(made_of).encode()
+        self._key_prefix = detection_files_digest(Path(selfdrive.__path__[0])) + repr(made_of).encode()
 
     def detect(self, view: CameraView) -> LaneLines:
         """Return the lines in the picture. Plain arrays, which have no key, are always examined."""
@@ -68,27 +68,27 @@ class RememberingDetector:
         if not isinstance(picture, Picture):
             return detector.detect(view)
         text = repr((picture.key, detector.state)).encode()  # repr is unique per float
-        key = blake2b(self._seeing + text, digest_size=KEY).digest()
-        kept = self._memory.recall(key)
-        if kept is not None:
-            detector.state = kept[_NUMBERS:]
-            return LaneLines(*(RoadLine(*kept[k : k + 3]) for k in range(0, _NUMBERS, 3)))
+        key = blake2b(self._key_prefix + text, digest_size=KEY_BYTES).digest()
+        stored = self._memory.recall(key)
+        if stored is not None:
+            detector.state = stored[_NUMBERS_OF_LINES:]
+            return LaneLines(*(RoadLine(*stored[k : k + 3]) for k in range(0, _NUMBERS_OF_LINES, 3)))
         lines = detector.detect(view)
-        self._memory.keep(key, [number for line in lines for number in line[:3]] + list(detector.state))
+        self._memory.store(key, [number for line in lines for number in line[:3]] + list(detector.state))
         return lines
 
 
-def seeing_digest(root: Path) -> bytes:
+def detection_files_digest(root: Path) -> bytes:
     digest = sha256()
     calculator = sys.version, platform.machine(), cv2.__version__, cv2.getCPUFeaturesLine(), np.__version__
     digest.update(repr(calculator).encode())
-    for name, data in _seeing(root):
+    for name, data in _read_detection_files(root):
         digest.update(repr(name).encode())
         digest.update(sha256(data).digest())
     return digest.digest()
 
 
-def _seeing(root: Path) -> Iterator[tuple[str, bytes]]:
-    for pattern in SEEING:
+def _read_detection_files(root: Path) -> Iterator[tuple[str, bytes]]:
+    for pattern in DETECTION_FILES:
         for file in sorted(root.glob(pattern)):
             yield file.relative_to(root).as_posix(), file.read_bytes()

@@ -16,7 +16,7 @@ from selfdrive.sim.compare.tolerances import load_tolerances
 from selfdrive.sim.compare.trace_comparison import compare_trace
 from selfdrive.sim.compare.trace_csv import load_reference_trace, save_reference_trace
 from selfdrive.sim.run import EXIT_INVALID_INPUT
-from selfdrive.sim.scenario import PLANTS, REFERENCE, on_plant
+from selfdrive.sim.scenario import PLANTS, REFERENCE_PLANT, on_plant
 
 EXIT_BEYOND_TOLERANCE = 1
 
@@ -98,7 +98,7 @@ def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
         help="the scenario files",
     )
     add("--tolerances", type=Path, default=TOLERANCES_PATH, metavar="FILE", help="the tolerance table")
-    add("--plant", choices=PLANTS, default=REFERENCE, help="the plant to run on (%(default)s)")
+    add("--plant", choices=PLANTS, default=REFERENCE_PLANT, help="the plant to run on (%(default)s)")
     add("--runs", type=Path, metavar="DIR", help="compare the finished runs DIR/NAME/ instead of running")
     add("--long", action="store_true", help="print all channels, and all crossings of tolerances")
     add("--update-references", action="store_true", help="write the runs as the new references")

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 from selfdrive.common.interp import interp
 
-Table = tuple[Sequence[float], Sequence[float]]
+PiecewiseTable = tuple[Sequence[float], Sequence[float]]
 
 
 class Road:
     """Grade (m/s^2, uphill positive) as a table over time, curvature (1/m, left positive) over distance."""
 
-    def __init__(self, grade: Table | None, curvature: Table | None) -> None:
+    def __init__(self, grade: PiecewiseTable | None, curvature: PiecewiseTable | None) -> None:
         self._grade, self._curvature = grade, curvature
 
     def grade(self, t: float) -> float:

@@ -6,12 +6,12 @@ centre of the ego lane, left positive.
 
 from dataclasses import dataclass, replace
 
-DASH, DASH_PERIOD = 3.05, 12.2  # m: 10 ft painted every 40 ft (MUTCD, section 3A.06)
+DASH_LENGTH, DASH_PERIOD = 3.05, 12.2  # m: 10 ft painted every 40 ft (MUTCD, section 3A.06)
 SOLID, DASHED = "solid", "dashed"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Paint:
+class LinePaint:
     """One line of paint. `wear` is the share that has flaked off, `fade` its loss of contrast.
 
     A `double` line is two strips with a gap of the same width.
@@ -20,7 +20,7 @@ class Paint:
     tone: float = 218.0
     width: float = 0.12
     dashed: bool = False
-    dash: float = DASH
+    dash: float = DASH_LENGTH
     period: float = DASH_PERIOD
     phase: float = 0.0  # start of a dash along the road
     double: bool = False
@@ -29,7 +29,7 @@ class Paint:
     fade: float = 0.0  # 0 fresh .. 1 invisible
 
 
-YELLOW_PAINT = Paint(tone=182.0, yellow=True)
+YELLOW_PAINT = LinePaint(tone=182.0, yellow=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +44,7 @@ class OtherCar:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Look:
+class RoadLook:
     """All variations between roads. The defaults are a clean highway in daylight.
 
     `left` and `right` bound the ego lane, `far_left` and `far_right` the adjacent lanes; None means no line.
@@ -52,36 +52,36 @@ class Look:
     """
 
     lane_width: float = 3.7
-    left: Paint = YELLOW_PAINT
-    right: Paint = Paint()
-    far_left: Paint | None = Paint()
-    far_right: Paint | None = Paint()
+    left: LinePaint = YELLOW_PAINT
+    right: LinePaint = LinePaint()
+    far_left: LinePaint | None = LinePaint()
+    far_right: LinePaint | None = LinePaint()
     # the ground
-    asphalt: float = 97.0
+    asphalt_tone: float = 97.0
     grain: float = 4.0  # standard deviation of the fine texture (grey levels)
     mottle: float = 3.0  # standard deviation of slow changes, over metres
-    tracks: float = 5.0  # darkening in the wheel tracks
-    shoulder: float = 88.0
+    wheel_track_darkening: float = 5.0  # darkening in the wheel tracks
+    shoulder_tone: float = 88.0
     shoulder_width: float = 2.6
-    verge: float = 78.0
-    kerb: float | None = None  # tone of a kerb between shoulder and verge
+    verge_tone: float = 78.0
+    kerb_tone: float | None = None  # tone of a kerb between shoulder and verge
     # flaws per 100 m of road
-    patches: float = 1.0
-    cracks: float = 2.0
-    seams: float = 0.0  # tar seams that run along the road
-    joints: float | None = None  # m between the joints across a concrete road
+    patches_per_100_m: float = 1.0
+    cracks_per_100_m: float = 2.0
+    seams_per_100_m: float = 0.0  # tar seams that run along the road
+    joint_spacing: float | None = None  # m between the joints across a concrete road
     joint_tone: float = -30.0  # of patches, cracks, seams and joints, relative to the ground
     # light
-    shadows: float = 0.04  # share of the road in tree shadows
+    shadow_share: float = 0.04  # share of the road in tree shadows
     shadow_depth: float = 0.3  # share of light lost in shadows
-    sky: float = 222.0
-    trees: float = 72.0
+    sky_tone: float = 222.0
+    trees_tone: float = 72.0
     exposure: float = 1.0  # factor on all tones
     cars: tuple[OtherCar, ...] = ()
 
 
-def standard_look(marks: str = SOLID) -> Look:
+def standard_look(marks: str = SOLID) -> RoadLook:
     if marks not in (SOLID, DASHED):
         raise ValueError(f"marks: {marks!r}, expected {SOLID!r} or {DASHED!r}")
-    look = Look()
+    look = RoadLook()
     return replace(look, right=replace(look.right, dashed=marks == DASHED))

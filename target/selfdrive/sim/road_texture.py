@@ -11,11 +11,11 @@ import numpy as np
 
 from selfdrive.common.array_math import each
 from selfdrive.common.ordered import total
-from selfdrive.sim.road_look import DASH_PERIOD, Look, Paint
+from selfdrive.sim.road_look import DASH_PERIOD, LinePaint, RoadLook
 
-HALF_WIDTH = 12.0  # m from the lane centre to the strip's edge
+STRIP_HALF_WIDTH = 12.0  # m from the lane centre to the strip's edge
 ROWS_PER_PERIOD, COLUMNS = 400, 2400
-ROW_LENGTH, COLUMN_WIDTH = DASH_PERIOD / ROWS_PER_PERIOD, 2.0 * HALF_WIDTH / COLUMNS  # m
+ROW_LENGTH, COLUMN_WIDTH = DASH_PERIOD / ROWS_PER_PERIOD, 2.0 * STRIP_HALF_WIDTH / COLUMNS  # m
 TILE_PERIODS = 3  # after which the finest texture, which cameras cannot resolve, repeats
 TRACK_OFFSET, TRACK_WIDTH = 0.8, 0.35  # m: wheel tracks in a lane
 KERB_WIDTH = 0.25  # m
@@ -24,14 +24,14 @@ VERGE_GRAIN = 3.0  # coarseness relative to the road
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Strip:
+class RoadStrip:
     """Grey levels of the road from above; `row_length` and `column_width` (m) are the size of a texel."""
 
     texels: np.ndarray
     row_length: float
     column_width: float
 
-    def shrunk(self, row_length: float, column_width: float) -> "Strip":
+    def shrink(self, row_length: float, column_width: float) -> "RoadStrip":
         """Return a copy with texels of about this size, each the mean of its area."""
         rows, columns = self.texels.shape
         length, width = rows * self.row_length, columns * self.column_width
@@ -40,121 +40,129 @@ class Strip:
         texels = self.texels
         if (fewer_rows, fewer_columns) != texels.shape:
             texels = cv2.resize(texels, (fewer_columns, fewer_rows), interpolation=cv2.INTER_AREA)
-        return Strip(texels=texels, row_length=length / fewer_rows, column_width=width / fewer_columns)
+        return RoadStrip(texels=texels, row_length=length / fewer_rows, column_width=width / fewer_columns)
 
-    def from_road(self) -> np.ndarray:
+    def road_to_texels(self) -> np.ndarray:
         """Homography (3 x 3) from (along, left, 1) on the road in m to (column, row, 1) in texels."""
         return np.array(
             [
-                (0.0, -1.0 / self.column_width, HALF_WIDTH / self.column_width - 0.5),
+                (0.0, -1.0 / self.column_width, STRIP_HALF_WIDTH / self.column_width - 0.5),
                 (1.0 / self.row_length, 0.0, -0.5),
                 (0.0, 0.0, 1.0),
             ]
         )
 
 
-def paint_strip(look: Look, periods: int, rng: np.random.Generator) -> Strip:
-    texels = _ground(look, periods, rng)
-    _flaws(texels, look, rng)
-    for line_y, paint in lines(look):
+def paint_strip(look: RoadLook, periods: int, rng: np.random.Generator) -> RoadStrip:
+    texels = _paint_ground(look, periods, rng)
+    _add_flaws(texels, look, rng)
+    for line_y, paint in road_lines(look):
         if paint is not None:
-            _line(texels, line_y, paint, look, rng)
-    if look.shadows > 0.0:
-        _shade(texels, look, rng)
+            _paint_line(texels, line_y, paint, look, rng)
+    if look.shadow_share > 0.0:
+        _add_tree_shadows(texels, look, rng)
     if look.exposure != 1.0:
         texels = cv2.convertScaleAbs(texels, alpha=look.exposure)
-    return Strip(texels=texels, row_length=ROW_LENGTH, column_width=COLUMN_WIDTH)
+    return RoadStrip(texels=texels, row_length=ROW_LENGTH, column_width=COLUMN_WIDTH)
 
 
-def lines(look: Look) -> tuple[tuple[float, Paint | None], ...]:
+def road_lines(look: RoadLook) -> tuple[tuple[float, LinePaint | None], ...]:
     """(y, paint) of the road's lines, from left to right."""
     half = 0.5 * look.lane_width
     return (3 * half, look.far_left), (half, look.left), (-half, look.right), (-3 * half, look.far_right)
 
 
-def _edge(look: Look) -> float:
+def _verge_start(look: RoadLook) -> float:
     return 1.5 * look.lane_width + look.shoulder_width
 
 
-def _lateral() -> np.ndarray:
-    return HALF_WIDTH - (np.arange(COLUMNS) + 0.5) * COLUMN_WIDTH
+def _column_positions() -> np.ndarray:
+    return STRIP_HALF_WIDTH - (np.arange(COLUMNS) + 0.5) * COLUMN_WIDTH
 
 
-def _profile(look: Look) -> np.ndarray:
-    y = _lateral()
-    paved, edge = 1.5 * look.lane_width, _edge(look)
-    tone = np.where(np.abs(y) < paved + 0.15, look.asphalt, look.shoulder)
-    tone[np.abs(y) > edge] = look.verge
-    if look.kerb is not None:
-        tone[np.abs(np.abs(y) - edge) < 0.5 * KERB_WIDTH] = look.kerb
+def _cross_profile(look: RoadLook) -> np.ndarray:
+    y = _column_positions()
+    paved, edge = 1.5 * look.lane_width, _verge_start(look)
+    tone = np.where(np.abs(y) < paved + 0.15, look.asphalt_tone, look.shoulder_tone)
+    tone[np.abs(y) > edge] = look.verge_tone
+    if look.kerb_tone is not None:
+        tone[np.abs(np.abs(y) - edge) < 0.5 * KERB_WIDTH] = look.kerb_tone
     for lane in (-look.lane_width, 0.0, look.lane_width):
         for side in (-TRACK_OFFSET, TRACK_OFFSET):
-            tone -= look.tracks * each(exp, -(((y - lane - side) / TRACK_WIDTH) ** 2))
+            tone -= look.wheel_track_darkening * each(exp, -(((y - lane - side) / TRACK_WIDTH) ** 2))
     return tone.astype(np.float32)
 
 
-def _ground(look: Look, periods: int, rng: np.random.Generator) -> np.ndarray:
+def _paint_ground(look: RoadLook, periods: int, rng: np.random.Generator) -> np.ndarray:
     tile_periods = min(TILE_PERIODS, periods)
     fine = rng.standard_normal((tile_periods * ROWS_PER_PERIOD, COLUMNS), dtype=np.float32)
-    coarser = np.where(np.abs(_lateral()) > _edge(look), VERGE_GRAIN, 1.0).astype(np.float32)
-    fine = _profile(look) + 2.0 * look.grain * coarser * cv2.blur(fine, (2, 2), borderType=cv2.BORDER_REFLECT)
+    coarser = np.where(np.abs(_column_positions()) > _verge_start(look), VERGE_GRAIN, 1.0).astype(np.float32)
+    fine = _cross_profile(look) + 2.0 * look.grain * coarser * cv2.blur(
+        fine, (2, 2), borderType=cv2.BORDER_REFLECT
+    )
     slow = look.mottle * rng.standard_normal((periods * 6, 24), dtype=np.float32)
     texels = np.empty((periods * ROWS_PER_PERIOD, COLUMNS), np.uint8)
     for k in range(periods):
         tile = k % tile_periods * ROWS_PER_PERIOD
-        tones = fine[tile : tile + ROWS_PER_PERIOD] + _enlarged(slow, k, periods)
+        tones = fine[tile : tile + ROWS_PER_PERIOD] + _enlarge_for_period(slow, k, periods)
         texels[k * ROWS_PER_PERIOD : (k + 1) * ROWS_PER_PERIOD] = np.clip(tones, 0.0, 255.0)
     return texels
 
 
-def _flaws(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
+def _add_flaws(texels: np.ndarray, look: RoadLook, rng: np.random.Generator) -> None:
     rows, length = len(texels), len(texels) * ROW_LENGTH
     paved = 1.5 * look.lane_width
-    for _ in range(rng.poisson(look.patches * length / 100.0)):
+    for _ in range(rng.poisson(look.patches_per_100_m * length / 100.0)):
         long, wide = rng.uniform(0.8, 8.0), rng.uniform(0.5, 2.6)
         row, y = rng.integers(rows), rng.uniform(-paved, paved)
-        part = texels[row : row + int(long / ROW_LENGTH), _column(y + wide) : _column(y)]
+        part = texels[row : row + int(long / ROW_LENGTH), _column_of(y + wide) : _column_of(y)]
         part[:] = cv2.add(part, look.joint_tone * rng.uniform(-0.3, 0.5))
-    tone = max(0.0, look.asphalt + look.joint_tone)
-    for _ in range(rng.poisson(look.cracks * length / 100.0)):
-        _polyline(texels, rng, tone, length=rng.uniform(1.0, 6.0), heading=rng.uniform(0.0, 2.0 * np.pi))
-    for _ in range(rng.poisson(look.seams * length / 100.0)):
-        _polyline(texels, rng, tone, length=rng.uniform(10.0, 60.0), heading=rng.normal(0.0, 0.01))
-    if look.joints is not None:
-        for x in np.arange(0.0, length, look.joints):
+    tone = max(0.0, look.asphalt_tone + look.joint_tone)
+    for _ in range(rng.poisson(look.cracks_per_100_m * length / 100.0)):
+        _draw_crack(texels, rng, tone, length=rng.uniform(1.0, 6.0), heading=rng.uniform(0.0, 2.0 * np.pi))
+    for _ in range(rng.poisson(look.seams_per_100_m * length / 100.0)):
+        _draw_crack(texels, rng, tone, length=rng.uniform(10.0, 60.0), heading=rng.normal(0.0, 0.01))
+    if look.joint_spacing is not None:
+        for x in np.arange(0.0, length, look.joint_spacing):
             row = int(x / ROW_LENGTH)
-            part = texels[row : row + 1, _column(paved) : _column(-paved)]
+            part = texels[row : row + 1, _column_of(paved) : _column_of(-paved)]
             part[:] = cv2.add(part, look.joint_tone)
 
 
-def _polyline(
+def _draw_crack(
     texels: np.ndarray, rng: np.random.Generator, tone: float, *, length: float, heading: float
 ) -> None:
     steps = max(3, int(length / 0.4))
     turns = heading + np.cumsum(rng.normal(0.0, 0.25 if length < 10.0 else 0.004, steps))
     x = rng.uniform(0.0, len(texels) * ROW_LENGTH) + np.cumsum(0.4 * each(cos, turns))
     y = rng.uniform(-6.0, 6.0) + np.cumsum(0.4 * each(sin, turns))
-    points = np.stack([(HALF_WIDTH - y) / COLUMN_WIDTH, x / ROW_LENGTH], axis=1)
+    points = np.stack([(STRIP_HALF_WIDTH - y) / COLUMN_WIDTH, x / ROW_LENGTH], axis=1)
     thickness = int(rng.integers(1, 4))
     cv2.polylines(texels, [points.astype(np.int32)], False, tone, thickness, cv2.LINE_AA)
 
 
-def _line(texels: np.ndarray, y: float, paint: Paint, look: Look, rng: np.random.Generator) -> None:
+def _paint_line(
+    texels: np.ndarray, y: float, paint: LinePaint, look: RoadLook, rng: np.random.Generator
+) -> None:
     centres = (y - paint.width, y + paint.width) if paint.double else (y,)
-    first, last = _column(max(centres) + paint.width), _column(min(centres) - paint.width) + 1
+    first, last = _column_of(max(centres) + paint.width), _column_of(min(centres) - paint.width) + 1
     across = total(
-        np.clip((0.5 * paint.width - np.abs(_lateral()[first:last] - centre)) / COLUMN_WIDTH + 0.5, 0.0, 1.0)
+        np.clip(
+            (0.5 * paint.width - np.abs(_column_positions()[first:last] - centre)) / COLUMN_WIDTH + 0.5,
+            0.0,
+            1.0,
+        )
         for centre in centres
     )
-    along = _dashes(len(texels), paint)
+    along = _painted_share(len(texels), paint)
     cover = (1.0 - paint.fade) * along[:, None] * np.asarray(across)[None, :]
     if paint.wear > 0.0:
-        cover *= 1.0 - 0.85 * _flakes(cover.shape, paint.wear, rng)
+        cover *= 1.0 - 0.85 * _flaked_share(cover.shape, paint.wear, rng)
     part = texels[:, first:last]
     part[:] = np.clip(part + cover * (paint.tone - part.astype(np.float32)), 0.0, 255.0)
 
 
-def _dashes(rows: int, paint: Paint) -> np.ndarray:
+def _painted_share(rows: int, paint: LinePaint) -> np.ndarray:
     if not paint.dashed:
         return np.ones(rows, np.float32)
     edges = np.arange(rows + 1) * ROW_LENGTH - paint.phase
@@ -163,7 +171,7 @@ def _dashes(rows: int, paint: Paint) -> np.ndarray:
     return (np.diff(painted) / ROW_LENGTH).astype(np.float32)
 
 
-def _flakes(shape: tuple[int, int], share: float, rng: np.random.Generator) -> np.ndarray:
+def _flaked_share(shape: tuple[int, int], share: float, rng: np.random.Generator) -> np.ndarray:
     """1 where paint has come off (`share` of the area), 0 elsewhere, with soft edges."""
     rows, columns = shape
     spots = rng.standard_normal((rows // FLAKE_ROWS + 2, columns // FLAKE_COLUMNS + 2), dtype=np.float32)
@@ -172,23 +180,25 @@ def _flakes(shape: tuple[int, int], share: float, rng: np.random.Generator) -> n
     return np.clip((spots - limit) * 12.0 + 0.5, 0.0, 1.0)
 
 
-def _shade(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
+def _add_tree_shadows(texels: np.ndarray, look: RoadLook, rng: np.random.Generator) -> None:
     rows = len(texels)
-    small = (max(8, int(rows * ROW_LENGTH / 0.6)), int(2.0 * HALF_WIDTH / 0.6))
+    small = (max(8, int(rows * ROW_LENGTH / 0.6)), int(2.0 * STRIP_HALF_WIDTH / 0.6))
     noise = rng.standard_normal(small, dtype=np.float32)
     noise = cv2.GaussianBlur(np.concatenate([noise] * 3), (0, 0), 2.2)
     noise += 0.25 * cv2.GaussianBlur(rng.standard_normal(noise.shape, dtype=np.float32), (0, 0), 0.7)
     noise = noise[small[0] : 2 * small[0]]
-    limit = np.quantile(noise, 1.0 - look.shadows)
+    limit = np.quantile(noise, 1.0 - look.shadow_share)
     # Beyond the strip its edge is repeated, so shadows must not reach the edge.
-    depth = look.shadow_depth * np.clip(HALF_WIDTH - 0.5 - np.abs(_lateral()), 0.0, 1.0).astype(np.float32)
+    depth = look.shadow_depth * np.clip(
+        STRIP_HALF_WIDTH - 0.5 - np.abs(_column_positions()), 0.0, 1.0
+    ).astype(np.float32)
     for k in range(rows // ROWS_PER_PERIOD):
         part = texels[k * ROWS_PER_PERIOD : (k + 1) * ROWS_PER_PERIOD]
-        shade = _enlarged(noise, k, rows // ROWS_PER_PERIOD)
+        shade = _enlarge_for_period(noise, k, rows // ROWS_PER_PERIOD)
         part[:] = part * (1.0 - depth * np.clip((shade - limit) * 12.0, 0.0, 1.0))
 
 
-def _enlarged(coarse: np.ndarray, k: int, periods: int) -> np.ndarray:
+def _enlarge_for_period(coarse: np.ndarray, k: int, periods: int) -> np.ndarray:
     down, across = len(coarse) / (periods * ROWS_PER_PERIOD), coarse.shape[1] / COLUMNS
     matrix = np.array(
         [[across, 0.0, 0.5 * across - 0.5], [0.0, down, down * (k * ROWS_PER_PERIOD + 0.5) - 0.5]]
@@ -198,5 +208,5 @@ def _enlarged(coarse: np.ndarray, k: int, periods: int) -> np.ndarray:
     return cv2.warpAffine(coarse, matrix, size, flags=flags, borderMode=cv2.BORDER_WRAP)
 
 
-def _column(y: float) -> int:
-    return min(max(int((HALF_WIDTH - y) / COLUMN_WIDTH), 0), COLUMNS - 1)
+def _column_of(y: float) -> int:
+    return min(max(int((STRIP_HALF_WIDTH - y) / COLUMN_WIDTH), 0), COLUMNS - 1)

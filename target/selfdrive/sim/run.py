@@ -15,10 +15,18 @@ from pathlib import Path
 
 from selfdrive.common import compiled
 from selfdrive.common.errors import ConfigError, writing
-from selfdrive.sim.picture_options import DETECTORS, GROUND, MARKS, PAPER, SOLID, TRANSLATIONS, Pictures
+from selfdrive.sim.picture_options import (
+    DETECTORS,
+    GROUND_TRANSLATION,
+    MARKS,
+    PAPER_DETECTOR,
+    SOLID_MARKS,
+    TRANSLATIONS,
+    PictureOptions,
+)
 from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, on_plant
 from selfdrive.sim.simulator import SimulationResult, Simulator
-from selfdrive.sim.trace_file import pieces
+from selfdrive.sim.trace_file import npz_pieces
 
 EXIT_INVALID_INPUT = 2
 
@@ -26,7 +34,7 @@ EXIT_INVALID_INPUT = 2
 def main(arguments: Sequence[str] | None = None) -> int:
     options = _parse_arguments(arguments)
     try:
-        run = _open(options)
+        run = _open_run(options)
         while not run.done:
             run.step()
         run.write(options.out)
@@ -36,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-class Run:
+class SteppedRun:
     """A run in progress, stepped by the caller. It gives the same bytes as the command line."""
 
     def __init__(self, simulator: Simulator) -> None:
@@ -50,21 +58,21 @@ class Run:
         self._simulator.step()
 
     def recorded(self) -> dict[str, float]:
-        return self._simulator.recorder.newest()
+        return self._simulator.recorder.newest_row()
 
     def write(self, folder: Path) -> None:
-        write(self._simulator.result(), folder)
+        write_run(self._simulator.result(), folder)
 
 
-def open_run(arguments: Sequence[str]) -> Run:
+def open_run(arguments: Sequence[str]) -> SteppedRun:
     """Prepare the run that these command line arguments describe.
 
     `--out` is ignored: `write` takes the folder. Raises ConfigError for invalid input.
     """
-    return _open(_parse_arguments(arguments))
+    return _open_run(_parse_arguments(arguments))
 
 
-def _open(options: argparse.Namespace) -> Run:
+def _open_run(options: argparse.Namespace) -> SteppedRun:
     scenario = load_scenario(options.scenario)
     if options.no_lead:
         scenario = replace(scenario, lead=None)
@@ -74,11 +82,11 @@ def _open(options: argparse.Namespace) -> Run:
         scenario = replace(scenario, steps=min(scenario.steps, options.max_steps))
     compiled.use(None if options.forget else options.compiled)
     simulator = Simulator()
-    simulator.reset(scenario, options.seed, _pictures(options), options.film)
-    return Run(simulator)
+    simulator.reset(scenario, options.seed, _picture_options(options), options.film)
+    return SteppedRun(simulator)
 
 
-def simulate(scenario: Scenario, seed: int, pictures: Pictures | None = None) -> SimulationResult:
+def simulate(scenario: Scenario, seed: int, pictures: PictureOptions | None = None) -> SimulationResult:
     simulator = Simulator()
     simulator.reset(scenario, seed, pictures)
     while not simulator.done:
@@ -86,8 +94,8 @@ def simulate(scenario: Scenario, seed: int, pictures: Pictures | None = None) ->
     return simulator.result()
 
 
-def write(result: SimulationResult, folder: Path) -> None:
-    trace, digest = pieces(result.trace), sha256()
+def write_run(result: SimulationResult, folder: Path) -> None:
+    trace, digest = npz_pieces(result.trace), sha256()
     for piece in trace:
         digest.update(piece)
     record = {**result.record, "trace_digest": digest.hexdigest()}
@@ -107,15 +115,17 @@ def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--scenario", type=Path, required=True, metavar="FILE", help="scenario YAML")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the results")
-    parser.add_argument("--seed", type=_seed, default=0, metavar="N", help="seed of all random numbers")
+    parser.add_argument("--seed", type=_parse_seed, default=0, metavar="N", help="seed of all random numbers")
     parser.add_argument("--no-lead", action="store_true", help="run without the lead vehicle")
     parser.add_argument("--plant", choices=PLANTS, help="plant to drive on, instead of the scenario's")
     parser.add_argument("--pictures", action="store_true", help="run with pictures and a lane detector")
-    parser.add_argument("--detector", choices=DETECTORS, default=PAPER, help="lane detector for pictures")
-    parser.add_argument("--marks", choices=MARKS, default=SOLID, help="the rendered road's right line")
+    parser.add_argument(
+        "--detector", choices=DETECTORS, default=PAPER_DETECTOR, help="lane detector for pictures"
+    )
+    parser.add_argument("--marks", choices=MARKS, default=SOLID_MARKS, help="the rendered road's right line")
     parser.add_argument("--frames", type=Path, metavar="DIR", help="use your own pictures, not rendered ones")
     parser.add_argument(
-        "--translation", choices=TRANSLATIONS, default=GROUND, help="how frames follow the car"
+        "--translation", choices=TRANSLATIONS, default=GROUND_TRANSLATION, help="how frames follow the car"
     )
     parser.add_argument(
         "--cache", type=Path, metavar="DIR", help="cache pictures and detections in this folder"
@@ -123,34 +133,34 @@ def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--compiled", type=Path, metavar="DIR", help="find compiled code in this folder")
     parser.add_argument("--forget", action="store_true", help="use no cached detections and no compiled code")
     parser.add_argument("--film", type=Path, metavar="DIR", help="record the camera's frames in this folder")
-    parser.add_argument("--max-steps", type=_positive, metavar="N", help="stop after N steps of 10 ms")
+    parser.add_argument("--max-steps", type=_parse_positive, metavar="N", help="stop after N steps of 10 ms")
     return parser.parse_args(arguments)
 
 
-def _pictures(options: argparse.Namespace) -> Pictures | None:
+def _picture_options(options: argparse.Namespace) -> PictureOptions | None:
     if not options.pictures:
         if options.frames:
             raise ConfigError(
                 f"--frames {options.frames}", expected="--pictures with it", remedy="give both or none"
             )
         return None
-    return Pictures(
+    return PictureOptions(
         detector=options.detector,
         marks=options.marks,
         frames=options.frames,
         translation=options.translation,
         cache=options.cache,
-        forget=options.forget,
+        ignore_stored=options.forget,
     )
 
 
-def _seed(text: str) -> int:
+def _parse_seed(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 0 or more")
     return int(text)
 
 
-def _positive(text: str) -> int:
+def _parse_positive(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
     return int(text)

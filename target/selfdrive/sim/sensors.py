@@ -10,7 +10,7 @@ from selfdrive.sim.truth import GroundTruth
 STANDSTILL_SPEED = 0.3  # m/s; below this the speed reads 0 although the wheels turn
 
 # Constant signals, by period in steps: doors closed, seat belt fastened, gear in drive, main switch on.
-_CONSTANT = {
+_CONSTANT_SIGNALS = {
     1: {
         "STEER_STATUS": {"STEER_TORQUE_SENSOR": 0, "STEER_STATUS": 0},
         "POWERTRAIN_DATA": {"PEDAL_GAS": 0, "BRAKE_SWITCH": 0, "BRAKE_PRESSED": 0},
@@ -42,7 +42,7 @@ class CarSensors:
         self._steering = Packer(messages["STEERING_SENSORS"], ("STEER_ANGLE", "STEER_ANGLE_RATE"), CAR_BUS)
         self._standstill = Packer(messages["STANDSTILL"], ("WHEELS_MOVING",), CAR_BUS)
         self._buttons = Packer(messages["SCM_BUTTONS"], ("CRUISE_BUTTONS",), CAR_BUS)
-        self._constant = [(period, _constant_frames(names)) for period, names in _CONSTANT.items()]
+        self._constant = [(period, _constant_frames(names)) for period, names in _CONSTANT_SIGNALS.items()]
 
     def measure(self, truth: GroundTruth, button: int, frame: int) -> list[CanFrame]:
         """Return all frames of step `frame`; `button` is the cruise button held (CruiseButton)."""

@@ -10,17 +10,17 @@ from selfdrive.car.honda.radar_interface import RadarInterface
 from selfdrive.manager import Manager
 from selfdrive.messages import Actuators, CanFrame
 from selfdrive.sim.actuators import ActuatorReceiver
-from selfdrive.sim.camera_and_detector import build_vision
+from selfdrive.sim.camera_and_detector import build_camera_and_detector
 from selfdrive.sim.film.film_recorder import FilmRecorder
 from selfdrive.sim.hazards import HazardMonitor
 from selfdrive.sim.lead import LeadVehicle
-from selfdrive.sim.picture_options import Pictures
+from selfdrive.sim.picture_options import PictureOptions
 from selfdrive.sim.plant import Plant
 from selfdrive.sim.radar import RadarSensor
-from selfdrive.sim.recorder import Recorder
+from selfdrive.sim.recorder import TraceRecorder
 from selfdrive.sim.reference_plant import ReferencePlant
 from selfdrive.sim.road import Road
-from selfdrive.sim.scenario import REFERENCE, STANDARD, Scenario
+from selfdrive.sim.scenario import REFERENCE_PLANT, STANDARD_PLANT, Scenario
 from selfdrive.sim.sensors import CarSensors
 from selfdrive.sim.truth import GroundTruth
 from selfdrive.visiond.detector import MirroredDetector
@@ -29,7 +29,7 @@ from selfdrive.visiond.visiond import Visiond
 RECORD_SCHEMA = "sim-record/1"
 STEPS_PER_SECOND = 100
 CYCLE = 5  # steps between radar cycles and between pictures
-PLANTS: dict[str, type[Plant]] = {STANDARD: Plant, REFERENCE: ReferencePlant}
+PLANT_CLASSES: dict[str, type[Plant]] = {STANDARD_PLANT: Plant, REFERENCE_PLANT: ReferencePlant}
 FREE_ROAD_DISTANCE = 200.0  # m; constant distance that radar and camera report on a free road
 
 
@@ -48,7 +48,7 @@ class Simulator:
         self,
         scenario: Scenario,
         seed: int = 0,
-        pictures: Pictures | None = None,
+        pictures: PictureOptions | None = None,
         film: Path | None = None,
     ) -> None:
         """Rebuild car, controller and recorder. `seed` is for the pictures; `film` is a folder for a film.
@@ -62,21 +62,21 @@ class Simulator:
         self._road = Road(scenario.grade, scenario.curvature)
         self._lead = LeadVehicle(lead.gap, lead.times, lead.speeds) if lead else None
         self._radar = RadarSensor(self._road)
-        self._vision = build_vision(pictures, self._road, seed)
+        self._vision = build_camera_and_detector(pictures, self._road, seed)
         self._camera, self._takes_pictures = self._vision.camera, pictures is not None
         self._film = FilmRecorder(film, self._vision.model) if film else None
         self._receiver = ActuatorReceiver()
         self._actuators = Actuators()
         car = CarInterface()
-        make_plant = PLANTS[scenario.plant]
+        make_plant = PLANT_CLASSES[scenario.plant]
         self._plant = make_plant(car.params, speed=scenario.speed, offset=scenario.lateral_offset)
         self._sensors = CarSensors(self._plant.gearbox_scale)
         detector = self._vision.detector
-        if make_plant.mirrors:
+        if make_plant.has_mirrored_messages:
             detector = MirroredDetector(detector)
         self.manager = Manager(car, RadarInterface(), Visiond(detector))
         self.hazards = HazardMonitor()
-        self.recorder = Recorder()
+        self.recorder = TraceRecorder()
 
     @property
     def done(self) -> bool:
@@ -115,7 +115,7 @@ class Simulator:
             "seed": self._seed,
             "no_lead": self._scenario.lead is None,
             "plant": self._scenario.plant,
-            "pictures": self._vision.description,
+            "pictures": self._vision.for_record,
             "steps": self.frame,
             "engaged_from": recorder.engaged_from,
             "engaged_to": recorder.engaged_to,

@@ -9,10 +9,10 @@ import yaml
 from selfdrive.common.errors import ConfigError
 
 # YAML 1.1 reads 060 as 48 and 1:30 as 90; here only decimal numbers are allowed.
-_DECIMAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+_DECIMAL_PATTERN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 
 
-def read_yaml(text: str, where: str, keys: dict[str, str]) -> "Section":
+def read_yaml(text: str, where: str, keys: dict[str, str]) -> "YamlSection":
     """Return the mapping in a document. Raises ConfigError if it is not YAML or not a single mapping."""
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
@@ -29,10 +29,10 @@ def read_yaml(text: str, where: str, keys: dict[str, str]) -> "Section":
     if node is None:
         remedy = f"write the keys {', '.join(keys)}"
         raise ConfigError("an empty file", where=where, line=1, expected="a mapping", remedy=remedy)
-    return Section(node, where, keys)
+    return YamlSection(node, where, keys)
 
 
-class Section:
+class YamlSection:
     """A mapping of the document. `keys` are the allowed keys with their meanings."""
 
     def __init__(self, node: yaml.Node, where: str, keys: dict[str, str]) -> None:
@@ -41,9 +41,9 @@ class Section:
         self._nodes: dict[str, yaml.Node] = {}
         self.line = node.start_mark.line + 1
         if not isinstance(node, yaml.MappingNode):
-            self._fail(node, _shown(node), "a mapping", f"give the keys {', '.join(keys)}")
+            self._fail(node, _describe_node(node), "a mapping", f"give the keys {', '.join(keys)}")
         for key, value in node.value:
-            name = key.value if isinstance(key, yaml.ScalarNode) else _shown(key)
+            name = key.value if isinstance(key, yaml.ScalarNode) else _describe_node(key)
             if name not in keys:
                 near = get_close_matches(name, keys, n=1)
                 remedy = f"did you mean {near[0]!r}?" if near else "remove it"
@@ -60,7 +60,7 @@ class Section:
         good = isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:str" and node.value
         if not good or (allowed and node.value not in allowed):
             expected = f"one of {', '.join(allowed)}" if allowed else "a text"
-            self._fail(node, f"{key}: {_shown(node)}", expected, f"{key} is {self._keys[key]}")
+            self._fail(node, f"{key}: {_describe_node(node)}", expected, f"{key} is {self._keys[key]}")
         return node.value
 
     def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
@@ -71,7 +71,7 @@ class Section:
     def numbers(self, key: str, low: float, high: float) -> tuple[float, ...]:
         return tuple(self._number(item, key, low, high) for item in self._items(key))
 
-    def ascending(self, key: str, low: float, high: float) -> tuple[float, ...]:
+    def ascending_numbers(self, key: str, low: float, high: float) -> tuple[float, ...]:
         """Like `numbers`, strictly ascending."""
         values = self.numbers(key, low, high)
         for item, before, value in zip(self._items(key)[1:], values, values[1:], strict=False):
@@ -81,28 +81,28 @@ class Section:
                 )
         return values
 
-    def quantity(self, name: str, units: tuple[str, ...]) -> str:
+    def key_with_unit(self, name: str, units: tuple[str, ...]) -> str:
         """Return the key that gives `name` in one of `units`; exactly one must be present."""
-        found = [key for unit in units if (key := f"{name}_{unit}") in self]
-        if len(found) != 1:
+        matching_keys = [key for unit in units if (key := f"{name}_{unit}") in self]
+        if len(matching_keys) != 1:
             names = [f"{name}_{unit}" for unit in units]
-            got = " and ".join(found) if found else f"no {name}"
+            got = " and ".join(matching_keys) if matching_keys else f"no {name}"
             self.fail(got, f"exactly one of {', '.join(names)}", "give one of these keys")
-        return found[0]
+        return matching_keys[0]
 
     def is_list(self, key: str) -> bool:
         return isinstance(self._node(key), yaml.SequenceNode)
 
-    def section(self, key: str, keys: dict[str, str]) -> "Section":
-        return Section(self._node(key), self._where, keys)
+    def section(self, key: str, keys: dict[str, str]) -> "YamlSection":
+        return YamlSection(self._node(key), self._where, keys)
 
-    def sections(self, key: str, keys: dict[str, str]) -> list["Section"]:
-        return [Section(item, self._where, keys) for item in self._items(key)]
+    def sections(self, key: str, keys: dict[str, str]) -> list["YamlSection"]:
+        return [YamlSection(item, self._where, keys) for item in self._items(key)]
 
     def check(self, key: str, good: bool, expected: str, remedy: str) -> None:
         if not good:
             node = self._node(key)
-            self._fail(node, f"{key}: {_shown(node)}", expected, remedy)
+            self._fail(node, f"{key}: {_describe_node(node)}", expected, remedy)
 
     def fail(self, got: str, expected: str, remedy: str) -> NoReturn:
         raise ConfigError(got, where=self._where, line=self.line, expected=expected, remedy=remedy)
@@ -115,15 +115,15 @@ class Section:
     def _items(self, key: str) -> list[yaml.Node]:
         node = self._node(key)
         if not isinstance(node, yaml.SequenceNode) or not node.value:
-            self._fail(node, f"{key}: {_shown(node)}", "a list", "write it as [a, b, ...]")
+            self._fail(node, f"{key}: {_describe_node(node)}", "a list", "write it as [a, b, ...]")
         return node.value
 
     def _number(self, node: yaml.Node, key: str, low: float, high: float) -> float:
         plain = isinstance(node, yaml.ScalarNode) and node.style is None
-        value = float(node.value) if plain and _DECIMAL.fullmatch(node.value) else None
+        value = float(node.value) if plain and _DECIMAL_PATTERN.fullmatch(node.value) else None
         if value is None or not low <= value <= high:
             expected = f"a number from {low:g} to {high:g}"
-            self._fail(node, f"{key}: {_shown(node)}", expected, f"{key} is {self._keys[key]}")
+            self._fail(node, f"{key}: {_describe_node(node)}", expected, f"{key} is {self._keys[key]}")
         return value
 
     def _fail(self, node: yaml.Node, got: str, expected: str, remedy: str) -> NoReturn:
@@ -131,7 +131,7 @@ class Section:
         raise ConfigError(got, where=self._where, line=line, expected=expected, remedy=remedy)
 
 
-def _shown(node: yaml.Node) -> str:
+def _describe_node(node: yaml.Node) -> str:
     if isinstance(node, yaml.ScalarNode):
         return repr(node.value)[:60]
     return "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"

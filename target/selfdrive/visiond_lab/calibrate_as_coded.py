@@ -31,7 +31,7 @@ def evaluate_thresholds() -> list[tuple[float, float, float]]:
     rng = np.random.default_rng(SEED)
     road = RoadRenderer(CameraModel(), SOLID, int(rng.integers(2**31)), periods=66)
     offsets = rng.normal(0.0, OFFSET_SIGMA, PICTURE_COUNT).tolist()
-    pictures = [road.grey(805.2 * k / PICTURE_COUNT, offset) for k, offset in enumerate(offsets)]
+    pictures = [road.render_grey(805.2 * k / PICTURE_COUNT, offset) for k, offset in enumerate(offsets)]
     scores = np.concatenate(
         [_scores_inside_lane(road, *pair) for pair in zip(pictures, offsets, strict=True)]
     )
@@ -50,7 +50,9 @@ def _scores_inside_lane(road: RoadRenderer, picture: np.ndarray, offset: float) 
         top, first = coded.FIRST_ROW + STRIDE * down, coded.FIRST_COLUMN + STRIDE * across
         rows = np.array([top, top + WINDOW])
         margin = MIN_DISTANCE_FROM_LINE / np.array([model.metres_per_pixel(row) for row in rows])
-        left, right = (a * rows + b for a, b in (model.line_in_picture(*line) for line in road.truth(offset)))
+        left, right = (
+            a * rows + b for a, b in (model.line_in_picture(*line) for line in road.true_lines(offset))
+        )
         inside[down, across] = (left + margin < first).all() and (right - margin > first + WINDOW).all()
     return scores[inside.ravel()]
 
@@ -63,7 +65,7 @@ def _misplaced_share(
         ideal_view = {"left_lane_y": 0.0, "right_lane_y": 0.0, "path_y": 0.0, "bend": (), "lead_d_rel": 0.0}
         detected = detector.detect(CameraView(**ideal_view, picture=picture))
         true_columns = [
-            a * coded.ROW + b for a, b in (road.model.line_in_picture(*x) for x in road.truth(offset))
+            a * coded.ROW + b for a, b in (road.model.line_in_picture(*x) for x in road.true_lines(offset))
         ]
         true_positions = (
             coded.metres(true_columns[0] + coded.INWARD),

@@ -20,7 +20,7 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError, writing
 from selfdrive.messages import CameraView
-from selfdrive.sim.image_folder import CALIBRATION, camera_of
+from selfdrive.sim.image_folder import CALIBRATION_FILE, load_camera
 from selfdrive.visiond.detector import LaneDetector, LaneLines
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
@@ -102,7 +102,7 @@ def to_canonical_frame(colour: np.ndarray, source: CameraSource) -> np.ndarray:
 def load_labelled_frames(folder: Path, truth: Path) -> list[LabelledFrame]:
     """Read the frames that the truth file names. Raises ConfigError if one is missing or unreadable."""
     images = [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in IMAGE_SUFFIXES]
-    folder_source = _source_from_model(camera_of(folder)) if (folder / CALIBRATION).exists() else None
+    folder_source = _source_from_model(load_camera(folder)) if (folder / CALIBRATION_FILE).exists() else None
     frames = []
     for key, entry in _load_truth(truth).items():
         source = folder_source or SOURCE_BY_KEY.get(key.partition("_")[0])
@@ -111,7 +111,7 @@ def load_labelled_frames(folder: Path, truth: Path) -> list[LabelledFrame]:
                 f"no camera for {key!r}",
                 where=str(truth),
                 expected=f"a key that starts with one of {', '.join(SOURCE_BY_KEY)}",
-                remedy=f"rename it, or add a {CALIBRATION} to the frames",
+                remedy=f"rename it, or add a {CALIBRATION_FILE} to the frames",
             )
         left, right = _true_columns(key, entry, truth)
         path = _image_of_key(key, images, folder)

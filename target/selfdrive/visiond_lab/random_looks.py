@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.sim.road_look import Look, OtherCar, Paint
+from selfdrive.sim.road_look import LinePaint, OtherCar, RoadLook
 
 MIN_PAINT_CONTRAST = 14.0  # grey levels between paint and asphalt
 
@@ -27,42 +27,42 @@ def random_camera(rng: np.random.Generator) -> CameraModel:
     )
 
 
-def random_look(rng: np.random.Generator) -> Look:
+def random_look(rng: np.random.Generator) -> RoadLook:
     asphalt = _draw_from_either(rng, (45.0, 120.0), (110.0, 185.0))
     paints = [_draw_paint(asphalt, rng) for _ in range(4)]
-    return Look(
+    return RoadLook(
         lane_width=rng.uniform(3.0, 4.1),
         left=paints[0],
         right=paints[1],
         far_left=paints[2] if rng.random() < 0.7 else None,
         far_right=paints[3] if rng.random() < 0.7 else None,
-        asphalt=asphalt,
+        asphalt_tone=asphalt,
         grain=rng.uniform(0.5, 9.0),
         mottle=rng.uniform(0.0, 10.0),
-        tracks=rng.uniform(-10.0, 14.0),
-        shoulder=np.clip(asphalt + rng.normal(0.0, 35.0), 30.0, 210.0),
+        wheel_track_darkening=rng.uniform(-10.0, 14.0),
+        shoulder_tone=np.clip(asphalt + rng.normal(0.0, 35.0), 30.0, 210.0),
         shoulder_width=rng.uniform(0.3, 3.5),
-        verge=rng.uniform(35.0, 200.0),
-        kerb=rng.uniform(40.0, 220.0) if rng.random() < 0.3 else None,
-        patches=rng.uniform(0.0, 8.0),
-        cracks=rng.uniform(0.0, 16.0),
-        seams=_draw_sometimes(rng, 0.4, 0.5, 6.0),
-        joints=rng.uniform(4.0, 12.0) if rng.random() < 0.25 else None,
+        verge_tone=rng.uniform(35.0, 200.0),
+        kerb_tone=rng.uniform(40.0, 220.0) if rng.random() < 0.3 else None,
+        patches_per_100_m=rng.uniform(0.0, 8.0),
+        cracks_per_100_m=rng.uniform(0.0, 16.0),
+        seams_per_100_m=_draw_sometimes(rng, 0.4, 0.5, 6.0),
+        joint_spacing=rng.uniform(4.0, 12.0) if rng.random() < 0.25 else None,
         joint_tone=_draw_from_either(rng, (-65.0, -10.0), (5.0, 20.0)),
-        shadows=_draw_sometimes(rng, 0.6, 0.05, 0.6),
+        shadow_share=_draw_sometimes(rng, 0.6, 0.05, 0.6),
         shadow_depth=rng.uniform(0.2, 0.7),
-        sky=rng.uniform(150.0, 250.0),
-        trees=rng.uniform(30.0, 130.0),
+        sky_tone=rng.uniform(150.0, 250.0),
+        trees_tone=rng.uniform(30.0, 130.0),
         exposure=rng.uniform(0.65, 1.25),
         cars=tuple(_draw_car(rng) for _ in range(int(rng.integers(0, 4)))),
     )
 
 
-def _draw_paint(asphalt: float, rng: np.random.Generator) -> Paint:
+def _draw_paint(asphalt: float, rng: np.random.Generator) -> LinePaint:
     room = 245.0 - asphalt
     tone = asphalt + room * rng.uniform(0.25, 1.0)
     most = max(0.0, 1.0 - MIN_PAINT_CONTRAST / (tone - asphalt))
-    return Paint(
+    return LinePaint(
         tone=tone,
         width=rng.uniform(0.09, 0.20),
         dashed=rng.random() < 0.45,

@@ -7,7 +7,7 @@ import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.lead_picture import draw_car
-from selfdrive.sim.road_look import Look, Paint
+from selfdrive.sim.road_look import LinePaint, RoadLook
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond_lab.picture_flaws import RoadsideFlaws, bend_images, simulate_camera
 from selfdrive.visiond_lab.random_looks import random_camera, random_look
@@ -34,21 +34,21 @@ def generate_views(scenes: int, rng: np.random.Generator) -> Iterator[TrainingVi
         ground = RoadsideFlaws(model, look.lane_width, rng)
         for _ in range(VIEWS_PER_SCENE):
             pose = rng.uniform(0.0, 50.0), rng.normal(0.0, 0.45), rng.normal(0.0, 0.02)
-            paint = np.where(hidden, np.uint8(0), marks.grey(*pose))
-            picture, paint = ground.apply(road.grey(*pose), paint, offset=pose[1], heading=pose[2])
+            paint = np.where(hidden, np.uint8(0), marks.render_grey(*pose))
+            picture, paint = ground.apply(road.render_grey(*pose), paint, offset=pose[1], heading=pose[2])
             picture, paint = bend_images(model, (picture, paint), rng)
             yield TrainingView(model=model, picture=simulate_camera(picture, rng), paint=paint)
 
 
-def _pixels_behind_cars(look: Look, model: CameraModel) -> np.ndarray:
+def _pixels_behind_cars(look: RoadLook, model: CameraModel) -> np.ndarray:
     picture = np.zeros((model.rows, model.width), np.uint8)
     for car in look.cars:
         draw_car(picture, model, car)
     return picture > 0
 
 
-def _only_paint(look: Look) -> Look:
-    def line(old: Paint | None) -> Paint | None:
+def _only_paint(look: RoadLook) -> RoadLook:
+    def line(old: LinePaint | None) -> LinePaint | None:
         return old and replace(old, tone=255.0, wear=0.0, fade=0.0)
 
     return replace(
@@ -57,10 +57,23 @@ def _only_paint(look: Look) -> Look:
         right=line(look.right),
         far_left=line(look.far_left),
         far_right=line(look.far_right),
-        **dict.fromkeys(("asphalt", "grain", "mottle", "tracks", "shoulder", "verge", "patches"), 0.0),
-        **dict.fromkeys(("cracks", "seams", "shadows", "sky", "trees"), 0.0),
-        kerb=None,
-        joints=None,
+        **dict.fromkeys(
+            (
+                "asphalt_tone",
+                "grain",
+                "mottle",
+                "wheel_track_darkening",
+                "shoulder_tone",
+                "verge_tone",
+                "patches_per_100_m",
+            ),
+            0.0,
+        ),
+        **dict.fromkeys(
+            ("cracks_per_100_m", "seams_per_100_m", "shadow_share", "sky_tone", "trees_tone"), 0.0
+        ),
+        kerb_tone=None,
+        joint_spacing=None,
         exposure=1.0,
         cars=(),
     )

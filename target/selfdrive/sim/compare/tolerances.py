@@ -6,7 +6,7 @@ from pathlib import Path
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.compare.key_figures import FIGURE_MEANINGS
 from selfdrive.sim.compare.trace_csv import COLUMN_BY_CHANNEL
-from selfdrive.sim.yaml_section import Section, read_yaml
+from selfdrive.sim.yaml_section import YamlSection, read_yaml
 
 SCHEMA = "replay-tolerances/1"
 
@@ -65,7 +65,7 @@ def load_tolerances(path: Path) -> Tolerances:
     )
 
 
-def _parse_limits(section: Section) -> ChannelLimits:
+def _parse_limits(section: YamlSection) -> ChannelLimits:
     rms, largest, lag = (
         section.number(key, 0.0, 1e9) if key in section else None for key in ("rms", "max", "lag_s")
     )

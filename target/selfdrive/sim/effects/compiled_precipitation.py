@@ -141,7 +141,7 @@ def _veil_picture(
     particle_shares: np.ndarray,
     light: float,
 ) -> np.ndarray:
-    code = library.code.veil_picture
+    code = library.code.veiled
     code.argtypes = [_POINTER, _LONG, _POINTER, _LONG, _POINTER, _LONG, _LONG, _FLOAT, _FLOAT, _POINTER]
     code.restype = None
     picture, veil, particle_shares = (

@@ -135,9 +135,9 @@ class EffectStudio:
             Moment(2.0 + PICTURE_STEP * k, 50.0 + PICTURE_STEP * CAR_SPEED * k, CAR_SPEED)
             for k in range(PICTURES_PER_SEED)
         ]
-        self._clean_pictures = [renderer.grey(moment.position) for moment in self._moments]
-        self._gauge = DegradationGauge(self.model, renderer.truth())
-        self._truth = renderer.truth()
+        self._clean_pictures = [renderer.render_grey(moment.position) for moment in self._moments]
+        self._gauge = DegradationGauge(self.model, renderer.true_lines())
+        self._truth = renderer.true_lines()
 
     def measure_clean(self) -> Degradation:
         return _mean_degradation([self._gauge.measure(clean, clean) for clean in self._clean_pictures])

@@ -10,7 +10,7 @@ from selfdrive.sim.film import drawing
 from selfdrive.sim.film.film_recorder import SAMPLE_DISTANCES
 from selfdrive.sim.film.recorded_film import FilmFrame
 from selfdrive.sim.hazards import CAR_WIDTH
-from selfdrive.sim.lead_picture import LENGTH
+from selfdrive.sim.lead_picture import CAR_LENGTH
 
 ROAD_COLOUR = (84, 78, 74)
 PAINT_COLOUR = (205, 205, 205)
@@ -38,7 +38,7 @@ class BirdsEyeView:
         self._draw_road(strip, frame.position)
         self._draw_detections(strip, frame)
         if frame.d_rel is not None:
-            self._draw_car(strip, frame.d_rel + LENGTH, 0.0, 0.0, LEAD_COLOUR)
+            self._draw_car(strip, frame.d_rel + CAR_LENGTH, 0.0, 0.0, LEAD_COLOUR)
         self._draw_car(strip, 0.0, frame.offset, frame.heading, self._colour)
         self._draw_distances(strip, frame)
         return strip
@@ -72,7 +72,7 @@ class BirdsEyeView:
         self, strip: np.ndarray, front: float, offset: float, heading: float, colour: drawing.Colour
     ) -> None:
         for x, y, tone in (
-            ([0.0, 0.0, -LENGTH, -LENGTH], 1.0, colour),
+            ([0.0, 0.0, -CAR_LENGTH, -CAR_LENGTH], 1.0, colour),
             ([-1.2, -1.2, -1.9, -1.9], 0.8, drawing.PAPER),
         ):
             along = np.array(x)

@@ -11,7 +11,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.film import drawing
 from selfdrive.sim.film.film_recorder import SAMPLE_DISTANCES
 from selfdrive.sim.film.recorded_film import DetectedLine, FilmFrame
-from selfdrive.sim.lead_picture import CAMERA_TO_BUMPER, FURTHEST, NEAREST, draw_lead
+from selfdrive.sim.lead_picture import CAMERA_TO_BUMPER, FARTHEST_DRAWN, NEAREST_DRAWN, draw_lead
 from selfdrive.sim.road_renderer import RoadRenderer
 
 LINE_HALF_WIDTH, PATH_HALF_WIDTH = 0.06, 0.8  # m; half the drawn width
@@ -47,12 +47,12 @@ class CameraPane:
     def _compose_picture(self, frame: FilmFrame) -> np.ndarray:
         grey = frame.load_picture()
         if grey is None:
-            picture = self._road_renderer.colour(frame.position, -frame.middle, frame.heading)
+            picture = self._road_renderer.render_colour(frame.position, -frame.middle, frame.heading)
             picture = self._bend_picture(picture, frame)
         else:
             picture = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
         if frame.d_rel is not None:
-            turn = -self._road_shift(frame, frame.d_rel) / max(frame.d_rel, NEAREST)
+            turn = -self._road_shift(frame, frame.d_rel) / max(frame.d_rel, NEAREST_DRAWN)
             draw_lead(picture, self._model, frame.d_rel, -frame.middle, turn)
         return picture
 
@@ -114,7 +114,7 @@ class CameraPane:
         self, pane: np.ndarray, frame: FilmFrame, distance: float, colour: drawing.Colour, label: str
     ) -> None:
         x = distance + CAMERA_TO_BUMPER
-        if not NEAREST <= x <= FURTHEST:
+        if not NEAREST_DRAWN <= x <= FARTHEST_DRAWN:
             return
         y = frame.middle + self._road_shift(frame, distance)
         corners = [(x, y + LEAD_FRAME_HALF_WIDTH, LEAD_FRAME_HEIGHT), (x, y - LEAD_FRAME_HALF_WIDTH, 0.0)]

@@ -9,7 +9,7 @@ import numpy as np
 from selfdrive.sim.film import drawing
 from selfdrive.sim.film.film_events import FilmEvents, TimelineMark
 from selfdrive.sim.film.recorded_film import FilmFrame, RecordedFilm
-from selfdrive.sim.hazards import LANE_OFFSET
+from selfdrive.sim.hazards import LANE_DEPARTURE_OFFSET
 
 MARK_COLOURS = {
     "trigger": drawing.TRIGGER,
@@ -40,7 +40,7 @@ class Timeline:
         rows = (height - FOOT_HEIGHT - HEAD_HEIGHT - GAP) // 2
         reels = ((golden, drawing.GOLDEN, 2), (faulty, drawing.FAULTY, 1))
         self._drive_end = self._end if events.drive_end is None else events.drive_end
-        self._plot_runs("offset [m]", HEAD_HEIGHT, rows, _offset, reels, LANE_OFFSET)
+        self._plot_runs("offset [m]", HEAD_HEIGHT, rows, _offset, reels, LANE_DEPARTURE_OFFSET)
         self._plot_runs("lead [m]", HEAD_HEIGHT + rows + GAP, rows, _distance, reels, None)
         if events.active_span:
             self._shade_span(*events.active_span)

@@ -9,7 +9,7 @@ from selfdrive.common import compiled
 from selfdrive.controls.lib.compiled_fit import CompiledFit, build_fit
 from selfdrive.controls.lib.cubic_fit import CubicFit
 from selfdrive.controls.lib.polynomial import ZERO, blend, shifted, slope, value
-from selfdrive.sim.compile_helpers import compiler
+from selfdrive.sim.compile_helpers import compiler_command
 
 CURVE = (1e-5, -2e-3, 0.05, 1.85)
 
@@ -28,7 +28,7 @@ def test_fit_is_least_squares() -> None:
         )
 
 
-@pytest.mark.skipif(not compiler(), reason="there is no C compiler")
+@pytest.mark.skipif(not compiler_command(), reason="there is no C compiler")
 def test_a_compiled_fit_has_the_same_bits(all_compiled: Path) -> None:
     compiled.use(all_compiled)
     fast = build_fit()

@@ -28,8 +28,8 @@ from selfdrive.sim.effects.gaussian import Gaussian
 from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
 from selfdrive.sim.picture import Picture, Region
 from selfdrive.sim.picture_camera import PictureCamera
-from selfdrive.sim.picture_options import AS_CODED, PAPER, Pictures
-from selfdrive.sim.run import simulate, write
+from selfdrive.sim.picture_options import CODED_DETECTOR, PAPER_DETECTOR, PictureOptions
+from selfdrive.sim.run import simulate, write_run
 from selfdrive.sim.scenario import load_scenario
 
 SCENARIO = Path(__file__).resolve().parents[4] / "fault_library/scenarios/S1.yaml"
@@ -50,7 +50,7 @@ COMPILED = (
 )
 C_SOURCES = (compiled_gaussian.C_SOURCE, compiled_precipitation.C_SOURCE, compiled_scattered.C_SOURCE)
 
-pytestmark = pytest.mark.skipif(not compile_helpers.compiler(), reason="there is no C compiler")
+pytestmark = pytest.mark.skipif(not compile_helpers.compiler_command(), reason="there is no C compiler")
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,14 @@ def folder(tmp_path_factory):
 def compile_effects(folder, *options):
     for source in C_SOURCES:
         made = folder / compiled.file_name(source)
-        words = [*compile_helpers.compiler(), *options, source, "-o", made, *compile_helpers.OPTIONS]
+        words = [
+            *compile_helpers.compiler_command(),
+            *options,
+            source,
+            "-o",
+            made,
+            *compile_helpers.COMPILER_OPTIONS,
+        ]
         subprocess.run(words, check=True)
         made.write_bytes(made.read_bytes() + sha256(made.read_bytes()).digest())
     return folder
@@ -212,13 +219,13 @@ def test_a_camera_with_numpy_scalars_uses_python(folder):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [effects.PaperRain, effects.PaperSnow, effects.Rain, effects.Snow])
 def test_runs_in_weather_have_the_same_bytes(folder, tmp_path, monkeypatch, kind):
-    same_runs(folder, tmp_path, monkeypatch, kind, PAPER)
+    same_runs(folder, tmp_path, monkeypatch, kind, PAPER_DETECTOR)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [effects.CodedRain, effects.CodedSnow])
 def test_runs_in_weather_as_coded_have_the_same_bytes(folder, tmp_path, monkeypatch, kind):
-    same_runs(folder, tmp_path, monkeypatch, kind, AS_CODED)
+    same_runs(folder, tmp_path, monkeypatch, kind, CODED_DETECTOR)
 
 
 def same_runs(folder, tmp_path, monkeypatch, kind, detector):
@@ -236,10 +243,10 @@ def same_runs(folder, tmp_path, monkeypatch, kind, detector):
             return view._replace(picture=weather[0].apply(view.picture, truth))
 
         monkeypatch.setattr(PictureCamera, "look", in_weather)
-        pictures = Pictures(detector=detector, cache=tmp_path / "frames")
+        pictures = PictureOptions(detector=detector, cache=tmp_path / "frames")
         (tmp_path / "frames" / "detections-1.table").unlink(missing_ok=True)
         out = tmp_path / ("fast" if libraries else "plain")
-        write(simulate(scenario, 0, pictures), out)
+        write_run(simulate(scenario, 0, pictures), out)
         assert bool(weather[0]._key[-1]) == (libraries is not None and kind is not effects.PaperSnow)
         return [(out / name).read_bytes() for name in ("record.json", "trace.npz")]
 

@@ -44,7 +44,7 @@ def seeing(tmp_path_factory):
     (folder / "camera.yaml").write_text(CALIBRATION)
     road = RoadRenderer(CameraModel(), "solid", 0)
     for number in range(4):
-        cv2.imwrite(str(folder / f"{number}.png"), road.grey(1.342 * number))
+        cv2.imwrite(str(folder / f"{number}.png"), road.render_grey(1.342 * number))
     return "--pictures", "--frames", str(folder), "--cache", str(folder / "cache")
 
 

@@ -20,7 +20,7 @@ from selfdrive.controls.lib.lateral_ocp import lateral_ocp
 from selfdrive.controls.lib.long_ocp import long_ocp
 from selfdrive.controls.lib.mpc_iteration import Iteration, Solver
 from selfdrive.controls.lib.mpc_solver import build_solver
-from selfdrive.sim.compile_helpers import compiler
+from selfdrive.sim.compile_helpers import compiler_command
 
 RATE_COST = 0.5
 REFERENCES = {
@@ -30,7 +30,7 @@ REFERENCES = {
 COMPILED = {"longitudinal": build_longitudinal, "lateral": lambda: build_lateral(RATE_COST)}
 NO_NUMBERS = (math.nan, math.inf, -math.inf, 1e300, -1e9)
 
-pytestmark = pytest.mark.skipif(not compiler(), reason="there is no C compiler")
+pytestmark = pytest.mark.skipif(not compiler_command(), reason="there is no C compiler")
 
 
 @pytest.fixture

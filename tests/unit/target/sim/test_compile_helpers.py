@@ -16,7 +16,7 @@ from selfdrive.visiond.compiled_windows import C_SOURCE
 
 ROOT = Path(__file__).resolve().parents[4]
 SCENARIO = ROOT / "fault_library/scenarios/S1.yaml"
-COMPILER = compile_helpers.compiler()
+COMPILER = compile_helpers.compiler_command()
 MODEL = CameraModel()
 NAME = compiled.file_name(C_SOURCE)
 
@@ -36,7 +36,7 @@ def helpers(all_compiled, tmp_path):
 
 
 def test_every_c_file_names_the_python_files_that_it_replaces():
-    sources = list(compile_helpers.PACKAGE.rglob("*.c"))
+    sources = list(compile_helpers.PACKAGE_FOLDER.rglob("*.c"))
     assert C_SOURCE in sources
     for source in sources:
         named = compiled.stands_for(source.read_bytes())
@@ -110,7 +110,7 @@ def test_without_cc_the_compiler_of_ziglang_is_used(monkeypatch, there):
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setattr(compile_helpers, "find_spec", lambda name: there or None)
-    assert compile_helpers.compiler()[:3] == [sys.executable, "-m", "ziglang"] * there
+    assert compile_helpers.compiler_command()[:3] == [sys.executable, "-m", "ziglang"] * there
 
 
 @needs_compiler

@@ -9,7 +9,14 @@ from pathlib import Path
 import pytest
 import selfdrive
 from selfdrive.sim import detection_memory
-from selfdrive.sim.detection_memory import BUCKETS, ENTRY, FILE, MOST, WAYS, DetectionMemory
+from selfdrive.sim.detection_memory import (
+    BUCKET_COUNT,
+    ENTRIES_PER_BUCKET,
+    ENTRY_BYTES,
+    FILE_NAME,
+    MOST_NUMBERS,
+    DetectionMemory,
+)
 
 NUMBERS = (1.5, -0.0, float("inf"), 5e-324)
 
@@ -20,52 +27,52 @@ def key(number: int, bucket: int = 7) -> bytes:
 
 def test_stored_entries_are_recalled(tmp_path):
     memory = DetectionMemory(tmp_path)
-    memory.keep(key(1), NUMBERS)
-    memory.keep(key(2), ())
-    memory.keep(key(3), range(MOST))
+    memory.store(key(1), NUMBERS)
+    memory.store(key(2), ())
+    memory.store(key(3), range(MOST_NUMBERS))
     other = DetectionMemory(tmp_path)
     assert [value.hex() for value in other.recall(key(1))] == [value.hex() for value in NUMBERS]
-    assert other.recall(key(2)) == () and other.recall(key(3)) == tuple(range(MOST))
+    assert other.recall(key(2)) == () and other.recall(key(3)) == tuple(range(MOST_NUMBERS))
     assert other.recall(key(4)) is None and other.recall(key(1, 8)) is None
 
 
 def test_the_table_never_grows(tmp_path):
     memory = DetectionMemory(tmp_path)
-    for number in range(1, 4 * WAYS):
-        memory.keep(key(number), (float(number),))
+    for number in range(1, 4 * ENTRIES_PER_BUCKET):
+        memory.store(key(number), (float(number),))
         assert memory.recall(key(number)) == (float(number),)
-    left = [memory.recall(key(number)) for number in range(1, 4 * WAYS)]
-    assert sum(value is not None for value in left) == WAYS
-    size = (tmp_path / FILE).stat()
-    assert size.st_size == BUCKETS * WAYS * ENTRY and 512 * size.st_blocks < 1 << 20
+    left = [memory.recall(key(number)) for number in range(1, 4 * ENTRIES_PER_BUCKET)]
+    assert sum(value is not None for value in left) == ENTRIES_PER_BUCKET
+    size = (tmp_path / FILE_NAME).stat()
+    assert size.st_size == BUCKET_COUNT * ENTRIES_PER_BUCKET * ENTRY_BYTES and 512 * size.st_blocks < 1 << 20
 
 
-@pytest.mark.parametrize("at", [0, 16, 24, 32, ENTRY - 1])
+@pytest.mark.parametrize("at", [0, 16, 24, 32, ENTRY_BYTES - 1])
 def test_a_damaged_entry_is_not_recalled_and_can_be_stored_again(tmp_path, at):
     memory = DetectionMemory(tmp_path)
-    memory.keep(key(1), NUMBERS)
-    with (tmp_path / FILE).open("r+b") as file:
-        file.seek(7 * WAYS * ENTRY + at)
+    memory.store(key(1), NUMBERS)
+    with (tmp_path / FILE_NAME).open("r+b") as file:
+        file.seek(7 * ENTRIES_PER_BUCKET * ENTRY_BYTES + at)
         byte = file.read(1)[0]
         file.seek(-1, os.SEEK_CUR)
         file.write(bytes([byte ^ 4]))
     assert memory.recall(key(1)) is None
-    memory.keep(key(1), NUMBERS)
+    memory.store(key(1), NUMBERS)
     assert memory.recall(key(1)) == NUMBERS
 
 
 def test_a_file_with_other_content_does_not_prevent_storing(tmp_path):
-    (tmp_path / FILE).write_bytes(b"no table" * 5000)
+    (tmp_path / FILE_NAME).write_bytes(b"no table" * 5000)
     memory = DetectionMemory(tmp_path)
     assert memory.recall(key(1, 2)) is None
-    memory.keep(key(1, 2), NUMBERS)
+    memory.store(key(1, 2), NUMBERS)
     assert memory.recall(key(1, 2)) == NUMBERS
 
 
 def test_nothing_is_stored_if_the_file_cannot_be_opened(tmp_path):
-    (tmp_path / FILE).mkdir()
+    (tmp_path / FILE_NAME).mkdir()
     memory = DetectionMemory(tmp_path)
-    memory.keep(key(1), NUMBERS)
+    memory.store(key(1), NUMBERS)
     assert memory.recall(key(1)) is None
 
 
@@ -76,7 +83,7 @@ def test_a_full_disk_only_prevents_storing(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(detection_memory.os, "pwrite", full)
-    memory.keep(key(1), NUMBERS)
+    memory.store(key(1), NUMBERS)
     assert memory.recall(key(1)) is None
 
 
@@ -89,7 +96,7 @@ for turn in range(30):
     for number in range(1, 200):
         key = (number % 5).to_bytes(8, "little") + number.to_bytes(8, "little")
         assert memory.recall(key) in (None, (float(number),) * (number % 20))
-        memory.keep(key, (float(number),) * (number % 20))
+        memory.store(key, (float(number),) * (number % 20))
 """
 
 
@@ -105,7 +112,7 @@ def test_a_forked_child_shares_the_memory(tmp_path):
         "import os, sys; from pathlib import Path\n"
         "from selfdrive.sim.detection_memory import DetectionMemory\n"
         "memory = DetectionMemory(Path(sys.argv[1])); key = bytes(range(16))\n"
-        "if os.fork() == 0: memory.keep(key, (4.0,)); os._exit(0)\n"
+        "if os.fork() == 0: memory.store(key, (4.0,)); os._exit(0)\n"
         "os.wait(); print(memory.recall(key))"
     )
     root = str(Path(selfdrive.__path__[0]).parent)

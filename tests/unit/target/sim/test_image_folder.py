@@ -12,8 +12,8 @@ import pytest
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.image_folder import ImageFolder
-from selfdrive.sim.image_library import open_library
-from selfdrive.sim.picture_options import Pictures
+from selfdrive.sim.image_library import open_frame_library
+from selfdrive.sim.picture_options import PictureOptions
 
 PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "use-your-own-frames.md"
 VIEW = """\
@@ -52,13 +52,13 @@ def folder(tmp_path):
 
 
 def test_frames_are_read_in_the_order_of_their_numbers(folder):
-    frames = list(ImageFolder(folder).read())
+    frames = list(ImageFolder(folder).decode_frames())
     assert [frame[0, 0] for frame in frames] == list(range(10, 121, 10))
     assert {frame.shape for frame in frames} == {(48, 64)}
 
 
 def test_a_folder_becomes_a_library(folder, tmp_path):
-    library = open_library(Pictures(frames=folder, cache=tmp_path / "cache"), 0)
+    library = open_frame_library(PictureOptions(frames=folder, cache=tmp_path / "cache"), 0)
     assert library.name == "test drive"
     assert (library.fps, library.spacing) == (20.0, None)
     assert library.frame(0.55, 0.0)[0, 0] == 120 and library.frame(0.6, 0.0)[0, 0] == 10
@@ -85,14 +85,14 @@ def test_resizing_scales_frames_and_camera(folder):
     full = ImageFolder(folder).model
     (folder / "camera.yaml").write_text(VIEW + "resize_width: 32\n")
     half = ImageFolder(folder)
-    assert {frame.shape for frame in half.read()} == {(24, 32)}
+    assert {frame.shape for frame in half.decode_frames()} == {(24, 32)}
     column, row = full.project(9.0, 1.2, 0.0)
     assert half.model.project(9.0, 1.2, 0.0) == pytest.approx((0.5 * column - 0.25, 0.5 * row - 0.25))
 
 
 def error(folder):
     with pytest.raises(ConfigError) as caught:
-        list(ImageFolder(folder).read())
+        list(ImageFolder(folder).decode_frames())
     return str(caught.value)
 
 
@@ -112,7 +112,7 @@ def test_the_error_names_a_truncated_frame(folder):
     for kind in (".png", ".jpg"):
         whole = cv2.imencode(kind, picture)[1].tobytes()
         (folder / "7.png").write_bytes(whole)
-        assert len(list(ImageFolder(folder).read())) == 12
+        assert len(list(ImageFolder(folder).decode_frames())) == 12
         (folder / "7.png").write_bytes(whole[: len(whole) // 2])
         assert error(folder).startswith(f"{folder}/7.png: not readable as a picture, expected an undamaged ")
 
@@ -132,7 +132,7 @@ def test_colour_depth_and_transparency_do_not_matter(folder):
         path.unlink()
     for shape, kind in (((48, 64), np.uint8), ((48, 64, 4), np.uint8), ((48, 64), np.uint16)):
         cv2.imwrite(str(folder / "1.png"), np.full(shape, 90 * (257 if kind == np.uint16 else 1), kind))
-        (frame,) = ImageFolder(folder).read()
+        (frame,) = ImageFolder(folder).decode_frames()
         assert frame.dtype == np.uint8 and (frame == 90).all()
 
 
@@ -144,7 +144,7 @@ def test_the_error_names_a_missing_frame(folder):
 def test_frame_numbers_can_have_larger_steps(folder):
     for path in folder.glob("*.png"):
         path.rename(folder / f"run{30 * int(path.stem):05}.png")
-    assert len(ImageFolder(folder).files) == 12
+    assert len(ImageFolder(folder).frame_paths) == 12
     (folder / "run00120.png").unlink()
     assert f"{folder}/run00120.png: missing" in error(folder)
 
@@ -155,11 +155,11 @@ def test_several_sequences_follow_each_other(folder):
         for number in (1, 2, 3):
             cv2.imwrite(str(folder / clip / f"{number}.jpg"), np.zeros((48, 64), np.uint8))
     (folder / "camera.yaml").write_text(VIEW.replace("*.png", "*/*.jpg"))
-    names = [str(path.relative_to(folder)) for path in ImageFolder(folder).files]
+    names = [str(path.relative_to(folder)) for path in ImageFolder(folder).frame_paths]
     assert names == ["a/1.jpg", "a/2.jpg", "a/3.jpg", "b/1.jpg", "b/2.jpg", "b/3.jpg"]
     for path in folder.glob("*/2.jpg"):
         path.rename(path.with_name("two.jpg"))
-    assert len(ImageFolder(folder).files) == 6
+    assert len(ImageFolder(folder).frame_paths) == 6
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,14 @@ import selfdrive
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim import image_library
-from selfdrive.sim.image_library import FRAMES, SPACING, ImageLibrary, cached, open_library
-from selfdrive.sim.picture_options import DASHED, Pictures
+from selfdrive.sim.image_library import (
+    RENDERED_FRAMES,
+    RENDERED_SPACING,
+    FrameLibrary,
+    map_or_make_frames,
+    open_frame_library,
+)
+from selfdrive.sim.picture_options import DASHED_MARKS, PictureOptions
 from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
 
@@ -38,7 +44,7 @@ def library(**given):
         "spacing": None,
         "fps": None,
     }
-    return ImageLibrary(**fields | given)
+    return FrameLibrary(**fields | given)
 
 
 def test_frames_follow_the_distance_and_repeat():
@@ -54,16 +60,16 @@ def test_frames_follow_the_time_and_repeat():
 
 def test_the_rendered_loop_has_whole_dash_periods():
     """At 60 mph, 20 frames pass per second."""
-    periods = FRAMES * SPACING / DASH_PERIOD
-    assert FRAMES >= 600
+    periods = RENDERED_FRAMES * RENDERED_SPACING / DASH_PERIOD
+    assert RENDERED_FRAMES >= 600
     assert periods == pytest.approx(round(periods))
-    assert pytest.approx(60 * 0.44704 / 20, rel=0.001) == SPACING
+    assert pytest.approx(60 * 0.44704 / 20, rel=0.001) == RENDERED_SPACING
 
 
 def test_frames_are_built_once(tmp_path):
-    first = cached(tmp_path, DIGEST, SHAPE, noise)
-    again = cached(tmp_path, DIGEST, SHAPE, refuse)
-    other = cached(tmp_path, "cd" * 32, SHAPE, lambda: noise(2))
+    first = map_or_make_frames(tmp_path, DIGEST, SHAPE, noise)
+    again = map_or_make_frames(tmp_path, DIGEST, SHAPE, refuse)
+    other = map_or_make_frames(tmp_path, "cd" * 32, SHAPE, lambda: noise(2))
     assert np.array_equal(first, np.stack(list(noise()))) and np.array_equal(first, again)
     assert not np.array_equal(first, other)
     with pytest.raises(ValueError, match="read-only"):
@@ -93,35 +99,35 @@ def test_frames_are_built_once(tmp_path):
     ],
 )
 def test_a_damaged_file_is_detected_and_rebuilt(tmp_path, harm):
-    cached(tmp_path, DIGEST, SHAPE, noise)
+    map_or_make_frames(tmp_path, DIGEST, SHAPE, noise)
     (path,) = tmp_path.iterdir()
     path.write_bytes(harm(path.read_bytes()))
-    assert np.array_equal(cached(tmp_path, DIGEST, SHAPE, noise), np.stack(list(noise())))
-    assert len(list(cached(tmp_path, DIGEST, SHAPE, refuse))) == 5
+    assert np.array_equal(map_or_make_frames(tmp_path, DIGEST, SHAPE, noise), np.stack(list(noise())))
+    assert len(list(map_or_make_frames(tmp_path, DIGEST, SHAPE, refuse))) == 5
 
 
 def test_frames_are_verified_when_they_are_used(tmp_path):
     """Mapping a file takes almost no time. A damaged frame is rebuilt when it is used."""
-    cached(tmp_path, DIGEST, SHAPE, noise)
+    map_or_make_frames(tmp_path, DIGEST, SHAPE, noise)
     (path,) = tmp_path.iterdir()
     data = path.read_bytes()
     path.write_bytes(data[:128] + bytes([data[128] ^ 1]) + data[129:])
-    frames, sound = cached(tmp_path, DIGEST, SHAPE, refuse), np.stack(list(noise()))
+    frames, sound = map_or_make_frames(tmp_path, DIGEST, SHAPE, refuse), np.stack(list(noise()))
     assert np.array_equal(frames[4], sound[4])
     with pytest.raises(AssertionError, match="built again"):
         frames[0]
 
 
 def test_frames_stay_in_memory_if_the_disk_returns_other_data(tmp_path, monkeypatch):
-    cached(tmp_path, DIGEST, SHAPE, noise)
-    real = image_library._mapped
+    map_or_make_frames(tmp_path, DIGEST, SHAPE, noise)
+    real = image_library._map_cache_file
 
     def mapped(path, shape):
         frames, digests = real(path, shape)
         return np.zeros_like(frames), digests
 
-    monkeypatch.setattr(image_library, "_mapped", mapped)
-    assert np.array_equal(cached(tmp_path, DIGEST, SHAPE, noise), np.stack(list(noise())))
+    monkeypatch.setattr(image_library, "_map_cache_file", mapped)
+    assert np.array_equal(map_or_make_frames(tmp_path, DIGEST, SHAPE, noise), np.stack(list(noise())))
 
 
 def test_a_failed_build_leaves_no_file(tmp_path):
@@ -130,7 +136,7 @@ def test_a_failed_build_leaves_no_file(tmp_path):
         raise ConfigError("unreadable", where="0002.png", expected="a picture", remedy="replace it")
 
     with pytest.raises(ConfigError, match=r"0002\.png"):
-        cached(tmp_path, DIGEST, SHAPE, break_off)
+        map_or_make_frames(tmp_path, DIGEST, SHAPE, break_off)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -138,8 +144,8 @@ def test_a_failed_build_leaves_no_file(tmp_path):
 def test_frames_are_the_same_without_a_writable_cache(tmp_path, place):
     (tmp_path / "file").write_text("in the way")
     cache = None if place is None else tmp_path / place
-    frames = cached(cache, DIGEST, SHAPE, noise)
-    assert np.array_equal(frames, cached(tmp_path / "sound", DIGEST, SHAPE, noise))
+    frames = map_or_make_frames(cache, DIGEST, SHAPE, noise)
+    assert np.array_equal(frames, map_or_make_frames(tmp_path / "sound", DIGEST, SHAPE, noise))
     with pytest.raises(ValueError, match="read-only"):
         frames[0][0, 0] = 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "sound"]
@@ -148,9 +154,9 @@ def test_frames_are_the_same_without_a_writable_cache(tmp_path, place):
 def test_processes_can_build_the_same_frames_at_once(tmp_path):
     code = (
         "import numpy as np, hashlib, pathlib, sys\n"
-        "from selfdrive.sim.image_library import cached\n"
+        "from selfdrive.sim.image_library import map_or_make_frames\n"
         "make = lambda: iter(np.random.default_rng(1).integers(0, 256, (40, 97, 101), dtype=np.uint8))\n"
-        f"frames = cached(pathlib.Path(sys.argv[1]), {DIGEST!r}, (40, 97, 101), make)\n"
+        f"frames = map_or_make_frames(pathlib.Path(sys.argv[1]), {DIGEST!r}, (40, 97, 101), make)\n"
         "print(hashlib.sha256(np.stack(list(frames)).tobytes()).hexdigest())\n"
     )
     root = str(Path(selfdrive.__path__[0]).parent)
@@ -169,14 +175,14 @@ def test_processes_can_build_the_same_frames_at_once(tmp_path):
 
 @pytest.mark.slow
 def test_the_rendered_library_has_the_renderers_frames(tmp_path):
-    pictures = Pictures(marks=DASHED, cache=tmp_path / "one")
-    frames = open_library(pictures, 5)
+    pictures = PictureOptions(marks=DASHED_MARKS, cache=tmp_path / "one")
+    frames = open_frame_library(pictures, 5)
     assert frames.frames.shape == (600, 480, 640)
     assert (frames.name, frames.model) == ("rendered, dashed", CameraModel())
-    drawn = RoadRenderer(CameraModel(), DASHED, 5, periods=66).grey(100 * SPACING)
-    assert np.array_equal(frames.frame(0.0, 100.5 * SPACING), drawn)
-    elsewhere = open_library(Pictures(marks=DASHED, cache=tmp_path / "two"), 5)
+    drawn = RoadRenderer(CameraModel(), DASHED_MARKS, 5, periods=66).render_grey(100 * RENDERED_SPACING)
+    assert np.array_equal(frames.frame(0.0, 100.5 * RENDERED_SPACING), drawn)
+    elsewhere = open_frame_library(PictureOptions(marks=DASHED_MARKS, cache=tmp_path / "two"), 5)
     assert elsewhere.digest == frames.digest
     assert np.array_equal(elsewhere.frames, frames.frames)
-    digests = {open_library(Pictures(cache=tmp_path / "one"), seed).digest for seed in (5, 6)}
+    digests = {open_frame_library(PictureOptions(cache=tmp_path / "one"), seed).digest for seed in (5, 6)}
     assert len(digests | {frames.digest}) == 3

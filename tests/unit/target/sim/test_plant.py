@@ -3,7 +3,7 @@
 import pytest
 from selfdrive.car.honda.interface import get_params
 from selfdrive.messages import Actuators
-from selfdrive.sim.plant import BASE_SPEED, Plant, acceleration
+from selfdrive.sim.plant import BASE_SPEED, Plant, longitudinal_acceleration
 
 
 @pytest.fixture
@@ -35,22 +35,24 @@ def test_position_uses_the_old_speed(plant):
 def test_gas_below_and_above_base_speed():
     assert abs(BASE_SPEED - 19.608) < 1e-3
     for speed, force in ((10.0, 5100 * 3.33), (25.0, 100_000 / 25.0 * 3.33)):
-        gain = acceleration(speed, 0.5, 0.0, 0.0) - acceleration(speed, 0.0, 0.0, 0.0)
+        gain = longitudinal_acceleration(speed, 0.5, 0.0, 0.0) - longitudinal_acceleration(
+            speed, 0.0, 0.0, 0.0
+        )
         assert gain == pytest.approx(0.5 * force / 1700)
 
 
 def test_brake_and_grade():
-    free = acceleration(15.0, 0.0, 0.0, 0.0)
-    assert free - acceleration(15.0, 0.0, 1.0, 0.0) == pytest.approx(3.0)
-    assert free - acceleration(15.0, 0.0, 0.0, 1.0) == pytest.approx(1.0)
+    free = longitudinal_acceleration(15.0, 0.0, 0.0, 0.0)
+    assert free - longitudinal_acceleration(15.0, 0.0, 1.0, 0.0) == pytest.approx(3.0)
+    assert free - longitudinal_acceleration(15.0, 0.0, 0.0, 1.0) == pytest.approx(1.0)
 
 
 def test_creep():
     """The idling engine accelerates the car at 1 m/s^2 at rest and not at all at 1.5 m/s. Rolling resistance
     is subtracted."""
-    assert acceleration(0.0, 0.0, 0.0, 0.0) == pytest.approx(1.0 - 0.0981)
-    assert acceleration(0.75, 0.0, 0.0, 0.0) == pytest.approx(0.5 - 0.0981, abs=1e-3)
-    assert acceleration(1.5, 0.0, 0.0, 0.0) == pytest.approx(-0.0981, abs=1e-3)
+    assert longitudinal_acceleration(0.0, 0.0, 0.0, 0.0) == pytest.approx(1.0 - 0.0981)
+    assert longitudinal_acceleration(0.75, 0.0, 0.0, 0.0) == pytest.approx(0.5 - 0.0981, abs=1e-3)
+    assert longitudinal_acceleration(1.5, 0.0, 0.0, 0.0) == pytest.approx(-0.0981, abs=1e-3)
 
 
 def test_the_car_never_drives_backwards(plant):

@@ -11,15 +11,15 @@ import pytest
 import selfdrive
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.sim.camera import Camera
-from selfdrive.sim.detection_memory import FILE, DetectionMemory
+from selfdrive.sim.camera import GeometryCamera
+from selfdrive.sim.detection_memory import FILE_NAME, DetectionMemory
 from selfdrive.sim.effects import Brightness, Contrast, LowLight, PaperRain
 from selfdrive.sim.effects.effect import Effect
-from selfdrive.sim.image_library import SPACING, ImageLibrary
+from selfdrive.sim.image_library import RENDERED_SPACING, FrameLibrary
 from selfdrive.sim.picture import Picture
 from selfdrive.sim.picture_camera import PictureCamera
-from selfdrive.sim.picture_options import GROUND, SHIFT
-from selfdrive.sim.remembering_detector import SEEING, RememberingDetector, seeing_digest
+from selfdrive.sim.picture_options import GROUND_TRANSLATION, SHIFT_TRANSLATION
+from selfdrive.sim.remembering_detector import DETECTION_FILES, RememberingDetector, detection_files_digest
 from selfdrive.sim.road import Road
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.paper_detector import PaperDetector
@@ -32,16 +32,16 @@ MODEL = CameraModel()
 @pytest.fixture(scope="module")
 def frames():
     renderer = RoadRenderer(MODEL, "dashed", 3, periods=1)
-    return np.stack([renderer.grey(k * SPACING) for k in range(3)])
+    return np.stack([renderer.render_grey(k * RENDERED_SPACING) for k in range(3)])
 
 
 @pytest.fixture
 def look(frames, truth):
-    def taken(translation=GROUND, digest="d", **pose):
-        library = ImageLibrary(
-            name="few", digest=digest, model=MODEL, frames=frames, spacing=SPACING, fps=None
+    def taken(translation=GROUND_TRANSLATION, digest="d", **pose):
+        library = FrameLibrary(
+            name="few", digest=digest, model=MODEL, frames=frames, spacing=RENDERED_SPACING, fps=None
         )
-        camera = PictureCamera(Camera(Road(None, None)), library, translation)
+        camera = PictureCamera(GeometryCamera(Road(None, None)), library, translation)
         return camera.look(truth(**pose)).picture
 
     return taken
@@ -79,7 +79,7 @@ def test_remembered_lines_equal_detected_ones(make, look, tmp_path):
         for number, picture in enumerate(seen):
             assert repr(detector.detect(view(picture))) == expected[number], (known, number)
             if known == 9 and number == 8:  # the rest is detected again, based on the recalled part
-                (tmp_path / FILE).unlink()
+                (tmp_path / FILE_NAME).unlink()
                 detector._memory = DetectionMemory(tmp_path)
 
 
@@ -104,12 +104,12 @@ def test_different_images_have_different_keys(look, truth):
     rain, light = PaperRain(5, 1, MODEL), Brightness(20, 1, MODEL)
     pictures = [
         base,
-        look(position=SPACING),
+        look(position=RENDERED_SPACING),
         look(lateral_offset=0.004),
         look(lateral_offset=-0.004),
         look(heading=0.00025),
-        look(SHIFT, lateral_offset=0.2),
-        look(SHIFT, lateral_offset=0.4),
+        look(SHIFT_TRANSLATION, lateral_offset=0.2),
+        look(SHIFT_TRANSLATION, lateral_offset=0.4),
         look(digest="e"),
         rain.apply(base, moment),
         rain.apply(base, later),
@@ -152,17 +152,17 @@ def test_results_of_other_effects_are_not_remembered(look, truth):
 def test_the_digest_changes_only_with_code_that_affects_detection(tmp_path):
     root = tmp_path / "selfdrive"
     copytree(ROOT, root)
-    before = seeing_digest(root)
-    assert before == seeing_digest(ROOT)
+    before = detection_files_digest(root)
+    assert before == detection_files_digest(ROOT)
     for unrelated in ("visiond/visiond.py", "sim/picture_camera.py", "controls/plannerd.py"):
         (root / unrelated).write_text("")
-    assert seeing_digest(root) == before
-    files = [file for pattern in SEEING for file in root.glob(pattern)]
+    assert detection_files_digest(root) == before
+    files = [file for pattern in DETECTION_FILES for file in root.glob(pattern)]
     assert len(files) == len(set(files)) > 40
     for file in files:
         kept = file.read_bytes()
         file.write_bytes(kept + b"\n")
-        assert seeing_digest(root) != before, file
+        assert detection_files_digest(root) != before, file
         file.write_bytes(kept)
 
 
@@ -179,7 +179,9 @@ def test_the_digest_covers_all_code_of_detectors_frames_and_effects():
         command, env={"PYTHONPATH": str(ROOT.parent)}, capture_output=True, text=True, check=True
     )
     loaded = {Path(name).relative_to(ROOT).as_posix() for name in done.stdout.split()}
-    covered = {file.relative_to(ROOT).as_posix() for pattern in SEEING for file in ROOT.glob(pattern)}
+    covered = {
+        file.relative_to(ROOT).as_posix() for pattern in DETECTION_FILES for file in ROOT.glob(pattern)
+    }
     plain = {"__init__.py", "common/__init__.py", "sim/__init__.py", "messages.py", "common/errors.py"}
     plain |= {"common/conversions.py", "sim/yaml_section.py"}  # the camera is in the key
     plain |= {"common/interp.py", "sim/camera.py", "sim/road.py", "sim/truth.py"}  # the view's geometry

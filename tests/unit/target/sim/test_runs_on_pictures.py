@@ -12,15 +12,23 @@ import selfdrive
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim import camera_and_detector, detection_memory
-from selfdrive.sim.detection_memory import ENTRY, FILE, DetectionMemory
+from selfdrive.sim.detection_memory import ENTRY_BYTES, FILE_NAME, DetectionMemory
 from selfdrive.sim.effects import PaperRain
-from selfdrive.sim.image_library import SPACING
+from selfdrive.sim.image_library import RENDERED_SPACING
 from selfdrive.sim.picture import Picture
 from selfdrive.sim.picture_camera import PictureCamera
-from selfdrive.sim.picture_options import AS_CODED, CODED, GROUND, PAPER, ROBUST, SHIFT, Pictures
+from selfdrive.sim.picture_options import (
+    CODED_DETECTOR,
+    CODED_TRANSLATION,
+    GROUND_TRANSLATION,
+    PAPER_DETECTOR,
+    ROBUST_DETECTOR,
+    SHIFT_TRANSLATION,
+    PictureOptions,
+)
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.sim.run import main, simulate, write
-from selfdrive.sim.scenario import REFERENCE, STANDARD, load_scenario, on_plant
+from selfdrive.sim.run import main, simulate, write_run
+from selfdrive.sim.scenario import REFERENCE_PLANT, STANDARD_PLANT, load_scenario, on_plant
 from selfdrive.visiond.detector import LaneLines, RoadLine, path_between
 
 CALIBRATION = f"""\
@@ -35,7 +43,7 @@ cx_px: 317.9
 cy_px: 256.5
 height_m: 2.18
 pitch_deg: 14
-spacing_m: {SPACING}
+spacing_m: {RENDERED_SPACING}
 """
 
 
@@ -78,7 +86,7 @@ def frames(tmp_path):
     (folder / "camera.yaml").write_text(CALIBRATION)
     renderer = RoadRenderer(CameraModel(), "solid", 0, periods=1)
     for number in range(9):
-        cv2.imwrite(str(folder / f"{number:04}.png"), renderer.grey(number * SPACING))
+        cv2.imwrite(str(folder / f"{number:04}.png"), renderer.render_grey(number * RENDERED_SPACING))
     return folder
 
 
@@ -86,21 +94,27 @@ def brought_aside(scenarios, steps):
     return replace(load_scenario(scenarios / "S1.yaml"), lateral_offset=0.3, steps=steps)
 
 
-@pytest.mark.parametrize(("translation", "left_over"), [(GROUND, 0.06), (SHIFT, 0.15)])
+@pytest.mark.parametrize(
+    ("translation", "left_over"), [(GROUND_TRANSLATION, 0.06), (SHIFT_TRANSLATION, 0.15)]
+)
 def test_a_car_that_sees_only_frames_returns_to_the_middle(
     monkeypatch, scenarios, frames, tmp_path, translation, left_over
 ):
-    monkeypatch.setattr(camera_and_detector, "_detector", lambda pictures, library: LineReader(library.model))
-    pictures = Pictures(frames=frames, translation=translation, cache=tmp_path / "cache")
+    monkeypatch.setattr(
+        camera_and_detector,
+        "_build_detector_with_memory",
+        lambda pictures, library: LineReader(library.model),
+    )
+    pictures = PictureOptions(frames=frames, translation=translation, cache=tmp_path / "cache")
     result = simulate(brought_aside(scenarios, 1000), 0, pictures)
     offset = np.abs(result.trace["lateral_offset"])
     assert offset[0] > 0.25 and offset.max() < 0.4 and offset[-300:].max() < left_over
     assert result.record["pictures"]["translation"] == translation
 
 
-@pytest.mark.parametrize("detector", [PAPER, ROBUST, AS_CODED])
+@pytest.mark.parametrize("detector", [PAPER_DETECTOR, ROBUST_DETECTOR, CODED_DETECTOR])
 def test_the_detection_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_path, detector):
-    monkeypatch.setattr(detection_memory, "BUCKETS", 512)
+    monkeypatch.setattr(detection_memory, "BUCKET_COUNT", 512)
     clean, look = PictureCamera.look, []
 
     def rainy(self, truth):
@@ -113,12 +127,12 @@ def test_the_detection_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, f
 
     monkeypatch.setattr(PictureCamera, "look", rainy)
     cache, without = tmp_path / "cache", tmp_path / "without"
-    (without / FILE).mkdir(parents=True)
+    (without / FILE_NAME).mkdir(parents=True)
 
     def bytes_of(run, cache):
         out = tmp_path / run
-        pictures = Pictures(detector=detector, frames=frames, cache=cache)
-        write(simulate(brought_aside(scenarios, 100), 0, pictures), out)
+        pictures = PictureOptions(detector=detector, frames=frames, cache=cache)
+        write_run(simulate(brought_aside(scenarios, 100), 0, pictures), out)
         return (out / "trace.npz").read_bytes(), (out / "record.json").read_bytes()
 
     plain = bytes_of("without", without)
@@ -127,15 +141,15 @@ def test_the_detection_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, f
         patched.setattr(Picture, "pixels", None)
         patched.setattr(Picture, "__getitem__", None)
         assert bytes_of("warm", cache) == plain
-    table = bytearray((cache / FILE).read_bytes())
-    for at in range(30, len(table), ENTRY):
+    table = bytearray((cache / FILE_NAME).read_bytes())
+    for at in range(30, len(table), ENTRY_BYTES):
         table[at] ^= 1
-    (cache / FILE).write_bytes(table)
+    (cache / FILE_NAME).write_bytes(table)
     assert bytes_of("damaged", cache) == plain
 
 
 def test_a_run_with_forget_ignores_the_memory(monkeypatch, scenarios, frames, tmp_path):
-    monkeypatch.setattr(detection_memory, "BUCKETS", 512)
+    monkeypatch.setattr(detection_memory, "BUCKET_COUNT", 512)
     cache = tmp_path / "cache"
 
     def bytes_of(name, *more):
@@ -146,7 +160,7 @@ def test_a_run_with_forget_ignores_the_memory(monkeypatch, scenarios, frames, tm
         return (out / "trace.npz").read_bytes(), (out / "record.json").read_bytes()
 
     plain = bytes_of("first", "--forget")
-    assert not (cache / FILE).exists()
+    assert not (cache / FILE_NAME).exists()
     assert bytes_of("remembered") == plain
     recall = DetectionMemory.recall
 
@@ -164,9 +178,9 @@ def test_a_run_on_frames_has_one_thread(scenarios, frames, tmp_path):
     code = (
         "import os, sys; from pathlib import Path; from dataclasses import replace\n"
         "from selfdrive.sim.run import simulate; from selfdrive.sim.scenario import load_scenario\n"
-        "from selfdrive.sim.picture_options import Pictures\n"
+        "from selfdrive.sim.picture_options import PictureOptions\n"
         "scenario = replace(load_scenario(Path(sys.argv[1])), steps=20)\n"
-        "simulate(scenario, 0, Pictures(frames=Path(sys.argv[2]), cache=Path(sys.argv[3])))\n"
+        "simulate(scenario, 0, PictureOptions(frames=Path(sys.argv[2]), cache=Path(sys.argv[3])))\n"
         "print(len(os.listdir('/proc/self/task')))"
     )
     root = str(Path(selfdrive.__path__[0]).parent)
@@ -192,12 +206,16 @@ def test_runs_with_ideal_vision_do_not_import_the_slow_libraries():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("translation", [GROUND, SHIFT])
+@pytest.mark.parametrize("translation", [GROUND_TRANSLATION, SHIFT_TRANSLATION])
 def test_all_scenarios_run_without_alerts_on_the_rendered_road(
     monkeypatch, scenarios, tmp_path_factory, translation
 ):
-    monkeypatch.setattr(camera_and_detector, "_detector", lambda pictures, library: LineReader(library.model))
-    pictures = Pictures(translation=translation, cache=tmp_path_factory.getbasetemp() / "pictures")
+    monkeypatch.setattr(
+        camera_and_detector,
+        "_build_detector_with_memory",
+        lambda pictures, library: LineReader(library.model),
+    )
+    pictures = PictureOptions(translation=translation, cache=tmp_path_factory.getbasetemp() / "pictures")
     for name in ("S1", "S2", "S3", "S4", "S5"):
         result = simulate(load_scenario(scenarios / f"{name}.yaml"), 0, pictures)
         assert set(result.record["hazards"].values()) == {None}
@@ -208,14 +226,17 @@ def test_all_scenarios_run_without_alerts_on_the_rendered_road(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("plant", "translation", "alerting", "aside"),
-    [(STANDARD, GROUND, set(), 0.2), (REFERENCE, CODED, {"S2", "S4"}, 0.6)],
+    [
+        (STANDARD_PLANT, GROUND_TRANSLATION, set(), 0.2),
+        (REFERENCE_PLANT, CODED_TRANSLATION, {"S2", "S4"}, 0.6),
+    ],
 )
 def test_fault_free_runs_with_the_detector_as_coded_have_no_hazard(
     scenarios, tmp_path_factory, plant, translation, alerting, aside
 ):
     """On the reference plant, two of the runs raise *steer saturated*."""
     cache = tmp_path_factory.getbasetemp() / "pictures"
-    pictures = Pictures(detector=AS_CODED, translation=translation, cache=cache)
+    pictures = PictureOptions(detector=CODED_DETECTOR, translation=translation, cache=cache)
     found = set()
     for name in ("S1", "S2", "S3", "S4", "S5"):
         result = simulate(on_plant(load_scenario(scenarios / f"{name}.yaml"), plant), 0, pictures)

@@ -43,8 +43,8 @@ def test_all_values_are_converted_to_si_units():
     assert scenario.lead.speeds == pytest.approx((10.0, 20.0))
     assert scenario.lead.times == (0.0, 10.0)
     assert scenario.buttons == (
-        ButtonPress(code=3, press=120, release=130),
-        ButtonPress(code=2, press=500, release=510),
+        ButtonPress(button_code=3, press_step=120, release_step=130),
+        ButtonPress(button_code=2, press_step=500, release_step=510),
     )
     assert scenario.grade == ((0.0, 5.0), (0.0, 1.0))
     assert scenario.curvature == ((0.0, 100.0), (0.0, 0.002))
@@ -141,7 +141,7 @@ def test_the_five_scenarios_have_the_expected_values(scenarios, name):
     assert (scenario.name, scenario.steps, scenario.speed) == (name, 3000, pytest.approx(26.8224))
     assert scenario.lead.gap == 100.0
     assert scenario.lead.speeds[0] == pytest.approx(25 * 0.44704 if name == "S2" else 40 * 0.44704)
-    assert scenario.buttons == (ButtonPress(code=3, press=120, release=130),)
+    assert scenario.buttons == (ButtonPress(button_code=3, press_step=120, release_step=130),)
 
 
 def test_the_digest_changes_even_with_a_comment(tmp_path):

@@ -23,13 +23,16 @@ def accepted(data: dict[str, Any]) -> tuple[bool, bool]:
         parsed = False
     else:
         parsed = True
-    return jsonschema.Draft7Validator(scenario_page.schema()).is_valid(data), parsed
+    return jsonschema.Draft7Validator(scenario_page.scenario_json_schema()).is_valid(data), parsed
 
 
 def test_page_and_schema_are_up_to_date() -> None:
     remedy = "run: python -m selfdrive.sim.scenario_page"
-    assert (REFERENCE / "scenario.md").read_text() == scenario_page.page(), remedy
-    assert json.loads((REFERENCE / "schemas" / "scenario.json").read_text()) == scenario_page.schema(), remedy
+    assert (REFERENCE / "scenario.md").read_text() == scenario_page.render_scenario_page(), remedy
+    assert (
+        json.loads((REFERENCE / "schemas" / "scenario.json").read_text())
+        == scenario_page.scenario_json_schema()
+    ), remedy
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)

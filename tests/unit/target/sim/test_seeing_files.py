@@ -11,9 +11,9 @@ import pytest
 from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim import compile_helpers
-from selfdrive.sim.detection_memory import FILE
-from selfdrive.sim.image_library import SPACING
-from selfdrive.sim.remembering_detector import SEEING
+from selfdrive.sim.detection_memory import FILE_NAME
+from selfdrive.sim.image_library import RENDERED_SPACING
+from selfdrive.sim.remembering_detector import DETECTION_FILES
 from selfdrive.sim.road_renderer import RoadRenderer
 
 from mutator._common import shared_cache
@@ -38,11 +38,11 @@ def drive(tmp_path: Path) -> Drive:
     frames.mkdir()
     work.mkdir()
     values = {"files": "*.png", "width": 640, "rows": 480, "fx_px": 309.4, "fy_px": 344.2, "cx_px": 317.9}
-    values |= {"cy_px": 256.5, "height_m": 2.18, "pitch_deg": 14, "spacing_m": SPACING}
+    values |= {"cy_px": 256.5, "height_m": 2.18, "pitch_deg": 14, "spacing_m": RENDERED_SPACING}
     (frames / "camera.yaml").write_text(json.dumps({"schema": "camera/1", "name": "three"} | values))
     renderer = RoadRenderer(CameraModel(), "solid", 0, periods=1)
     for number in range(3):
-        cv2.imwrite(str(frames / f"{number}.png"), renderer.grey(number * SPACING))
+        cv2.imwrite(str(frames / f"{number}.png"), renderer.render_grey(number * RENDERED_SPACING))
     workspace = Workspace.find(root=ROOT)
     manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
     more = ("--pictures", "--frames", str(frames), "--max-steps", "100")
@@ -75,7 +75,7 @@ def drive(tmp_path: Path) -> Drive:
 
 def memory() -> Path:
     """The folder where the harness lets the target store detections."""
-    return shared_cache.target_folder("openpilot") / FILE
+    return shared_cache.target_folder("openpilot") / FILE_NAME
 
 
 def test_the_manifest_lists_every_file_that_affects_detection() -> None:
@@ -85,7 +85,11 @@ def test_the_manifest_lists_every_file_that_affects_detection() -> None:
     """
     manifest = Workspace.find(root=ROOT).manifest("openpilot")
     package = ROOT / "target" / "selfdrive"
-    seeing = {f"selfdrive/{p.relative_to(package).as_posix()}" for glob in SEEING for p in package.glob(glob)}
+    seeing = {
+        f"selfdrive/{p.relative_to(package).as_posix()}"
+        for glob in DETECTION_FILES
+        for p in package.glob(glob)
+    }
     assert len(seeing) > 30
     assert [
         path
@@ -144,7 +148,9 @@ def test_a_fault_in_a_detector_does_not_depend_on_earlier_runs(drive: Drive) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not any(compile_helpers.FOLDER.glob("mark_windows-*")), reason="nothing is compiled")
+@pytest.mark.skipif(
+    not any(compile_helpers.COMPILED_FOLDER.glob("mark_windows-*")), reason="nothing is compiled"
+)
 def test_a_fault_in_code_with_a_compiled_version_is_activated(drive: Drive) -> None:
     place = ("selfdrive/visiond/hog.py", "Hog._votes", "votes")
     acted = drive(place, 0.3)

@@ -49,7 +49,10 @@ def test_the_scenario_equals_the_stock_maneuver(scenarios, name):
     assert scenario.speed == pytest.approx(speed)
     assert scenario.grade == GRADES.get(name)
     assert (scenario.curvature, scenario.lateral_offset) == (None, 0.0)
-    assert tuple((press.code, press.press, press.release) for press in scenario.buttons) == buttons
+    assert (
+        tuple((press.button_code, press.press_step, press.release_step) for press in scenario.buttons)
+        == buttons
+    )
     if gap is None:
         assert scenario.lead is None
     else:

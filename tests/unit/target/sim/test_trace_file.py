@@ -4,7 +4,7 @@ import io
 
 import numpy as np
 import pytest
-from selfdrive.sim.trace_file import pieces
+from selfdrive.sim.trace_file import npz_pieces
 
 
 @pytest.mark.parametrize("rows", [0, 1, 3000])
@@ -19,10 +19,10 @@ def test_the_file_has_the_bytes_of_savez(rows):
     }
     expected = io.BytesIO()
     np.savez(expected, **trace)
-    assert b"".join(pieces(trace)) == expected.getvalue()
+    assert b"".join(npz_pieces(trace)) == expected.getvalue()
 
 
 def test_a_trace_without_channels_is_an_empty_archive():
     expected = io.BytesIO()
     np.savez(expected)
-    assert b"".join(pieces({})) == expected.getvalue()
+    assert b"".join(npz_pieces({})) == expected.getvalue()

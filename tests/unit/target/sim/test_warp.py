@@ -10,12 +10,12 @@ from selfdrive.common import compiled
 from selfdrive.common.array_math import product
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim import compile_helpers, compiled_warp
-from selfdrive.sim.compiled_warp import CompiledWarp, agrees, build_warp
+from selfdrive.sim.compiled_warp import CompiledWarp, build_warp, is_bit_identical
 from selfdrive.sim.picture import Region, whole
 from selfdrive.sim.road_renderer import car_to_road, picture_to_car
 from selfdrive.sim.warp import warp
 
-needs_compiler = pytest.mark.skipif(not compile_helpers.compiler(), reason="there is no C compiler")
+needs_compiler = pytest.mark.skipif(not compile_helpers.compiler_command(), reason="there is no C compiler")
 TO_CAR = picture_to_car(CameraModel(), 172)
 SHAPE = 308, 640
 
@@ -60,7 +60,7 @@ def test_a_region_equals_that_of_opencvs_whole_image():
 
 @needs_compiler
 def test_compiled_warps_have_the_same_bits(library):
-    if not agrees(library):
+    if not is_bit_identical(library):
         pytest.skip("OpenCV computes different bits from the C code")
     random, fast = np.random.default_rng(2), CompiledWarp(library)
     for matrix in moves(random):
@@ -78,8 +78,8 @@ def test_compiled_warps_have_the_same_bits(library):
 @needs_compiler
 @pytest.mark.parametrize("option", ["-DIS_FAST=0", "-DIS_WIDE=0"])
 def test_results_do_not_depend_on_wide_vector_instructions(library, tmp_path, option):
-    words = [*compile_helpers.compiler(), option, compiled_warp.C_SOURCE, "-o", tmp_path / "warp.so"]
-    subprocess.run([*words, *compile_helpers.OPTIONS], check=True)
+    words = [*compile_helpers.compiler_command(), option, compiled_warp.C_SOURCE, "-o", tmp_path / "warp.so"]
+    subprocess.run([*words, *compile_helpers.COMPILER_OPTIONS], check=True)
     narrow = compiled.Library(ctypes.CDLL(str(tmp_path / "warp.so")), b"")
     random, fast = np.random.default_rng(5), CompiledWarp(library)
     for matrix in moves(random):
@@ -91,7 +91,7 @@ def test_results_do_not_depend_on_wide_vector_instructions(library, tmp_path, op
 @needs_compiler
 @pytest.mark.parametrize("shape", [(50, 100), (64, 64), (3, 65), (1, 200), (2, 64)])
 def test_pictures_of_any_size_are_warped(library, shape):
-    if not agrees(library):
+    if not is_bit_identical(library):
         pytest.skip("OpenCV computes different bits from the C code")
     random, fast = np.random.default_rng(3), CompiledWarp(library)
     for _ in range(20):
@@ -114,9 +114,9 @@ def test_the_library_is_not_used_if_opencv_computes_other_bits(library, monkeypa
         return warp(source, matrix * (1.0 + 1e-7), region)
 
     monkeypatch.setattr(compiled_warp, "warp", rounds_otherwise)
-    agrees.cache_clear()
+    is_bit_identical.cache_clear()
     assert build_warp() == (rounds_otherwise, "")
-    agrees.cache_clear()
+    is_bit_identical.cache_clear()
 
 
 @needs_compiler

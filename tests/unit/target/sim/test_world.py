@@ -1,7 +1,7 @@
 """The lead vehicle, the road and what the camera sees of them."""
 
 import pytest
-from selfdrive.sim.camera import Camera
+from selfdrive.sim.camera import GeometryCamera
 from selfdrive.sim.lead import LeadVehicle
 from selfdrive.sim.road import Road
 from selfdrive.visiond.detector import IdealDetector
@@ -38,24 +38,26 @@ def test_bend_is_a_parabola_for_constant_curvature():
 
 
 def test_lane_in_view(truth):
-    view = Camera(STRAIGHT).look(truth(d_rel=42.0))
+    view = GeometryCamera(STRAIGHT).look(truth(d_rel=42.0))
     assert (view.left_lane_y, view.right_lane_y, view.path_y, view.lead_d_rel) == (1.85, -1.85, 0.0, 42.0)
     assert view.bend == (0.0,) * 50
-    view = Camera(STRAIGHT).look(truth(lateral_offset=0.4))
+    view = GeometryCamera(STRAIGHT).look(truth(lateral_offset=0.4))
     assert (view.left_lane_y, view.right_lane_y, view.path_y) == pytest.approx((1.45, -2.25, -0.4))
 
 
 def test_heading_and_bend_in_view(truth):
-    assert Camera(STRAIGHT).look(truth(heading=0.1)).bend[49] == pytest.approx(-49 * 0.100335, rel=1e-4)
-    assert Camera(BEND).look(truth()).bend[49] == pytest.approx(0.001 * 49**2)
-    both = Camera(BEND).look(truth(heading=0.1)).bend
+    assert GeometryCamera(STRAIGHT).look(truth(heading=0.1)).bend[49] == pytest.approx(
+        -49 * 0.100335, rel=1e-4
+    )
+    assert GeometryCamera(BEND).look(truth()).bend[49] == pytest.approx(0.001 * 49**2)
+    both = GeometryCamera(BEND).look(truth(heading=0.1)).bend
     assert both[49] == pytest.approx(0.001 * 49**2 - 49 * 0.100335, rel=1e-4)
 
 
 def test_ideal_vision_publishes_the_true_geometry(truth):
     visiond = Visiond(IdealDetector())
     assert visiond.latest is None
-    visiond.update(Camera(BEND).look(truth(lateral_offset=0.5, d_rel=33.0)), 7.0)
+    visiond.update(GeometryCamera(BEND).look(truth(lateral_offset=0.5, d_rel=33.0)), 7.0)
     model = visiond.latest
     bend = [0.001 * x * x for x in range(50)]
     assert model.t == 7.0

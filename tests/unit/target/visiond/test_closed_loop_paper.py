@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from selfdrive.sim.picture_options import Pictures
+from selfdrive.sim.picture_options import PictureOptions
 from selfdrive.sim.scenario import load_scenario
 from selfdrive.sim.simulator import Simulator
 
@@ -18,7 +18,7 @@ def cache(tmp_path_factory) -> Path:
 
 def drive(name: str, marks: str, cache: Path):
     simulator = Simulator()
-    pictures = Pictures(detector="paper", marks=marks, cache=cache)
+    pictures = PictureOptions(detector="paper", marks=marks, cache=cache)
     simulator.reset(load_scenario(SCENARIOS / f"{name}.yaml"), 0, pictures)
     while not simulator.done:
         simulator.step()

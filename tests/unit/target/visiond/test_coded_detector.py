@@ -30,8 +30,8 @@ def test_lines_are_read_in_one_row(road: RoadRenderer, offset: float) -> None:
     """Each line is read at row 278, shifted 3 px towards the middle, and converted to metres by a fixed
     scale.
     """
-    found = seen(CodedDetector(CALTECH), road.grey(4.0, offset))
-    for line, true, inward in zip(found[:2], road.truth(offset), (3, -3), strict=True):
+    found = seen(CodedDetector(CALTECH), road.render_grey(4.0, offset))
+    for line, true, inward in zip(found[:2], road.true_lines(offset), (3, -3), strict=True):
         a, b = CALTECH.line_in_picture(*true)
         assert line.y == pytest.approx(metres(a * 278 + b + inward), abs=0.05)
         assert (line.slope, line.prob) == (0.0, 1.0)
@@ -40,7 +40,7 @@ def test_lines_are_read_in_one_row(road: RoadRenderer, offset: float) -> None:
 
 def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> None:
     for half, expected in ((slice(320, None), (None, 8.03)), (slice(None, 320), (7.88, None))):
-        picture = road.grey(4.0).copy()
+        picture = road.render_grey(4.0).copy()
         picture[:, half] = 97
         found = seen(CodedDetector(CALTECH), picture)
         for line, y in zip(found[:2], expected, strict=True):
@@ -51,7 +51,7 @@ def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> 
 
 def test_both_lines_can_be_missing(road: RoadRenderer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(coded, "LEAST_POINTS", 10**6)
-    found = seen(CodedDetector(CALTECH), road.grey(4.0))
+    found = seen(CodedDetector(CALTECH), road.render_grey(4.0))
     assert [line.y for line in found[:2]] == pytest.approx([7.88, 8.03], abs=0.005)
     assert [line.prob for line in found[:2]] == [1.0, 1.0]
 
@@ -78,7 +78,7 @@ def test_a_cluster_needs_30_points(points: int, column: int) -> None:
 
 def test_without_edges_the_lines_keep_their_positions(road: RoadRenderer) -> None:
     detector = CodedDetector(CALTECH)
-    before = seen(detector, road.grey(4.0, 0.3))
+    before = seen(detector, road.render_grey(4.0, 0.3))
     assert seen(detector, np.full((480, 640), 97, np.uint8)) == before
     blind = CodedDetector(CALTECH)
     assert seen(blind, np.zeros((480, 640), np.uint8)).left.y == 1.85
@@ -86,7 +86,7 @@ def test_without_edges_the_lines_keep_their_positions(road: RoadRenderer) -> Non
 
 def test_the_detectors_only_memory_is_its_state(road: RoadRenderer) -> None:
     one, other = CodedDetector(CALTECH), CodedDetector(CALTECH)
-    seen(one, road.grey(4.0, 0.3))
+    seen(one, road.render_grey(4.0, 0.3))
     other.state = one.state
     nothing = np.zeros((480, 640), np.uint8)
     assert seen(other, nothing) == seen(one, nothing)

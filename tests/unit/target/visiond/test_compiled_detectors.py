@@ -28,7 +28,7 @@ from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.robust_detector import RobustDetector
 from selfdrive.visiond.voting import Belief, vote
 
-pytestmark = pytest.mark.skipif(not compile_helpers.compiler(), reason="there is no C compiler")
+pytestmark = pytest.mark.skipif(not compile_helpers.compiler_command(), reason="there is no C compiler")
 MODEL = CameraModel()
 SMALL = CameraModel.from_view(width=512, rows=400, horizon=150.0, focal=400.0, height=1.3)
 VOTING = C_SOURCES[1]
@@ -50,7 +50,7 @@ def helpers(request, tmp_path_factory, all_compiled):
         return all_compiled
     folder = tmp_path_factory.mktemp("compiled")
     with pytest.MonkeyPatch.context() as patch:
-        words = " ".join(compile_helpers.compiler())
+        words = " ".join(compile_helpers.compiler_command())
         patch.setenv("CC", words + request.param)
         list(compile_helpers.compile_helpers(folder))
     return folder
@@ -73,11 +73,11 @@ def pictures():
         kind(amount, 1, MODEL) for kind, each in LEVEL_AMOUNTS.items() for amount in (each[0], each[-1])
     ]
     for k, effect in enumerate(changes):
-        picture = roads[k % 2].grey(9.0 * k, 1.5 * sin(k), 0.03 * sin(1.7 * k))
+        picture = roads[k % 2].render_grey(9.0 * k, 1.5 * sin(k), 0.03 * sin(1.7 * k))
         if effect:
             picture = effect.apply(picture, Moment(2.0 + k, 9.0 * k, 26.0))
         found.append(picture)
-    clean = roads[0].grey(0.0)
+    clean = roads[0].render_grey(0.0)
     found += [
         np.clip(clean + chance.normal(0.0, size, clean.shape), 0, 255).astype(np.uint8)
         for size in (5, 15, 60)
@@ -115,7 +115,7 @@ def test_lines_of_another_camera_have_the_same_bits(model):
     slow, fast = PaperDetector(model), build_paper_detector(model)
     road = RoadRenderer(model, "dashed", 2, periods=2)
     for k in range(8):
-        picture = cv2.add(road.grey(7.0 * k, 0.8 * sin(k), 0.02 * sin(3 * k)), k)
+        picture = cv2.add(road.render_grey(7.0 * k, 0.8 * sin(k), 0.02 * sin(3 * k)), k)
         assert repr(fast.detect(view(picture))) == repr(slow.detect(view(picture)))
 
 

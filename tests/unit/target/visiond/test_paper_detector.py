@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.sim.road_look import Look, standard_look
+from selfdrive.sim.road_look import RoadLook, standard_look
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.dbscan import dbscan
 from selfdrive.visiond.lane_net import LaneNet
@@ -44,8 +44,8 @@ def faded() -> RoadRenderer:
 
 @pytest.mark.parametrize(("offset", "heading"), POSES)
 def test_both_lines_are_found_at_their_true_place(road, offset, heading):
-    found = PaperDetector(road.model).detect(view(road.grey(4.0, offset, heading)))
-    for line, (y, slope) in zip(found[:2], road.truth(offset, heading), strict=True):
+    found = PaperDetector(road.model).detect(view(road.render_grey(4.0, offset, heading)))
+    for line, (y, slope) in zip(found[:2], road.true_lines(offset, heading), strict=True):
         assert line.prob > 0.5
         assert line.y == pytest.approx(y, abs=0.06)
         assert line.slope == pytest.approx(slope, abs=0.01)
@@ -54,16 +54,16 @@ def test_both_lines_are_found_at_their_true_place(road, offset, heading):
 
 def test_earlier_frames_do_not_change_the_result():
     road = RoadRenderer(CALTECH, "dashed", 3, periods=3)
-    detector, picture = PaperDetector(CALTECH), road.grey(7.0, 0.3)
+    detector, picture = PaperDetector(CALTECH), road.render_grey(7.0, 0.3)
     expected = PaperDetector(CALTECH).detect(view(picture))
     for offset in (-1.0, 0.0, 1.0):
-        detector.detect(view(road.grey(2.0, offset)))
+        detector.detect(view(road.render_grey(2.0, offset)))
     assert detector.detect(view(picture)) == expected
 
 
 def test_read_only_images_are_accepted_and_not_changed():
     """Processes share read-only images."""
-    picture = RoadRenderer(CALTECH, "solid", 1, periods=2).grey(0.0)
+    picture = RoadRenderer(CALTECH, "solid", 1, periods=2).render_grey(0.0)
     before = picture.copy()
     picture.flags.writeable = False
     assert PaperDetector(CALTECH).detect(view(picture)).left.prob > 0.5
@@ -77,31 +77,38 @@ def test_an_even_image_has_no_lines(level):
 
 
 def test_with_one_line_the_path_is_half_a_lane_beside_it(faded):
-    found = PaperDetector(CALTECH).detect(view(faded.grey(5.0, 0.4)))
+    found = PaperDetector(CALTECH).detect(view(faded.render_grey(5.0, 0.4)))
     assert found.left.prob > 0.5
     assert found.right.prob == 0.0
     assert found.path.y == pytest.approx(1.45 - 1.85, abs=0.06)
 
 
 def test_the_middle_of_the_car_divides_left_from_right(faded):
-    found = PaperDetector(CALTECH).detect(view(faded.grey(5.0, 2.6)))
+    found = PaperDetector(CALTECH).detect(view(faded.render_grey(5.0, 2.6)))
     assert found.right.y == pytest.approx(1.85 - 2.6, abs=0.08)
 
 
 def test_shadows_and_seams_beside_the_middle_are_not_lines():
-    look = Look(shadows=0.35, shadow_depth=0.6, seams=8.0, cracks=12.0, patches=6.0, joint_tone=-50.0)
+    look = RoadLook(
+        shadow_share=0.35,
+        shadow_depth=0.6,
+        seams_per_100_m=8.0,
+        cracks_per_100_m=12.0,
+        patches_per_100_m=6.0,
+        joint_tone=-50.0,
+    )
     road = RoadRenderer(CALTECH, look, 11, periods=8)
     detector = PaperDetector(CALTECH)
     for position in np.arange(0.0, 90.0, 6.0):
-        found = detector.detect(view(road.grey(position)))
+        found = detector.detect(view(road.render_grey(position)))
         assert found.left.y == pytest.approx(1.85, abs=0.3)
         assert found.right.y == pytest.approx(-1.85, abs=0.3)
 
 
 def test_real_edges_get_the_clusters_of_scikit_learn():
     region = RoadRegion(CALTECH)
-    for look in (Look(), Look(shadows=0.5, shadow_depth=0.6, cracks=20.0, grain=9.0)):
-        part = RoadRenderer(CALTECH, look, 2, periods=3).grey(3.0)[region.part]
+    for look in (RoadLook(), RoadLook(shadow_share=0.5, shadow_depth=0.6, cracks_per_100_m=20.0, grain=9.0)):
+        part = RoadRenderer(CALTECH, look, 2, periods=3).render_grey(3.0)[region.part]
         at, _ = edges(np.ascontiguousarray(part))
         pixels = np.stack(np.unravel_index(at, part.shape), axis=1)
         expected = DBSCAN(eps=EPS, min_samples=MIN_SAMPLES, metric="chebyshev").fit_predict(pixels)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.sim.road_look import OtherCar, Paint, standard_look
+from selfdrive.sim.road_look import LinePaint, OtherCar, standard_look
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.detector import LaneLines
 from selfdrive.visiond.robust_detector import FORGET, RobustDetector
@@ -42,8 +42,8 @@ def errors(lines: LaneLines, truth: tuple) -> list[float]:
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.6, -0.03), (-0.7, 0.04)])
 def test_one_frame_is_enough_to_find_both_lines(camera, marks, offset, heading):
     road = renderer(camera, marks)
-    truth = road.truth(offset, heading)
-    lines = see(RobustDetector(road.model), road.grey(3.0, offset, heading))
+    truth = road.true_lines(offset, heading)
+    lines = see(RobustDetector(road.model), road.render_grey(3.0, offset, heading))
     assert max(errors(lines, truth)) < 0.06
     for line, (_, slope) in zip((lines.left, lines.right), truth, strict=True):
         assert line.slope == pytest.approx(slope, abs=0.01)
@@ -56,19 +56,19 @@ def test_distractors_do_not_hide_the_lines():
     cars."""
     look = replace(
         standard_look("dashed"),
-        asphalt=150.0,
-        left=Paint(tone=176.0, double=True, yellow=True, width=0.1),
-        right=Paint(tone=200.0, dashed=True, wear=0.2),
-        seams=2.0,
-        joints=5.0,
-        shadows=0.3,
-        kerb=200.0,
+        asphalt_tone=150.0,
+        left=LinePaint(tone=176.0, double=True, yellow=True, width=0.1),
+        right=LinePaint(tone=200.0, dashed=True, wear=0.2),
+        seams_per_100_m=2.0,
+        joint_spacing=5.0,
+        shadow_share=0.3,
+        kerb_tone=200.0,
         cars=(OtherCar(x=14.0, y=3.8, tone=220.0), OtherCar(x=25.0, y=0.2, tone=30.0)),
     )
     road = RoadRenderer(CAMERAS["flat"], look, 8, periods=4)
     for position in (0.0, 4.0, 9.0):
-        lines = see(RobustDetector(road.model), road.grey(position, 0.2, 0.01))
-        assert max(errors(lines, road.truth(0.2, 0.01))) < 0.12
+        lines = see(RobustDetector(road.model), road.render_grey(position, 0.2, 0.01))
+        assert max(errors(lines, road.true_lines(0.2, 0.01))) < 0.12
 
 
 @pytest.mark.parametrize("tone", [0, 128, 255])
@@ -82,7 +82,7 @@ def test_an_image_of_one_tone_has_no_lines(tone):
 def test_lines_that_disappear_are_held_with_falling_probability():
     road = renderer()
     detector = RobustDetector(road.model)
-    before = see(detector, road.grey(0.0, 0.4, 0.02))
+    before = see(detector, road.render_grey(0.0, 0.4, 0.02))
     black = np.zeros((road.model.rows, road.model.width), np.uint8)
     held = [see(detector, black) for _ in range(FORGET + 1)]
     probs = [before.left.prob] + [lines.left.prob for lines in held]
@@ -90,25 +90,25 @@ def test_lines_that_disappear_are_held_with_falling_probability():
     for lines in held[:-1]:
         assert (lines.left.y, lines.right.y) == (before.left.y, before.right.y)
     assert held[-1].left.prob == 0.0 == held[-1].right.prob
-    again = see(detector, road.grey(1.0, -0.5, 0.0))
-    assert max(errors(again, road.truth(-0.5, 0.0))) < 0.06
+    again = see(detector, road.render_grey(1.0, -0.5, 0.0))
+    assert max(errors(again, road.true_lines(-0.5, 0.0))) < 0.06
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_one_line_gives_the_position_of_the_other(side):
     road = renderer()
     detector = RobustDetector(road.model)
-    see(detector, road.grey(0.0))
+    see(detector, road.render_grey(0.0))
     half = road.model.width // 2
     covered = slice(0, half) if side == "left" else slice(half, None)
     probs = []
     for i in range(1, 20):
         offset = 0.02 * i
-        picture = road.grey(STEP * i, offset)
+        picture = road.render_grey(STEP * i, offset)
         picture[:, covered] = 60
         lines = see(detector, picture)
         probs.append(getattr(lines, side).prob)
-        assert max(errors(lines, road.truth(offset))) < 0.1
+        assert max(errors(lines, road.true_lines(offset))) < 0.1
         assert lines.path.prob > 0.0
     assert probs[-1] < 0.3 * probs[0]
 
@@ -124,9 +124,9 @@ def test_lines_are_followed_through_rain():
     for i in range(40):
         scene = SimpleNamespace(t=0.05 * i, position=STEP * i, v_ego=26.8)
         offset = 0.3 * np.sin(0.1 * i)
-        picture = road.grey(STEP * i, offset)
+        picture = road.render_grey(STEP * i, offset)
         lines = see(detector, rain.apply(picture, scene) if i > 3 else picture)
-        assert max(errors(lines, road.truth(offset))) < 0.2
+        assert max(errors(lines, road.true_lines(offset))) < 0.2
 
 
 def test_after_crossing_a_line_the_next_lane_is_found():
@@ -134,10 +134,10 @@ def test_after_crossing_a_line_the_next_lane_is_found():
     detector = RobustDetector(road.model)
     for i in range(75):
         offset = 0.05 * i  # ends one lane further left
-        lines = see(detector, road.grey(STEP * i, offset, 0.01))
+        lines = see(detector, road.render_grey(STEP * i, offset, 0.01))
         known = offset if offset < 1.85 else offset - 3.7 if offset > 2.4 else None
         if known is not None:
-            assert max(errors(lines, road.truth(known, 0.01))) < 0.1
+            assert max(errors(lines, road.true_lines(known, 0.01))) < 0.1
 
 
 def test_the_same_frames_give_the_same_lines():
@@ -145,9 +145,9 @@ def test_the_same_frames_give_the_same_lines():
     first, second, other = (RobustDetector(road.model) for _ in range(3))
     noise = np.random.default_rng(2)
     for i in range(6):
-        picture = road.grey(STEP * i, 0.1 * i)
+        picture = road.render_grey(STEP * i, 0.1 * i)
         picture = (picture + noise.integers(0, 60, picture.shape)).clip(0, 255).astype(np.uint8)
         picture.flags.writeable = False
         one = see(first, picture)
-        see(other, road.grey(0.0, -0.5))
+        see(other, road.render_grey(0.0, -0.5))
         assert see(second, picture.copy()) == one

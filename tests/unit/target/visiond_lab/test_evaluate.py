@@ -32,10 +32,12 @@ def frames(tmp_path):
         ("tus_two", "deep/tus_two.png", TUSIMPLE_MODEL),
     ):
         road = _road(model)
-        left, right = (model.line_in_picture(y, slope) for y, slope in road.truth(0.2, 0.01))
+        left, right = (model.line_in_picture(y, slope) for y, slope in road.true_lines(0.2, 0.01))
         source = SOURCE_BY_KEY[key.partition("_")[0]]
         down = source.vanishing_row * 640 / (960 if key.startswith("p1") else 1280) - 200
-        frame = cv2.warpAffine(road.grey(2.0, 0.2, 0.01), np.float32([[1, 0, 0], [0, 1, down]]), (640, 360))
+        frame = cv2.warpAffine(
+            road.render_grey(2.0, 0.2, 0.01), np.float32([[1, 0, 0], [0, 1, down]]), (640, 360)
+        )
         width = 960 if key.startswith("p1") else 1280
         frame = cv2.resize(frame, (width, width * 9 // 16), interpolation=cv2.INTER_CUBIC)
         assert cv2.imwrite(str(folder / name), cv2.merge([frame] * 3))

@@ -18,10 +18,10 @@ def frames(tmp_path_factory):
     folder = tmp_path_factory.mktemp("frames")
     road = RoadRenderer(UDACITY_MODEL, "solid", 1, periods=2)
     down = SOURCE_BY_KEY["p1"].vanishing_row * 640 / 960 - 200
-    frame = cv2.warpAffine(road.grey(2.0), np.float32([[1, 0, 0], [0, 1, down]]), (640, 360))
+    frame = cv2.warpAffine(road.render_grey(2.0), np.float32([[1, 0, 0], [0, 1, down]]), (640, 360))
     frame = cv2.resize(frame, (960, 540), interpolation=cv2.INTER_CUBIC)
     cv2.imwrite(str(folder / "p1_one.png"), cv2.merge([frame] * 3))
-    left, right = (UDACITY_MODEL.line_in_picture(*line) for line in road.truth())
+    left, right = (UDACITY_MODEL.line_in_picture(*line) for line in road.true_lines())
     (folder / "truth.json").write_text(json.dumps({"lines": {"p1_one": {"L": left, "R": right}}}))
     return [str(folder), str(folder / "truth.json")]
 
