@@ -30,7 +30,7 @@ KINDS = (None, *DETECTORS)
 def run(kind: str | None, cache: Path, helpers: Path | None) -> tuple[float, bytes]:
     """Return CPU seconds and the trace of one run with frames that no other run has used."""
     (cache / FILE_NAME).unlink(missing_ok=True)
-    compiled.use(helpers)
+    compiled.use_libraries_in(helpers)
     pictures = PictureOptions(detector=kind, cache=cache) if kind else None
     scenario = load_scenario(ROOT / "fault_library/scenarios/S1.yaml")
     start = process_time()

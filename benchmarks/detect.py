@@ -32,8 +32,8 @@ from selfdrive.visiond.compiled_paper import build_paper_detector  # noqa: E402
 from selfdrive.visiond.dbscan import dbscan  # noqa: E402
 from selfdrive.visiond.edge_lines import EdgeLines  # noqa: E402
 from selfdrive.visiond.hog import Hog  # noqa: E402
-from selfdrive.visiond.mark_edges import edges  # noqa: E402
-from selfdrive.visiond.paper_detector import EPS, MIN_SAMPLES, PaperDetector  # noqa: E402
+from selfdrive.visiond.mark_edges import find_steep_edges  # noqa: E402
+from selfdrive.visiond.paper_detector import CLUSTER_REACH, MIN_CLUSTER_EDGES, PaperDetector  # noqa: E402
 from selfdrive.visiond.road_region import RoadRegion  # noqa: E402
 
 GOAL, FOUL_GOAL = 1.5, 4.0  # ms for a detection, in clear and in bad weather
@@ -69,13 +69,13 @@ def measure(model: CameraModel, picture: np.ndarray, repeat: int) -> list[float]
     view = CameraView(0.0, 0.0, 0.0, (), 0.0, picture)
     hog, lines = Hog(*region.shape), EdgeLines(model, region)
     part = np.ascontiguousarray(picture[region.part])
-    at, rising = edges(part)
-    labels = dbscan(at, part.shape, EPS, MIN_SAMPLES)
+    at, rising = find_steep_edges(part)
+    labels = dbscan(at, part.shape, CLUSTER_REACH, MIN_CLUSTER_EDGES)
     steps: tuple[Callable[[], object], ...] = (
         lambda: plain.detect(view),
         lambda: hog.blocks(part),
-        lambda: edges(part),
-        lambda: dbscan(at, part.shape, EPS, MIN_SAMPLES),
+        lambda: find_steep_edges(part),
+        lambda: dbscan(at, part.shape, CLUSTER_REACH, MIN_CLUSTER_EDGES),
         lambda: lines.nearest(at, rising, labels),
     )
     compiled_ms = median_ms(lambda: fast.detect(view), repeat) if fast.calculated_by else math.nan
@@ -87,7 +87,7 @@ def main() -> int:
     parser.add_argument("--repeat", type=int, default=300, help="detections for each median")
     repeat = parser.parse_args().repeat
     cv2.setNumThreads(1)
-    compiled.use(COMPILED_FOLDER)
+    compiled.use_libraries_in(COMPILED_FOLDER)
     model = CameraModel()
     print(f"{'':10}" + "".join(f"{column:>12}" for column in COLUMNS))
     late = False

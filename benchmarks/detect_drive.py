@@ -82,7 +82,7 @@ def main() -> int:
     parser.add_argument("--plain", action="store_true", help="without compiled code")
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    compiled.use(None if options.plain else COMPILED_FOLDER)
+    compiled.use_libraries_in(None if options.plain else COMPILED_FOLDER)
     slow = False
     columns = "".join(f"{name:>10}" for name in ("first", "median", "slowest", "goal"))
     print(f"{'detector':<10}{'marks':<8}{'weather':<18}{columns}{'ratio':>8}  in")

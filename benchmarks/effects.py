@@ -47,7 +47,7 @@ def main() -> int:
     parser.add_argument("--plain", action="store_true", help="without compiled code")
     given = parser.parse_args()
     cv2.setNumThreads(1)
-    compiled.use(None if given.plain else COMPILED_FOLDER)
+    compiled.use_libraries_in(None if given.plain else COMPILED_FOLDER)
     camera = CameraModel()
     picture = RoadRenderer(camera, "solid", 0).render_grey(10.0)
     slow = []

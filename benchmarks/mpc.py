@@ -88,7 +88,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--json", type=Path, help="file for the figures")
     options = parser.parse_args()
-    compiled.use(None if options.plain else COMPILED_FOLDER)
+    compiled.use_libraries_in(None if options.plain else COMPILED_FOLDER)
     times = measure(options.rounds)
     print(f"{'CPU, microseconds':28}{'median':>10}{'best':>10}{'goal':>10}{'ratio':>8}")
     missed = False

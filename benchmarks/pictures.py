@@ -75,7 +75,7 @@ def answers(cache: Path) -> Iterator[object]:
     from selfdrive.sim import effects
 
     cv2.setNumThreads(1)
-    compiled.use(cache)
+    compiled.use_libraries_in(cache)
     cases: dict[tuple[str, str], Drive] = {}
     for line in sys.stdin:
         kind, *words = json.loads(line)

@@ -92,7 +92,7 @@ class Row(NamedTuple):
 
     name: str
     parts: frozenset[str]
-    threshold: float = coded_detector.THRESHOLD
+    threshold: float = coded_detector.MIN_LOG_ODDS
 
 
 class Case(NamedTuple):
@@ -186,8 +186,11 @@ class MixedDetector:
         self._parts = row.parts
         coded = CLUSTERS in row.parts
         self._detector = CodedDetector(camera, row.threshold) if coded else PaperDetector(camera)
-        inward = coded_detector.INWARD
-        self._nowhere = [coded_detector.metres(coded_detector.MISSING + side) for side in (inward, -inward)]
+        inward = coded_detector.INWARD_PIXELS
+        self._nowhere = [
+            coded_detector.lateral_position(coded_detector.MISSING_LINE_COLUMN + side)
+            for side in (inward, -inward)
+        ]
         self._last = [RoadLine(y=side * LANE_WIDTH) for side in (0.5, -0.5)]
 
     def detect(self, view: CameraView) -> LaneLines:

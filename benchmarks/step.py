@@ -23,7 +23,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "target"))
 
-from selfdrive.can.packer import Packer  # noqa: E402
+from selfdrive.can.packer import MessagePacker  # noqa: E402
 from selfdrive.can.parser import CanParser  # noqa: E402
 from selfdrive.car.honda.interface import CarInterface  # noqa: E402
 from selfdrive.car.honda.radar_interface import RadarInterface  # noqa: E402
@@ -50,7 +50,7 @@ GROUPS: dict[str, tuple[tuple[type, str], ...]] = {
     "plant and ground truth": ((Plant, "step"), (Simulator, "_observe"), (HazardMonitor, "update")),
     "sensors and CAN out": (
         *((CarSensors, "measure"), (RadarSensor, "measure"), (GeometryCamera, "look")),
-        *((CarInterface, "apply"), (Packer, "pack")),
+        *((CarInterface, "apply"), (MessagePacker, "pack")),
     ),
     "CAN in": (
         *((CanParser, "update"), (CarInterface, "update")),
@@ -88,7 +88,7 @@ def run():
     simulator = Simulator()
     simulator.reset(scenario, 0)
     built = process_time()
-    while not simulator.done:
+    while not simulator.is_finished:
         simulator.step()
     simulator.result()
     return built - began, process_time() - built
@@ -136,7 +136,7 @@ def run(scenario: Scenario) -> tuple[float, float]:
     simulator = Simulator()
     simulator.reset(scenario, 0)
     built = process_time()
-    while not simulator.done:
+    while not simulator.is_finished:
         simulator.step()
     simulator.result()
     return built - start, process_time() - built
@@ -206,7 +206,7 @@ def main() -> None:
     options = parser.parse_args()
     if options.against:
         sys.exit(0 if against(options.against, options.scenario, options.rounds) else 1)
-    compiled.use(None if options.plain else COMPILED_FOLDER)
+    compiled.use_libraries_in(None if options.plain else COMPILED_FOLDER)
     scenario = load_scenario(options.scenario)
     times = [run(scenario) for _ in range(options.repeat)]
     first_build = times[0][0]

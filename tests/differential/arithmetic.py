@@ -107,5 +107,5 @@ def digest(picture: np.ndarray) -> str:
 
 
 if __name__ == "__main__":
-    compiled.use(Path(sys.argv[1]) if sys.argv[1:] else None)
+    compiled.use_libraries_in(Path(sys.argv[1]) if sys.argv[1:] else None)
     print(json.dumps(dict(digests()), indent=1))

@@ -15,14 +15,14 @@ from typing import NamedTuple
 COUNTER = "COUNTER"
 CHECKSUM = "CHECKSUM"
 
-_MESSAGE = re.compile(r"BO_ (?P<address>\d+) (?P<name>\w+) ?: (?P<size>\d+) \w+")
-_SIGNAL = re.compile(
+_MESSAGE_PATTERN = re.compile(r"BO_ (?P<address>\d+) (?P<name>\w+) ?: (?P<size>\d+) \w+")
+_SIGNAL_PATTERN = re.compile(
     r"SG_ (?P<name>\w+) : (?P<start>\d+)\|(?P<length>\d+)@0(?P<sign>[+-]) "
     r"\((?P<factor>[^,]+),(?P<offset>[^)]+)\) \[[^]]*\] \"[^\"]*\" .+"
 )
 
 
-class Field(NamedTuple):
+class SignalLayout(NamedTuple):
     """One signal: `raw = word >> shift & mask`, `physical = raw * factor + offset`."""
 
     name: str
@@ -34,33 +34,33 @@ class Field(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Message:
+class MessageLayout:
     """One frame's layout. A checksum is the low half of the last byte."""
 
     name: str
     address: int
     size: int  # bytes
-    fields: Mapping[str, Field]
+    fields: Mapping[str, SignalLayout]
     has_checksum: bool
     counter_shift: int | None  # of the two-bit counter; None if there is none
 
 
 @cache
-def load(path: Path) -> Mapping[str, Message]:
+def load_dbc(path: Path) -> Mapping[str, MessageLayout]:
     """Return all messages of a DBC file by name.
 
     Raises ValueError, with the line, for an unsupported message or signal.
     """
-    layouts: list[tuple[re.Match[str], dict[str, Field]]] = []
+    layouts: list[tuple[re.Match[str], dict[str, SignalLayout]]] = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
         where, text = f"{path}:{number}", line.strip()
         if text.startswith("BO_ "):
-            layouts.append((_match(_MESSAGE, text, where, "BO_ ADDRESS NAME: SIZE SENDER"), {}))
+            layouts.append((_match(_MESSAGE_PATTERN, text, where, "BO_ ADDRESS NAME: SIZE SENDER"), {}))
         elif text.startswith("SG_ "):
-            signal = _match(_SIGNAL, text, where, "a plain big-endian signal of a message")
+            signal = _match(_SIGNAL_PATTERN, text, where, "a plain big-endian signal of a message")
             head, fields = layouts[-1]
-            fields[signal["name"]] = _field(signal, int(head["size"]), where)
-    return MappingProxyType({head["name"]: _message(head, fields) for head, fields in layouts})
+            fields[signal["name"]] = _signal_layout(signal, int(head["size"]), where)
+    return MappingProxyType({head["name"]: _message_layout(head, fields) for head, fields in layouts})
 
 
 def _match(pattern: re.Pattern[str], text: str, where: str, expected: str) -> re.Match[str]:
@@ -70,13 +70,13 @@ def _match(pattern: re.Pattern[str], text: str, where: str, expected: str) -> re
     return match
 
 
-def _message(head: re.Match[str], fields: dict[str, Field]) -> Message:
+def _message_layout(head: re.Match[str], fields: dict[str, SignalLayout]) -> MessageLayout:
     name, counter, checksum = head["name"], fields.get(COUNTER), fields.get(CHECKSUM)
     if checksum is not None and (checksum.shift, checksum.mask) != (0, 0xF):
         raise ValueError(f"{name}: the checksum must be the low half of the last byte")
     if counter is not None and counter.mask != 0x3:
         raise ValueError(f"{name}: the counter must have two bits")
-    return Message(
+    return MessageLayout(
         name=name,
         address=int(head["address"]),
         size=int(head["size"]),
@@ -86,23 +86,23 @@ def _message(head: re.Match[str], fields: dict[str, Field]) -> Message:
     )
 
 
-def _field(signal: re.Match[str], size: int, where: str) -> Field:
+def _signal_layout(signal: re.Match[str], size: int, where: str) -> SignalLayout:
     start, length = int(signal["start"]), int(signal["length"])
     first = 8 * (start // 8) + 7 - start % 8  # counted from the payload's first bit
     shift = 8 * size - first - length
     if shift < 0:
         raise ValueError(f"{where}: {signal['name']} ends beyond the message's {size} bytes")
-    return Field(
+    return SignalLayout(
         name=signal["name"],
         shift=shift,
         mask=(1 << length) - 1,
         sign_bit=1 << (length - 1) if signal["sign"] == "-" else 0,
-        factor=_number(signal["factor"]),
-        offset=_number(signal["offset"]),
+        factor=_parse_number(signal["factor"]),
+        offset=_parse_number(signal["offset"]),
     )
 
 
-def _number(text: str) -> float:
+def _parse_number(text: str) -> float:
     try:
         return int(text)
     except ValueError:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from selfdrive.can.dbc import Field, Message
+from selfdrive.can.dbc import MessageLayout, SignalLayout
 from selfdrive.messages import CanFrame
 
 new_frame = tuple.__new__  # CanFrame's own constructor takes three times as long
@@ -18,7 +18,7 @@ def checksum_base(address: int) -> int:
     return 8 - half_byte_sum(address.to_bytes(4, "big"))
 
 
-def encode(fields: Sequence[Field], values: Sequence[float]) -> int:
+def encode_payload(fields: Sequence[SignalLayout], values: Sequence[float]) -> int:
     """Return the payload as one big-endian integer. Values are clipped to their fields; NaN becomes 0."""
     word = 0
     for (_, shift, mask, sign_bit, factor, offset), value in zip(fields, values, strict=True):
@@ -35,10 +35,10 @@ def encode(fields: Sequence[Field], values: Sequence[float]) -> int:
     return word
 
 
-class Packer:
+class MessagePacker:
     """Packs one message; `signals` fixes the order of the values given to `pack`."""
 
-    def __init__(self, message: Message, signals: Sequence[str], bus: int = 0) -> None:
+    def __init__(self, message: MessageLayout, signals: Sequence[str], bus: int = 0) -> None:
         self._fields = [message.fields[name] for name in signals]
         self._address, self._size, self._bus = message.address, message.size, bus
         self._counter_shift = message.counter_shift or 0
@@ -52,7 +52,7 @@ class Packer:
     def pack(self, values: tuple[float, ...], counter: int = 0) -> CanFrame:
         """Return the frame for physical `values`; `counter` is the number of earlier frames."""
         if values != self._values:
-            word = encode(self._fields, values)
+            word = encode_payload(self._fields, values)
             self._values = values
             if word != self._word:
                 self._word = word

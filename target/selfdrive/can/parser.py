@@ -3,15 +3,15 @@
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from selfdrive.can.dbc import Field, Message
+from selfdrive.can.dbc import MessageLayout, SignalLayout
 from selfdrive.can.packer import checksum_base, half_byte_sum
 from selfdrive.messages import CanFrame
 
-MISSED_PERIODS = 10  # periods without a frame until a message is invalid
+MOST_MISSED_PERIODS = 10  # periods without a frame until a message is invalid
 MAX_BAD_COUNTERS = 5  # frames with a wrong counter before the message is rejected
 
 
-class Expected(NamedTuple):
+class ExpectedMessage(NamedTuple):
     """A message to listen for: signals to read, rate in Hz, values before the first frame."""
 
     signals: tuple[str, ...]
@@ -19,7 +19,7 @@ class Expected(NamedTuple):
     initial: tuple[float, ...] | None = None  # zeros when None
 
 
-class _State:
+class _MessageState:
     __slots__ = (
         "bad_counters",
         "body",
@@ -37,9 +37,9 @@ class _State:
         "timeout",
     )
 
-    def __init__(self, message: Message, expected: Expected) -> None:
+    def __init__(self, message: MessageLayout, expected: ExpectedMessage) -> None:
         self.name, self.size = message.name, message.size
-        self.fields: list[Field] = [message.fields[name] for name in expected.signals]
+        self.fields: list[SignalLayout] = [message.fields[name] for name in expected.signals]
         self.counter_shift = message.counter_shift or 0
         self.counter_mask = 0 if message.counter_shift is None else 0x3
         self.checksum_mask = 0xF if message.has_checksum else 0
@@ -47,12 +47,12 @@ class _State:
         self.body_mask = sum(field.mask << field.shift for field in self.fields)
         self.body = -1  # the bits of `fields` in the last valid payload
         self.read: dict[bytes, int] = {}  # valid payloads with these bits, and their counters
-        self.timeout = MISSED_PERIODS / expected.rate + 1e-6  # 1e-6 s for the rounding of t
+        self.timeout = MOST_MISSED_PERIODS / expected.rate + 1e-6  # 1e-6 s for the rounding of t
         self.newest = float("-inf")  # s, time of the last valid frame
         self.counter: int | None = None  # expected in the next frame
         self.bad_counters = 0
 
-    def accepts(self, data: bytes, word: int) -> bool:
+    def accept_payload(self, data: bytes, word: int) -> bool:
         if len(data) != self.size or (half_byte_sum(data) - self.checksum_base) & self.checksum_mask:
             return False
         counter = word >> self.counter_shift & self.counter_mask
@@ -64,7 +64,7 @@ class _State:
             self.bad_counters += 1
         return self.bad_counters < MAX_BAD_COUNTERS
 
-    def takes(self, data: bytes, word: int) -> bool:
+    def store_body(self, data: bytes, word: int) -> bool:
         body = word & self.body_mask
         new = body != self.body
         if new:
@@ -82,14 +82,18 @@ class CanParser:
     message is missing or overdue. `updated` names the messages of the last update.
     """
 
-    def __init__(self, messages: Mapping[str, Message], expected: Mapping[str, Expected], bus: int) -> None:
+    def __init__(
+        self, messages: Mapping[str, MessageLayout], expected: Mapping[str, ExpectedMessage], bus: int
+    ) -> None:
         self.values: dict[str, tuple[float, ...]] = {
             name: e.initial or (0,) * len(e.signals) for name, e in expected.items()
         }
         self.updated: list[str] = []
         self.valid = False
         self._bus = bus
-        self._states = {messages[name].address: _State(messages[name], e) for name, e in expected.items()}
+        self._states = {
+            messages[name].address: _MessageState(messages[name], e) for name, e in expected.items()
+        }
         self._valid_until = float("-inf")  # lower bound, recomputed when it has passed
 
     def update(self, frames: Sequence[CanFrame], t: float) -> None:
@@ -103,10 +107,10 @@ class CanParser:
                 state.counter = counter + 1 & state.counter_mask
             else:
                 word = int.from_bytes(data, "big")
-                if not state.accepts(data, word):
+                if not state.accept_payload(data, word):
                     continue
-                if state.takes(data, word):
-                    self.values[state.name] = decode(state.fields, word)
+                if state.store_body(data, word):
+                    self.values[state.name] = decode_payload(state.fields, word)
             state.newest = t
             updated.append(state.name)
         self.updated = updated
@@ -115,7 +119,7 @@ class CanParser:
         self.valid = t <= self._valid_until
 
 
-def decode(fields: Sequence[Field], word: int) -> tuple[float, ...]:
+def decode_payload(fields: Sequence[SignalLayout], word: int) -> tuple[float, ...]:
     return tuple(
         [
             ((word >> shift & mask ^ sign_bit) - sign_bit) * factor + offset

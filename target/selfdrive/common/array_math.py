@@ -10,7 +10,7 @@ from math import log as scalar_log
 import numpy as np
 
 _LOG_2 = scalar_log(2.0)
-_LOG_TERMS = 10  # highest power of the square; the next term is below double precision
+_LOG_HIGHEST_POWER = 10  # highest power of the square; the next term is below double precision
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -21,7 +21,7 @@ def dot(a: np.ndarray, b: np.ndarray) -> float:
     return float((a * b).sum())
 
 
-def length(vectors: np.ndarray) -> np.ndarray:
+def vector_lengths(vectors: np.ndarray) -> np.ndarray:
     """The length of each vector along the last axis, which is kept with size 1."""
     return np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
 
@@ -32,7 +32,7 @@ def each(function: Callable[[float], float], values: np.ndarray) -> np.ndarray:
     return found.reshape(values.shape)
 
 
-def log(values: np.ndarray) -> np.ndarray:
+def natural_log(values: np.ndarray) -> np.ndarray:
     """Natural logarithm of positive numbers, float64, to double precision: 2 artanh((m - 1) / (m + 1)) of the
     mantissa m, plus the exponent times log 2."""
     mantissa, power = np.frexp(values)
@@ -41,7 +41,7 @@ def log(values: np.ndarray) -> np.ndarray:
     ratio = (mantissa - 1.0) / (mantissa + 1.0)
     square = ratio * ratio
     series = np.zeros_like(square)
-    for k in range(_LOG_TERMS, -1, -1):
+    for k in range(_LOG_HIGHEST_POWER, -1, -1):
         series *= square
         series += 2.0 / (2 * k + 1)
     return series * ratio + power * values.dtype.type(_LOG_2)

@@ -25,7 +25,7 @@ class Library(NamedTuple):
     digest: bytes
 
 
-def use(folder: Path | None) -> None:
+def use_libraries_in(folder: Path | None) -> None:
     """Look for libraries in this folder from now on; None: use none."""
     global _folder
     _folder = None

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from selfdrive.can.dbc import load
+from selfdrive.can.dbc import load_dbc
 from selfdrive.can.parser import CanParser
 from selfdrive.car.honda.values import CAR_BUS, CAR_DBC, COMMAND_MESSAGES, STEER_FULL_COUNTS
 from selfdrive.messages import Actuators, CanFrame
@@ -17,7 +17,7 @@ class ActuatorReceiver:
     """Decodes commands. Each actuator holds its last valid command."""
 
     def __init__(self) -> None:
-        self._parser = CanParser(load(CAR_DBC), COMMAND_MESSAGES, CAR_BUS)
+        self._parser = CanParser(load_dbc(CAR_DBC), COMMAND_MESSAGES, CAR_BUS)
 
     def update(self, frames: Sequence[CanFrame], t: float) -> Actuators:
         """Return gas and brake in 0..1, and steering torque relative to the EPS's maximum, left positive."""

@@ -53,7 +53,7 @@ def build_camera_and_detector(pictures: PictureOptions | None, road: Road, seed:
             remedy="run it without pictures",
         )
     if pictures.ignore_stored:
-        compiled.use(None)
+        compiled.use_libraries_in(None)
     library = open_frame_library(pictures, seed)
     camera = PictureCamera(GeometryCamera(road), library, pictures.translation)
     description = {

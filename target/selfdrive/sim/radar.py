@@ -2,8 +2,8 @@
 
 from math import isfinite, sin
 
-from selfdrive.can.dbc import load
-from selfdrive.can.packer import Packer
+from selfdrive.can.dbc import load_dbc
+from selfdrive.can.packer import MessagePacker
 from selfdrive.car.honda.values import RADAR_BUS, RADAR_DBC, RADAR_GOOD
 from selfdrive.common.interp import clip
 from selfdrive.messages import CanFrame
@@ -21,8 +21,8 @@ class RadarSensor:
 
     def __init__(self, road: Road) -> None:
         self._road = road
-        messages = load(RADAR_DBC)
-        self._state = Packer(messages["RADAR_DIAGNOSTIC"], ("RADAR_STATE",), RADAR_BUS)
+        messages = load_dbc(RADAR_DBC)
+        self._state = MessagePacker(messages["RADAR_DIAGNOSTIC"], ("RADAR_STATE",), RADAR_BUS)
         self._track = messages["TRACK_15"]
 
     def measure(self, truth: GroundTruth) -> list[CanFrame]:

@@ -52,7 +52,7 @@ class SteppedRun:
 
     @property
     def done(self) -> bool:
-        return self._simulator.done
+        return self._simulator.is_finished
 
     def step(self) -> None:
         self._simulator.step()
@@ -80,7 +80,7 @@ def _open_run(options: argparse.Namespace) -> SteppedRun:
         scenario = on_plant(scenario, options.plant)
     if options.max_steps is not None:
         scenario = replace(scenario, steps=min(scenario.steps, options.max_steps))
-    compiled.use(None if options.forget else options.compiled)
+    compiled.use_libraries_in(None if options.forget else options.compiled)
     simulator = Simulator()
     simulator.reset(scenario, options.seed, _picture_options(options), options.film)
     return SteppedRun(simulator)
@@ -89,7 +89,7 @@ def _open_run(options: argparse.Namespace) -> SteppedRun:
 def simulate(scenario: Scenario, seed: int, pictures: PictureOptions | None = None) -> SimulationResult:
     simulator = Simulator()
     simulator.reset(scenario, seed, pictures)
-    while not simulator.done:
+    while not simulator.is_finished:
         simulator.step()
     return simulator.result()
 

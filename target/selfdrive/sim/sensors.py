@@ -1,7 +1,7 @@
 """The car's own sensors and switches, as reported on the car bus."""
 
-from selfdrive.can.dbc import load
-from selfdrive.can.packer import Packer
+from selfdrive.can.dbc import load_dbc
+from selfdrive.can.packer import MessagePacker
 from selfdrive.car.honda.values import CAR_BUS, CAR_DBC, GEAR_CODES
 from selfdrive.common.conversions import MS_TO_KPH, RAD_TO_DEG
 from selfdrive.messages import CanFrame
@@ -35,13 +35,15 @@ class CarSensors:
 
     def __init__(self, gearbox_scale: float = 1.0) -> None:
         self._gearbox_scale = gearbox_scale
-        messages = load(CAR_DBC)
-        self._gearbox_speed = Packer(messages["ENGINE_DATA"], ("XMISSION_SPEED",), CAR_BUS)
+        messages = load_dbc(CAR_DBC)
+        self._gearbox_speed = MessagePacker(messages["ENGINE_DATA"], ("XMISSION_SPEED",), CAR_BUS)
         wheels = [f"WHEEL_SPEED_{corner}" for corner in ("FL", "FR", "RL", "RR")]
-        self._wheel_speeds = Packer(messages["WHEEL_SPEEDS"], wheels, CAR_BUS)
-        self._steering = Packer(messages["STEERING_SENSORS"], ("STEER_ANGLE", "STEER_ANGLE_RATE"), CAR_BUS)
-        self._standstill = Packer(messages["STANDSTILL"], ("WHEELS_MOVING",), CAR_BUS)
-        self._buttons = Packer(messages["SCM_BUTTONS"], ("CRUISE_BUTTONS",), CAR_BUS)
+        self._wheel_speeds = MessagePacker(messages["WHEEL_SPEEDS"], wheels, CAR_BUS)
+        self._steering = MessagePacker(
+            messages["STEERING_SENSORS"], ("STEER_ANGLE", "STEER_ANGLE_RATE"), CAR_BUS
+        )
+        self._standstill = MessagePacker(messages["STANDSTILL"], ("WHEELS_MOVING",), CAR_BUS)
+        self._buttons = MessagePacker(messages["SCM_BUTTONS"], ("CRUISE_BUTTONS",), CAR_BUS)
         self._constant = [(period, _constant_frames(names)) for period, names in _CONSTANT_SIGNALS.items()]
 
     def measure(self, truth: GroundTruth, button: int, frame: int) -> list[CanFrame]:
@@ -65,6 +67,8 @@ class CarSensors:
 
 
 def _constant_frames(values: dict[str, dict[str, int]]) -> list[list[CanFrame]]:
-    messages = load(CAR_DBC)
-    packers = [(Packer(messages[name], tuple(v), CAR_BUS), tuple(v.values())) for name, v in values.items()]
+    messages = load_dbc(CAR_DBC)
+    packers = [
+        (MessagePacker(messages[name], tuple(v), CAR_BUS), tuple(v.values())) for name, v in values.items()
+    ]
     return [[packer.pack(v, counter) for packer, v in packers] for counter in range(_COUNTERS)]

@@ -79,7 +79,7 @@ class Simulator:
         self.recorder = TraceRecorder()
 
     @property
-    def done(self) -> bool:
+    def is_finished(self) -> bool:
         return self.frame >= self._scenario.steps
 
     def step(self) -> None:

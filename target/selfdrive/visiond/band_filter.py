@@ -6,22 +6,30 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-SINGLE = (3, 5)  # columns: width of a mark (up to 0.2 m), and distance from its middle to that of each side
-DOUBLE = (9, 8)  # the same for a double line, 0.3 m wide in total
-EDGE = DOUBLE[1]
-SIDE = 5  # columns of road on each side for comparison
-ALONG = 3  # rows averaged
-SPECK = np.ones((5, 1), np.uint8)  # anything bright in fewer rows is a flake or a drop
-NEIGHBOURHOOD = (51, 9)  # columns and rows of the area in which texture is measured
-DARK = 12.0  # grey levels added to the road's brightness, so that noise in the dark has little contrast
-LEAST = 0.006  # lowest contrast of a mark, on the cleanest road
-QUIET, CLEAR = 1.6, 5.0  # response in units of the texture, at which certainty is 0 and 1
-STEEPNESS = 1.0 / (CLEAR - QUIET)
-STRONGEST = 1500  # number of points kept
-ACROSS = np.ones((1, 5), np.uint8)
+SINGLE_MARK = (
+    3,
+    5,
+)  # columns: width of a mark (up to 0.2 m), and distance from its middle to that of each side
+DOUBLE_MARK = (9, 8)  # the same for a double line, 0.3 m wide in total
+EDGE_COLUMNS = DOUBLE_MARK[1]
+SIDE_COLUMNS = 5  # columns of road on each side for comparison
+AVERAGED_ROWS = 3  # rows averaged
+SPECK_KERNEL = np.ones((5, 1), np.uint8)  # anything bright in fewer rows is a flake or a drop
+TEXTURE_AREA = (51, 9)  # columns and rows of the area in which texture is measured
+DARKNESS_OFFSET = (
+    12.0  # grey levels added to the road's brightness, so that noise in the dark has little contrast
+)
+MIN_CONTRAST = 0.006  # lowest contrast of a mark, on the cleanest road
+UNCERTAIN_RESPONSE, CERTAIN_RESPONSE = (
+    1.6,
+    5.0,
+)  # response in units of the texture, at which certainty is 0 and 1
+CERTAINTY_PER_RESPONSE = 1.0 / (CERTAIN_RESPONSE - UNCERTAIN_RESPONSE)
+MOST_POINTS = 1500  # number of points kept
+CREST_KERNEL = np.ones((1, 5), np.uint8)
 
 
-class Points(NamedTuple):
+class MarkPoints(NamedTuple):
     """Possible marks: row and column in the map, and certainty (0..1)."""
 
     row: np.ndarray
@@ -29,63 +37,67 @@ class Points(NamedTuple):
     weight: np.ndarray
 
 
-Crests = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+CrestFinder = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def crests(road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def find_crests(road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return positions (row-major, without the edge columns) and weights of the crests of bright bands."""
-    road = cv2.morphologyEx(road, cv2.MORPH_OPEN, SPECK)
-    side, single, double = (_mean(road, columns) for columns in (SIDE, SINGLE[0], DOUBLE[0]))
-    single = _inner(single)
-    sides = _sides(side, SINGLE[1])
+    road = cv2.morphologyEx(road, cv2.MORPH_OPEN, SPECK_KERNEL)
+    side, single, double = (
+        _box_mean(road, columns) for columns in (SIDE_COLUMNS, SINGLE_MARK[0], DOUBLE_MARK[0])
+    )
+    single = _without_edges(single)
+    sides = _left_and_right(side, SINGLE_MARK[1])
     # Results overwrite old arrays, because allocating memory is as slow as the sums.
     contrast = np.maximum(*sides)
     np.subtract(single, contrast, out=contrast)
-    other = np.maximum(*_sides(side, DOUBLE[1]))
-    np.subtract(_inner(double), other, out=other)
+    other = np.maximum(*_left_and_right(side, DOUBLE_MARK[1]))
+    np.subtract(_without_edges(double), other, out=other)
     np.maximum(contrast, other, out=contrast)
     ground = np.add(*sides)
     ground *= np.float32(0.5)
-    light = np.add(ground, np.float32(DARK), out=other)
+    light = np.add(ground, np.float32(DARKNESS_OFFSET), out=other)
     contrast /= light
     rough = np.subtract(single, ground, out=ground)
     np.abs(rough, out=rough)
     rough /= light
-    texture = cv2.blur(rough, NEIGHBOURHOOD, dst=light)
-    texture += np.float32(LEAST)
+    texture = cv2.blur(rough, TEXTURE_AREA, dst=light)
+    texture += np.float32(MIN_CONTRAST)
     sure = np.divide(contrast, texture, out=texture)
-    sure -= np.float32(QUIET)
-    sure *= np.float32(STEEPNESS)
+    sure -= np.float32(UNCERTAIN_RESPONSE)
+    sure *= np.float32(CERTAINTY_PER_RESPONSE)
     # A crest is the highest of five columns around it.
-    crest = (sure > 0.0) & (contrast >= cv2.dilate(contrast, ACROSS))
+    crest = (sure > 0.0) & (contrast >= cv2.dilate(contrast, CREST_KERNEL))
     at = np.flatnonzero(crest)  # np.nonzero in two dimensions takes four times as long
     return at, np.minimum(sure.ravel()[at], 1.0)
 
 
-def mark_points(road: np.ndarray, find: Crests = crests) -> Points:
-    return points_at(*strongest(*find(road)), road)
+def find_mark_points(road: np.ndarray, find: CrestFinder = find_crests) -> MarkPoints:
+    return mark_points_at(*strongest_points(*find(road)), road)
 
 
-def strongest(at: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    if len(at) > STRONGEST:
-        keep = np.sort(np.argsort(weight, kind="stable")[-STRONGEST:])
+def strongest_points(at: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    if len(at) > MOST_POINTS:
+        keep = np.sort(np.argsort(weight, kind="stable")[-MOST_POINTS:])
         return at[keep], weight[keep]
     return at, weight
 
 
-def points_at(at: np.ndarray, weight: np.ndarray, road: np.ndarray) -> Points:
-    row, column = np.divmod(at, road.shape[1] - 2 * EDGE)
-    return Points(row, column + EDGE, weight)
+def mark_points_at(at: np.ndarray, weight: np.ndarray, road: np.ndarray) -> MarkPoints:
+    row, column = np.divmod(at, road.shape[1] - 2 * EDGE_COLUMNS)
+    return MarkPoints(row, column + EDGE_COLUMNS, weight)
 
 
-def _mean(road: np.ndarray, columns: int) -> np.ndarray:
-    return cv2.boxFilter(road, cv2.CV_32F, (columns, ALONG))
+def _box_mean(road: np.ndarray, columns: int) -> np.ndarray:
+    return cv2.boxFilter(road, cv2.CV_32F, (columns, AVERAGED_ROWS))
 
 
-def _inner(picture: np.ndarray) -> np.ndarray:
-    return picture[:, EDGE:-EDGE]
+def _without_edges(picture: np.ndarray) -> np.ndarray:
+    return picture[:, EDGE_COLUMNS:-EDGE_COLUMNS]
 
 
-def _sides(side: np.ndarray, apart: int) -> tuple[np.ndarray, np.ndarray]:
+def _left_and_right(side: np.ndarray, apart: int) -> tuple[np.ndarray, np.ndarray]:
     end = side.shape[1]
-    return side[:, EDGE - apart : end - EDGE - apart], side[:, EDGE + apart : end - EDGE + apart]
+    return side[:, EDGE_COLUMNS - apart : end - EDGE_COLUMNS - apart], side[
+        :, EDGE_COLUMNS + apart : end - EDGE_COLUMNS + apart
+    ]

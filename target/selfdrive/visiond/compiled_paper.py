@@ -10,24 +10,24 @@ from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.visiond import compiled_windows
-from selfdrive.visiond.compiled_sums import adds_up_alike
-from selfdrive.visiond.compiled_windows import MarkWindows
+from selfdrive.visiond.compiled_sums import has_identical_sums
+from selfdrive.visiond.compiled_windows import MarkWindowFinder
 from selfdrive.visiond.detector import LaneLines, RoadLine
-from selfdrive.visiond.hog import STRIDE
-from selfdrive.visiond.mark_edges import limits
-from selfdrive.visiond.paper_detector import EPS, THRESHOLD, PaperDetector, lane_between
+from selfdrive.visiond.hog import WINDOW_STRIDE
+from selfdrive.visiond.mark_edges import steepness_limits
+from selfdrive.visiond.paper_detector import CLUSTER_REACH, MIN_LOG_ODDS, PaperDetector, complete_lane
 from selfdrive.visiond.road_region import RoadRegion
 
 C_SOURCE = Path(__file__).with_name("mark_lines.c")
-EXACT = 2**24  # smaller integers, and sums of them, are exact in single precision
-NONE = 2**31 - 1
+EXACT_BELOW = 2**24  # smaller integers, and sums of them, are exact in single precision
+NO_NUMBER = 2**31 - 1
 
 
-class _Points(ctypes.Structure):
+class _PointsStructure(ctypes.Structure):
     _fields_ = [(name, ctypes.c_void_p) for name in ("row", "column", "scale", "rising")]
 
 
-class _Paper(ctypes.Structure):
+class _PaperStructure(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_int64) for name in ("rows", "width", "first_row", "first_column")),
         *((name, ctypes.c_double) for name in ("cx", "horizon", "cos_pitch", "tan_pitch")),
@@ -38,8 +38,8 @@ class _Paper(ctypes.Structure):
         ),
         *((name, ctypes.c_void_p) for name in ("at", "label", "mask", "crowd", "number", "run", "named")),
         *((name, ctypes.c_void_p) for name in ("sum", "room")),
-        ("all", _Points),
-        ("own", _Points),
+        ("all", _PointsStructure),
+        ("own", _PointsStructure),
         ("count", ctypes.c_int64),
         ("lines", ctypes.c_double * 4 * 2),
     )
@@ -47,7 +47,7 @@ class _Paper(ctypes.Structure):
 
 def build_paper_detector(model: CameraModel) -> PaperDetector:
     libraries = [compiled.library(source) for source in (C_SOURCE, compiled_windows.C_SOURCE)]
-    if None in libraries or not adds_up_alike(libraries[0]):
+    if None in libraries or not has_identical_sums(libraries[0]):
         return PaperDetector(model)
     return CompiledPaperDetector(model, *libraries)
 
@@ -58,12 +58,12 @@ class CompiledPaperDetector(PaperDetector):
     def __init__(self, model: CameraModel, lines: compiled.Library, windows: compiled.Library) -> None:
         super().__init__(model)
         self.calculated_by = lines.digest.hex() + windows.digest.hex()
-        self._windows = MarkWindows(self._region.shape, THRESHOLD, windows)
+        self._windows = MarkWindowFinder(self._region.shape, MIN_LOG_ODDS, windows)
         self._arrays, self._points = (
-            _rooms(self._region, self._lines.scale),
-            {"all": _points(self._region), "own": _points(self._region)},
+            _build_arrays(self._region, self._lines.scale),
+            {"all": _build_point_arrays(self._region), "own": _build_point_arrays(self._region)},
         )
-        self._paper = _Paper(
+        self._paper = _PaperStructure(
             **dict(zip(("rows", "width"), self._region.shape, strict=True)),
             first_row=self._region.first_row,
             first_column=self._region.first_column,
@@ -73,7 +73,7 @@ class CompiledPaperDetector(PaperDetector):
             fx_cos=model.fx * cos(model.pitch),
             **{name: array.ctypes.data for name, array in self._arrays.items()},
             **{
-                name: _Points(*[array.ctypes.data for array in arrays])
+                name: _PointsStructure(*[array.ctypes.data for array in arrays])
                 for name, arrays in self._points.items()
             },
         )
@@ -94,20 +94,20 @@ class CompiledPaperDetector(PaperDetector):
             return super().detect(view)
         address, sums = part.ctypes.data, self._arrays["sums"]
         self._take_gradients(self._at, address)
-        if sums.max() >= EXACT:
+        if sums.max() >= EXACT_BELOW:
             return super().detect(view)
-        mean = (sums * np.float32(1.0 / STRIDE**2)).astype(np.float32)
-        self._arrays["limits"][...] = limits(mean)
+        mean = (sums * np.float32(1.0 / WINDOW_STRIDE**2)).astype(np.float32)
+        self._arrays["limits"][...] = steepness_limits(mean)
         self._take_edges(self._at)
-        if not self._windows.decide(address, self._looked_at):
+        if not self._windows.clear_windows_without_mark(address, self._looked_at):
             return super().detect(view)
         self._take_lines(self._at)
-        return lane_between(*(RoadLine(*line[1:]) if line[0] else None for line in self._paper.lines))
+        return complete_lane(*(RoadLine(*line[1:]) if line[0] else None for line in self._paper.lines))
 
 
-def _rooms(region: RoadRegion, scale: np.ndarray) -> dict[str, np.ndarray]:
+def _build_arrays(region: RoadRegion, scale: np.ndarray) -> dict[str, np.ndarray]:
     rows, width = region.shape
-    tiles, size = (rows // STRIDE, width // STRIDE), rows * width
+    tiles, size = (rows // WINDOW_STRIDE, width // WINDOW_STRIDE), rows * width
     return {
         "scale": scale,
         "windows": region.windows.astype(np.uint8),
@@ -117,9 +117,9 @@ def _rooms(region: RoadRegion, scale: np.ndarray) -> dict[str, np.ndarray]:
         "looked_at": np.zeros(region.windows.shape, np.uint8),
         "at": np.zeros(size + 8, np.int32),
         "label": np.zeros(size, np.int32),
-        "mask": np.zeros((rows + 2 * EPS) * (width + 2 * EPS) + rows, np.uint8),
+        "mask": np.zeros((rows + 2 * CLUSTER_REACH) * (width + 2 * CLUSTER_REACH) + rows, np.uint8),
         "crowd": np.zeros((rows, width), np.uint8),
-        "number": np.full((rows, width), NONE, np.int32),
+        "number": np.full((rows, width), NO_NUMBER, np.int32),
         "run": np.zeros((size, 4), np.int32),
         "named": np.zeros(size, np.int32),
         "sum": np.zeros((size, 5)),
@@ -127,6 +127,6 @@ def _rooms(region: RoadRegion, scale: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def _points(region: RoadRegion) -> list[np.ndarray]:
+def _build_point_arrays(region: RoadRegion) -> list[np.ndarray]:
     size = region.shape[0] * region.shape[1] + 1
     return [np.zeros(size) for _ in range(3)] + [np.zeros(size, np.uint8)]

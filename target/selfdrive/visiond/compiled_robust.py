@@ -9,15 +9,21 @@ import numpy as np
 
 from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.visiond.band_filter import EDGE, NEIGHBOURHOOD, STEEPNESS, STRONGEST, crests
-from selfdrive.visiond.compiled_sums import adds_up_alike
+from selfdrive.visiond.band_filter import (
+    CERTAINTY_PER_RESPONSE,
+    EDGE_COLUMNS,
+    MOST_POINTS,
+    TEXTURE_AREA,
+    find_crests,
+)
+from selfdrive.visiond.compiled_sums import has_identical_sums
 from selfdrive.visiond.compiled_view import CompiledRoadView
 from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.robust_detector import RobustDetector
-from selfdrive.visiond.voting import BIN, SIDEWAYS, Belief, Pose, vote
+from selfdrive.visiond.voting import BIN_WIDTH, MOST_LATERAL, ExpectedPose, LanePose, find_pose
 
-CANDIDATES = 512  # for the lines' meeting point; MOST in the C file
-AT_ONCE = 8  # rows that the C file sums at once
+MOST_CANDIDATES = 512  # for the lines' meeting point; MOST in the C file
+ROWS_AT_ONCE = 8  # rows that the C file sums at once
 C_SOURCES = [Path(__file__).with_name(name) for name in ("band_filter.c", "voting.c", "road_view.c")]
 
 
@@ -26,8 +32,8 @@ def build_robust_detector(model: CameraModel) -> RobustDetector:
     if None in libraries:
         return RobustDetector(model)
     bands, voting, mapping = libraries
-    alike = maps_alike(mapping, model) and finds_alike(bands)
-    if not (alike and adds_up_alike(voting) and votes_alike(voting, model)):
+    alike = has_identical_maps(mapping, model) and has_identical_crests(bands)
+    if not (alike and has_identical_sums(voting) and has_identical_votes(voting, model)):
         return RobustDetector(model)
     view = CompiledRoadView(model, mapping)
     digests = "".join(library.digest.hex() for library in libraries)
@@ -35,7 +41,7 @@ def build_robust_detector(model: CameraModel) -> RobustDetector:
     return RobustDetector(model, view, find, CompiledVote(voting, view), digests)
 
 
-class _Bands(ctypes.Structure):
+class _BandsStructure(ctypes.Structure):
     _fields_ = (
         ("road", ctypes.c_void_p),
         *((name, ctypes.c_int64) for name in ("rows", "width")),
@@ -46,32 +52,34 @@ class _Bands(ctypes.Structure):
 
 
 class CompiledCrests:
-    """`crests` for maps of one shape, in the compiled `band_filter.c`."""
+    """`find_crests` for maps of one shape, in the compiled `band_filter.c`."""
 
     def __init__(self, library: compiled.Library, shape: tuple[int, int]) -> None:
         self._crests = library.code.crests
         self._crests.argtypes, self._crests.restype = [ctypes.c_void_p], ctypes.c_long
-        self._shape, inner = shape, shape[1] - 2 * EDGE
+        self._shape, inner = shape, shape[1] - 2 * EDGE_COLUMNS
         points = shape[0], inner
         self._arrays = {
             "eroded": np.empty(shape, np.uint8),
             "opened": np.empty(shape, np.uint8),
             "contrast": np.empty(points, np.float32),
             "rough": np.empty(points, np.float32),
-            "sums": np.empty((shape[0] + AT_ONCE, inner)),
+            "sums": np.empty((shape[0] + ROWS_AT_ONCE, inner)),
             "column": np.empty(inner),
-            "padded": np.zeros((AT_ONCE, inner + NEIGHBOURHOOD[0])),
+            "padded": np.zeros((ROWS_AT_ONCE, inner + TEXTURE_AREA[0])),
             "sure": np.empty(inner, np.float32),
             "at": np.empty(shape[0] * inner + 1, np.int64),
             "weight": np.empty(shape[0] * inner + 1, np.float32),
         }
         rooms = {name: array.ctypes.data for name, array in self._arrays.items()}
-        self._bands = _Bands(rows=shape[0], width=shape[1], steepness=STEEPNESS, **rooms)
+        self._bands = _BandsStructure(
+            rows=shape[0], width=shape[1], steepness=CERTAINTY_PER_RESPONSE, **rooms
+        )
         self._address = ctypes.addressof(self._bands)
 
     def __call__(self, road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if road.shape != self._shape or road.dtype != np.uint8:  # a fault can cause this
-            return crests(road)
+            return find_crests(road)
         road = np.ascontiguousarray(road)
         self._bands.road = road.ctypes.data
         count = self._crests(self._address)
@@ -79,25 +87,30 @@ class CompiledCrests:
 
 
 @cache
-def maps_alike(library: compiled.Library, model: CameraModel) -> bool:
+def has_identical_maps(library: compiled.Library, model: CameraModel) -> bool:
     """Whether compiled maps equal the installed OpenCV's; versions can interpolate differently."""
     shape = model.rows, model.width
     noise = (
         (np.arange(model.rows * model.width, dtype=np.uint32) * 40503 >> 7).astype(np.uint8).reshape(shape)
     )
-    return np.array_equal(CompiledRoadView(model, library).map(noise), RoadView(model).map(noise))
+    return np.array_equal(
+        CompiledRoadView(model, library).map_picture(noise), RoadView(model).map_picture(noise)
+    )
 
 
 @cache
-def finds_alike(library: compiled.Library) -> bool:
+def has_identical_crests(library: compiled.Library) -> bool:
     """Whether compiled crests equal the installed OpenCV's; versions can add in a different order."""
     number = np.arange(48 * 260)
     road = (60 + number * 40503 % 65521 % 61 + 12 * (number % 260 % 37 < 3)).astype(np.uint8).reshape(48, 260)
-    found, wanted = CompiledCrests(library, road.shape)(road), crests(road)
-    return all(np.array_equal(one, other) for one, other in zip(found, wanted, strict=True))
+    compiled_crests, python_crests = CompiledCrests(library, road.shape)(road), find_crests(road)
+    return all(
+        np.array_equal(compiled_values, other)
+        for compiled_values, other in zip(compiled_crests, python_crests, strict=True)
+    )
 
 
-class _Map(ctypes.Structure):
+class _MapStructure(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("y", "drop", "scale", "share")),
         *((name, ctypes.c_int64) for name in ("rows", "columns", "edge")),
@@ -107,7 +120,7 @@ class _Map(ctypes.Structure):
 
 
 class CompiledVote:
-    """`vote` for maps of `view`, in the compiled `voting.c`."""
+    """`find_pose` for maps of `view`, in the compiled `voting.c`."""
 
     def __init__(self, library: compiled.Library, view: RoadView) -> None:
         pointer, number = ctypes.c_void_p, ctypes.c_long
@@ -116,39 +129,41 @@ class CompiledVote:
         self._shape = len(view.drop), len(view.y)
         self._arrays = {name: getattr(view, name) for name in ("y", "drop", "scale", "share")}
         for name in ("left", "below", "metre", "weight", "precision"):
-            self._arrays[name] = np.empty(STRONGEST, np.float32)
+            self._arrays[name] = np.empty(MOST_POINTS, np.float32)
         self._arrays |= {
-            "room": np.empty((18, STRONGEST)),
-            "found": np.empty((5, STRONGEST)),
-            "supports": np.empty((CANDIDATES, round(2 * SIDEWAYS / BIN))),
+            "room": np.empty((18, MOST_POINTS)),
+            "found": np.empty((5, MOST_POINTS)),
+            "supports": np.empty((MOST_CANDIDATES, round(2 * MOST_LATERAL / BIN_WIDTH))),
         }
         places = {name: array.ctypes.data for name, array in self._arrays.items()}
-        self._map = _Map(rows=self._shape[0], columns=self._shape[1], edge=EDGE, **places)
+        self._map = _MapStructure(rows=self._shape[0], columns=self._shape[1], edge=EDGE_COLUMNS, **places)
         self._belief, self._pose = (ctypes.c_double * 8)(), (ctypes.c_double * 6)()
 
     def __call__(
-        self, view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: Belief
-    ) -> Pose:
+        self, view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: ExpectedPose
+    ) -> LanePose:
         if road.shape != self._shape or road.dtype != np.uint8 or not road.flags.c_contiguous:
-            return vote(view, road, at, weight, belief)  # a fault can cause this
+            return find_pose(view, road, at, weight, belief)  # a fault can cause this
         at, weight = np.ascontiguousarray(at, np.int64), np.ascontiguousarray(weight, np.float32)
-        self._belief[:] = [*belief.left, *belief.dip, *belief.middle, *belief.width]
+        self._belief[:] = [*belief.meeting_left, *belief.meeting_dip, *belief.middle, *belief.width]
         points = at.ctypes.data, weight.ctypes.data, len(at)
         of = ctypes.addressof(self._map)
         if not self._vote(of, road.ctypes.data, *points, self._belief, self._pose):
-            return vote(view, road, at, weight, belief)
+            return find_pose(view, road, at, weight, belief)
         *pose, left, right = self._pose
-        return Pose(*pose, 1.0 - exp(left), 1.0 - exp(right))
+        return LanePose(*pose, 1.0 - exp(left), 1.0 - exp(right))
 
 
 @cache
-def votes_alike(library: compiled.Library, model: CameraModel) -> bool:
+def has_identical_votes(library: compiled.Library, model: CameraModel) -> bool:
     """Whether compiled votes equal those with the installed OpenCV; versions can add in a different order."""
     view = RoadView(model)
     number = np.arange(400)
     road = (np.arange(len(view.drop) * len(view.y)) % 251).astype(np.uint8).reshape(len(view.drop), -1)
-    row, column = number * 7 % len(view.drop), number * number * 13 % (len(view.y) - 2 * EDGE)
-    given = row * (len(view.y) - 2 * EDGE) + column, np.sqrt(number / 400).astype(np.float32)
-    beliefs = Belief(), Belief(left=(3.3, 7.1), width=(3.4, 0.02), dip=(0.7, 1.5))
+    row, column = number * 7 % len(view.drop), number * number * 13 % (len(view.y) - 2 * EDGE_COLUMNS)
+    points = row * (len(view.y) - 2 * EDGE_COLUMNS) + column, np.sqrt(number / 400).astype(np.float32)
+    beliefs = ExpectedPose(), ExpectedPose(meeting_left=(3.3, 7.1), width=(3.4, 0.02), meeting_dip=(0.7, 1.5))
     compiled_vote = CompiledVote(library, view)
-    return all(compiled_vote(view, road, *given, each) == vote(view, road, *given, each) for each in beliefs)
+    return all(
+        compiled_vote(view, road, *points, each) == find_pose(view, road, *points, each) for each in beliefs
+    )

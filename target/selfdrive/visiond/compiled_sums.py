@@ -10,7 +10,7 @@ from selfdrive.common.array_math import dot
 
 
 @cache
-def adds_up_alike(library: compiled.Library) -> bool:
+def has_identical_sums(library: compiled.Library) -> bool:
     """Whether the sums of `sums.h` equal the installed NumPy's; versions can add in a different order."""
     values = np.sqrt(np.arange(1.0, 5001.0))
     room = np.empty_like(values)

@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 
 from selfdrive.common import compiled
-from selfdrive.common.array_math import length
-from selfdrive.visiond.hog import BINS, BLOCK_FEATURES, CELL, FEATURES
-from selfdrive.visiond.lane_net import FEATURE_STEPS, HIDDEN, WEIGHT_STEPS, LaneNet
+from selfdrive.common.array_math import vector_lengths
+from selfdrive.visiond.hog import BLOCK_FEATURES, CELL_PIXELS, ORIENTATION_BINS, WINDOW_FEATURES
+from selfdrive.visiond.lane_net import FEATURE_STEPS, HIDDEN_NODES, WEIGHT_STEPS, LaneNet
 
 C_SOURCE = Path(__file__).with_name("mark_windows.c")
-FINEST = 2**13  # largest number of weight steps per unit in the coarse score
-PADDED = 1776  # number of a window's features, padded to whole vectors
+MOST_WEIGHT_STEPS = 2**13  # largest number of weight steps per unit in the coarse score
+PADDED_FEATURES = 1776  # number of a window's features, padded to whole vectors
 
 
-class _Net(ctypes.Structure):
+class _NetStructure(ctypes.Structure):
     _fields_ = (
         ("rows", ctypes.c_int64),
         ("width", ctypes.c_int64),
@@ -26,31 +26,31 @@ class _Net(ctypes.Structure):
     )
 
 
-class MarkWindows:
+class MarkWindowFinder:
     """Examines windows of pictures of one size with the compiled `mark_windows.c`."""
 
     def __init__(self, size: tuple[int, int], threshold: float, library: compiled.Library) -> None:
         net, (rows, width) = LaneNet.load(), size
-        coarse = np.zeros((HIDDEN, PADDED), np.int16)
+        coarse = np.zeros((HIDDEN_NODES, PADDED_FEATURES), np.int16)
         coarse_steps = _coarse_steps(net)
-        coarse[:, :FEATURES] = np.rint(net.whole.T * (coarse_steps / WEIGHT_STEPS))
-        down, across = rows // CELL, width // CELL
+        coarse[:, :WINDOW_FEATURES] = np.rint(net.hidden_steps.T * (coarse_steps / WEIGHT_STEPS))
+        down, across = rows // CELL_PIXELS, width // CELL_PIXELS
         self._arrays = {
-            "lengths": np.sqrt(np.arange(2 * 255**2 + 1)) / CELL**2,
+            "lengths": np.sqrt(np.arange(2 * 255**2 + 1)) / CELL_PIXELS**2,
             "coarse": coarse,
-            "whole": net.whole,
+            "whole": net.hidden_steps,
             "bias": net.hidden_bias,
             "out": net.out,
             "squares": np.zeros(width, np.int32),
             "bins": np.zeros(width, np.int32),
-            "sums": np.zeros(across * BINS),
-            "cells": np.zeros((down, across, BINS), np.float32),
+            "sums": np.zeros(across * ORIENTATION_BINS),
+            "cells": np.zeros((down, across, ORIENTATION_BINS), np.float32),
             "power": np.zeros((down, across), np.float32),
             "blocks": np.zeros((down - 1, across - 1, BLOCK_FEATURES), np.int16),
         }
         self.blocks = self._arrays["blocks"]  # of the windows examined last, in steps
         pointers = {name: array.ctypes.data for name, array in self._arrays.items()}
-        self._net = _Net(
+        self._net = _NetStructure(
             rows=rows,
             width=width,
             threshold=threshold,
@@ -64,7 +64,7 @@ class MarkWindows:
         self._which.restype = ctypes.c_long
         self._at = ctypes.addressof(self._net)
 
-    def decide(self, part: int, windows: int) -> bool:
+    def clear_windows_without_mark(self, part: int, windows: int) -> bool:
         """Clear the windows (bool, at the address `windows`) that have no mark.
 
         `part` is the address of the picture (uint8). Returns False if the Python code must decide.
@@ -78,10 +78,10 @@ def _coarse_steps(net: LaneNet) -> float:
     Features are not negative and a block's norm is at most 1, so the block adds at most the norm of its
     positive weights, or of its negative ones.
     """
-    blocks = net.hidden.T.reshape(HIDDEN, -1, BLOCK_FEATURES).astype(float)
+    blocks = net.hidden.T.reshape(HIDDEN_NODES, -1, BLOCK_FEATURES).astype(float)
     signs = [np.maximum(part, 0.0) for part in (blocks, -blocks)]
-    largest = max(length(part).sum(axis=(1, 2)).max() for part in signs)
-    steps = float(FINEST)
+    largest = max(vector_lengths(part).sum(axis=(1, 2)).max() for part in signs)
+    steps = float(MOST_WEIGHT_STEPS)
     while steps * largest * FEATURE_STEPS > 0.99 * 2**31 or steps * np.abs(blocks).max() > 2**15 - 1:
         steps *= 0.5
     return steps

@@ -47,32 +47,32 @@ class MirroredDetector:
         self._detector = detector
 
     def detect(self, view: CameraView) -> LaneLines:
-        return LaneLines(*(_mirrored(line) for line in self._detector.detect(view)))
+        return LaneLines(*(_mirror_line(line) for line in self._detector.detect(view)))
 
 
-def _mirrored(line: RoadLine) -> RoadLine:
+def _mirror_line(line: RoadLine) -> RoadLine:
     bend = line.bend and tuple(-y for y in line.bend)
     return RoadLine(y=-line.y, slope=-line.slope, prob=line.prob, bend=bend)
 
 
 def path_between(left: RoadLine, right: RoadLine, width: float = LANE_WIDTH) -> RoadLine:
     """The lane centre: between two lines, or half a `width` (m) from a single one, or straight ahead."""
-    seen = [line for line in (left, right) if line.prob > 0.0]
-    if len(seen) == 2:
+    detected = [line for line in (left, right) if line.prob > 0.0]
+    if len(detected) == 2:
         return RoadLine(
             y=0.5 * (left.y + right.y),
             slope=0.5 * (left.slope + right.slope),
             prob=left.prob * right.prob,
         )
-    if not seen:
+    if not detected:
         return RoadLine(y=0.0, prob=0.0)
-    (line,) = seen
+    (line,) = detected
     return RoadLine(
         y=line.y + (0.5 if line is right else -0.5) * width, slope=line.slope, prob=0.5 * line.prob
     )
 
 
-def points(y: float, line: RoadLine) -> tuple[float, ...]:
+def message_points(y: float, line: RoadLine) -> tuple[float, ...]:
     """A message's 50 points (m, 1 m apart) of `line`, which passes the car at `y`."""
     if line.bend is not None:
         return tuple([y + bend for bend in line.bend])

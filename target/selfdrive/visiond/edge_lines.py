@@ -13,18 +13,18 @@ from selfdrive.visiond.road_region import RoadRegion
 MIN_PIXELS = 24  # in a cluster, or a line, that is used
 MIN_SPREAD = 3.0  # standard deviation of its rows
 MAX_SLOPE = 0.15  # lines that diverge more from the car's heading do not bound its lane
-BESIDE = 8.0  # m ahead, where the nearest line is determined
-CROWD = 0.8  # m; of lines this close to each other, the one with more edges is used
-TRIES = 8  # clusters examined on each side, from the nearest
-REACHES = 0.3, 0.2  # m; distance of edges that belong to a line, in each round of fitting
-LEAST_SHARE = 0.12  # smallest share of a mark's edges that lead into the paint, and out of it
+NEAREST_LINE_DISTANCE = 8.0  # m ahead, where the nearest line is determined
+CROWD_WIDTH = 0.8  # m; of lines this close to each other, the one with more edges is used
+MOST_TRIED_CLUSTERS = 8  # clusters examined on each side, from the nearest
+FIT_REACHES = 0.3, 0.2  # m; distance of edges that belong to a line, in each round of fitting
+MIN_EDGE_SHARE = 0.12  # smallest share of a mark's edges that lead into the paint, and out of it
 MARK_WIDTHS = 0.03, 0.45  # m between both kinds of edges, for one or two strips of paint
-SHARP = 0.05  # m, standard deviation of the edges on one side of a strip of paint
-SURE_PIXELS = 80.0  # edge pixels of a line with full certainty
-SURE_SPREAD = 0.25  # m: root mean square distance of a line's edges at which its probability is half
+MOST_EDGE_DEVIATION = 0.05  # m, standard deviation of the edges on one side of a strip of paint
+CERTAIN_PIXELS = 80.0  # edge pixels of a line with full certainty
+HALF_CERTAIN_SPREAD = 0.25  # m: root mean square distance of a line's edges at which its probability is half
 
 
-class Points(NamedTuple):
+class EdgePoints(NamedTuple):
     """Edge pixels: row and column in the picture, whether it gets brighter to the right, m per pixel."""
 
     row: np.ndarray
@@ -32,8 +32,8 @@ class Points(NamedTuple):
     rising: np.ndarray
     scale: np.ndarray
 
-    def some(self, chosen: np.ndarray) -> "Points":
-        return Points(*[part.take(chosen) for part in self])
+    def take(self, chosen: np.ndarray) -> "EdgePoints":
+        return EdgePoints(*[part.take(chosen) for part in self])
 
 
 class EdgeLines:
@@ -48,7 +48,7 @@ class EdgeLines:
         rows = np.arange(region.shape[0]) + region.first_row
         self.scale = np.array([model.metres_per_pixel(row) for row in rows])
 
-    def nearest(
+    def nearest_lines(
         self, at: np.ndarray, rising: np.ndarray, labels: np.ndarray
     ) -> tuple[RoadLine | None, RoadLine | None]:
         """The lines next to the car, left and right, among the edges at the pixels `at` (row-major).
@@ -61,59 +61,61 @@ class EdgeLines:
         if not clustered.all():
             at, rising, labels = at[clustered], rising[clustered], labels[clustered]
         points = self._points(at, rising)
-        size, spread, a, b = _fit(points.row, points.column, labels)
+        size, spread, a, b = _fit_clusters(points.row, points.column, labels)
         y, slope = self._model.line_on_road(a, b)
         usable = (size >= MIN_PIXELS) & (spread >= MIN_SPREAD) & (np.abs(slope) <= MAX_SLOPE)
         sides = []
         for side in (1.0, -1.0):
-            away = np.where(usable, side * (y + BESIDE * slope), -1.0)
+            away = np.where(usable, side * (y + NEAREST_LINE_DISTANCE * slope), -1.0)
             order = np.argsort(away, kind="stable")
-            order = order[away[order] >= 0.0][:TRIES]
+            order = order[away[order] >= 0.0][:MOST_TRIED_CLUSTERS]
             clusters = np.stack((away, a, b), axis=1)[order].tolist()
-            sides.append(self._first_line(clusters, points))
+            sides.append(self._nearest_line(clusters, points))
         return sides[0], sides[1]
 
-    def _points(self, at: np.ndarray, rising: np.ndarray) -> Points:
+    def _points(self, at: np.ndarray, rising: np.ndarray) -> EdgePoints:
         region = self._region
         row = at // region.shape[1]
         column = at - row * region.shape[1]
-        return Points(
+        return EdgePoints(
             (row + region.first_row).astype(float),
             (column + region.first_column).astype(float),
             rising,
             self.scale.take(row),
         )
 
-    def _first_line(self, clusters: list[list[float]], points: Points) -> RoadLine | None:
-        best, first, most, where = None, 0.0, 0, 0.0
-        for away, a, b in clusters:
-            if best is not None and (away > first + CROWD or away < where + REACHES[0]):
+    def _nearest_line(self, clusters: list[list[float]], points: EdgePoints) -> RoadLine | None:
+        best, first, most_pixels, best_distance = None, 0.0, 0, 0.0
+        for distance, a, b in clusters:
+            if best is not None and (
+                distance > first + CROWD_WIDTH or distance < best_distance + FIT_REACHES[0]
+            ):
                 continue
-            line, pixels = self._line(a, b, points)
-            if line is not None and pixels > most:
-                first = first if best else away
-                best, most, where = line, pixels, away
+            line, pixels = self._fit_mark(a, b, points)
+            if line is not None and pixels > most_pixels:
+                first = first if best else distance
+                best, most_pixels, best_distance = line, pixels, distance
         return best
 
-    def _line(self, a: float, b: float, points: Points) -> tuple[RoadLine | None, int]:
+    def _fit_mark(self, a: float, b: float, points: EdgePoints) -> tuple[RoadLine | None, int]:
         """The line through all edges near column = a * row + b, and their number; (None, 0) if not a mark."""
-        own = points
-        for reach in REACHES:
-            away = np.abs(_away(own, a, b))
-            own = own.some((away <= reach).nonzero()[0])
-            if own.row.size < MIN_PIXELS:
+        near = points
+        for reach in FIT_REACHES:
+            away = np.abs(_distances_from_line(near, a, b))
+            near = near.take((away <= reach).nonzero()[0])
+            if near.row.size < MIN_PIXELS:
                 return None, 0
-            spread, a, b = _fit_one(own.row, own.column)
+            spread, a, b = _fit_line(near.row, near.column)
         y, slope = self._model.line_on_road(a, b)
-        away = _away(own, a, b)
-        if spread < MIN_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, own.rising):
+        away = _distances_from_line(near, a, b)
+        if spread < MIN_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, near.rising):
             return None, 0
-        doubt = dot(away, away) / away.size / SURE_SPREAD**2
-        prob = min(1.0, own.row.size / SURE_PIXELS) / (1.0 + doubt)
-        return RoadLine(y=y, slope=slope, prob=prob), own.row.size
+        doubt = dot(away, away) / away.size / HALF_CERTAIN_SPREAD**2
+        prob = min(1.0, near.row.size / CERTAIN_PIXELS) / (1.0 + doubt)
+        return RoadLine(y=y, slope=slope, prob=prob), near.row.size
 
 
-def _away(points: Points, a: float, b: float) -> np.ndarray:
+def _distances_from_line(points: EdgePoints, a: float, b: float) -> np.ndarray:
     away = points.column - a * points.row
     away -= b
     away *= points.scale
@@ -128,7 +130,7 @@ def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
     the other edges must be as sharp as paint.
     """
     brighter, darker = away[rising], away[~rising]
-    least = LEAST_SHARE * away.size
+    least = MIN_EDGE_SHARE * away.size
     if min(brighter.size, darker.size) < least:
         return False
     if _is_paint(brighter, darker):
@@ -138,7 +140,9 @@ def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
         (brighter[brighter < np.median(darker)], darker),  # right of it
     )
     return any(
-        min(up.size, down.size) >= least and max(up.std(), down.std()) <= SHARP and _is_paint(up, down)
+        min(up.size, down.size) >= least
+        and max(up.std(), down.std()) <= MOST_EDGE_DEVIATION
+        and _is_paint(up, down)
         for up, down in pairs
     )
 
@@ -148,7 +152,7 @@ def _is_paint(brighter: np.ndarray, darker: np.ndarray) -> bool:
     return MARK_WIDTHS[0] <= width <= MARK_WIDTHS[1]
 
 
-def _fit_one(row: np.ndarray, column: np.ndarray) -> tuple[float, float, float]:
+def _fit_line(row: np.ndarray, column: np.ndarray) -> tuple[float, float, float]:
     """Standard deviation of the rows, a and b of column = a * row + b."""
     mean_row, mean_column = float(row.sum()) / row.size, float(column.sum()) / row.size
     down = row - mean_row
@@ -157,10 +161,10 @@ def _fit_one(row: np.ndarray, column: np.ndarray) -> tuple[float, float, float]:
     return sqrt(power / row.size), a, mean_column - a * mean_row
 
 
-def _fit(
+def _fit_clusters(
     row: np.ndarray, column: np.ndarray, label: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """For each cluster: number of pixels, and the result of `_fit_one`."""
+    """For each cluster: number of pixels, and the result of `_fit_line`."""
     size = np.bincount(label)
     mean_row, mean_column = (np.bincount(label, value) / size for value in (row, column))
     down, across = row - mean_row.take(label), column - mean_column.take(label)

@@ -7,10 +7,10 @@ import numpy as np
 
 from selfdrive.common.array_math import each
 
-WEIGHTS = Path(__file__).with_name("lane_net.npz")
-HIDDEN = 10
+WEIGHTS_PATH = Path(__file__).with_name("lane_net.npz")
+HIDDEN_NODES = 10
 FEATURE_STEPS, WEIGHT_STEPS = 2**12, 2**20  # per unit of features and weights
-AT_ONCE = 32  # windows; for more, allocating memory takes longer than the sums
+WINDOWS_AT_ONCE = 32  # windows; for more, allocating memory takes longer than the sums
 
 
 class LaneNet:
@@ -24,10 +24,10 @@ class LaneNet:
     ) -> None:
         self.hidden, self.hidden_bias = hidden, hidden_bias
         self.out, self.out_bias = out, out_bias
-        self.whole = np.rint(hidden * float(WEIGHT_STEPS)).astype(float)
+        self.hidden_steps = np.rint(hidden * float(WEIGHT_STEPS)).astype(float)
 
     @classmethod
-    def load(cls, path: Path = WEIGHTS) -> "LaneNet":
+    def load(cls, path: Path = WEIGHTS_PATH) -> "LaneNet":
         """Load a net that `python -m selfdrive.visiond_lab.train` wrote."""
         with np.load(path) as stored:
             return cls(stored["hidden"], stored["hidden_bias"], stored["out"], stored["out_bias"])
@@ -42,15 +42,15 @@ class LaneNet:
             out_bias=self.out_bias,
         )
 
-    def score(self, features: np.ndarray) -> np.ndarray:
+    def log_odds(self, features: np.ndarray) -> np.ndarray:
         """Log odds of a mark, for `features` (windows, features) in float32.
 
         Features and weights are rounded to integer steps, so that doubles hold each sum exactly and the order
         of additions does not matter.
         """
-        steps = np.empty((len(features), self.whole.shape[1]))
-        for k in range(0, len(features), AT_ONCE):
-            some = np.rint(features[k : k + AT_ONCE] * np.float32(FEATURE_STEPS)).astype(float)
-            np.matmul(some, self.whole, out=steps[k : k + AT_ONCE])
+        steps = np.empty((len(features), self.hidden_steps.shape[1]))
+        for k in range(0, len(features), WINDOWS_AT_ONCE):
+            some = np.rint(features[k : k + WINDOWS_AT_ONCE] * np.float32(FEATURE_STEPS)).astype(float)
+            np.matmul(some, self.hidden_steps, out=steps[k : k + WINDOWS_AT_ONCE])
         hidden = each(tanh, steps / (FEATURE_STEPS * WEIGHT_STEPS) + self.hidden_bias)
         return (hidden * self.out).sum(axis=-1) + self.out_bias

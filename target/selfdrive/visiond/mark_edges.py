@@ -3,10 +3,10 @@
 import cv2
 import numpy as np
 
-from selfdrive.visiond.hog import STRIDE
+from selfdrive.visiond.hog import WINDOW_STRIDE
 
-RATIO = 1.6  # steepness of an edge, relative to the root mean square of its surroundings
-FLOOR = 40.0  # of the Sobel sum, whose weights add up to 4; anything less is grain
+STEEPNESS_RATIO = 1.6  # steepness of an edge, relative to the root mean square of its surroundings
+MIN_STEEPNESS = 40.0  # of the Sobel sum, whose weights add up to 4; anything less is grain
 
 
 def tiles_with_mark(marked: np.ndarray, need: int) -> np.ndarray:
@@ -19,7 +19,7 @@ def tiles_with_mark(marked: np.ndarray, need: int) -> np.ndarray:
     return cover >= need
 
 
-def windows_on(tiles: np.ndarray) -> np.ndarray:
+def windows_on_tiles(tiles: np.ndarray) -> np.ndarray:
     """Return the windows (rows x columns, bool) that cover any of these tiles (bool)."""
     down = tiles[:-1] | tiles[1:]
     return down[:, :-1] | down[:, 1:]
@@ -27,10 +27,12 @@ def windows_on(tiles: np.ndarray) -> np.ndarray:
 
 def tile_numbers(rows: int, width: int) -> np.ndarray:
     row, column = np.ogrid[:rows, :width]
-    return (row // STRIDE * (width // STRIDE) + column // STRIDE).astype(np.uint16).ravel()
+    return (
+        (row // WINDOW_STRIDE * (width // WINDOW_STRIDE) + column // WINDOW_STRIDE).astype(np.uint16).ravel()
+    )
 
 
-def edges(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def find_steep_edges(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find steep edges in `part` (uint8, sides are multiples of a tile's).
 
     Steepness is relative to the root mean square of nearby tiles, so light and haze do not matter. Returns
@@ -39,13 +41,15 @@ def edges(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     rows, width = part.shape
     gradient = cv2.Sobel(part, cv2.CV_32F, 1, 0, ksize=3)
     power = cv2.multiply(gradient, gradient)
-    tiles = width // STRIDE, rows // STRIDE
-    limit = np.repeat(limits(cv2.resize(power, tiles, interpolation=cv2.INTER_AREA)), STRIDE, axis=1)
-    steep = power.reshape(-1, STRIDE, width) > limit[:, np.newaxis]
+    tiles = width // WINDOW_STRIDE, rows // WINDOW_STRIDE
+    limit = np.repeat(
+        steepness_limits(cv2.resize(power, tiles, interpolation=cv2.INTER_AREA)), WINDOW_STRIDE, axis=1
+    )
+    steep = power.reshape(-1, WINDOW_STRIDE, width) > limit[:, np.newaxis]
     at = steep.ravel().nonzero()[0]
     return at, gradient.take(at) > 0.0
 
 
-def limits(power: np.ndarray) -> np.ndarray:
+def steepness_limits(power: np.ndarray) -> np.ndarray:
     """Each tile's squared gradient above which edges are steep; `power` has the tiles' means."""
-    return np.maximum(RATIO**2 * cv2.blur(power, (3, 3)), FLOOR**2)
+    return np.maximum(STEEPNESS_RATIO**2 * cv2.blur(power, (3, 3)), MIN_STEEPNESS**2)

@@ -11,14 +11,14 @@ from selfdrive.messages import CameraView
 from selfdrive.visiond.dbscan import dbscan
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
 from selfdrive.visiond.edge_lines import EdgeLines
-from selfdrive.visiond.hog import FEATURES, Hog, windows
+from selfdrive.visiond.hog import WINDOW_FEATURES, Hog, detection_windows
 from selfdrive.visiond.lane_net import LaneNet
-from selfdrive.visiond.mark_edges import edges, tile_numbers, tiles_with_mark, windows_on
+from selfdrive.visiond.mark_edges import find_steep_edges, tile_numbers, tiles_with_mark, windows_on_tiles
 from selfdrive.visiond.road_region import RoadRegion
 
-EPS, MIN_SAMPLES = 4, 8  # pixels, edge pixels
-THRESHOLD = 0.0  # log odds above which a window has a mark
-NEED = 2  # marked windows among the four that share a tile
+CLUSTER_REACH, MIN_CLUSTER_EDGES = 4, 8  # pixels, edge pixels
+MIN_LOG_ODDS = 0.0  # log odds above which a window has a mark
+MIN_MARKED_WINDOWS = 2  # marked windows among the four that share a tile
 
 
 class PaperDetector:
@@ -40,27 +40,27 @@ class PaperDetector:
     def detect(self, view: CameraView) -> LaneLines:
         """Return the lines in `view.picture`; a line not seen has prob 0 and the expected position."""
         part = np.ascontiguousarray(view.picture[self._region.part])
-        at, rising = edges(part)
+        at, rising = find_steep_edges(part)
         tile = self._tile.take(at)
-        inside = tiles_with_mark(self._marked(part, tile), NEED).take(tile)
+        inside = tiles_with_mark(self._windows_with_mark(part, tile), MIN_MARKED_WINDOWS).take(tile)
         at, rising = at[inside], rising[inside]
-        labels = dbscan(at, part.shape, EPS, MIN_SAMPLES)
-        return lane_between(*self._lines.nearest(at, rising, labels))
+        labels = dbscan(at, part.shape, CLUSTER_REACH, MIN_CLUSTER_EDGES)
+        return complete_lane(*self._lines.nearest_lines(at, rising, labels))
 
-    def _marked(self, part: np.ndarray, tile: np.ndarray) -> np.ndarray:
-        looked_at = self._region.windows
-        tiles = np.zeros((looked_at.shape[0] + 1, looked_at.shape[1] + 1), bool)
+    def _windows_with_mark(self, part: np.ndarray, tile: np.ndarray) -> np.ndarray:
+        candidates = self._region.windows
+        tiles = np.zeros((candidates.shape[0] + 1, candidates.shape[1] + 1), bool)
         tiles.ravel()[tile] = True
-        marked = looked_at & windows_on(tiles)
+        marked = candidates & windows_on_tiles(tiles)
         row, column = marked.nonzero()
         if row.size:
-            found = windows(self._hog.blocks(part))[row, column]
-            score = self._net.score(found.reshape(-1, FEATURES))
-            marked[row, column] = score > THRESHOLD
+            features = detection_windows(self._hog.blocks(part))[row, column]
+            score = self._net.log_odds(features.reshape(-1, WINDOW_FEATURES))
+            marked[row, column] = score > MIN_LOG_ODDS
         return marked
 
 
-def lane_between(left: RoadLine | None, right: RoadLine | None) -> LaneLines:
+def complete_lane(left: RoadLine | None, right: RoadLine | None) -> LaneLines:
     left = left or RoadLine(y=0.5 * LANE_WIDTH, prob=0.0)
     right = right or RoadLine(y=-0.5 * LANE_WIDTH, prob=0.0)
     return LaneLines(left=left, right=right, path=path_between(left, right))

@@ -10,14 +10,14 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 
-CELL = 0.04  # m, a column of the map
-REACH = 5.2  # m, to the left and to the right
-FINEST = 1.3 / 0.12  # px/m; with fewer, a mark of 0.12 m looks like texture
-FARTHEST = 35.0  # m
-LEAST_DROP = 13.0  # px below the horizon, more than a camera's pitch can be off
-LEAST_ROWS = 8
-LEVELS = 3  # full, half and quarter size
-BLEND = 40.0  # px/m above which the next smaller picture is used
+CELL_WIDTH = 0.04  # m, a column of the map
+SIDE_REACH = 5.2  # m, to the left and to the right
+MIN_RESOLUTION = 1.3 / 0.12  # px/m; with fewer, a mark of 0.12 m looks like texture
+FARTHEST_ROAD = 35.0  # m
+MIN_DROP = 13.0  # px below the horizon, more than a camera's pitch can be off
+MIN_ROWS = 8
+LEVEL_COUNT = 3  # full, half and quarter size
+HALVING_RESOLUTION = 40.0  # px/m above which the next smaller picture is used
 
 
 class RoadView:
@@ -29,25 +29,27 @@ class RoadView:
     """
 
     def __init__(self, model: CameraModel) -> None:
-        self.y = np.arange(REACH, -REACH, -CELL, dtype=np.float32)
-        found = [(level, rows) for level in range(LEVELS) if (rows := _rows_of(model, level))]
-        rows = [row for _, of_level in found for row in of_level]
-        shares = [2.0**level for level, of_level in found for _ in of_level]
-        if len(rows) < LEAST_ROWS:
+        self.y = np.arange(SIDE_REACH, -SIDE_REACH, -CELL_WIDTH, dtype=np.float32)
+        rows_by_level = [(level, rows) for level in range(LEVEL_COUNT) if (rows := _rows_of(model, level))]
+        rows = [row for _, of_level in rows_by_level for row in of_level]
+        shares = [2.0**level for level, of_level in rows_by_level for _ in of_level]
+        if len(rows) < MIN_ROWS:
             raise ConfigError(
-                f"{len(rows)} rows in which marks are wide enough, up to {FARTHEST:.0f} m ahead",
+                f"{len(rows)} rows in which marks are wide enough, up to {FARTHEST_ROAD:.0f} m ahead",
                 where="the camera's calibration",
-                expected=f"at least {LEAST_ROWS}",
+                expected=f"at least {MIN_ROWS}",
                 remedy="use larger pictures, or a camera that sees the road before the car",
             )
         # The first row used; a row of every level begins here.
-        self._first = int(min(rows)) >> LEVELS << LEVELS
-        self._levels = [_maps(model, of_level, self.y, level, self._first) for level, of_level in found]
+        self._first = int(min(rows)) >> LEVEL_COUNT << LEVEL_COUNT
+        self._levels = [
+            _remap_tables(model, of_level, self.y, level, self._first) for level, of_level in rows_by_level
+        ]
         self.drop = np.array(rows, np.float32) - np.float32(model.horizon)
         self.scale = np.array([1.0 / model.metres_per_pixel(row) for row in rows], np.float32)
         self.share = np.array(shares, np.float32)
 
-    def map(self, picture: np.ndarray) -> np.ndarray:
+    def map_picture(self, picture: np.ndarray) -> np.ndarray:
         """Return the map (uint8, rows x columns) of a grey picture (uint8)."""
         picture = np.asarray(picture[self._first :, :])
         parts = []
@@ -64,24 +66,24 @@ class RoadView:
 
 def _rows_of(model: CameraModel, level: int) -> list[float]:
     step = 2**level
-    finest = BLEND * step / 2 if level else 0.0
-    coarsest = BLEND * step if level < LEVELS - 1 else np.inf
+    finest = HALVING_RESOLUTION * step / 2 if level else 0.0
+    coarsest = HALVING_RESOLUTION * step if level < LEVEL_COUNT - 1 else np.inf
     rows = [step * (row + 0.5) - 0.5 for row in range(model.rows // step)]
     return [
         row
         for row in rows
-        if row > model.horizon + LEAST_DROP
-        and model.distance(row) < FARTHEST
-        and max(finest, FINEST) <= 1.0 / model.metres_per_pixel(row) < coarsest
+        if row > model.horizon + MIN_DROP
+        and model.distance(row) < FARTHEST_ROAD
+        and max(finest, MIN_RESOLUTION) <= 1.0 / model.metres_per_pixel(row) < coarsest
     ]
 
 
-def _maps(
+def _remap_tables(
     model: CameraModel, rows: list[float], y: np.ndarray, level: int, first: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Columns and rows in the level's picture (from row `first`) for each point of the map."""
     scale = np.array([1.0 / model.metres_per_pixel(row) for row in rows])
     columns = model.cx - scale[:, None] * y
-    there = np.broadcast_to(np.array(rows)[:, None] - first, columns.shape)
-    small = [((full + 0.5) / 2**level - 0.5).astype(np.float32) for full in (columns, there)]
+    row_grid = np.broadcast_to(np.array(rows)[:, None] - first, columns.shape)
+    small = [((full + 0.5) / 2**level - 0.5).astype(np.float32) for full in (columns, row_grid)]
     return cv2.convertMaps(small[0], small[1], cv2.CV_16SC2)

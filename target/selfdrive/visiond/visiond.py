@@ -1,7 +1,7 @@
 """visiond: from the camera's view to the road model, at 20 Hz."""
 
 from selfdrive.messages import CameraView, LeadVision, ModelData, PathData
-from selfdrive.visiond.detector import LaneDetector, RoadLine, points
+from selfdrive.visiond.detector import LaneDetector, RoadLine, message_points
 
 LINE_STD = 1.0  # m
 LEAD_STD = 0.1  # m
@@ -40,4 +40,4 @@ class Visiond:
 
 def _line(y: float, line: RoadLine) -> PathData:
     """The message for a line that passes the car at `y` (m, left positive)."""
-    return PathData(points=points(y, line), valid=line.prob > 0.0, prob=line.prob, std=LINE_STD)
+    return PathData(points=message_points(y, line), valid=line.prob > 0.0, prob=line.prob, std=LINE_STD)

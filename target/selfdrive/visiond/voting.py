@@ -2,7 +2,7 @@
 
 Lines along the road meet at one point of the picture. The car's heading moves it sideways; an error of the
 camera's pitch moves it up or down. `drop` px below the known horizon, a line `y` m beside the camera appears
-`left + y * metre * (drop + dip)` px left of the camera's column.
+`meeting_left + y * metre * (drop + meeting_dip)` px left of the camera's column.
 """
 
 from collections.abc import Callable
@@ -12,28 +12,30 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from selfdrive.common.array_math import each, log, product
-from selfdrive.visiond.band_filter import Points, points_at
+from selfdrive.common.array_math import each, natural_log, product
+from selfdrive.visiond.band_filter import MarkPoints, mark_points_at
 from selfdrive.visiond.road_view import RoadView
 
-BIN = 0.1  # m, for votes
-SIDEWAYS = 4.0  # m, largest lateral position of lines
+BIN_WIDTH = 0.1  # m, for votes
+MOST_LATERAL = 4.0  # m, largest lateral position of lines
 LEFT_STEP, DIP_STEP = 4.0, 6.0  # px between candidates
-SCATTER = 0.005  # share of a line's rows with points by chance, on the cleanest road
-AROUND = np.array([[1] * 8 + [0] * 5 + [1] * 8], np.float32) / 16  # averages the bins of y around a line
-BESIDE = 0.8  # m from a line, within which points by chance are counted
-ROUNDS = (0.30, 0.20, 0.15, 0.15)  # m from a line, where points are used in each round of the fit
-ALIKE = 10.0  # this many neighbouring points count as one, because they are not independent
-FAINT = 0.02  # share of rows that makes a line probable if there are no other points; a dash is 0.05
-BLUR = 0.5, 0.05  # px and m by which a point can miss its mark
+CHANCE_SHARE = 0.005  # share of a line's rows with points by chance, on the cleanest road
+SURROUNDINGS_KERNEL = (
+    np.array([[1] * 8 + [0] * 5 + [1] * 8], np.float32) / 16
+)  # averages the bins of y around a line
+CHANCE_DISTANCE = 0.8  # m from a line, within which points by chance are counted
+FIT_REACHES = (0.30, 0.20, 0.15, 0.15)  # m from a line, where points are used in each round of the fit
+DEPENDENT_POINTS = 10.0  # this many neighbouring points count as one, because they are not independent
+FAINT_SHARE = 0.02  # share of rows that makes a line probable if there are no other points; a dash is 0.05
+POINT_BLUR = 0.5, 0.05  # px and m by which a point can miss its mark
 
 
-class Pose(NamedTuple):
+class LanePose(NamedTuple):
     """Two lines: the point where they meet (px), y (m) of each at the camera, and their probabilities: 0 if
     there are no more points than by chance."""
 
-    left: float
-    dip: float
+    meeting_left: float
+    meeting_dip: float
     y_left: float
     y_right: float
     prob_left: float = 0.0
@@ -48,60 +50,75 @@ class Pose(NamedTuple):
         return self.y_left - self.y_right
 
 
-class Belief(NamedTuple):
+class ExpectedPose(NamedTuple):
     """The expected pose, each value with its standard deviation."""
 
     middle: tuple[float, float] = (0.0, 0.8)  # m
     width: tuple[float, float] = (3.7, 0.42)  # m
-    left: tuple[float, float] = (0.0, 40.0)  # px
-    dip: tuple[float, float] = (0.0, 6.0)  # px
+    meeting_left: tuple[float, float] = (0.0, 40.0)  # px
+    meeting_dip: tuple[float, float] = (0.0, 6.0)  # px
 
 
-class Voters:
-    """The points, in px left of the camera's column and below the horizon; `weight` in rows.
+class VotingPoints:
+    """The points: `offset` (px left of the camera's column), `drop` (px below the horizon), `weight` (rows).
 
     `rows` is the number of the picture's rows that can have points.
     """
 
-    def __init__(self, view: RoadView, points: Points, rows: float) -> None:
+    def __init__(self, view: RoadView, points: MarkPoints, rows: float) -> None:
         scale = view.scale[points.row]
-        self.left = view.y[points.column] * scale
+        self.offset = view.y[points.column] * scale
         self.drop = view.drop[points.row]
         self.metre = scale / self.drop
         self.weight = points.weight * view.share[points.row]
-        self.precision = self.weight / (ALIKE * (BLUR[0] + BLUR[1] * scale) ** 2)
+        self.precision = self.weight / (DEPENDENT_POINTS * (POINT_BLUR[0] + POINT_BLUR[1] * scale) ** 2)
         self.rows = max(rows, 1.0)
 
 
-Vote = Callable[[RoadView, np.ndarray, np.ndarray, np.ndarray, Belief], Pose]
+PoseFinder = Callable[[RoadView, np.ndarray, np.ndarray, np.ndarray, ExpectedPose], LanePose]
 
 
-def vote(view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: Belief) -> Pose:
-    """Find the lines from `belief` and points: positions in the map `road`, and weights (see `crests`)."""
-    voters = Voters(view, points_at(at, weight, road), view.rows_with_content(road))
-    return fit(elect(voters, belief), voters, belief)
+def find_pose(
+    view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: ExpectedPose
+) -> LanePose:
+    """Find the lines from `belief` and points: positions in the map `road`, weights (see `find_crests`)."""
+    voters = VotingPoints(view, mark_points_at(at, weight, road), view.rows_with_content(road))
+    return fit_pose(elect_candidate(voters, belief), voters, belief)
 
 
-def elect(voters: Voters, belief: Belief) -> Pose:
-    left = _candidates(*belief.left, LEFT_STEP)
-    dip = _candidates(*belief.dip, DIP_STEP)
-    left, dip = np.repeat(left, len(dip)), np.tile(dip, len(left))
-    votes = _votes(voters, left, dip)
-    around = cv2.filter2D(votes, -1, AROUND, borderType=cv2.BORDER_REFLECT)
-    support = log(np.float32(1.0) + np.maximum(votes - around, 0.0) / (around + np.float32(SCATTER)))
-    support -= (0.25 * (_unlikely(left, *belief.left) + _unlikely(dip, *belief.dip)))[:, None]
-    y = SIDEWAYS - BIN * (np.arange(votes.shape[1]) + 0.5)
-    best, found = -np.inf, (0, 0, 0)
-    for width in _candidates(*belief.width, BIN):
-        lane = round(float(width) / BIN)
+def elect_candidate(voters: VotingPoints, belief: ExpectedPose) -> LanePose:
+    meeting_left = _candidates(*belief.meeting_left, LEFT_STEP)
+    meeting_dip = _candidates(*belief.meeting_dip, DIP_STEP)
+    meeting_left, meeting_dip = (
+        np.repeat(meeting_left, len(meeting_dip)),
+        np.tile(meeting_dip, len(meeting_left)),
+    )
+    votes = _votes(voters, meeting_left, meeting_dip)
+    around = cv2.filter2D(votes, -1, SURROUNDINGS_KERNEL, borderType=cv2.BORDER_REFLECT)
+    support = natural_log(
+        np.float32(1.0) + np.maximum(votes - around, 0.0) / (around + np.float32(CHANCE_SHARE))
+    )
+    support -= (
+        0.25
+        * (
+            _unlikeliness(meeting_left, *belief.meeting_left)
+            + _unlikeliness(meeting_dip, *belief.meeting_dip)
+        )
+    )[:, None]
+    y = MOST_LATERAL - BIN_WIDTH * (np.arange(votes.shape[1]) + 0.5)
+    best, best_place = -np.inf, (0, 0, 0)
+    for width in _candidates(*belief.width, BIN_WIDTH):
+        lane = round(float(width) / BIN_WIDTH)
         pairs = support[:, :-lane] + support[:, lane:]
         middle = 0.5 * (y[:-lane] + y[lane:])
-        pairs -= 0.5 * (_unlikely(middle, *belief.middle) + _unlikely(width, *belief.width))
+        pairs -= 0.5 * (_unlikeliness(middle, *belief.middle) + _unlikeliness(width, *belief.width))
         at = int(np.argmax(pairs))
         if pairs.flat[at] > best:
-            best, found = float(pairs.flat[at]), (*divmod(at, pairs.shape[1]), lane)
-    which, column, lane = found
-    return Pose(float(left[which]), float(dip[which]), float(y[column]), float(y[column + lane]))
+            best, best_place = float(pairs.flat[at]), (*divmod(at, pairs.shape[1]), lane)
+    which, column, lane = best_place
+    return LanePose(
+        float(meeting_left[which]), float(meeting_dip[which]), float(y[column]), float(y[column + lane])
+    )
 
 
 def _candidates(mean: float, sigma: float, step: float) -> np.ndarray:
@@ -109,27 +126,27 @@ def _candidates(mean: float, sigma: float, step: float) -> np.ndarray:
     return (mean + step * np.arange(-n, n + 1)).astype(np.float32)
 
 
-def _unlikely(value: np.ndarray, mean: float, sigma: float) -> np.ndarray:
+def _unlikeliness(value: np.ndarray, mean: float, sigma: float) -> np.ndarray:
     return (((value - mean) / sigma) ** 2).astype(np.float32)
 
 
-def _votes(voters: Voters, left: np.ndarray, dip: np.ndarray) -> np.ndarray:
+def _votes(voters: VotingPoints, meeting_left: np.ndarray, meeting_dip: np.ndarray) -> np.ndarray:
     """Share of rows with a point, by candidate and by y; each point is counted in about three bins of y."""
-    bins, outside = round(2 * SIDEWAYS / BIN), 1
-    y = (voters.left - left[:, None]) / (voters.metre * (voters.drop + dip[:, None]))
-    column = ((SIDEWAYS - y) * np.float32(1.0 / BIN) + outside).astype(np.int32)
+    bins, outside = round(2 * MOST_LATERAL / BIN_WIDTH), 1
+    y = (voters.offset - meeting_left[:, None]) / (voters.metre * (voters.drop + meeting_dip[:, None]))
+    column = ((MOST_LATERAL - y) * np.float32(1.0 / BIN_WIDTH) + outside).astype(np.int32)
     np.clip(column, 0, bins + outside, out=column)
-    column += (np.arange(len(left), dtype=np.int32) * (bins + 2 * outside))[:, None]
+    column += (np.arange(len(meeting_left), dtype=np.int32) * (bins + 2 * outside))[:, None]
     votes = np.bincount(
         column.ravel(),
         weights=np.broadcast_to(voters.weight, column.shape).ravel(),
-        minlength=len(left) * (bins + 2 * outside),
+        minlength=len(meeting_left) * (bins + 2 * outside),
     )
-    votes = votes.reshape(len(left), -1)[:, outside:-outside].astype(np.float32) / voters.rows
+    votes = votes.reshape(len(meeting_left), -1)[:, outside:-outside].astype(np.float32) / voters.rows
     return cv2.filter2D(votes, -1, np.float32([[0.5, 1.0, 0.5]]), borderType=cv2.BORDER_CONSTANT)
 
 
-class Fitted(NamedTuple):
+class FitResult(NamedTuple):
     """The result of the fit, `state` (4), and the values of its last step before the state moved.
 
     `metre` is px per m at each of n points; `error` (px) and `count` (weight) are by line and point (2, n).
@@ -141,19 +158,21 @@ class Fitted(NamedTuple):
     count: np.ndarray
 
 
-def settled(state: np.ndarray, voters: Voters, expected: np.ndarray, believed: np.ndarray) -> Fitted:
-    """Move `state` (left, dip, y_left, y_right) by weighted Gauss-Newton steps.
+def fit_state(
+    state: np.ndarray, voters: VotingPoints, expected: np.ndarray, believed: np.ndarray
+) -> FitResult:
+    """Move `state` (the first four values of a LanePose) by weighted Gauss-Newton steps.
 
     Points further from a line have less weight. `expected` (4, 4) times the state should be `believed`.
     """
-    n = len(voters.left)
+    n = len(voters.offset)
     terms = np.zeros((5, 2, n))  # negative derivatives of the error for each unknown, and the error
     terms[0] = 1.0
     prior = product(expected.T, expected)
-    for near in ROUNDS:
+    for near in FIT_REACHES:
         metre = voters.metre * (voters.drop + state[1])
         y = state[2:, None]
-        error = voters.left - state[0] - y * metre
+        error = voters.offset - state[0] - y * metre
         count = np.maximum(1.0 - (error / (metre * near)) ** 2, 0.0)
         terms[1] = y * voters.metre
         terms[2, 0] = terms[3, 1] = metre
@@ -162,25 +181,25 @@ def settled(state: np.ndarray, voters: Voters, expected: np.ndarray, believed: n
         sums = product(design, (design[:4] * (count * voters.precision).reshape(-1)).T)
         surprise = believed - (expected * state).sum(axis=1)
         pull = sums[4] + (expected.T * surprise).sum(axis=1)
-        state = state + _solved(sums[:4] + prior, pull)
-    return Fitted(state, metre, error, count)
+        state = state + _solve(sums[:4] + prior, pull)
+    return FitResult(state, metre, error, count)
 
 
-def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
+def fit_pose(pose: LanePose, voters: VotingPoints, belief: ExpectedPose) -> LanePose:
     """Fit `pose` to the points around its lines; `belief` determines what the points do not."""
-    means, sigmas = np.array([belief.left, belief.dip, belief.middle, belief.width]).T
+    means, sigmas = np.array([belief.meeting_left, belief.meeting_dip, belief.middle, belief.width]).T
     expected = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0.5, 0.5), (0, 0, 1, -1)]) / sigmas[:, None]
-    state, metre, error, count = settled(np.array(pose[:4]), voters, expected, means / sigmas)
-    near = ROUNDS[-1]
+    state, metre, error, count = fit_state(np.array(pose[:4]), voters, expected, means / sigmas)
+    near = FIT_REACHES[-1]
     off = np.abs(error / metre)
-    beside = (((off > near) & (off < BESIDE)) * voters.weight).sum(axis=1) / voters.rows
-    chance = beside * (4.0 / 3.0 * near / (2.0 * (BESIDE - near)))
-    seen = np.maximum((count * voters.weight).sum(axis=1) / voters.rows - chance, 0.0)
-    prob = 1.0 - each(exp, -seen / (FAINT + chance))
-    return Pose(*state.tolist(), *prob.tolist())
+    beside = (((off > near) & (off < CHANCE_DISTANCE)) * voters.weight).sum(axis=1) / voters.rows
+    chance = beside * (4.0 / 3.0 * near / (2.0 * (CHANCE_DISTANCE - near)))
+    excess = np.maximum((count * voters.weight).sum(axis=1) / voters.rows - chance, 0.0)
+    prob = 1.0 - each(exp, -excess / (FAINT_SHARE + chance))
+    return LanePose(*state.tolist(), *prob.tolist())
 
 
-def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve matrix * x = right for a positive definite matrix, by elimination."""
     rows = np.column_stack((matrix, right)).tolist()
     for i, pivot in enumerate(rows):

@@ -15,7 +15,7 @@ from selfdrive.messages import CameraView
 from selfdrive.sim.road_look import SOLID
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond import coded_detector as coded
-from selfdrive.visiond.hog import FEATURES, STRIDE, WINDOW, Hog, windows
+from selfdrive.visiond.hog import WINDOW_FEATURES, WINDOW_PIXELS, WINDOW_STRIDE, Hog, detection_windows
 from selfdrive.visiond.lane_net import LaneNet
 
 MOST_MISTAKEN_SHARE = 0.003
@@ -44,16 +44,20 @@ def evaluate_thresholds() -> list[tuple[float, float, float]]:
 def _scores_inside_lane(road: RoadRenderer, picture: np.ndarray, offset: float) -> np.ndarray:
     model = road.model
     part = np.ascontiguousarray(picture[coded.PART])
-    scores = LaneNet.load().score(windows(Hog(*part.shape).blocks(part)).reshape(-1, FEATURES))
+    scores = LaneNet.load().log_odds(
+        detection_windows(Hog(*part.shape).blocks(part)).reshape(-1, WINDOW_FEATURES)
+    )
     inside = np.zeros(coded.WINDOWS, bool)
     for down, across in np.ndindex(*coded.WINDOWS):
-        top, first = coded.FIRST_ROW + STRIDE * down, coded.FIRST_COLUMN + STRIDE * across
-        rows = np.array([top, top + WINDOW])
+        top, first = coded.FIRST_ROW + WINDOW_STRIDE * down, coded.FIRST_COLUMN + WINDOW_STRIDE * across
+        rows = np.array([top, top + WINDOW_PIXELS])
         margin = MIN_DISTANCE_FROM_LINE / np.array([model.metres_per_pixel(row) for row in rows])
         left, right = (
             a * rows + b for a, b in (model.line_in_picture(*line) for line in road.true_lines(offset))
         )
-        inside[down, across] = (left + margin < first).all() and (right - margin > first + WINDOW).all()
+        inside[down, across] = (left + margin < first).all() and (
+            right - margin > first + WINDOW_PIXELS
+        ).all()
     return scores[inside.ravel()]
 
 
@@ -65,11 +69,12 @@ def _misplaced_share(
         ideal_view = {"left_lane_y": 0.0, "right_lane_y": 0.0, "path_y": 0.0, "bend": (), "lead_d_rel": 0.0}
         detected = detector.detect(CameraView(**ideal_view, picture=picture))
         true_columns = [
-            a * coded.ROW + b for a, b in (road.model.line_in_picture(*x) for x in road.true_lines(offset))
+            a * coded.READ_ROW + b
+            for a, b in (road.model.line_in_picture(*x) for x in road.true_lines(offset))
         ]
         true_positions = (
-            coded.metres(true_columns[0] + coded.INWARD),
-            coded.metres(true_columns[1] - coded.INWARD),
+            coded.lateral_position(true_columns[0] + coded.INWARD_PIXELS),
+            coded.lateral_position(true_columns[1] - coded.INWARD_PIXELS),
         )
         off += (
             abs(detected.left.y - true_positions[0]) > MOST_LINE_ERROR

@@ -16,7 +16,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPClassifier
 from threadpoolctl import threadpool_limits
 
-from selfdrive.visiond.lane_net import HIDDEN, WEIGHTS, LaneNet
+from selfdrive.visiond.lane_net import HIDDEN_NODES, WEIGHTS_PATH, LaneNet
 from selfdrive.visiond_lab.training_windows import draw_labelled_windows
 
 FULL_ROADS, SMALL_ROADS = (600, 60), (12, 4)  # roads for training and testing
@@ -26,7 +26,7 @@ WEIGHT_DECAY = 3e-3  # penalty on large weights
 
 def train_net(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
     model = MLPClassifier(
-        hidden_layer_sizes=(HIDDEN,),
+        hidden_layer_sizes=(HIDDEN_NODES,),
         activation="tanh",
         alpha=WEIGHT_DECAY,
         batch_size=256,
@@ -45,7 +45,7 @@ def train_net(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m selfdrive.visiond_lab.train", description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=WEIGHTS, help="the file to write")
+    parser.add_argument("--out", type=Path, default=WEIGHTS_PATH, help="the file to write")
     parser.add_argument("--small", action="store_true", help="few roads, for a trial")
     options = parser.parse_args(arguments)
     cv2.setNumThreads(1)
@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     learn, test = (np.random.default_rng([options.seed, purpose]) for purpose in (0, 1))
     net = train_net(*draw_labelled_windows(scenes, learn), options.seed)
     features, labels = draw_labelled_windows(others, test)
-    marked = net.score(features) > 0.0
+    marked = net.log_odds(features) > 0.0
     net.save(options.out)
     right_share, found_share, mistaken_share = (
         np.mean(part) for part in (marked == labels, marked[labels], marked[~labels])

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from selfdrive.visiond.hog import FEATURES, STRIDE, WINDOW, Hog, windows
+from selfdrive.visiond.hog import WINDOW_FEATURES, WINDOW_PIXELS, WINDOW_STRIDE, Hog, detection_windows
 from selfdrive.visiond.road_region import RoadRegion
 from selfdrive.visiond_lab.training_scenes import VIEWS_PER_SCENE, TrainingView, generate_views
 
@@ -16,16 +16,16 @@ RING_KERNEL = np.ones((7, 7), np.uint8)  # neighbourhood for comparison with pai
 
 def draw_labelled_windows(scenes: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Return features (windows x 1764, float32) and labels (bool), about half with a mark."""
-    features = np.empty((2 * MOST_WINDOWS_PER_LABEL * VIEWS_PER_SCENE * scenes, FEATURES), np.float32)
+    features = np.empty((2 * MOST_WINDOWS_PER_LABEL * VIEWS_PER_SCENE * scenes, WINDOW_FEATURES), np.float32)
     labels = np.empty(len(features), bool)
     used = 0
     for view in generate_views(scenes, rng):
         region = RoadRegion(view.model)
-        features_by_window = windows(Hog(*region.shape).blocks(view.picture[region.part]))
+        features_by_window = detection_windows(Hog(*region.shape).blocks(view.picture[region.part]))
         for label, weight in zip((True, False), _sampling_weights(view, region), strict=True):
             chosen = _draw_windows(weight * region.windows, rng)
             features[used : used + len(chosen)] = features_by_window[chosen[:, 0], chosen[:, 1]].reshape(
-                -1, FEATURES
+                -1, WINDOW_FEATURES
             )
             labels[used : used + len(chosen)] = label
             used += len(chosen)
@@ -62,7 +62,7 @@ def _sampling_weights(view: TrainingView, region: RoadRegion) -> tuple[np.ndarra
 
 
 def _sum_windows(image: np.ndarray) -> np.ndarray:
-    rows, columns = (size // STRIDE for size in image.shape)
-    tiles = image.reshape(rows, STRIDE, columns, STRIDE).sum(axis=(1, 3))
-    assert WINDOW == 2 * STRIDE
+    rows, columns = (size // WINDOW_STRIDE for size in image.shape)
+    tiles = image.reshape(rows, WINDOW_STRIDE, columns, WINDOW_STRIDE).sum(axis=(1, 3))
+    assert WINDOW_PIXELS == 2 * WINDOW_STRIDE
     return tiles[:-1, :-1] + tiles[1:, :-1] + tiles[:-1, 1:] + tiles[1:, 1:]

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from selfdrive.can.dbc import load
+from selfdrive.can.dbc import load_dbc
 from selfdrive.can.parser import CanParser
 from selfdrive.car.honda.values import (
     CAR_BUS,
@@ -41,7 +41,7 @@ class CarStateReader:
     """
 
     def __init__(self) -> None:
-        self._parser = CanParser(load(CAR_DBC), CAR_MESSAGES, CAR_BUS)
+        self._parser = CanParser(load_dbc(CAR_DBC), CAR_MESSAGES, CAR_BUS)
         self._speed = SteadyKalman(0.0, 0.0, dt=DT_CTRL, gains=SPEED_GAINS)
         self._cruise_button = CruiseButton.NONE
         self._cruise_setting = 0

@@ -1,7 +1,7 @@
 """The frames that the controller sends to the car."""
 
-from selfdrive.can.dbc import load
-from selfdrive.can.packer import Packer
+from selfdrive.can.dbc import load_dbc
+from selfdrive.can.packer import MessagePacker
 from selfdrive.car.honda.values import BRAKE_COUNTS, CAR_BUS, CAR_DBC
 from selfdrive.messages import CanFrame
 
@@ -10,10 +10,10 @@ class CommandPacker:
     """Packs commands in counts."""
 
     def __init__(self) -> None:
-        messages = load(CAR_DBC)
+        messages = load_dbc(CAR_DBC)
 
-        def packer(name: str, *signals: str) -> Packer:
-            return Packer(messages[name], signals, CAR_BUS)
+        def packer(name: str, *signals: str) -> MessagePacker:
+            return MessagePacker(messages[name], signals, CAR_BUS)
 
         self._steering = packer("STEERING_CONTROL", "STEER_TORQUE", "STEER_TORQUE_REQUEST")
         self._brake = packer(

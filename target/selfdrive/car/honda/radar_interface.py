@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from selfdrive.can.dbc import load
+from selfdrive.can.dbc import load_dbc
 from selfdrive.can.parser import CanParser
 from selfdrive.car.honda.values import (
     NO_TRACK_DISTANCE,
@@ -20,7 +20,7 @@ class RadarInterface:
     """Collects one radar cycle (20 Hz): a state frame, then the track frame that completes it."""
 
     def __init__(self) -> None:
-        self._parser = CanParser(load(RADAR_DBC), RADAR_MESSAGES, RADAR_BUS)
+        self._parser = CanParser(load_dbc(RADAR_DBC), RADAR_MESSAGES, RADAR_BUS)
         self._track_id = 0
         self._tracking = False
 

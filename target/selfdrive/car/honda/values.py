@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from selfdrive.can.parser import Expected
+from selfdrive.can.parser import ExpectedMessage
 
 CAR_BUS = 0
 RADAR_BUS = 1
@@ -39,31 +39,33 @@ STEER_OVERRIDE_TORQUE = 1200  # counts; above this, the driver's hands are on th
 
 # The messages that the controller reads. Some, such as STEER_STATUS, start in their unsafe state.
 CAR_MESSAGES = {
-    "ENGINE_DATA": Expected(("XMISSION_SPEED",), 100),
-    "WHEEL_SPEEDS": Expected(("WHEEL_SPEED_FL", "WHEEL_SPEED_FR", "WHEEL_SPEED_RL", "WHEEL_SPEED_RR"), 100),
-    "STEERING_SENSORS": Expected(("STEER_ANGLE", "STEER_ANGLE_RATE"), 100),
-    "STEER_STATUS": Expected(("STEER_TORQUE_SENSOR", "STEER_STATUS"), 100, (0, STEER_STATUS_FAULT)),
-    "POWERTRAIN_DATA": Expected(("PEDAL_GAS", "ACC_STATUS", "BRAKE_SWITCH", "BRAKE_PRESSED"), 100),
-    "GEARBOX": Expected(("GEAR_SHIFTER",), 50),
-    "VSA_STATUS": Expected(("ESP_DISABLED", "BRAKE_HOLD_ACTIVE"), 50, (1, 0)),
-    "STANDSTILL": Expected(("WHEELS_MOVING", "BRAKE_ERROR_1", "BRAKE_ERROR_2"), 50, (1, 0, 0)),
-    "EPB_STATUS": Expected(("EPB_STATE",), 10),
-    "SCM_BUTTONS": Expected(("CRUISE_BUTTONS", "CRUISE_SETTING"), 25),
-    "SCM_FEEDBACK": Expected(("MAIN_ON", "LEFT_BLINKER", "RIGHT_BLINKER"), 10),
-    "SEATBELT_STATUS": Expected(("SEATBELT_DRIVER_LAMP", "SEATBELT_DRIVER_LATCHED"), 10, (1, 0)),
-    "CRUISE": Expected(("CRUISE_SPEED_PCM",), 10),
-    "DOORS_STATUS": Expected(
+    "ENGINE_DATA": ExpectedMessage(("XMISSION_SPEED",), 100),
+    "WHEEL_SPEEDS": ExpectedMessage(
+        ("WHEEL_SPEED_FL", "WHEEL_SPEED_FR", "WHEEL_SPEED_RL", "WHEEL_SPEED_RR"), 100
+    ),
+    "STEERING_SENSORS": ExpectedMessage(("STEER_ANGLE", "STEER_ANGLE_RATE"), 100),
+    "STEER_STATUS": ExpectedMessage(("STEER_TORQUE_SENSOR", "STEER_STATUS"), 100, (0, STEER_STATUS_FAULT)),
+    "POWERTRAIN_DATA": ExpectedMessage(("PEDAL_GAS", "ACC_STATUS", "BRAKE_SWITCH", "BRAKE_PRESSED"), 100),
+    "GEARBOX": ExpectedMessage(("GEAR_SHIFTER",), 50),
+    "VSA_STATUS": ExpectedMessage(("ESP_DISABLED", "BRAKE_HOLD_ACTIVE"), 50, (1, 0)),
+    "STANDSTILL": ExpectedMessage(("WHEELS_MOVING", "BRAKE_ERROR_1", "BRAKE_ERROR_2"), 50, (1, 0, 0)),
+    "EPB_STATUS": ExpectedMessage(("EPB_STATE",), 10),
+    "SCM_BUTTONS": ExpectedMessage(("CRUISE_BUTTONS", "CRUISE_SETTING"), 25),
+    "SCM_FEEDBACK": ExpectedMessage(("MAIN_ON", "LEFT_BLINKER", "RIGHT_BLINKER"), 10),
+    "SEATBELT_STATUS": ExpectedMessage(("SEATBELT_DRIVER_LAMP", "SEATBELT_DRIVER_LATCHED"), 10, (1, 0)),
+    "CRUISE": ExpectedMessage(("CRUISE_SPEED_PCM",), 10),
+    "DOORS_STATUS": ExpectedMessage(
         ("DOOR_OPEN_FL", "DOOR_OPEN_FR", "DOOR_OPEN_RL", "DOOR_OPEN_RR"), 10, (1, 1, 1, 1)
     ),
 }
 
 RADAR_MESSAGES = {
-    "RADAR_DIAGNOSTIC": Expected(("RADAR_STATE",), 20),
-    "TRACK_15": Expected(("LONG_DIST", "LAT_DIST", "REL_SPEED"), 20),
+    "RADAR_DIAGNOSTIC": ExpectedMessage(("RADAR_STATE",), 20),
+    "TRACK_15": ExpectedMessage(("LONG_DIST", "LAT_DIST", "REL_SPEED"), 20),
 }
 
 COMMAND_MESSAGES = {
-    "STEERING_CONTROL": Expected(("STEER_TORQUE", "STEER_TORQUE_REQUEST"), 100),
-    "BRAKE_COMMAND": Expected(("COMPUTER_BRAKE",), 50),
-    "GAS_COMMAND": Expected(("GAS_COMMAND",), 50),
+    "STEERING_CONTROL": ExpectedMessage(("STEER_TORQUE", "STEER_TORQUE_REQUEST"), 100),
+    "BRAKE_COMMAND": ExpectedMessage(("COMPUTER_BRAKE",), 50),
+    "GAS_COMMAND": ExpectedMessage(("GAS_COMMAND",), 50),
 }

@@ -26,8 +26,8 @@ class CompiledFit(CubicFit):
         self._fit.restype = None
         self._points, self._poly = array("d", bytes(8 * N_POINTS)), array("d", bytes(8 * len(POWERS)))
         arrays = array("d", chain(*weights(N_POINTS))), self._points, self._poly
-        self._held = [ctypes.c_double.from_buffer(values) for values in arrays]
-        of, points, poly = (ctypes.c_void_p(ctypes.addressof(first)) for first in self._held)
+        self._buffers = [ctypes.c_double.from_buffer(values) for values in arrays]
+        of, points, poly = (ctypes.c_void_p(ctypes.addressof(first)) for first in self._buffers)
         self._arguments = of, points, ctypes.c_long(N_POINTS), poly
 
     def __call__(self, points: Sequence[float]) -> Poly:

@@ -22,10 +22,10 @@ class DriverAwareness:
         self.status -= DT_CTRL / AWARENESS_TIME
         if self.status <= 0.0:
             return "driver_distracted"
-        left = self.status * AWARENESS_TIME
+        remaining = self.status * AWARENESS_TIME
         return (
             "pre_driver_distracted"
-            if AWARENESS_PRE_TIME - PRE_ALERT_TIME <= left <= AWARENESS_PRE_TIME
+            if AWARENESS_PRE_TIME - PRE_ALERT_TIME <= remaining <= AWARENESS_PRE_TIME
             else ""
         )
 

@@ -34,10 +34,10 @@ def _residuals(z: ca.SX, rate: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX]:
     left, right, model = ca.horzsplit(ca.horzcat(x**3, x**2, x, 1) @ cubics)
     headings = ca.horzsplit(ca.atan(ca.horzcat(3 * x**2, 2 * x, 1) @ cubics[:3, :]))
 
-    seen = left_prob + right_prob - left_prob * right_prob
-    by_left = seen * left_prob / (left_prob + right_prob + 0.0001)
-    by_right = seen * right_prob / (left_prob + right_prob + 0.0001)
-    shares = (by_left, by_right, 1 - seen)
+    lane_prob = left_prob + right_prob - left_prob * right_prob
+    by_left = lane_prob * left_prob / (left_prob + right_prob + 0.0001)
+    by_right = lane_prob * right_prob / (left_prob + right_prob + 0.0001)
+    shares = (by_left, by_right, 1 - lane_prob)
     lines = (left - width / 2, right + width / 2, model)
     off_path = total(share * line for share, line in zip(shares, lines, strict=True)) - y
     off_heading = total(share * angle for share, angle in zip(shares, headings, strict=True)) - heading

@@ -24,8 +24,8 @@ def _ode(z: ca.SX, jerk: ca.SX, decay: ca.SX) -> ca.SX:
 def _residuals(z: ca.SX, jerk: ca.SX, decay: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Danger of a collision, error of the gap, acceleration and jerk (not at the end)."""
     x, v, a, x_lead, v_lead, _ = ca.vertsplit(z)
-    wanted = STANDSTILL_GAP + TIME_GAP * (2 * v - v_lead) + (v * v - v_lead * v_lead) / BRAKING
-    lack = wanted - (x_lead - x)
+    desired_gap = STANDSTILL_GAP + TIME_GAP * (2 * v - v_lead) + (v * v - v_lead * v_lead) / BRAKING
+    lack = desired_gap - (x_lead - x)
     danger = ca.exp(0.3 * lack / (ca.sqrt(v + 0.5) + 0.1)) - 1
     comfort = 1 + v / 10
     end = ca.vertcat(danger, -lack / (0.1 * v + 0.5), a * comfort)

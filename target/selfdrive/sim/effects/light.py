@@ -5,7 +5,7 @@ from math import acos, cos, exp, log, pi, radians, sin, sqrt
 import cv2
 import numpy as np
 
-from selfdrive.common.array_math import each, length
+from selfdrive.common.array_math import each, vector_lengths
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 from selfdrive.sim.picture import Picture, Region
@@ -60,7 +60,7 @@ def pixel_rays(camera: CameraModel) -> np.ndarray:
     down = low * cos(camera.pitch) + sin(camera.pitch)
     ahead = cos(camera.pitch) - low * sin(camera.pitch)
     rays = np.stack([right, down, ahead], axis=-1)
-    return rays / length(rays)
+    return rays / vector_lengths(rays)
 
 
 def mirrored_sun_luminance(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
@@ -70,7 +70,7 @@ def mirrored_sun_luminance(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
     """
     down = np.maximum(rays[..., 1], 0.02)
     half = sun - rays
-    half /= length(half)
+    half /= vector_lengths(half)
     across = np.clip((half * sun).sum(axis=-1), 0.0, 1.0)
     upright = np.maximum(-half[..., 1], 1e-3)
     slope = (1.0 / upright**2 - 1.0) / ASPHALT_SLOPES**2

@@ -1,15 +1,15 @@
 """The parser accepts only frames with a valid size, checksum and counter, and detects missing messages."""
 
 import pytest
-from selfdrive.can.dbc import load
-from selfdrive.can.packer import Packer
-from selfdrive.can.parser import CanParser, Expected
+from selfdrive.can.dbc import load_dbc
+from selfdrive.can.packer import MessagePacker
+from selfdrive.can.parser import CanParser, ExpectedMessage
 from selfdrive.car.honda.values import CAR_DBC
 
-MESSAGES = load(CAR_DBC)
+MESSAGES = load_dbc(CAR_DBC)
 EXPECTED = {
-    "ENGINE_DATA": Expected(("XMISSION_SPEED",), 100, (-1,)),
-    "WHEEL_SPEEDS": Expected(("WHEEL_SPEED_FL",), 50),
+    "ENGINE_DATA": ExpectedMessage(("XMISSION_SPEED",), 100, (-1,)),
+    "WHEEL_SPEEDS": ExpectedMessage(("WHEEL_SPEED_FL",), 50),
 }
 
 
@@ -20,12 +20,12 @@ def parser():
 
 @pytest.fixture
 def speed():
-    return Packer(MESSAGES["ENGINE_DATA"], ("XMISSION_SPEED",))
+    return MessagePacker(MESSAGES["ENGINE_DATA"], ("XMISSION_SPEED",))
 
 
 @pytest.fixture
 def wheels():
-    return Packer(MESSAGES["WHEEL_SPEEDS"], ("WHEEL_SPEED_FL",))
+    return MessagePacker(MESSAGES["WHEEL_SPEEDS"], ("WHEEL_SPEED_FL",))
 
 
 def test_values_are_defaults_before_the_first_frame(parser):

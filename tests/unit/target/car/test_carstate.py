@@ -3,8 +3,8 @@
 from math import radians
 
 import pytest
-from selfdrive.can.dbc import load
-from selfdrive.can.packer import Packer
+from selfdrive.can.dbc import load_dbc
+from selfdrive.can.packer import MessagePacker
 from selfdrive.car.honda.carstate import CarStateReader
 from selfdrive.car.honda.values import CAR_DBC, CruiseButton
 from selfdrive.messages import ButtonEvent
@@ -21,7 +21,7 @@ def read(reader, bench, **kw):
 
 
 def pack(name, counter, **signals):
-    return Packer(load(CAR_DBC)[name], tuple(signals)).pack(tuple(signals.values()), counter)
+    return MessagePacker(load_dbc(CAR_DBC)[name], tuple(signals)).pack(tuple(signals.values()), counter)
 
 
 def test_an_ordinary_car_is_ready_to_engage(reader, bench):

@@ -1,8 +1,8 @@
 """Events that the car raises."""
 
 import pytest
-from selfdrive.can.dbc import load
-from selfdrive.can.packer import Packer
+from selfdrive.can.dbc import load_dbc
+from selfdrive.can.packer import MessagePacker
 from selfdrive.car.honda.interface import CarInterface
 from selfdrive.car.honda.values import CAR_DBC, CruiseButton
 
@@ -18,7 +18,7 @@ def update(car, bench, **kw):
 
 
 def pack(name, counter, **signals):
-    return Packer(load(CAR_DBC)[name], tuple(signals)).pack(tuple(signals.values()), counter)
+    return MessagePacker(load_dbc(CAR_DBC)[name], tuple(signals)).pack(tuple(signals.values()), counter)
 
 
 def kinds(state):

@@ -30,9 +30,9 @@ def test_fit_is_least_squares() -> None:
 
 @pytest.mark.skipif(not compiler_command(), reason="there is no C compiler")
 def test_a_compiled_fit_has_the_same_bits(all_compiled: Path) -> None:
-    compiled.use(all_compiled)
+    compiled.use_libraries_in(all_compiled)
     fast = build_fit()
-    compiled.use(None)
+    compiled.use_libraries_in(None)
     assert isinstance(fast, CompiledFit) and type(build_fit()) is CubicFit
     draw = random.Random(3)
     cases: list[list[float]] = [[draw.gauss(0.0, 10.0**size) for _ in range(50)] for size in range(-3, 12)]

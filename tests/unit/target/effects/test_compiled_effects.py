@@ -79,16 +79,16 @@ def both(folder):
     """Build an effect in Python and in C. Skip the test if OpenCV computes different bits from the C code."""
 
     def made(kind, amount, seed, camera):
-        compiled.use(None)
+        compiled.use_libraries_in(None)
         plain = kind(amount, seed, camera).ready()
-        compiled.use(folder)
+        compiled.use_libraries_in(folder)
         fast = kind(amount, seed, camera).ready()
         if fast._key == plain._key:
             pytest.skip("OpenCV computes different bits from the C code")
         return plain, fast
 
     yield made
-    compiled.use(None)
+    compiled.use_libraries_in(None)
 
 
 def pictures(random, shape):
@@ -125,9 +125,9 @@ def test_results_do_not_depend_on_wide_vector_instructions(folder, tmp_path, cam
     drawn = []
     noise = np.random.default_rng(2).integers(0, 256, (camera.rows, camera.width), np.uint8)
     for libraries in (folder, compile_effects(tmp_path, "-DIS_FAST=0")):
-        compiled.use(libraries)
+        compiled.use_libraries_in(libraries)
         drawn.append(kind(LEVEL_AMOUNTS[kind][-1], 1, camera))
-    compiled.use(None)
+    compiled.use_libraries_in(None)
     if any(effect._key[-1] == "" for effect in drawn):
         pytest.skip("OpenCV computes different bits from the C code")
     assert drawn[0]._key != drawn[1]._key
@@ -146,9 +146,9 @@ def test_impossible_speeds_give_the_same_drawing(both, camera, speed):
 
 @pytest.mark.parametrize(("sigma", "size"), [(0.5, 0), (1.2, 0), (5.0, 0), (7.0, 29), (0.0, 3), (0.0, 31)])
 def test_compiled_blurs_have_the_same_bits(folder, sigma, size):
-    compiled.use(folder)
+    compiled.use_libraries_in(folder)
     fast, plain, random = build_gaussian(sigma, size), Gaussian(sigma, size), np.random.default_rng(3)
-    compiled.use(None)
+    compiled.use_libraries_in(None)
     if not isinstance(fast, CompiledGaussian):
         pytest.skip("OpenCV computes different bits from the C code")
     for shape in [(1, 1), (3, 90), (plain.size // 2 + 1,) * 2, (60, 80), *random.integers(1, 200, (12, 2))]:
@@ -158,9 +158,9 @@ def test_compiled_blurs_have_the_same_bits(folder, sigma, size):
 
 
 def test_droplets_use_numpys_random_numbers(folder):
-    compiled.use(folder)
+    compiled.use_libraries_in(folder)
     fast, by = compiled_scattered.build_scattered()
-    compiled.use(None)
+    compiled.use_libraries_in(None)
     assert by
     for before in range(3):
         for shape, count in (((480, 640), 1), ((480, 640), 15_000), ((1, 3), 40), ((720, 1279), 150_001)):
@@ -173,7 +173,7 @@ def test_droplets_use_numpys_random_numbers(folder):
 
 @pytest.mark.parametrize("source", C_SOURCES, ids=lambda source: source.stem)
 def test_an_edited_effect_does_not_use_its_library(folder, tmp_path, monkeypatch, source):
-    compiled.use(folder)
+    compiled.use_libraries_in(folder)
     assert compiled.library(source) is not None
     named = compiled.stands_for(source.read_bytes())
     for name in (source.name, *named):
@@ -184,11 +184,11 @@ def test_an_edited_effect_does_not_use_its_library(folder, tmp_path, monkeypatch
         (tmp_path / name).write_text(text + "\n")
         assert compiled.library(tmp_path / source.name) is None
         (tmp_path / name).write_text(text)
-    compiled.use(None)
+    compiled.use_libraries_in(None)
 
 
 def test_the_library_is_not_used_if_opencv_computes_other_bits(folder, monkeypatch):
-    compiled.use(folder)
+    compiled.use_libraries_in(folder)
     darker = Gaussian.__call__
     monkeypatch.setattr(Gaussian, "__call__", lambda blur, picture: darker(blur, picture) // 2)
     plain = compiled_precipitation.PYTHON_PARTS
@@ -205,15 +205,15 @@ def test_the_library_is_not_used_if_opencv_computes_other_bits(folder, monkeypat
     assert parts.particles is particles.Particles and by == ""
     for kept in caches:
         kept.cache_clear()
-    compiled.use(None)
+    compiled.use_libraries_in(None)
 
 
 def test_a_camera_with_numpy_scalars_uses_python(folder):
     """With NumPy scalars in the camera, NumPy computes in double precision."""
-    compiled.use(folder)
+    compiled.use_libraries_in(folder)
     camera = replace(CameraModel(), cx=np.float64(317.9))
     assert precipitation.build_precipitation_parts(camera)[1] == ""
-    compiled.use(None)
+    compiled.use_libraries_in(None)
 
 
 @pytest.mark.slow
@@ -233,7 +233,7 @@ def same_runs(folder, tmp_path, monkeypatch, kind, detector):
     amount = LEVEL_AMOUNTS[kind][4]
 
     def driven(libraries):
-        compiled.use(libraries)
+        compiled.use_libraries_in(libraries)
         weather = []
 
         def in_weather(camera, truth):
@@ -251,4 +251,4 @@ def same_runs(folder, tmp_path, monkeypatch, kind, detector):
         return [(out / name).read_bytes() for name in ("record.json", "trace.npz")]
 
     assert driven(folder) == driven(None)
-    compiled.use(None)
+    compiled.use_libraries_in(None)

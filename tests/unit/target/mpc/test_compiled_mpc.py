@@ -13,7 +13,7 @@ from pathlib import Path
 import casadi
 import pytest
 from selfdrive.common import compiled
-from selfdrive.controls.lib import compiled_mpc, mpc_parts
+from selfdrive.controls.lib import compiled_mpc, generate_mpc_header
 from selfdrive.controls.lib.compiled_mpc import CompiledSolver, build_lateral, build_longitudinal
 from selfdrive.controls.lib.lateral_mpc import FIRST_RATE
 from selfdrive.controls.lib.lateral_ocp import lateral_ocp
@@ -35,9 +35,9 @@ pytestmark = pytest.mark.skipif(not compiler_command(), reason="there is no C co
 
 @pytest.fixture
 def use(all_compiled: Path) -> Iterator[None]:
-    compiled.use(all_compiled)
+    compiled.use_libraries_in(all_compiled)
     yield
-    compiled.use(None)
+    compiled.use_libraries_in(None)
 
 
 @pytest.fixture(scope="module")
@@ -126,8 +126,8 @@ def test_a_solvers_result_does_not_depend_on_earlier_problems(name: str) -> None
 
 
 def test_the_generated_header_is_current() -> None:
-    assert casadi.__version__ == compiled_mpc.CASADI
-    assert mpc_parts.HEADER.read_text() == mpc_parts.header()
+    assert casadi.__version__ == compiled_mpc.CASADI_VERSION
+    assert generate_mpc_header.HEADER_PATH.read_text() == generate_mpc_header.render_header()
     assert long_ocp().weights == compiled_mpc.LONGITUDINAL_WEIGHTS
     assert lateral_ocp(RATE_COST).weights == (*compiled_mpc.LATERAL_WEIGHTS, RATE_COST)
 
@@ -137,18 +137,18 @@ def test_the_generated_header_is_current() -> None:
 def test_the_library_is_not_used_with_another_version_of_daqp(
     other: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    compiled_mpc._daqp.cache_clear()
+    compiled_mpc._find_daqp.cache_clear()
     if other == "version":
-        monkeypatch.setattr(compiled_mpc, "CASADI", "3.7.0")
+        monkeypatch.setattr(compiled_mpc, "CASADI_VERSION", "3.7.0")
     elif other == "function":
         monkeypatch.setattr(ctypes, "CDLL", lambda path: object())
     else:
         nothing = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(lambda *_: None)
-        monkeypatch.setattr(compiled_mpc, "_daqp", lambda: ctypes.cast(nothing, ctypes.c_void_p))
-    found = compiled_mpc._code()
+        monkeypatch.setattr(compiled_mpc, "_find_daqp", lambda: ctypes.cast(nothing, ctypes.c_void_p))
+    found = compiled_mpc._load_code()
     monkeypatch.undo()
-    compiled_mpc._daqp.cache_clear()
-    assert found is None and compiled_mpc._code() is not None
+    compiled_mpc._find_daqp.cache_clear()
+    assert found is None and compiled_mpc._load_code() is not None
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_the_library_is_not_used_with_another_version_of_daqp(
 def test_an_edited_problem_is_solved_by_casadi(all_compiled: Path, tmp_path: Path, edited: str) -> None:
     target = tmp_path / "target"
     shutil.copytree(
-        mpc_parts.HEADER.parents[3] / "selfdrive",
+        generate_mpc_header.HEADER_PATH.parents[3] / "selfdrive",
         target / "selfdrive",
         ignore=shutil.ignore_patterns("*.pyc"),
     )
@@ -185,7 +185,7 @@ def test_a_compiled_run_without_frames_does_not_import_casadi(all_compiled: Path
         "open_run(['--scenario', %r, '--out', 'none', '--compiled', %r]).step(); "
         "print([name for name in ('casadi', 'cv2', 'skimage') if name in sys.modules])"
     )
-    root = mpc_parts.HEADER.parents[3]
+    root = generate_mpc_header.HEADER_PATH.parents[3]
     scenario = root.parent / "fault_library/scenarios/S1.yaml"
     command = [sys.executable, "-c", code % (str(scenario), str(all_compiled))]
     ran = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)

@@ -12,7 +12,7 @@ def drive(scenario, change=lambda simulator: None, simulator=None):
     simulator = simulator or Simulator()
     simulator.reset(scenario, 0)
     change(simulator)
-    while not simulator.done:
+    while not simulator.is_finished:
         simulator.step()
     return simulator.result()
 

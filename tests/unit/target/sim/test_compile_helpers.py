@@ -27,7 +27,7 @@ needs_compiler = pytest.mark.skipif(not COMPILER, reason="there is no C compiler
 def _none_afterwards():
     """Hide the helpers compiled here from all other tests."""
     yield
-    compiled.use(None)
+    compiled.use_libraries_in(None)
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def test_every_c_file_names_the_python_files_that_it_replaces():
 @needs_compiler
 @pytest.mark.parametrize("edited", ["mark_windows.c", "hog.py", "lane_net.py"])
 def test_a_library_is_found_only_for_the_code_that_it_replaces(helpers, monkeypatch, tmp_path, edited):
-    compiled.use(helpers)
+    compiled.use_libraries_in(helpers)
     assert compiled.library(C_SOURCE) is not None
     for name in (C_SOURCE.name, *compiled.stands_for(C_SOURCE.read_bytes())):
         shutil.copy(C_SOURCE.with_name(name), tmp_path)
@@ -54,7 +54,7 @@ def test_a_library_is_found_only_for_the_code_that_it_replaces(helpers, monkeypa
     assert type(build_coded_detector(MODEL)) is CompiledCodedDetector
     (tmp_path / edited).write_text((tmp_path / edited).read_text() + "\n")
     assert type(build_coded_detector(MODEL)) is CodedDetector
-    compiled.use(None)
+    compiled.use_libraries_in(None)
     assert compiled.library(C_SOURCE) is None
 
 
@@ -62,7 +62,7 @@ def test_a_library_is_found_only_for_the_code_that_it_replaces(helpers, monkeypa
 @pytest.mark.parametrize("keep", [0, 10, 5000, -1])
 def test_a_truncated_library_is_not_used(helpers, keep):
     (helpers / NAME).write_bytes((helpers / NAME).read_bytes()[:keep])
-    compiled.use(helpers)
+    compiled.use_libraries_in(helpers)
     assert compiled.library(C_SOURCE) is None
     assert type(build_coded_detector(MODEL)) is CodedDetector
 
@@ -73,14 +73,14 @@ def test_a_library_with_a_changed_byte_is_not_used(helpers):
     data = bytearray((helpers / NAME).read_bytes())
     data[len(data) // 2] ^= 1
     (helpers / NAME).write_bytes(data)
-    compiled.use(helpers)
+    compiled.use_libraries_in(helpers)
     assert type(build_coded_detector(MODEL)) is CodedDetector
 
 
 @pytest.mark.parametrize("folder", ["none", "x" * 300, "empty"])
 def test_a_folder_without_libraries_is_not_an_error(tmp_path, folder):
     (tmp_path / "empty").mkdir()
-    compiled.use(tmp_path / folder)
+    compiled.use_libraries_in(tmp_path / folder)
     assert compiled.library(C_SOURCE) is None
 
 

@@ -25,7 +25,7 @@ def drive(scenarios):
         )
         simulator = Simulator()
         simulator.reset(scenario, 0)
-        while not simulator.done:
+        while not simulator.is_finished:
             if simulator.frame == STEP_AT:
                 simulator._plant.lateral.offset -= step
             simulator.step()

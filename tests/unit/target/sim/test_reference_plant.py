@@ -159,7 +159,7 @@ def test_one_simulator_can_run_both_plants(s1):
     simulator, results = Simulator(), []
     for scenario in (s1, replace(s1, plant="standard"), s1):
         simulator.reset(replace(scenario, steps=200), 0)
-        while not simulator.done:
+        while not simulator.is_finished:
             simulator.step()
         results.append(simulator.result())
     assert [result.record["plant"] for result in results] == ["reference", "standard", "reference"]

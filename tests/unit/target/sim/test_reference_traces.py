@@ -120,7 +120,7 @@ def faulty(scenario, disturb):
     observe = simulator._observe
     simulator._observe = lambda t: truths.append(observe(t)) or truths[-1]
     disturb(simulator, truths)
-    while not simulator.done:
+    while not simulator.is_finished:
         simulator.step()
     return simulator.result().record
 

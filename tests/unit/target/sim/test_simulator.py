@@ -113,7 +113,7 @@ def test_the_record_has_hazards_and_alerts(s1):
     simulator = Simulator()
     simulator.reset(replace(s1, steps=1000), 7)
     simulator.manager = script
-    while not simulator.done:
+    while not simulator.is_finished:
         on = simulator.frame // 100 % 2 == 1
         script.controlsd.state = ControlsState(
             enabled=simulator.frame >= 131, alerts=("fcw", "startup") if on else ("startup",)

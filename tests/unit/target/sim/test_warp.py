@@ -22,9 +22,9 @@ SHAPE = 308, 640
 
 @pytest.fixture(scope="module")
 def library(all_compiled):
-    compiled.use(all_compiled)
+    compiled.use_libraries_in(all_compiled)
     yield compiled.library(compiled_warp.C_SOURCE)
-    compiled.use(None)
+    compiled.use_libraries_in(None)
 
 
 def moves(random):

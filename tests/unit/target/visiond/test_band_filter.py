@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from selfdrive.visiond.band_filter import mark_points
+from selfdrive.visiond.band_filter import find_mark_points
 
 ROWS, COLUMNS = 60, 260
 
@@ -18,7 +18,7 @@ def road(*bands: tuple[int, int, float], ground: float = 90.0, noise: float = 1.
 
 def support(picture: np.ndarray, first: int, last: int) -> float:
     """Return the weight of the points in these columns, as a share of the rows."""
-    points = mark_points(picture)
+    points = find_mark_points(picture)
     return float(points.weight[(points.column >= first) & (points.column < last)].sum()) / ROWS
 
 
@@ -26,7 +26,7 @@ def support(picture: np.ndarray, first: int, last: int) -> float:
 @pytest.mark.parametrize("brighter", [15.0, 60.0, 140.0])
 def test_the_middle_of_a_mark_is_found(width, brighter):
     picture = road((100, width, brighter))
-    points = mark_points(picture)
+    points = find_mark_points(picture)
     near = np.abs(points.column - (100 + 0.5 * (width - 1))) <= 1.0
     assert support(picture, 95, 110) > (0.5 if brighter < 20.0 else 0.8)
     assert points.weight[near].sum() > 0.95 * points.weight.sum() - 2.0
@@ -56,5 +56,5 @@ def test_brightness_does_not_matter(light):
 
 def test_points_on_rough_ground_have_little_weight():
     rough = road(noise=25.0)
-    points = mark_points(rough)
+    points = find_mark_points(rough)
     assert points.weight.sum() / ROWS * 7 / COLUMNS < 0.1

@@ -20,7 +20,7 @@ def drive(name: str, marks: str, cache: Path):
     simulator = Simulator()
     pictures = PictureOptions(detector="paper", marks=marks, cache=cache)
     simulator.reset(load_scenario(SCENARIOS / f"{name}.yaml"), 0, pictures)
-    while not simulator.done:
+    while not simulator.is_finished:
         simulator.step()
     return simulator.result()
 

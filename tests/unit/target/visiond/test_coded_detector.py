@@ -7,7 +7,7 @@ from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond import coded_detector as coded
-from selfdrive.visiond.coded_detector import CodedDetector, edges_in_windows, metres
+from selfdrive.visiond.coded_detector import CodedDetector, edges_in_windows, lateral_position
 from selfdrive.visiond.detector import LaneLines
 
 CALTECH = CameraModel()
@@ -33,7 +33,7 @@ def test_lines_are_read_in_one_row(road: RoadRenderer, offset: float) -> None:
     found = seen(CodedDetector(CALTECH), road.render_grey(4.0, offset))
     for line, true, inward in zip(found[:2], road.true_lines(offset), (3, -3), strict=True):
         a, b = CALTECH.line_in_picture(*true)
-        assert line.y == pytest.approx(metres(a * 278 + b + inward), abs=0.05)
+        assert line.y == pytest.approx(lateral_position(a * 278 + b + inward), abs=0.05)
         assert (line.slope, line.prob) == (0.0, 1.0)
     assert found.path == (0.0, 0.0, 1.0, None)
 
@@ -50,7 +50,7 @@ def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> 
 
 
 def test_both_lines_can_be_missing(road: RoadRenderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(coded, "LEAST_POINTS", 10**6)
+    monkeypatch.setattr(coded, "MIN_CLUSTER_POINTS", 10**6)
     found = seen(CodedDetector(CALTECH), road.render_grey(4.0))
     assert [line.y for line in found[:2]] == pytest.approx([7.88, 8.03], abs=0.005)
     assert [line.prob for line in found[:2]] == [1.0, 1.0]
@@ -62,7 +62,7 @@ def test_a_window_needs_25_edges(edges: int, looked_at: bool, monkeypatch: pytes
     crests[40].reshape(-1)[:edges] = True
     monkeypatch.setattr(coded, "edges_in_windows", lambda part: crests)
     detector = CodedDetector(CALTECH, threshold=-np.inf)
-    points = detector._points(np.zeros(coded.SIZE, np.uint8))
+    points = detector._points(np.zeros(coded.PART_SIZE, np.uint8))
     assert len(points) == (edges if looked_at else 0)
     if looked_at:  # window 40 is the twelfth of the second row
         assert points.min(axis=0).tolist() == [235 + 16, 90 + 11 * 16]
@@ -94,13 +94,13 @@ def test_the_detectors_only_memory_is_its_state(road: RoadRenderer) -> None:
 
 def test_steepness_is_relative_to_the_window() -> None:
     random = np.random.default_rng(1)
-    faint = random.integers(0, 10, coded.SIZE).astype(np.uint8)
+    faint = random.integers(0, 10, coded.PART_SIZE).astype(np.uint8)
     assert edges_in_windows(faint).any()
     assert np.array_equal(edges_in_windows(faint), edges_in_windows(10 * faint))
 
 
 def test_edges_are_brightness_steps_between_rows() -> None:
-    level, upright = np.zeros((2, *coded.SIZE), np.uint8)
+    level, upright = np.zeros((2, *coded.PART_SIZE), np.uint8)
     level[40:], upright[:, 40:] = 100, 100
     assert edges_in_windows(level).any()
     assert not edges_in_windows(upright).any()
@@ -110,9 +110,9 @@ def test_a_chain_of_pixels_joins_two_clusters() -> None:
     crowd = np.argwhere(np.ones((8, 8), bool))
     beyond = crowd + np.array([0, 38])
     chain = np.column_stack((np.full(30, 4), np.arange(8, 38)))
-    labels = coded._linked(np.concatenate((crowd, chain, beyond)), 1.5)
+    labels = coded._link_pixels(np.concatenate((crowd, chain, beyond)), 1.5)
     assert len(set(labels)) == 1
-    assert len(set(coded._linked(np.concatenate((crowd, beyond)), 1.5))) == 2
+    assert len(set(coded._link_pixels(np.concatenate((crowd, beyond)), 1.5))) == 2
 
 
 def test_frames_of_another_size_are_refused() -> None:

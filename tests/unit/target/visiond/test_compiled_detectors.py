@@ -14,19 +14,19 @@ from selfdrive.sim.effects.effect import Moment
 from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond import compiled_robust, compiled_view, compiled_windows
-from selfdrive.visiond.band_filter import EDGE, STRONGEST
+from selfdrive.visiond.band_filter import EDGE_COLUMNS, MOST_POINTS
 from selfdrive.visiond.coded_detector import CodedDetector
 from selfdrive.visiond.compiled_coded import CompiledCodedDetector, build_coded_detector
 from selfdrive.visiond.compiled_paper import CompiledPaperDetector, build_paper_detector
 from selfdrive.visiond.compiled_robust import C_SOURCES, CompiledVote, build_robust_detector
 from selfdrive.visiond.compiled_view import CompiledRoadView
-from selfdrive.visiond.compiled_windows import MarkWindows
-from selfdrive.visiond.hog import FEATURES, Hog, windows
+from selfdrive.visiond.compiled_windows import MarkWindowFinder
+from selfdrive.visiond.hog import WINDOW_FEATURES, Hog, detection_windows
 from selfdrive.visiond.lane_net import FEATURE_STEPS, LaneNet
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.robust_detector import RobustDetector
-from selfdrive.visiond.voting import Belief, vote
+from selfdrive.visiond.voting import ExpectedPose, find_pose
 
 pytestmark = pytest.mark.skipif(not compile_helpers.compiler_command(), reason="there is no C compiler")
 MODEL = CameraModel()
@@ -58,9 +58,9 @@ def helpers(request, tmp_path_factory, all_compiled):
 
 @pytest.fixture(autouse=True)
 def _found(helpers):
-    compiled.use(helpers)
+    compiled.use_libraries_in(helpers)
     yield
-    compiled.use(None)
+    compiled.use_libraries_in(None)
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +155,7 @@ def test_maps_of_any_camera_are_the_same(width, rows, focal):
     slow, fast = RoadView(model), CompiledRoadView(model, compiled.library(compiled_view.C_SOURCE))
     for seed in range(5):
         picture = np.random.default_rng(seed).integers(0, 256, (rows, width), np.uint8)
-        assert np.array_equal(fast.map(picture), slow.map(picture))
+        assert np.array_equal(fast.map_picture(picture), slow.map_picture(picture))
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -164,15 +164,15 @@ def test_votes_are_the_same(seed):
     view = RoadView(MODEL)
     road = chance.integers(0, 2, (len(view.drop), len(view.y)), np.uint8)
     road[chance.random(len(view.drop)) < chance.choice([0.0, 0.5, 1.0])] = 7
-    numbers = len(view.drop) * (len(view.y) - 2 * EDGE)
-    count = chance.choice([seed % 10, chance.integers(0, 900), STRONGEST])
+    numbers = len(view.drop) * (len(view.y) - 2 * EDGE_COLUMNS)
+    count = chance.choice([seed % 10, chance.integers(0, 900), MOST_POINTS])
     at = np.sort(chance.choice(numbers, count, replace=False))
     weight = chance.uniform(0.0, 1.0, len(at)).astype(np.float32)
     fast = CompiledVote(compiled.library(VOTING), view)
-    first, then = Belief(), Belief((0.3, 0.19), (3.5, 0.02), (-9.1, 11.14), (1.7, 1.5))
-    wider, anywhere = then._replace(width=(7.9, 0.2)), first._replace(left=(0.0, 104.0))
-    for belief in (first, then, then._replace(left=(2.0, 41.0), width=(3.3, 0.2)), wider, anywhere):
-        found = [_voted(each, view, road, at, weight, belief) for each in (fast, vote)]
+    first, then = ExpectedPose(), ExpectedPose((0.3, 0.19), (3.5, 0.02), (-9.1, 11.14), (1.7, 1.5))
+    wider, anywhere = then._replace(width=(7.9, 0.2)), first._replace(meeting_left=(0.0, 104.0))
+    for belief in (first, then, then._replace(meeting_left=(2.0, 41.0), width=(3.3, 0.2)), wider, anywhere):
+        found = [_voted(each, view, road, at, weight, belief) for each in (fast, find_pose)]
         assert found[0] == found[1]
 
 
@@ -183,16 +183,22 @@ def _voted(choose, *given) -> str:
         return repr(type(error))
 
 
-@pytest.mark.parametrize("name", ["RoadView", "crests", "vote"])
+@pytest.mark.parametrize("name", ["RoadView", "find_crests", "find_pose"])
 def test_the_library_is_not_used_if_python_computes_other_bits(name, monkeypatch):
-    here = RoadView.map if name == "RoadView" else getattr(compiled_robust, name)
+    here = RoadView.map_picture if name == "RoadView" else getattr(compiled_robust, name)
 
     def otherwise(*given):
         first, *others = here(*given)
         return [first + 1, *others]
 
-    checks = compiled_robust.maps_alike, compiled_robust.finds_alike, compiled_robust.votes_alike
-    monkeypatch.setattr(*((RoadView, "map") if name == "RoadView" else (compiled_robust, name)), otherwise)
+    checks = (
+        compiled_robust.has_identical_maps,
+        compiled_robust.has_identical_crests,
+        compiled_robust.has_identical_votes,
+    )
+    monkeypatch.setattr(
+        *((RoadView, "map_picture") if name == "RoadView" else (compiled_robust, name)), otherwise
+    )
     for check in checks:
         check.cache_clear()
     found = build_robust_detector(MODEL)
@@ -206,28 +212,35 @@ def test_features_and_marked_windows_are_the_same(helpers, pictures):
     size = 112, 480
     hog, net = Hog(*size), LaneNet.load()
     for threshold in (0.0, 4.0, -2.5):
-        fast = MarkWindows(size, threshold, compiled.library(compiled_windows.C_SOURCE))
+        fast = MarkWindowFinder(size, threshold, compiled.library(compiled_windows.C_SOURCE))
         for picture in pictures[::3]:
             part = np.ascontiguousarray(picture[200:312, 80:560])
             found = hog.blocks(part)
             looked_at = np.random.default_rng(int(part.sum())).random((6, 29)) < 0.4
             marked = looked_at.copy()
-            assert fast.decide(part.ctypes.data, marked.ctypes.data)
+            assert fast.clear_windows_without_mark(part.ctypes.data, marked.ctypes.data)
             row, column = looked_at.nonzero()
-            above = net.score(windows(found)[row, column].reshape(-1, FEATURES)) > threshold
+            above = (
+                net.log_odds(detection_windows(found)[row, column].reshape(-1, WINDOW_FEATURES)) > threshold
+            )
             assert (marked[row, column] == above).all() and not marked[~looked_at].any()
-            steps = np.rint(windows(found) * np.float32(FEATURE_STEPS))
-            assert (windows(fast.blocks)[looked_at] == steps[looked_at]).all()
+            steps = np.rint(detection_windows(found) * np.float32(FEATURE_STEPS))
+            assert (detection_windows(fast.blocks)[looked_at] == steps[looked_at]).all()
 
 
 def test_a_score_too_close_to_the_threshold_is_left_to_python(pictures):
     """The C code reports a score close to the threshold, and the detector asks the net."""
     part = np.ascontiguousarray(pictures[0][200:232, 280:312])
-    score = float(LaneNet.load().score(windows(Hog(32, 32).blocks(part)).reshape(1, FEATURES))[0])
+    score = float(
+        LaneNet.load().log_odds(detection_windows(Hog(32, 32).blocks(part)).reshape(1, WINDOW_FEATURES))[0]
+    )
     library = compiled.library(compiled_windows.C_SOURCE)
     for threshold, decided in ((score, False), (score - 1e-8, True), (score + 1e-8, True)):
         window = np.ones(1, bool)
         assert (
-            MarkWindows((32, 32), threshold, library).decide(part.ctypes.data, window.ctypes.data) is decided
+            MarkWindowFinder((32, 32), threshold, library).clear_windows_without_mark(
+                part.ctypes.data, window.ctypes.data
+            )
+            is decided
         )
         assert not decided or window[0] == (score > threshold)

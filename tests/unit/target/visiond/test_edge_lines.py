@@ -6,7 +6,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.visiond.dbscan import dbscan
 from selfdrive.visiond.edge_lines import EdgeLines
-from selfdrive.visiond.mark_edges import edges
+from selfdrive.visiond.mark_edges import find_steep_edges
 from selfdrive.visiond.road_region import RoadRegion
 
 MODEL = CameraModel()
@@ -25,8 +25,8 @@ def seen(*strips: tuple[float, float, int], slope: float = 0.0):
         inside = (column >= a * row + b) & (column < c * row + d)
         picture[inside & (row > MODEL.horizon)] = tone
     part = np.ascontiguousarray(picture[REGION.part])
-    at, rising = edges(part)
-    return EdgeLines(MODEL, REGION).nearest(at, rising, dbscan(at, part.shape, 4, 8))
+    at, rising = find_steep_edges(part)
+    return EdgeLines(MODEL, REGION).nearest_lines(at, rising, dbscan(at, part.shape, 4, 8))
 
 
 @pytest.mark.parametrize("slope", [-0.05, 0.0, 0.05])
@@ -67,9 +67,9 @@ def test_a_dark_joint_beside_the_paint_does_not_hide_it(gap, width):
 def test_contrast_and_brightness_change_no_edge():
     part = np.full((64, 96), 80, np.uint8)
     part[:, 40:46] = 180
-    at, _ = edges(part)
+    at, _ = find_steep_edges(part)
     assert at.size > 0
-    assert np.array_equal(edges(part // 2 + 90)[0], at)
+    assert np.array_equal(find_steep_edges(part // 2 + 90)[0], at)
 
 
 def test_a_camera_that_sees_no_road_is_refused():

@@ -2,7 +2,16 @@
 
 import numpy as np
 import pytest
-from selfdrive.visiond.hog import BINS, CELL, FEATURES, STRIDE, WINDOW, Hog, _tables, windows
+from selfdrive.visiond.hog import (
+    CELL_PIXELS,
+    ORIENTATION_BINS,
+    WINDOW_FEATURES,
+    WINDOW_PIXELS,
+    WINDOW_STRIDE,
+    Hog,
+    _build_tables,
+    detection_windows,
+)
 from skimage.feature import hog
 
 TOLERANCE = 1e-6  # features are at most 1
@@ -22,7 +31,7 @@ def pictures() -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("name", pictures())
 def test_blocks_equal_those_of_scikit_image(name):
     picture = pictures()[name].astype(np.uint8)
-    expected = hog(picture, BINS, (CELL, CELL), (2, 2), "L2", feature_vector=False)
+    expected = hog(picture, ORIENTATION_BINS, (CELL_PIXELS, CELL_PIXELS), (2, 2), "L2", feature_vector=False)
     blocks = Hog(*picture.shape).blocks(picture)
     assert np.abs(blocks.reshape(expected.shape) - expected).max() <= TOLERANCE
 
@@ -30,11 +39,11 @@ def test_blocks_equal_those_of_scikit_image(name):
 def test_a_window_has_the_features_of_its_part_of_the_image():
     """The border is not compared, because a separate image has no gradient there."""
     picture = pictures()["noise"].astype(np.uint8)
-    shared = windows(Hog(*picture.shape).blocks(picture))
-    assert shared.shape == (3, 5, 7, FEATURES // 7)
+    shared = detection_windows(Hog(*picture.shape).blocks(picture))
+    assert shared.shape == (3, 5, 7, WINDOW_FEATURES // 7)
     top, left = 1, 2
-    part = picture[top * STRIDE :, left * STRIDE :][:WINDOW, :WINDOW]
-    alone = hog(part, BINS, (CELL, CELL), (2, 2), "L2", feature_vector=False)
+    part = picture[top * WINDOW_STRIDE :, left * WINDOW_STRIDE :][:WINDOW_PIXELS, :WINDOW_PIXELS]
+    alone = hog(part, ORIENTATION_BINS, (CELL_PIXELS, CELL_PIXELS), (2, 2), "L2", feature_vector=False)
     inner = shared[top, left].reshape(alone.shape)[1:-1, 1:-1]
     assert np.abs(inner - alone[1:-1, 1:-1]).max() <= TOLERANCE
 
@@ -50,6 +59,6 @@ def test_contrast_and_brightness_change_no_feature():
 def test_the_tables_have_the_angle_and_length_of_every_gradient():
     dx, dy = np.arange(-255, 256)[np.newaxis, :], np.arange(-255, 256)[:, np.newaxis]
     turned = np.degrees(np.arctan2(dy, dx)) % 180.0
-    tables = _tables()
-    assert np.array_equal(tables.orientation, (turned * BINS / 180.0).astype(np.uint8).ravel())
-    assert np.array_equal(tables.length, (np.sqrt(dx * dx + dy * dy) / CELL**2).ravel())
+    tables = _build_tables()
+    assert np.array_equal(tables.orientation, (turned * ORIENTATION_BINS / 180.0).astype(np.uint8).ravel())
+    assert np.array_equal(tables.length, (np.sqrt(dx * dx + dy * dy) / CELL_PIXELS**2).ravel())

@@ -10,8 +10,13 @@ from selfdrive.sim.road_look import RoadLook, standard_look
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.dbscan import dbscan
 from selfdrive.visiond.lane_net import LaneNet
-from selfdrive.visiond.mark_edges import edges, tile_numbers, tiles_with_mark, windows_on
-from selfdrive.visiond.paper_detector import EPS, MIN_SAMPLES, NEED, PaperDetector
+from selfdrive.visiond.mark_edges import find_steep_edges, tile_numbers, tiles_with_mark, windows_on_tiles
+from selfdrive.visiond.paper_detector import (
+    CLUSTER_REACH,
+    MIN_CLUSTER_EDGES,
+    MIN_MARKED_WINDOWS,
+    PaperDetector,
+)
 from selfdrive.visiond.road_region import RoadRegion
 from sklearn.cluster import DBSCAN
 from threadpoolctl import threadpool_limits
@@ -109,40 +114,42 @@ def test_real_edges_get_the_clusters_of_scikit_learn():
     region = RoadRegion(CALTECH)
     for look in (RoadLook(), RoadLook(shadow_share=0.5, shadow_depth=0.6, cracks_per_100_m=20.0, grain=9.0)):
         part = RoadRenderer(CALTECH, look, 2, periods=3).render_grey(3.0)[region.part]
-        at, _ = edges(np.ascontiguousarray(part))
+        at, _ = find_steep_edges(np.ascontiguousarray(part))
         pixels = np.stack(np.unravel_index(at, part.shape), axis=1)
-        expected = DBSCAN(eps=EPS, min_samples=MIN_SAMPLES, metric="chebyshev").fit_predict(pixels)
+        expected = DBSCAN(eps=CLUSTER_REACH, min_samples=MIN_CLUSTER_EDGES, metric="chebyshev").fit_predict(
+            pixels
+        )
         assert expected.max() > 0
-        assert np.array_equal(dbscan(at, part.shape, EPS, MIN_SAMPLES), expected)
+        assert np.array_equal(dbscan(at, part.shape, CLUSTER_REACH, MIN_CLUSTER_EDGES), expected)
 
 
 def test_scores_do_not_depend_on_the_number_of_threads():
     features = np.random.default_rng(0).random((192, 1764), dtype=np.float32)
     net = LaneNet.load()
     with threadpool_limits(1):
-        alone = net.score(features)
+        alone = net.log_odds(features)
     with threadpool_limits(2):
-        assert np.array_equal(net.score(features), alone)
+        assert np.array_equal(net.log_odds(features), alone)
 
 
 def test_a_tile_needs_enough_marked_windows():
     marked = np.zeros((3, 4), bool)
     marked[1, 2] = True
     assert tiles_with_mark(marked, 1).sum() == 4
-    assert tiles_with_mark(marked, NEED).sum() == 0
+    assert tiles_with_mark(marked, MIN_MARKED_WINDOWS).sum() == 0
 
 
 def test_the_windows_on_a_tile_are_those_that_can_mark_it():
     tiles = np.zeros((4, 5), bool)
     tiles.ravel()[tile_numbers(64, 80)[40 * 80 + 50]] = True  # the pixel in row 40, column 50
     assert np.argwhere(tiles).tolist() == [[2, 3]]
-    assert np.argwhere(windows_on(tiles)).tolist() == [[1, 2], [1, 3], [2, 2], [2, 3]]
-    assert tiles_with_mark(windows_on(tiles), 4)[2, 3]
+    assert np.argwhere(windows_on_tiles(tiles)).tolist() == [[1, 2], [1, 3], [2, 2], [2, 3]]
+    assert tiles_with_mark(windows_on_tiles(tiles), 4)[2, 3]
 
 
 def test_a_windows_score_does_not_depend_on_other_windows():
     features = np.random.default_rng(1).random((64, 1764), dtype=np.float32)
     net = LaneNet.load()
-    scores = net.score(features)
+    scores = net.log_odds(features)
     other = np.random.default_rng(2).permutation(64)
-    assert np.array_equal(net.score(features[other]), scores[other])
+    assert np.array_equal(net.log_odds(features[other]), scores[other])

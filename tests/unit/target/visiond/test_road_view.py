@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
-from selfdrive.visiond.road_view import CELL, RoadView
+from selfdrive.visiond.road_view import CELL_WIDTH, RoadView
 
 CAMERAS = {
     "steep": CameraModel(),
@@ -22,13 +22,13 @@ def test_a_line_along_the_road_is_vertical_in_the_map(name, y):
     half = 0.1 * model.spread(1.0) * (v - model.horizon)
     picture = np.where(np.abs(u - (a * v + b)) <= half, 255, 40).astype(np.uint8)
     view = RoadView(model)
-    road = view.map(picture)
+    road = view.map_picture(picture)
     assert road.dtype == np.uint8 and road.shape == (len(view.drop), len(view.y))
     column = model.cx - y * view.scale
     shown = (column > 0.2 * view.scale) & (column < model.width - 0.2 * view.scale)
     bright = road[shown].astype(float) - 40
     assert shown.sum() > 0.6 * len(shown)
-    assert np.abs(bright @ view.y / bright.sum(axis=1) - y).max() < CELL
+    assert np.abs(bright @ view.y / bright.sum(axis=1) - y).max() < CELL_WIDTH
 
 
 @pytest.mark.parametrize("name", CAMERAS)
@@ -47,7 +47,7 @@ def test_near_rows_are_means_of_many_pixels():
         np.random.default_rng(1).normal(128, 30, (model.rows, model.width)).clip(0, 255).astype(np.uint8)
     )
     view = RoadView(model)
-    road = view.map(picture)
+    road = view.map_picture(picture)
     middle = np.abs(view.y) < 1.5
     assert road[-10:][:, middle].std() < 0.4 * picture.std()
 

@@ -11,7 +11,7 @@ from selfdrive.messages import CameraView
 from selfdrive.sim.road_look import LinePaint, OtherCar, standard_look
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.detector import LaneLines
-from selfdrive.visiond.robust_detector import FORGET, RobustDetector
+from selfdrive.visiond.robust_detector import MOST_PICTURES_WITHOUT_LINES, RobustDetector
 
 CAMERAS = {
     "steep": CameraModel(),
@@ -84,7 +84,7 @@ def test_lines_that_disappear_are_held_with_falling_probability():
     detector = RobustDetector(road.model)
     before = see(detector, road.render_grey(0.0, 0.4, 0.02))
     black = np.zeros((road.model.rows, road.model.width), np.uint8)
-    held = [see(detector, black) for _ in range(FORGET + 1)]
+    held = [see(detector, black) for _ in range(MOST_PICTURES_WITHOUT_LINES + 1)]
     probs = [before.left.prob] + [lines.left.prob for lines in held]
     assert all(later < earlier for earlier, later in pairwise(probs))
     for lines in held[:-1]:

@@ -41,4 +41,4 @@ def test_the_stored_threshold_is_the_one_that_the_search_finds(
     """After a change of the net, the road or the rule, search again."""
     monkeypatch.undo()
     calibrate_as_coded.main()
-    assert float(capsys.readouterr().out.splitlines()[-1]) == coded_detector.THRESHOLD
+    assert float(capsys.readouterr().out.splitlines()[-1]) == coded_detector.MIN_LOG_ODDS
