@@ -35,7 +35,7 @@ def drive(name: str, step: float) -> Trace:
     simulator.reset(load_scenario(ROOT / "fault_library" / "scenarios" / f"{name}.yaml"), 0)
     if step:
         simulator._plant.lateral.offset = 0.0
-    while not simulator.done:
+    while not simulator.is_finished:
         if simulator.frame == round(STEP_AT * 100):
             simulator._plant.lateral.offset -= step
         simulator.step()

@@ -128,7 +128,7 @@ THEN = [
 class TrueLabels(ReferencePlant):
     """A reference plant that does not swap left and right in frames."""
 
-    mirrors = False
+    has_mirrored_messages = False
 
     def pictured(self, truth: GroundTruth) -> GroundTruth:
         return truth
@@ -226,7 +226,7 @@ def drive(case: Case) -> tuple[Case, Ending]:
     run._camera = camera = FaultyCamera(run._camera, case)
     detector = MixedDetector(case.row, camera.model)
     run.manager.visiond._detector = MirroredDetector(detector) if labels else detector
-    while not run.done:
+    while not run.is_finished:
         run.step()
     record = run.result().record
     hazards = sorted((t, name) for name, t in record["hazards"].items() if t is not None)

@@ -82,13 +82,14 @@ from selfdrive.sim.run import Scenario, Simulator, load_scenario
 from selfdrive.common import compiled
 imported = process_time()
 folder, scenario = Path(sys.argv[1]), load_scenario(Path(sys.argv[2]))
-compiled.use(folder)
+use = getattr(compiled, "use_libraries_in", None) or compiled.use  # older versions have the latter
+use(folder)
 def run():
     began = process_time()
     simulator = Simulator()
     simulator.reset(scenario, 0)
     built = process_time()
-    while not simulator.is_finished:
+    for _ in range(scenario.steps):
         simulator.step()
     simulator.result()
     return built - began, process_time() - built

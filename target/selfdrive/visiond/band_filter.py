@@ -16,9 +16,8 @@ SIDE_COLUMNS = 5  # columns of road on each side for comparison
 AVERAGED_ROWS = 3  # rows averaged
 SPECK_KERNEL = np.ones((5, 1), np.uint8)  # anything bright in fewer rows is a flake or a drop
 TEXTURE_AREA = (51, 9)  # columns and rows of the area in which texture is measured
-DARKNESS_OFFSET = (
-    12.0  # grey levels added to the road's brightness, so that noise in the dark has little contrast
-)
+# grey levels added to the road's brightness, so that noise in the dark has little contrast
+DARKNESS_OFFSET = 12.0
 MIN_CONTRAST = 0.006  # lowest contrast of a mark, on the cleanest road
 UNCERTAIN_RESPONSE, CERTAIN_RESPONSE = (
     1.6,

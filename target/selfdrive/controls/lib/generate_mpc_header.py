@@ -1,4 +1,4 @@
-"""Generates `mpc_generated.h`: `python -m selfdrive.controls.lib.generate_mpc_header`, after changing a problem.
+"""Generates `mpc_generated.h`; run `python -m selfdrive.controls.lib.generate_mpc_header` after changes.
 
 It contains what CasADi derives from each optimal control problem, one statement per operation, in order.
 Tests of `compiled_mpc` show whether `mpc.c` gives the same bits as a new CasADi.

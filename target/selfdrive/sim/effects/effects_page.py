@@ -36,9 +36,8 @@ DETECTOR_STYLES: dict[str, tuple[type, tuple[int, int, int], int]] = {  # with c
 CHECK_DISTANCE, MOST_LINE_ERROR = 10.0, 0.3  # m: a line is found if it is at most this far off
 PANEL_SIZE, TITLE_HEIGHT = (320, 240), 20  # px
 COVERAGE_GREY = 100  # grey level of the picture in which coverage is measured
-REAL_FRAMES_CSV = (
-    "real-frames.csv"  # in the folder of pictures; counted by `visiond_lab.evaluate_under_effects`
-)
+# in the folder of pictures; counted by `visiond_lab.evaluate_under_effects`
+REAL_FRAMES_CSV = "real-frames.csv"
 PAGE_TEXT = """\
 # Image effects
 

@@ -164,7 +164,8 @@ def test_an_edited_problem_is_solved_by_casadi(all_compiled: Path, tmp_path: Pat
     path = target / "selfdrive/controls/lib" / edited
     path.write_text(path.read_text() + "\n")
     code = (
-        "from pathlib import Path; from selfdrive.common import compiled; compiled.use(Path(%r)); "
+        "from pathlib import Path; from selfdrive.common import compiled; "
+        "compiled.use_libraries_in(Path(%r)); "
         "from selfdrive.controls.lib.compiled_mpc import *; "
         "print(type(build_lateral(0.5)).__name__, type(build_longitudinal()).__name__)"
     )
