@@ -25,9 +25,8 @@ from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
 
 RENDERED_FRAMES, RENDERED_PERIODS = 600, 66  # of the rendered road, which repeats seamlessly after 805.2 m
-RENDERED_SPACING = (
-    RENDERED_PERIODS * DASH_PERIOD / RENDERED_FRAMES
-)  # m between frames: 1.342, for 20 frames per second at 60 mph
+# m between frames: 1.342, for 20 frames per second at 60 mph
+RENDERED_SPACING = RENDERED_PERIODS * DASH_PERIOD / RENDERED_FRAMES
 CHECK_BYTES = 8  # bytes; the file ends with a check per frame, then a digest of these and the header
 DIGEST_BYTES = sha256().digest_size
 

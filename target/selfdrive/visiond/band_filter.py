@@ -6,10 +6,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-SINGLE_MARK = (
-    3,
-    5,
-)  # columns: width of a mark (up to 0.2 m), and distance from its middle to that of each side
+# columns: width of a mark (up to 0.2 m), and distance from its middle to that of each side
+SINGLE_MARK = (3, 5)
 DOUBLE_MARK = (9, 8)  # the same for a double line, 0.3 m wide in total
 EDGE_COLUMNS = DOUBLE_MARK[1]
 SIDE_COLUMNS = 5  # columns of road on each side for comparison
@@ -19,10 +17,8 @@ TEXTURE_AREA = (51, 9)  # columns and rows of the area in which texture is measu
 # grey levels added to the road's brightness, so that noise in the dark has little contrast
 DARKNESS_OFFSET = 12.0
 MIN_CONTRAST = 0.006  # lowest contrast of a mark, on the cleanest road
-UNCERTAIN_RESPONSE, CERTAIN_RESPONSE = (
-    1.6,
-    5.0,
-)  # response in units of the texture, at which certainty is 0 and 1
+# response in units of the texture, at which certainty is 0 and 1
+UNCERTAIN_RESPONSE, CERTAIN_RESPONSE = 1.6, 5.0
 CERTAINTY_PER_RESPONSE = 1.0 / (CERTAIN_RESPONSE - UNCERTAIN_RESPONSE)
 MOST_POINTS = 1500  # number of points kept
 CREST_KERNEL = np.ones((1, 5), np.uint8)

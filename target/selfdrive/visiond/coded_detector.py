@@ -24,9 +24,8 @@ from selfdrive.visiond.lane_net import LaneNet
 PICTURE_WIDTH, PICTURE_ROWS = 640, 480  # px, the size of pictures for all positions below
 FIRST_ROW, FIRST_COLUMN = 235, 90  # of the windows
 WINDOWS = 6, 29  # down, across
-PART_SIZE = tuple(
-    (count - 1) * WINDOW_STRIDE + WINDOW_PIXELS for count in WINDOWS
-)  # px of the part that they cover
+# px of the part of the picture that they cover
+PART_SIZE = tuple((count - 1) * WINDOW_STRIDE + WINDOW_PIXELS for count in WINDOWS)
 PART = slice(FIRST_ROW, FIRST_ROW + PART_SIZE[0]), slice(FIRST_COLUMN, FIRST_COLUMN + PART_SIZE[1])
 MIN_LOG_ODDS = 4.0  # lowest log odds of a window with a mark; see visiond_lab.calibrate_as_coded
 MIN_STEEPNESS = 4.0  # an edge's squared gradient, as a multiple of the window's mean

@@ -12,10 +12,8 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.visiond.hog import WINDOW_PIXELS, WINDOW_STRIDE
 
-REGION_NEAR, REGION_FAR = (
-    4.9,
-    30.0,
-)  # m ahead; the nearest row is always examined, the furthest can be left out
+# m ahead; the nearest row is always examined, the furthest can be left out
+REGION_NEAR, REGION_FAR = 4.9, 30.0
 REGION_SIDE = 3.8  # m; where a lane's line is when the car is almost in the next lane
 REGION_WIDENING = 0.08  # m wider per metre ahead
 

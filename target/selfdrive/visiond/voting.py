@@ -20,9 +20,8 @@ BIN_WIDTH = 0.1  # m, for votes
 MOST_LATERAL = 4.0  # m, largest lateral position of lines
 LEFT_STEP, DIP_STEP = 4.0, 6.0  # px between candidates
 CHANCE_SHARE = 0.005  # share of a line's rows with points by chance, on the cleanest road
-SURROUNDINGS_KERNEL = (
-    np.array([[1] * 8 + [0] * 5 + [1] * 8], np.float32) / 16
-)  # averages the bins of y around a line
+# averages the bins of y around a line
+SURROUNDINGS_KERNEL = np.array([[1] * 8 + [0] * 5 + [1] * 8], np.float32) / 16
 CHANCE_DISTANCE = 0.8  # m from a line, within which points by chance are counted
 FIT_REACHES = (0.30, 0.20, 0.15, 0.15)  # m from a line, where points are used in each round of the fit
 DEPENDENT_POINTS = 10.0  # this many neighbouring points count as one, because they are not independent

@@ -23,10 +23,8 @@ GAP = 6  # pixels between plots and between labels
 TICK_STEPS = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)  # s
 MOST_TICKS = 16
 MIN_OFFSET_SPAN, MOST_OFFSET_SPAN = 0.3, 4.0  # m; limits of the plot's range
-MIN_DISTANCE_SPAN, MIN_DISTANCE_SHOWN = (
-    10.0,
-    -10.0,
-)  # m; the plot reaches at least the first, and not below the second
+# m; the plot reaches at least the first, and not below the second
+MIN_DISTANCE_SPAN, MIN_DISTANCE_SHOWN = 10.0, -10.0
 
 
 class Timeline:

@@ -62,7 +62,7 @@ def test_a_window_needs_25_edges(edges: int, looked_at: bool, monkeypatch: pytes
     crests[40].reshape(-1)[:edges] = True
     monkeypatch.setattr(coded, "edges_in_windows", lambda part: crests)
     detector = CodedDetector(CALTECH, threshold=-np.inf)
-    points = detector._points(np.zeros(coded.PART_SIZE, np.uint8))
+    points = detector._edge_points(np.zeros(coded.PART_SIZE, np.uint8))
     assert len(points) == (edges if looked_at else 0)
     if looked_at:  # window 40 is the twelfth of the second row
         assert points.min(axis=0).tolist() == [235 + 16, 90 + 11 * 16]

@@ -40,7 +40,7 @@ def test_lines_are_found_at_any_pose_and_width(middle, left, dip, width):
     found = solve(points_on(true, chance=120), ExpectedPose())
     assert found.y_left == pytest.approx(true.y_left, abs=0.04)
     assert found.y_right == pytest.approx(true.y_right, abs=0.04)
-    assert found.left == pytest.approx(left, abs=2.0)
+    assert found.meeting_left == pytest.approx(left, abs=2.0)
     assert min(found.prob_left, found.prob_right) > 0.5
 
 
