@@ -76,7 +76,7 @@ def measure(model: CameraModel, picture: np.ndarray, repeat: int) -> list[float]
         lambda: hog.blocks(part),
         lambda: find_steep_edges(part),
         lambda: dbscan(at, part.shape, CLUSTER_REACH, MIN_CLUSTER_EDGES),
-        lambda: lines.nearest(at, rising, labels),
+        lambda: lines.nearest_lines(at, rising, labels),
     )
     compiled_ms = median_ms(lambda: fast.detect(view), repeat) if fast.calculated_by else math.nan
     return [compiled_ms, *(median_ms(step, repeat) for step in steps), float(at.size)]

@@ -75,7 +75,8 @@ def answers(cache: Path) -> Iterator[object]:
     from selfdrive.sim import effects
 
     cv2.setNumThreads(1)
-    use = getattr(compiled, "use_libraries_in", None) or compiled.use  # older versions have the latter
+    names = vars(compiled)
+    use = names.get("use_libraries_in") or names["use"]  # older versions have the latter
     use(cache)
     cases: dict[tuple[str, str], Drive] = {}
     for line in sys.stdin:
