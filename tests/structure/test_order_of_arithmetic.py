@@ -41,10 +41,10 @@ SORTS = {"argsort"}  # the order of equal values does not matter
 EXACT = {  # whole numbers, and sums that a double holds exactly, where order does not matter
     ("can/packer.py", "sum(data.translate(_HALF_BYTE_SUMS))"),
     ("can/parser.py", "sum((field.mask << field.shift for field in self.fields))"),
-    ("sim/recorder.py", "sum((1 << bit for bit, name in enumerate(COUNTED_ALERTS) if name in shown))"),
+    ("sim/recorder.py", "sum((1 << bit for bit, name in enumerate(COUNTED_ALERTS) if name in alerts))"),
     (
         "visiond/lane_net.py",
-        "np.matmul(some, self.whole, out=steps[k:k + AT_ONCE])",
+        "np.matmul(some, self.hidden_steps, out=steps[k:k + WINDOWS_AT_ONCE])",
     ),
 }
 
