@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-PICTURE_REQUEST: dict[str, Any] = json.loads(
-    "{}"
-)  # file, picture, effects; filled in by `review.effect_pictures`
+# file, picture, effects, mutant: `review.effect_pictures` replaces the text of this call
+PICTURE_REQUEST: dict[str, Any] = json.loads("{}")
 PICTURES_FILE = "pictures.npz"
 
 _output_folder = Path.cwd()
