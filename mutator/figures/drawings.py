@@ -8,7 +8,7 @@ import pandas as pd
 
 from mutator.figures import hazards_by_fault_type, heat_map, propagation_times
 from mutator.figures.run_plot import images
-from mutator.statistics.results_frame import select_columns
+from mutator.statistics.results_frame import select_common_columns
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,7 +33,7 @@ class Drawing:
 
 
 def draw_figures(frame: pd.DataFrame) -> tuple[Drawing, ...]:
-    frame = select_columns(frame)
+    frame = select_common_columns(frame)
     kinds, scenarios = frame["kind"].nunique(), frame["scenario"].nunique()
     made = []
     if kinds > 1:

@@ -14,7 +14,7 @@ from mutator.paper.published_numbers import has_published_numbers, load_publishe
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import csv_files
 from mutator.report.reported_run import ReportedRun
-from mutator.statistics.results_frame import select_columns
+from mutator.statistics.results_frame import select_common_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,7 +71,7 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
         return None
     ends = run.ends() or {}
     file_words = re.findall(r"\w+", read_bounded(file, MOST_YAML_BYTES).decode())
-    frame = select_columns(run.frame, *file_words)  # the queries use only columns that the file names
+    frame = select_common_columns(run.frame, *file_words)  # the queries use only columns that the file names
     frame = frame.assign(t_end=frame["scenario"].map(ends))  # `median_time` needs the ends of the runs
     judged = observations.judge_observations(file, frame, list(_mixture_gaps(run, missing)))
     coverage = _describe_coverage(run, len(fault_types), missing)

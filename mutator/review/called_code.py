@@ -36,14 +36,14 @@ class CalledCode:
     def __init__(self, tree: SourceTree) -> None:
         self._tree = tree
 
-    def called_by_injected_lines(self, path: str, data: bytes) -> dict[str, str]:
+    def called_by_injected_lines(self, path: str, mutated_file: bytes) -> dict[str, str]:
         """Return the code that the injected lines of a mutated file call: the source of each place, such as
-        `car/weather.py Rain`. `data` is the content of the file at `path`. Files other than Python are
-        included whole.
+        `car/weather.py Rain`. `mutated_file` is the content of the file at `path`. Files other than Python
+        are included whole.
         """
-        module = source_names.parse_module(path, data, Path())
+        module = source_names.parse_module(path, mutated_file, Path())
         return self._sources_with_callees(
-            path, uses_in(module.tree, is_selected=_injected_node_predicate(data))
+            path, uses_in(module.tree, is_selected=_injected_node_predicate(mutated_file))
         )
 
     def called_by_expressions(self, path: str, function: str, texts: Iterable[str]) -> dict[str, str]:
@@ -181,12 +181,12 @@ class CalledCode:
         )
 
 
-def _injected_node_predicate(data: bytes) -> Callable[[ast.expr], bool]:
+def _injected_node_predicate(mutated_file: bytes) -> Callable[[ast.expr], bool]:
     """Return a predicate for the injected nodes of a mutated file: those in inserted lines, and those in the
     new parts of changed lines.
     """
-    tags = {number: tag for number, line in enumerate(data.splitlines(), 1) if (tag := tag_of(line))}
-    changed = [(line, first, end) for _, line, first, end in changed_value_positions(data)]
+    tags = {number: tag for number, line in enumerate(mutated_file.splitlines(), 1) if (tag := tag_of(line))}
+    changed = [(line, first, end) for _, line, first, end in changed_value_positions(mutated_file)]
 
     def is_injected(node: ast.expr) -> bool:
         tag = tags.get(node.lineno)

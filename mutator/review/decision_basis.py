@@ -11,7 +11,7 @@ from mutator.model import FaultLocation
 from mutator.mutants.injected_lines import adds_fault
 from mutator.mutants.readable_patches import adds_file, file_patches
 from mutator.review.entries import BasisDigests
-from mutator.review.patch_shapes import HOLE, without_values
+from mutator.review.patch_shapes import HOLE_CHARACTER, without_values
 from mutator.targets.source_tree import SourceTree
 
 # line numbers, which change when somebody edits lines above
@@ -43,7 +43,7 @@ class DecisionBasis:
     def sections(self) -> dict[str, str]:
         changes = (change if isinstance(change, str) else " -> ".join(change) + "\n" for change in self.diff)
         return {
-            "diff": "".join(changes).replace(HOLE, _SHOWN_HOLE),
+            "diff": "".join(changes).replace(HOLE_CHARACTER, _SHOWN_HOLE),
             "function": _join_titled(self.functions),
             "template": _join_titled(self.templates),
             "calls": _join_titled(self.called_code),

@@ -85,7 +85,7 @@ def _build_results(
     frame: "pd.DataFrame",
     ended: Sequence[str],
     rows: Sequence[int],
-    about: Mapping[str, str],
+    hazard_meanings: Mapping[str, str],
     faults: Mapping[str, Fault],
 ) -> GroupResults:
     """Return the result for `rows`, sorted from worst to best. Of two equally frequent outcomes, the worse
@@ -101,16 +101,16 @@ def _build_results(
     order = [*Outcome, *Status]
     counts = {name.value: len(by_ending[name.value]) for name in order if name.value in by_ending}
     chosen = rows_of(frame.iloc[[most[len(most) // 2], rows[0]]], faults)
-    typical, worst = (_build_example(row, about) for row in chosen)
+    typical, worst = (_build_example(row, hazard_meanings) for row in chosen)
     return GroupResults(experiments=len(rows), outcomes=counts, typical=typical, worst=worst)
 
 
-def _build_example(row: ResultRow, about: Mapping[str, str]) -> ExampleExperiment:
+def _build_example(row: ResultRow, hazard_meanings: Mapping[str, str]) -> ExampleExperiment:
     return ExampleExperiment(
         id=row.experiment_id,
         label=f"{row.fault}, {row.scenario}, {row.trigger}",
         ending=row.ending,
-        verdict=describe_result(row, about),
+        verdict=describe_result(row, hazard_meanings),
     )
 
 

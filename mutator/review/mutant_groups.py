@@ -177,7 +177,7 @@ class _GroupBuilder:
         else:
             representatives = [faults[shape.member_ids[0]] for shape in shapes]
             material = self._basis_of_mutants(
-                representatives, [patches[one.injections] for one in representatives]
+                representatives, [patches[representative.injections] for representative in representatives]
             )
             values = value_ranges_of(faults.values(), self.specs, self.models)
         return Group(
@@ -190,7 +190,9 @@ class _GroupBuilder:
             functions=tuple(dict.fromkeys(i.location.function for i in injections)),
             models=models,
             trigger_kinds=" or ".join(sorted({patch_shapes.trigger_kind(trigger) for _, trigger in members})),
-            hold_kinds=" or ".join(sorted({patch_shapes.hold_of(*member).value for member in members})),
+            hold_kinds=" or ".join(
+                sorted({patch_shapes.effective_hold(*member).value for member in members})
+            ),
             shapes=tuple(
                 s.with_named_holes(patch_shapes.parameter_values(faults[m]) for m in s.member_ids)
                 for s in shapes

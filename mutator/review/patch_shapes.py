@@ -20,7 +20,7 @@ from mutator.triggers.conditions import TIME, names_in
 
 ValueSpan = tuple[int, int, str]  # position of a value in a patch: begin, end, name (empty: not yet known)
 
-HOLE = "\0"  # never occurs in Python source
+HOLE_CHARACTER = "\0"  # never occurs in Python source
 _WORD_CHARS = (
     r"\w.\\\x80-\U0010ffff"  # next to one of these, a number is part of a longer number or of a name
 )
@@ -142,7 +142,7 @@ def trigger_kind(trigger: Trigger) -> str:
     return "time" if names_in(trigger.condition) == (TIME,) else "state"
 
 
-def hold_of(fault: Fault, trigger: Trigger) -> Hold:
+def effective_hold(fault: Fault, trigger: Trigger) -> Hold:
     return fault.hold or trigger.hold
 
 
@@ -174,7 +174,7 @@ class _ShapeBuilder:
         """Build the shape: values equal in all members become text, and values equal to each other share a
         hole.
         """
-        pieces = rest.split(HOLE) if self.value_labels else [rest]
+        pieces = rest.split(HOLE_CHARACTER) if self.value_labels else [rest]
         parts, places = [pieces[0]], []
         columns: dict[tuple[str, ...], int] = {}
         holes: list[str] = []
@@ -208,7 +208,7 @@ def _unused_name(label: str, used_names: list[str]) -> str:
 
 
 def _value_spans(patch: str) -> Iterator[ValueSpan]:
-    if HOLE in patch:  # no holes, because it is not Python source
+    if HOLE_CHARACTER in patch:  # no holes, because it is not Python source
         return
     begin = 0
     for section in file_patches(patch):
@@ -230,7 +230,7 @@ def _line_value_spans(patch: str, begin: int, end: int) -> Iterator[ValueSpan]:
 def _text_outside_spans(patch: str, spans: list[ValueSpan]) -> str:
     ends = [0, *(end for _, end, _ in spans)]
     starts = [*(begin for begin, _, _ in spans), len(patch)]
-    return HOLE.join(patch[a:b] for a, b in zip(ends, starts, strict=True))
+    return HOLE_CHARACTER.join(patch[a:b] for a, b in zip(ends, starts, strict=True))
 
 
 def _is_text_of_value(text: str, value: Value) -> bool:

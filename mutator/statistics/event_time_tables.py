@@ -44,10 +44,12 @@ def propagation_sheet(
     )
 
 
-def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_reaction_s: float) -> Sheet:
+def reaction_sheet(
+    frame: pd.DataFrame, end_by_scenario: Mapping[str, float], driver_reaction_s: float
+) -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for method, scenario, group in _groups_with_totals(frame):
-        reaction = event_times.reaction_times(group, ends, driver_reaction_s)
+        reaction = event_times.reaction_times(group, end_by_scenario, driver_reaction_s)
         median: tuple[SheetCell, ...] = (reaction.median, reaction.median_low, reaction.median_high)
         counts = (
             reaction.runs_alerted_first,
@@ -55,7 +57,9 @@ def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_reacti
             reaction.runs_alerted_first - reaction.hazards_after_alert,
             reaction.runs_alerted_too_late,
         )
-        lines.append((method, scenario, *counts, *median, reaction.no_hazard_share, reaction.late_hazards))
+        lines.append(
+            (method, scenario, *counts, *median, reaction.no_hazard_share, reaction.late_hazard_share)
+        )
     reaction_text = f"{driver_reaction_s:g} s"
     return Sheet(
         name="alert_to_hazard",

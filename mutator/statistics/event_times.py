@@ -45,8 +45,8 @@ class ReactionTimes:
     is the section's beginning. From `median_low` to `median_high`, the curve's log-log transformed interval
     contains one half (Brookmeyer and Crowley 1982). A bound is infinite if the runs do not reach it.
     `no_hazard_share` is the Kaplan-Meier share of alerts without a hazard within the driver's reaction time;
-    `late_hazards` is the share, among the hazards after an alert, of those that came later than this reaction
-    time.
+    `late_hazard_share` is the share, among the hazards after an alert, of those that came later than this
+    reaction time.
     """
 
     runs_alerted_first: int
@@ -55,7 +55,7 @@ class ReactionTimes:
     median_low: float
     median_high: float
     no_hazard_share: float
-    late_hazards: Share
+    late_hazard_share: Share
     runs_alerted_too_late: (
         int  # runs with the first alert after the first hazard; no other number includes them
     )
@@ -83,7 +83,7 @@ def propagation_times(frame: pd.DataFrame) -> dict[str, TimeSpread]:
         "activation to manifest": spread_of_times(frame["t_manifest"] - start),
         "activation to alert": spread_of_times(frame["t_alert"] - start),
         "activation to hazard": spread_of_times(frame["t_hazard"] - start),
-        "alert to hazard": spread_of_times(reaction[_has_alert_first(frame)]),
+        "alert to hazard": spread_of_times(reaction[_alert_first_flags(frame)]),
     }
 
 
@@ -98,7 +98,7 @@ def reaction_times(
     from statsmodels.duration.survfunc import SurvfuncRight  # type: ignore[import-untyped]
 
     alerted = frame[frame["is_alert"] & (frame["status"] == "ok")]
-    first = alerted[~alerted["is_hazard"] | _has_alert_first(alerted)]
+    first = alerted[~alerted["is_hazard"] | _alert_first_flags(alerted)]
     status = first["is_hazard"].astype(int)
     times = first["t_hazard"].fillna(first["scenario"].map(end_by_scenario)) - first["t_alert"]
     # rounded, so that a hazard exactly at the driver's reaction time is not later
@@ -119,7 +119,7 @@ def reaction_times(
             median_low=nan,
             median_high=nan,
             no_hazard_share=no_hazard_share,
-            late_hazards=late_hazards,
+            late_hazard_share=late_hazards,
         )
     curve = SurvfuncRight(times.to_numpy().round(6), status.to_numpy())
     reached = curve.surv_prob[curve.surv_times <= driver_reaction_s]
@@ -130,7 +130,7 @@ def reaction_times(
         median_low=low,
         median_high=high,
         no_hazard_share=float(reached[-1]) if len(reached) else 1.0,
-        late_hazards=late_hazards,
+        late_hazard_share=late_hazards,
     )
 
 
@@ -196,6 +196,6 @@ def _describe_order(times: Mapping[str, float]) -> str:
     return text
 
 
-def _has_alert_first(frame: pd.DataFrame) -> pd.Series:
+def _alert_first_flags(frame: pd.DataFrame) -> pd.Series:
     """Whether an alert came before the first hazard. An alert at the same time is no warning."""
     return frame["t_alert"] < frame["t_hazard"]

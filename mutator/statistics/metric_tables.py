@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import pandas as pd
 
 from mutator.statistics.median_intervals import median_interval
-from mutator.statistics.results_frame import select_columns
+from mutator.statistics.results_frame import select_common_columns
 from mutator.statistics.shares import share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 from mutator.targets.contact_severity import SEVERITY_CLASSES
@@ -65,7 +65,7 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
 
 
 def fault_tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
-    with_hazard = select_columns(frame)[frame["is_hazard"]]
+    with_hazard = select_common_columns(frame)[frame["is_hazard"]]
     starts = {"activation": "t_activation", "manifestation": "t_manifest"}
     starts |= {"alert": "t_alert"} if alerts else {}
     lines: list[tuple[SheetCell, ...]] = []

@@ -66,7 +66,7 @@ def mutant_drives(
     if golden_alerts is None:
         del flags[_ALERT_EFFECT]
     else:
-        flags[_ALERT_EFFECT] = _has_new_alerts(mutant_runs, golden_alerts)
+        flags[_ALERT_EFFECT] = _new_alert_flags(mutant_runs, golden_alerts)
     permanent = mutant_runs["trigger"] == ALWAYS
     return pd.DataFrame(
         {
@@ -86,7 +86,7 @@ def function_label(fault: Fault) -> str:
     return f"{location.path}::{location.function}"
 
 
-def _has_new_alerts(mutant_runs: pd.DataFrame, golden_alerts: AlertsByGoldenRun) -> list[bool]:
+def _new_alert_flags(mutant_runs: pd.DataFrame, golden_alerts: AlertsByGoldenRun) -> list[bool]:
     rows = zip(mutant_runs["scenario"], mutant_runs["seed"].astype(str), mutant_runs["alerts"], strict=True)
     return [
         not golden_alerts.get((scenario, seed), golden_alerts.get((scenario, ""), frozenset())).issuperset(

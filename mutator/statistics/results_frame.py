@@ -59,7 +59,7 @@ _SHARED_COLUMNS = (
 )
 
 
-def select_columns(frame: pd.DataFrame, *more_columns: str) -> pd.DataFrame:
+def select_common_columns(frame: pd.DataFrame, *more_columns: str) -> pd.DataFrame:
     """Keep only the columns that most statistics need, and those in `more`. Selecting from a million rows
     with all columns takes seconds.
     """

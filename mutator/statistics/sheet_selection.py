@@ -8,7 +8,7 @@ from mutator.statistics import event_time_tables, guided_against_random_tables, 
 from mutator.statistics.event_times import AlertsByExperiment
 from mutator.statistics.guided_against_random import GUIDED, RANDOM
 from mutator.statistics.published_counts import PublishedCounts
-from mutator.statistics.results_frame import select_columns
+from mutator.statistics.results_frame import select_common_columns
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.statistics.tallies import tally_by_fault_type, tally_by_scenario
 
@@ -30,7 +30,7 @@ def run_sheets(
     decide which event came first. `end_by_scenario` has the end of each scenario's runs in simulated seconds;
     censored times need it. Tables whose inputs are missing are left out.
     """
-    frame = select_columns(frame)
+    frame = select_common_columns(frame)
     if not published and not {GUIDED, RANDOM} <= set(frame["method"]):
         return ()
     scenarios, kinds = tally_by_scenario(frame), tally_by_fault_type(frame)

@@ -53,7 +53,7 @@ def test_kaplan_meier_of_a_textbook_sample() -> None:
     assert found.median == 2.5
     assert found.median_low <= 2.5 <= found.median_high
     assert found.no_hazard_share == pytest.approx(0.8)
-    assert (found.late_hazards.count, found.late_hazards.of) == (3, 4)
+    assert (found.late_hazard_share.count, found.late_hazard_share.of) == (3, 4)
 
 
 def test_censored_times_raise_the_median() -> None:
@@ -83,7 +83,7 @@ def test_crashed_runs_are_left_out_of_censored_times() -> None:
 
 def test_a_reaction_time_equal_to_the_drivers_is_not_longer() -> None:
     """11.8 - 10.0 is 1.8000000000000007 in floating point and counts as 1.8 s."""
-    assert event_times.reaction_times(results(run(10.0, 11.8)), ENDS, DRIVER_S).late_hazards.count == 0
+    assert event_times.reaction_times(results(run(10.0, 11.8)), ENDS, DRIVER_S).late_hazard_share.count == 0
 
 
 def test_alerts_are_counted_before_each_hazard() -> None:
