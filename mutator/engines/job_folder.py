@@ -23,7 +23,7 @@ from mutator.engines.target_processes import parse_report, read_log_tail
 from mutator.errors import Outside
 
 OUTPUT_FOLDER = "output"  # the name of the folder with the output's plain files
-_OUT, _LOG, _REPORT, _INACTIVE = "out", "log", "report.json", "inactive"
+_OUT_FOLDER, _LOG_FILE, _REPORT_FILE, _INACTIVE_MARKER = "out", "log", "report.json", "inactive"
 
 
 _DISTURBANCE_ERRNOS = (errno.ENOENT, errno.EEXIST, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENOTEMPTY)
@@ -51,18 +51,18 @@ class JobFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.output_folder, self.log_path = path / _OUT, path / _LOG
-        self.report_path = path / _REPORT
-        self.inactive_marker = path / _INACTIVE  # the first activation deletes it
+        self.output_folder, self.log_path = path / _OUT_FOLDER, path / _LOG_FILE
+        self.report_path = path / _REPORT_FILE
+        self.inactive_marker = path / _INACTIVE_MARKER  # the first activation deletes it
         self._open_handles = ExitStack()
 
     def __enter__(self) -> "JobFolder":
         self.path.mkdir(parents=True, exist_ok=True)
         with ExitStack() as opened:
             self._folder_handle = opened.enter_context(open_folder(self.path))
-            os.mkdir(_OUT, dir_fd=self._folder_handle)
-            self._output_handle = opened.enter_context(open_folder(_OUT, self._folder_handle))
-            os.close(os.open(_INACTIVE, os.O_CREAT | os.O_EXCL, 0o644, dir_fd=self._folder_handle))
+            os.mkdir(_OUT_FOLDER, dir_fd=self._folder_handle)
+            self._output_handle = opened.enter_context(open_folder(_OUT_FOLDER, self._folder_handle))
+            os.close(os.open(_INACTIVE_MARKER, os.O_CREAT | os.O_EXCL, 0o644, dir_fd=self._folder_handle))
             self._open_handles = opened.pop_all()
         self._path_by_handle = Path(f"/proc/self/fd/{self._folder_handle}")
         return self
@@ -78,16 +78,16 @@ class JobFolder:
     def read_report(self, **extra_fields: type) -> dict[str, Any] | None:
         """Return the child's report; None if it is missing, incomplete or invalid (`parsed_report`)."""
         try:
-            return parse_report(read_below(self._path_by_handle, _REPORT), **extra_fields)
+            return parse_report(read_below(self._path_by_handle, _REPORT_FILE), **extra_fields)
         except (OSError, Outside, ValueError):
             return None
 
     def log_tail(self) -> str:
-        return read_log_tail(self._path_by_handle, _LOG)
+        return read_log_tail(self._path_by_handle, _LOG_FILE)
 
     def was_fault_active(self) -> bool:
         try:
-            os.stat(_INACTIVE, dir_fd=self._folder_handle, follow_symlinks=False)
+            os.stat(_INACTIVE_MARKER, dir_fd=self._folder_handle, follow_symlinks=False)
         except OSError:
             return True
         return False

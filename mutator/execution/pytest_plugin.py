@@ -73,7 +73,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if cluster and getattr(config.option, "numprocesses", None):
         raise pytest.UsageError("--campaign-cluster with -n: leave out -n (the cluster has its own workers)")
     try:
-        deals = choose_distributor(cluster, insecure=insecure) if cluster or insecure else None
+        work_distributor = choose_distributor(cluster, insecure=insecure) if cluster or insecure else None
     except MutatorError as err:
         raise pytest.UsageError(str(err)) from None
     register_controller(
@@ -83,6 +83,6 @@ def pytest_configure(config: pytest.Config) -> None:
         reviewed=config.getoption("require_reviewed"),
         accept_versions=config.getoption("accept_versions"),
         sandbox=config.getoption("campaign_sandbox"),
-        distributor=deals,
-        packages=packages_of_distributor(deals) if deals else (),
+        distributor=work_distributor,
+        packages=packages_of_distributor(work_distributor) if work_distributor else (),
     )

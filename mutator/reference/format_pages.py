@@ -108,7 +108,7 @@ def render_clusters_page(workspace: Workspace) -> str:
         "the run. See\n[Run on many machines](../how-to/run-on-many-machines.md), with examples "
         "[for Slurm](../how-to/clusters/slurm.yaml) and\n"
         "[for Kubernetes](../how-to/clusters/kubernetes.yaml).\n",
-        f"The first key is `schema: {cluster_files.SCHEMA}`. {_STRICT_YAML_LINKS}\n",
+        f"The first key is `schema: {cluster_files.CLUSTER_FILE_SCHEMA}`. {_STRICT_YAML_LINKS}\n",
         *model_sections("cluster-file.md", cluster_files.ClusterModel),
         "The run sets these options itself and rejects them in a file: "
         f"{', '.join(f'`{name}`' for name in cluster_files.RESERVED_OPTIONS)}.\n"

@@ -72,7 +72,7 @@ def file_formats(declared_readings: Readings) -> tuple[YamlFormat, ...]:
         ),
         YamlFormat(
             model=cluster_files.ClusterModel,
-            schema=cluster_files.SCHEMA,
+            schema=cluster_files.CLUSTER_FILE_SCHEMA,
             files_glob="docs/how-to/clusters/*.yaml",
         ),
     )

@@ -32,7 +32,7 @@ from mutator.execution.cluster.dask_connections import (
 if TYPE_CHECKING:
     from distributed import Client
 
-SCHEMA = "cluster/1"
+CLUSTER_FILE_SCHEMA = "cluster/1"
 KUBERNETES = "kubernetes"
 _CLUSTER_CLASSES = {
     "slurm": ("dask_jobqueue", "SLURMCluster"),
@@ -212,7 +212,7 @@ class ClusterFile:
 
 
 def load_cluster_file(path: Path) -> ClusterFile:
-    model, source = load_yaml_model(path, ClusterModel, SCHEMA)
+    model, source = load_yaml_model(path, ClusterModel, CLUSTER_FILE_SCHEMA)
     return ClusterFile(model=model, source=source)
 
 

@@ -23,7 +23,7 @@ _SOURCE_FOLDERS = ("manifest", "target", "overlay")  # folders of a bundle
 
 
 class GoldenRunCache:
-    """The cached golden runs of a site."""
+    """The cached golden runs of an unpacked bundle."""
 
     def __init__(self, bundle: UnpackedBundle, manifest: TargetManifest) -> None:
         self._bundle, self._manifest = bundle, manifest

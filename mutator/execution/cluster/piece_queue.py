@@ -1,4 +1,4 @@
-"""Decide which worker runs which piece of work next. The board uses no network and starts no process.
+"""Decide which worker runs which piece of work next. The queue uses no network and starts no process.
 
 Pieces are cut on demand. Their sizes depend on measured times, so that all workers finish at about the same
 time. If possible, a worker gets experiments whose golden run it already has. Near the end, idle workers

@@ -99,10 +99,10 @@ class PieceResult:
     series: bytes = b""
     series_of: tuple[str, ...] = field(default=())  # golden runs to which `series` refers
 
-    _HEAD = ("number", "ending", "text", "at", "seconds", "forked", "series_of")
+    _HEAD_FIELDS = ("number", "ending", "text", "at", "seconds", "forked", "series_of")
 
     def to_bytes(self) -> bytes:
-        head = {name: getattr(self, name) for name in self._HEAD}
+        head = {name: getattr(self, name) for name in self._HEAD_FIELDS}
         parts = {"head": json.dumps(head).encode(), "patches": self.patches, "series": self.series}
         return pack_parcel(
             parts | {"records": _join_lines(self.records), "timings": _join_lines(self.timings)}

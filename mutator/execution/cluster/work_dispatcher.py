@@ -1,6 +1,6 @@
 """Distribute work through Dask, which carries the bytes and knows which workers are present.
 
-The board decides which worker runs which piece. A worker has at most two tasks per thread. A finished task is
+The queue decides which worker runs which piece. A worker has at most two tasks per thread. A finished task is
 released immediately.
 """
 
@@ -78,7 +78,7 @@ class WorkDispatcher:
         self._write_lock = asyncio.Lock()
         self._pending_writes: set[asyncio.Task[None]] = set()
         self._is_proof_need_settled = False
-        self._alone_since = time.monotonic()
+        self._without_workers_since = time.monotonic()
 
     async def run(self) -> None:
         try:
@@ -181,11 +181,14 @@ class WorkDispatcher:
             worker.serving_task is not None and not worker.serving_task.done()
             for worker in self._workers_by_key.values()
         ):
-            self._alone_since = time.monotonic()
+            self._without_workers_since = time.monotonic()
         elif len(self._workers_by_key) >= (self._expected_workers or 1):
             reasons = "; ".join(dict.fromkeys(self._crew.refusal_reasons.values()))
             self._session.problem = f"no worker is left to do the work: {reasons}"
-        elif self._expected_workers is None and time.monotonic() - self._alone_since > _WORKERLESS_TIMEOUT_S:
+        elif (
+            self._expected_workers is None
+            and time.monotonic() - self._without_workers_since > _WORKERLESS_TIMEOUT_S
+        ):
             self._session.problem = (
                 f"no worker at {self._address} for {_WORKERLESS_TIMEOUT_S:.0f} s; start workers "
                 "(`dask worker`), then run the same command"
