@@ -45,7 +45,7 @@ class Door:
     first_names: tuple[str, ...] = ()  # these come before all others, in this order
 
     @property
-    def attribute(self) -> str:
+    def attribute_in_module(self) -> str:
         """The name of the object in a shipped module."""
         return self.addition.upper()
 
@@ -68,7 +68,7 @@ class Door:
         """Return a key that sorts names."""
         return self.first_names.index(name) if name in self.first_names else len(self.first_names), name
 
-    def has(self, name: str) -> bool:
+    def has_name(self, name: str) -> bool:
         return name in self.shipped_names() or name in self.installed_names()
 
     def load(self, name: str) -> Any:
@@ -85,7 +85,7 @@ class Door:
                 name, f"{self.addition} '{name}' comes from {' and '.join(owners)}", "uninstall all but one"
             )
         if self.shipped_package and is_shipped:
-            return _load_shipped(self.shipped_package, self.attribute, name)
+            return _load_shipped(self.shipped_package, self.attribute_in_module, name)
         if not points:
             remedy = "correct the name, or install the package that adds it"
             raise self._name_error(

@@ -14,14 +14,16 @@ from mutator._common.cpu_cores import usable_cores
 from mutator.errors import MutatorError
 
 _MOST_PROCESSES = 2  # the maximum number of processes, because each needs memory
-_MIN_EXPERIMENTS = 20_000  # the smallest number of experiments for which a second process is worth starting
+_MIN_EXPERIMENTS_TO_SHARE = (
+    20_000  # the smallest number of experiments for which a second process is worth starting
+)
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 
 def process_count_for(experiments: int) -> int:
-    return min(_MOST_PROCESSES, usable_cores()) if experiments >= _MIN_EXPERIMENTS else 1
+    return min(_MOST_PROCESSES, usable_cores()) if experiments >= _MIN_EXPERIMENTS_TO_SHARE else 1
 
 
 def map_in_processes(compute: Callable[[T], R], items: Sequence[T], process_count: int) -> Iterator[R]:

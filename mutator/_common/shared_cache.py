@@ -94,13 +94,13 @@ def target_folder(name: str) -> Path:
 
 def list_entries() -> list[CacheEntry]:
     """List all cached entries. Each file that a target keeps is an entry."""
-    listed = [_build_entry(CHECKS, path) for path in _children(checks_folder())]
-    listed += [_build_entry(GOLDENS, path) for path in _children(goldens_folder())]
-    listed += [_build_entry(RUNS, path) for path in _children(runs_folder())]
-    listed += [_build_entry(LINES, path) for path in _children(lines_folder())]
-    listed += [_build_entry(PICTURES, path) for path in _children(pictures_folder())]
-    listed += [_build_entry(PAGES, path) for path in _children(pages_folder())]
-    for target in _children(caches_folder() / TARGETS):
+    listed = [_build_entry(CHECKS, path) for path in _paths_in(checks_folder())]
+    listed += [_build_entry(GOLDENS, path) for path in _paths_in(goldens_folder())]
+    listed += [_build_entry(RUNS, path) for path in _paths_in(runs_folder())]
+    listed += [_build_entry(LINES, path) for path in _paths_in(lines_folder())]
+    listed += [_build_entry(PICTURES, path) for path in _paths_in(pictures_folder())]
+    listed += [_build_entry(PAGES, path) for path in _paths_in(pages_folder())]
+    for target in _paths_in(caches_folder() / TARGETS):
         listed += [_build_entry(f"target {target.name}", path) for path in _files_below(target)]
     return sorted(listed, key=lambda entry: (entry.what, entry.path))
 
@@ -124,7 +124,7 @@ def prune_target(target: str) -> list[CacheEntry]:
 
 def prune_pages() -> list[CacheEntry]:
     """Delete the least recently used reports of the server until at most PAGES_BYTES remain; return them."""
-    return _prune_entries([_build_entry(PAGES, path) for path in _children(pages_folder())], MOST_PAGES_BYTES)
+    return _prune_entries([_build_entry(PAGES, path) for path in _paths_in(pages_folder())], MOST_PAGES_BYTES)
 
 
 def _prune_entries(entries: list[CacheEntry], most_bytes: int) -> list[CacheEntry]:
@@ -165,7 +165,7 @@ def _file_states(paths: Iterable[Path]) -> Iterator[os.stat_result]:
             continue
 
 
-def _children(folder: Path) -> list[Path]:
+def _paths_in(folder: Path) -> list[Path]:
     try:
         return sorted(folder.iterdir())
     except OSError:  # missing, or owned by somebody else

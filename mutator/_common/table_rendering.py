@@ -31,9 +31,9 @@ class TextTable:
         """Return the table as text, without trailing spaces."""
         lines = [self.heads, *self.rows]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-        return "\n".join(self._padded(line, widths) for line in lines)
+        return "\n".join(self._pad_line(line, widths) for line in lines)
 
-    def _padded(self, cells: Sequence[str], widths: Sequence[int]) -> str:
+    def _pad_line(self, cells: Sequence[str], widths: Sequence[int]) -> str:
         pairs = enumerate(zip(cells, widths, strict=True))
         return "  ".join(
             c.rjust(w) if i in self.right_aligned else c.ljust(w) for i, (c, w) in pairs
@@ -49,7 +49,7 @@ class TextTable:
         rule = f"|{'---|' * len(self.heads)}"
         return "\n".join([line(self.heads), rule, *map(line, self.rows)])
 
-    def as_html(self, style: str = "") -> "Markup":
+    def as_html(self, css_class: str = "") -> "Markup":
         """Return a scrollable HTML table of class `style`, without a head row if all heads are empty.
 
         A row with an empty first cell continues the row above and has the class `group`; cells of columns in
@@ -72,7 +72,7 @@ class TextTable:
         return Markup(
             '<div class="scroll" tabindex="0" role="group" aria-label="Table"><table class="{}">\n'
             "{}<tbody>\n{}</tbody></table></div>"
-        ).format(style, self._html_head(), Markup("").join(rows))
+        ).format(css_class, self._html_head(), Markup("").join(rows))
 
     def _html_head(self) -> "Markup":
         from markupsafe import Markup

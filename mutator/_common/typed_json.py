@@ -53,7 +53,7 @@ def _reader_of(kind: Any) -> _Reader:
     if dataclasses.is_dataclass(kind):
         return _dataclass_reader(cast(type[Any], kind))
     if issubclass(kind, tuple):
-        values = [_reader_of(one) for one in get_type_hints(kind).values()]
+        values = [_reader_of(annotation) for annotation in get_type_hints(kind).values()]
         return _fixed_list_reader(values, lambda items: kind(*items))
     return _enum_reader(kind) if issubclass(kind, Enum) else _scalar_reader(kind)
 

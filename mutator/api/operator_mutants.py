@@ -60,5 +60,5 @@ def draw_operator_faults(
         if len(sample) == len(candidates.mutations)
         else f"{counted(len(sample), 'draw')} of {candidates.summary}"
     )
-    reading = selected_target.workspace.readings().default
+    reading = selected_target.workspace.readings().default_name
     return tuple(mutation.to_fault(reading) for mutation in sample), note

@@ -182,7 +182,7 @@ def _warn_of_value(
     outside = []
     for variant in declared_spec:
         if variant.draw and f"{declared_spec.name}/{variant.name}" in {fault.spec for fault in faults}:
-            low, high = variant.draw.bounds
+            low, high = variant.draw.least_and_greatest
             unit = f" {units.UNITS[variant.draw.unit].symbol}" if variant.draw.unit else ""
             if not low <= value <= high:
                 outside.append(f"{declared_spec.name}/{variant.name}, {low:g} to {high:g}{unit}")

@@ -211,7 +211,7 @@ def _source_problems(folder: RunFolder, workspace: Workspace | None) -> Problems
                 remedy="verify with the run's sources (trees and patches were not compared)",
             )
     for path, recorded in head.target_files.items():
-        if (current := manifest.tree.digests.get(path)) != recorded:
+        if (current := manifest.tree.digest_by_path.get(path)) != recorded:
             yield MutatorError(
                 f"{path} {recorded[:16]}", where=where, expected=f"{str(current)[:16]}, the digest here"
             )

@@ -24,7 +24,7 @@ from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Experiment, Fault, Method, Trigger
 from mutator.operators.executed_lines import GoldenRunInputs
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always_trigger, draw_time, trigger_at_time
+from mutator.triggers.trigger_kinds import always_trigger, draw_trigger_time, trigger_at_time
 from mutator.workspace import Workspace
 
 _NumberedFault = tuple[int, Fault]  # a fault and its position among its variant's values
@@ -275,7 +275,7 @@ class CampaignExpansion:
         The drawn time depends on the reading only through the earliest possible time.
         """
         assert self.campaign.random_until_s is not None  # the schema requires it for random times
-        time = draw_time(
+        time = draw_trigger_time(
             self.seed,
             # what else the campaign selects does not affect this experiment's draw
             f"{scenario}/{fault.spec}/{number}/{paired_trigger.name}",

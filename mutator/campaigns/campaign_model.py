@@ -20,7 +20,7 @@ from mutator.model import AfterHazard, Limits, Method
 
 
 def _validated_operator(name: str) -> str:
-    if not OPERATORS.has(name):
+    if not OPERATORS.has_name(name):
         *others, last = map(repr, OPERATORS.names())
         raise PydanticKnownError("enum", {"expected": f"{', '.join(others)} or {last}"})
     return name

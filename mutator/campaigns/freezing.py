@@ -210,7 +210,7 @@ def collect_target_facts(workspace: Workspace, manifest: TargetManifest) -> Targ
         channels=channel_facts(manifest),
         structure=structure.model_dump(mode="json", by_alias=True) if structure else None,
         golden_files=tuple(manifest.output_files),
-        target_files=manifest.tree.digests,
+        target_files=manifest.tree.digest_by_path,
     )
 
 

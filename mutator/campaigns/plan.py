@@ -150,7 +150,7 @@ class SeedBySeedPlan:
         readings = workspace.readings()
         check_readings(self.campaign, readings)
         load_campaign_study(self.campaign)
-        self.reading = self.choices.reading or self.campaign.reading or readings.default
+        self.reading = self.choices.reading or self.campaign.reading or readings.default_name
         if self.choices.reading is not None:
             readings.check_name(self.choices.reading)
         self._workspace, self._manifest = workspace, workspace.manifest(self.campaign.target)

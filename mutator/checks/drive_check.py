@@ -342,7 +342,7 @@ def _thread_refusal(execution: JobResult) -> NotForkable | None:
 
 
 def _reading_of(workspace: Workspace, campaign: Campaign) -> str:
-    return campaign.reading or workspace.readings().default
+    return campaign.reading or workspace.readings().default_name
 
 
 def _scenario_changes(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mutator.mutants.probe import Probe
-from mutator.triggers.trace_formulas import ARITHMETIC, COMPARISONS
+from mutator.triggers.trace_formulas import ARITHMETIC_FUNCTIONS, COMPARISON_FUNCTIONS
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # hashed by identity, because hashing all values is slow
@@ -126,14 +126,14 @@ def _evaluate_expression(node: ast.expr, values: Mapping[str, Any]) -> Any:
         case ast.IfExp():
             return np.where(of(node.test), of(node.body), of(node.orelse))
         case ast.BinOp():
-            return ARITHMETIC[type(node.op)](of(node.left), of(node.right))
+            return ARITHMETIC_FUNCTIONS[type(node.op)](of(node.left), of(node.right))
         case ast.Call():
             return _FUNCTIONS_BY_NAME[ast.unparse(node.func)](*map(of, node.args))
     raise AssertionError(ast.unparse(node))
 
 
 def _compare_values(operator: ast.cmpop, left: Any, right: Any) -> Any:
-    return COMPARISONS[type(operator)](left, right)
+    return COMPARISON_FUNCTIONS[type(operator)](left, right)
 
 
 def _elementwise_min(*terms: Any) -> Any:

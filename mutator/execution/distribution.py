@@ -54,7 +54,7 @@ def choose_distributor(cluster: str | None = None, *, insecure: bool = False) ->
             )
         return LocalDistributor()
     name, colon, where = cluster.partition(":")
-    if not (colon and DISTRIBUTORS.has(name)):
+    if not (colon and DISTRIBUTORS.has_name(name)):
         name, where = _DEFAULT_DISTRIBUTOR, cluster
     kind = DISTRIBUTORS.load(name)
     assert isinstance(kind, DistributorKind)

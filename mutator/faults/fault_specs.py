@@ -46,7 +46,7 @@ class Draw:
         return len(self.values) if self.kind == "list" else len(self.ranges)
 
     @property
-    def bounds(self) -> tuple[float, float]:
+    def least_and_greatest(self) -> tuple[float, float]:
         """The least and the greatest possible value."""
         ends = self.values or [end for ends in self.ranges for end in ends]
         return min(ends), max(ends) if self.cap is None else min(max(ends), self.cap)
@@ -69,10 +69,10 @@ class Variant:
     hold_by_reading: Mapping[str, Hold | None]
     keys: KeyPath
 
-    def injections(self, reading: str) -> tuple[InjectionSpec, ...]:
+    def injections_in_reading(self, reading: str) -> tuple[InjectionSpec, ...]:
         return self.injections_by_reading[self._defined_reading(reading)]
 
-    def hold(self, reading: str) -> Hold | None:
+    def hold_in_reading(self, reading: str) -> Hold | None:
         """Return how long the fault stays active; None: the trigger decides."""
         return self.hold_by_reading[self._defined_reading(reading)]
 
@@ -125,7 +125,7 @@ class SweepModel(StrictModel, title="A sweep"):
     last: list[_DrawnNumber] = Field(description="The last range, a whole number of steps above the first.")
 
     @model_validator(mode="after")
-    def _even(self) -> "SweepModel":
+    def _check_ranges(self) -> "SweepModel":
         self.ranges()
         return self
 
@@ -179,7 +179,7 @@ class _ReadingModel(StrictModel, title="A reading"):
     )
 
 
-class _VariantBase(StrictModel, title="A variant"):
+class _VariantModelBase(StrictModel, title="A variant"):
     """A variant is one row of the library: its injections share one trigger, one draw and one aim."""
 
     aim: str = Field(description="The hazard that the fault is meant to cause, one of the target's hazards.")
@@ -213,10 +213,12 @@ def build_spec_model(readings: Readings) -> type[SpecModel]:
     """Make the schema of a library's spec files. A variant has one key for each reading."""
     keys: dict[str, Any] = {}
     for name, about in zip(readings.names, readings.descriptions, strict=True):
-        required = name == readings.default
+        required = name == readings.default_name
         kind = _ReadingModel if required else _ReadingModel | None
         keys[name] = (kind, Field(... if required else None, description=about))
-    variant = create_model("_VariantModel", __base__=_VariantBase, __doc__=_VariantBase.__doc__, **keys)
+    variant = create_model(
+        "_VariantModel", __base__=_VariantModelBase, __doc__=_VariantModelBase.__doc__, **keys
+    )
     variants = Field(description="Name of the variant -> variant; at least one.")
     return create_model(
         "SpecModel",
@@ -229,7 +231,7 @@ def build_spec_model(readings: Readings) -> type[SpecModel]:
 def load_spec(path: Path, readings: Readings) -> FaultSpec:
     """Read one spec of a library; errors have file and line. `expand` does the remaining checks."""
     model, source = load_yaml_model(path, build_spec_model(readings), SCHEMA)
-    models: dict[str, _VariantBase] = model.variants  # type: ignore[attr-defined]
+    models: dict[str, _VariantModelBase] = model.variants  # type: ignore[attr-defined]
     for key in ("module", "fault_type"):
         _check_name(getattr(model, key), source, (key,))
     if not models:
@@ -252,7 +254,7 @@ def _check_name(name: str, source: YamlSource, keys: KeyPath) -> None:
 
 
 def _build_variant(
-    spec: str, name: str, model: _VariantBase, readings: Readings, source: YamlSource
+    spec: str, name: str, model: _VariantModelBase, readings: Readings, source: YamlSource
 ) -> Variant:
     keys: KeyPath = ("variants", name)
     _check_name(name, source, keys)
@@ -273,9 +275,9 @@ def _build_variant(
         else None,
         changes=tuple(model.changes),
         injections_by_reading={
-            reading: _build_injections(one, source, (*keys, reading))
-            for reading, one in models_by_reading.items()
-            if one
+            reading: _build_injections(reading_model, source, (*keys, reading))
+            for reading, reading_model in models_by_reading.items()
+            if reading_model
         },
         hold_by_reading={reading: hold and Hold(hold) for reading, hold in holds.items()},
         keys=keys,

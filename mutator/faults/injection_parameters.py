@@ -22,8 +22,8 @@ _EXPECTED_BY_NAME_TYPE = {
     "variable": "a name as in the source",
     "import": "a module of the target and a name in it",
 }
-_ANCHORS_WITHOUT_TARGET = VALUE_ANCHORS | FIXED_ANCHORS
-_ANCHORS_WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
+_ANCHOR_KINDS_WITHOUT_TARGET = VALUE_ANCHORS | FIXED_ANCHORS
+_ANCHOR_KINDS_WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
 
 def resolve_injection(
@@ -47,7 +47,7 @@ def resolve_injection(
     for param in spec.params:
         schema = resolver.schema_of(param)
         params[schema.name] = resolver.resolved_value(param, schema)
-        if schema.name == "target" and spec.location.anchor.kind in _ANCHORS_WITHOUT_TARGET:
+        if schema.name == "target" and spec.location.anchor.kind in _ANCHOR_KINDS_WITHOUT_TARGET:
             raise source.error(
                 param.keys,
                 f"'{param.value}' for '{param.key}' at `{spec.location.anchor.kind.value}`",
@@ -57,9 +57,9 @@ def resolve_injection(
     for schema in model.params:
         if schema.type == "seed":
             params[schema.name] = int(random_generator(seed, f"{key}/{schema.name}").random() * 2**53)
-        elif schema.name == "target" and spec.location.anchor.kind in _ANCHORS_WITH_DEFAULT_TARGET:
+        elif schema.name == "target" and spec.location.anchor.kind in _ANCHOR_KINDS_WITH_DEFAULT_TARGET:
             params.setdefault("target", spec.location.anchor.name)
-        at_value = schema.name == "target" and spec.location.anchor.kind in _ANCHORS_WITHOUT_TARGET
+        at_value = schema.name == "target" and spec.location.anchor.kind in _ANCHOR_KINDS_WITHOUT_TARGET
         if schema.name not in params and not (schema.optional or at_value):
             raise source.error(
                 (*spec.keys, "params"),

@@ -23,7 +23,7 @@ class Readings:
     descriptions: tuple[str, ...]
 
     @property
-    def default(self) -> str:
+    def default_name(self) -> str:
         return self.names[0]
 
     def check_name(self, name: str) -> None:

@@ -60,4 +60,7 @@ class ProbeTemplates:
 def _split_at_marks(path: Path, text: str, mark: str) -> list[TemplatePart]:
     texts = text.split(mark)
     lines = accumulate((part.count("\n") + 1 for part in texts[:-1]), initial=1)
-    return [TemplatePart(text=one, path=path, line=line) for one, line in zip(texts, lines, strict=True)]
+    return [
+        TemplatePart(text=part_text, path=path, line=line)
+        for part_text, line in zip(texts, lines, strict=True)
+    ]

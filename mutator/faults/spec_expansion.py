@@ -35,7 +35,7 @@ def expand_spec(
     (file:line) for an unknown model, parameter or change, a wrong unit, a value out of range, and a location
     outside the target or in a forbidden place. Anchors are resolved later, when a mutant is built.
     """
-    reading = reading or spec.readings.default
+    reading = reading or spec.readings.default_name
     spec.readings.check_name(reading)
     expander = _SpecExpander(spec, seed, reading, models, manifest)
     return tuple(fault for variant in spec for fault in expander.faults(variant))
@@ -101,7 +101,7 @@ class _SpecExpander:
                 unit=unit,
                 aim=variant.aim,
                 injections=self._injections(variant, value, number),
-                hold=variant.hold(self.reading),
+                hold=variant.hold_in_reading(self.reading),
                 changes=variant.changes,
             )
 
@@ -116,7 +116,7 @@ class _SpecExpander:
                 seed=self.seed,
                 key=f"{self.spec.name}/{variant.name}/{number}/{i}",
             )
-            for i, injection in enumerate(variant.injections(self.reading))
+            for i, injection in enumerate(variant.injections_in_reading(self.reading))
         )
 
     def _check_variant(self, variant: Variant) -> None:
@@ -130,7 +130,7 @@ class _SpecExpander:
                 raise self._unknown_name_error(
                     keys, f"change '{change}'", tuple(self.manifest.args_by_change)
                 )
-        for injection in variant.injections(self.reading):
+        for injection in variant.injections_in_reading(self.reading):
             self._check_injection(injection)
 
     def _check_injection(self, injection: InjectionSpec) -> None:

@@ -122,7 +122,7 @@ def _observation_edit(manifest: TargetManifest) -> Edit:
     observation = manifest.observation
     file = parsed_file(manifest.tree, observation.location.path)
     anchor = file.resolve_statement(observation.location)
-    return insertion_edit(file, anchor, [observe_call(observation.expressions)], OBSERVE_TAG)
+    return insertion_edit(file, anchor, [observe_call(observation.name_expression_pairs)], OBSERVE_TAG)
 
 
 def _build_probe(

@@ -125,7 +125,7 @@ def build_probe_settings(
         condition=to_python(canonical_condition(trigger.condition, variables=observation.variables)),
         variables=(TIME, *names),
         values=names,
-        observed=tuple(name for name, _ in observation.expressions),
+        observed=tuple(name for name, _ in observation.name_expression_pairs),
         derived=tuple((value.name, to_python(value.text, number=True)) for value in observation.derived),
         counted=observation.time is None,
         step_s=float(step_s),

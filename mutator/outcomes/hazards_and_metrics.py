@@ -127,7 +127,7 @@ def _golden_values(golden: ValuesByName, steps: np.ndarray) -> ValuesByName:
 
 def _robustness(hazard: Hazard, values: ValuesByName, manifest: TargetManifest) -> np.ndarray:
     try:
-        return temporal_logic.robustness(hazard.stl, values, manifest.step_s)
+        return temporal_logic.robustness_at_each_step(hazard.stl, values, manifest.step_s)
     except MutatorError as error:
         where = manifest.trace_file
         raise BadOutput(error.got, where=where, expected=error.expected, remedy=error.remedy) from None

@@ -116,7 +116,7 @@ def _target_section(manifest: TargetManifest) -> Iterator[str]:
 
 
 def _channel_row(channel: Channel) -> tuple[str, ...]:
-    has_special_tolerance = channel.tolerance != channel.role.tolerance
+    has_special_tolerance = channel.tolerance != channel.role.default_tolerance
     role = f"{channel.role}, to {channel.tolerance:g}" if has_special_tolerance else str(channel.role)
     return f"`{channel.name}`", channel.unit, role, channel.component or "-", channel.about or "-"
 

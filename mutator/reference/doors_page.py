@@ -126,7 +126,8 @@ def _door_section(door: Door) -> Iterator[str]:
     yield f"It adds {adds}. The object is a `{door.type_path.replace(':', '.')}`."
     if door.shipped_package:
         folder = door.shipped_package.replace(".", "/")
-        yield f"Inside the project, it is the attribute `{door.attribute}` of a module in `{folder}/`."
+        attribute = door.attribute_in_module
+        yield f"Inside the project, it is the attribute `{attribute}` of a module in `{folder}/`."
     yield f"\n{inspect.cleandoc(kind.__doc__)}\n"
     yield f'```toml\n[project.entry-points."{door.group}"]\n{example_name} = "{example_value}"\n```\n'
     shipped_rows = [(f"`{name}`", door.load(name).about) for name in door.shipped_names()]

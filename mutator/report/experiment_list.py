@@ -40,7 +40,7 @@ from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.formula_json import JsonTree, formula_as_json
-from mutator.triggers.trigger_kinds import ALWAYS
+from mutator.triggers.trigger_kinds import ALWAYS_NAME
 from mutator.web import embedded
 
 if TYPE_CHECKING:
@@ -179,7 +179,7 @@ def _of_operators(
         "value": [change or ("" if row.value is None else str(row.value)) for row, change in both],
         "variant": [row.variant.removesuffix(f" {change}" if change else "") for row, change in both],
         "line": [source.places.get(name, "") for name in faults],
-        "lasting": [PERMANENT if row.trigger == ALWAYS else TRANSIENT for row in rows],
+        "lasting": [PERMANENT if row.trigger == ALWAYS_NAME else TRANSIENT for row in rows],
     }
 
 

@@ -13,7 +13,7 @@ from mutator.results.outcome_counting import endings_of_rows
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import ALWAYS
+from mutator.triggers.trigger_kinds import ALWAYS_NAME
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def _marks(
         results["fault_id"], results["trigger"], endings_of_rows(results), strict=True
     ):
         if name in at and ending in ENDINGS:
-            ranks = found.setdefault((at[name], PERMANENT if trigger == ALWAYS else TRANSIENT), {})
+            ranks = found.setdefault((at[name], PERMANENT if trigger == ALWAYS_NAME else TRANSIENT), {})
             ranks[name] = min(ENDINGS.index(ending), ranks.get(name, len(ENDINGS)))
     for (place, lasting), ranks in sorted(found.items()):
         worst = min(ranks.values())

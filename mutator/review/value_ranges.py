@@ -53,14 +53,14 @@ def _injections_at_bounds(
                             draw=variant.draw,
                             value=value,
                         )
-                        for injection in variant.injections(fault.reading)
+                        for injection in variant.injections_in_reading(fault.reading)
                     )
 
 
 def _drawn_bounds(variant: Variant) -> tuple[float, ...]:
     assert variant.draw is not None
     digits = variant.draw.decimals
-    return tuple(end if digits is None else round(end, digits) for end in variant.draw.bounds)
+    return tuple(end if digits is None else round(end, digits) for end in variant.draw.least_and_greatest)
 
 
 def _ranged_values(injections: tuple[Injection, ...], models: FaultModels) -> Iterator[tuple[str, _Value]]:

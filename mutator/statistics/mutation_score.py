@@ -17,7 +17,7 @@ from mutator.results.table_columns import alert_names_in
 from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.shares import Share, share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell, cell_text
-from mutator.triggers.trigger_kinds import ALWAYS
+from mutator.triggers.trigger_kinds import ALWAYS_NAME
 
 AlertsByGoldenRun = Mapping[tuple[str, str], frozenset[str]]  # (scenario, seed or "") -> names of alerts
 
@@ -67,7 +67,7 @@ def mutant_drives(
         del flags[_ALERT_EFFECT]
     else:
         flags[_ALERT_EFFECT] = _new_alert_flags(mutant_runs, golden_alerts)
-    permanent = mutant_runs["trigger"] == ALWAYS
+    permanent = mutant_runs["trigger"] == ALWAYS_NAME
     return pd.DataFrame(
         {
             "mutant": mutant_runs["fault_id"],

@@ -39,7 +39,7 @@ class UnsafeCategory(StrEnum):
     WRONG_DURATION = "wrong_duration"
 
 
-class VariableModel(StrictModel, title="A variable"):
+class ProcessVariableModel(StrictModel, title="A variable"):
     """What a controller assumes about the process."""
 
     about: str = Field(description="What the variable means.")
@@ -59,7 +59,7 @@ class ComponentModel(StrictModel, title="A component"):
         description="The component's source files in the target. The path of a fault in one of them begins "
         "at this component.",
     )
-    process_model: dict[str, VariableModel] = Field(
+    process_model: dict[str, ProcessVariableModel] = Field(
         default_factory=dict, description="Name -> variable in a controller's process model."
     )
     drawn: list[int] = Field(

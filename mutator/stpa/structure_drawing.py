@@ -47,7 +47,7 @@ def render_structure(analysis: HazardAnalysis) -> str:
         *_link_arrows(analysis, layout),
         *_component_boxes(analysis, layout),
         *_link_labels(analysis, layout),
-        *_legend(layout.height),
+        *_legend_lines(layout.height),
         "</svg>",
     ]
     return "\n".join(lines) + "\n"
@@ -72,10 +72,10 @@ def _link_arrows(analysis: HazardAnalysis, layout: StructureLayout) -> Iterator[
     for name, link in analysis.structure.links.items():
         colour = FAULT_COLOUR if name in faulty else ACTION_COLOUR if name in actions else FEEDBACK_COLOUR
         width = 2.6 if colour != FEEDBACK_COLOUR else 1.4
-        yield _arrow(layout.arrows[name].points, colour, width, dashed=not link.studied)
+        yield _arrow_path(layout.arrows[name].points, colour, width, dashed=not link.studied)
 
 
-def _arrow(points: Iterable[Point], colour: str, width: float, *, dashed: bool = False) -> str:
+def _arrow_path(points: Iterable[Point], colour: str, width: float, *, dashed: bool = False) -> str:
     dashes = ' stroke-dasharray="6 4"' if dashed else ""
     return (
         f'<path d="{svg_shapes.path_data(points)}" fill="none" stroke="{colour}" stroke-width="{width}"'
@@ -122,7 +122,7 @@ def join_with_common_prefix(names: list[str]) -> str:
     return ", ".join([first, *(name.removeprefix(prefix) for name in rest)])
 
 
-def _legend(top: float) -> Iterator[str]:
+def _legend_lines(top: float) -> Iterator[str]:
     entries = (
         (ACTION_COLOUR, 2.6, False, "control action"),
         (FEEDBACK_COLOUR, 1.4, False, "feedback, effect"),
@@ -131,6 +131,6 @@ def _legend(top: float) -> Iterator[str]:
     )
     x, y = float(DRAWING_EDGE), top + LEGEND_HEIGHT / 2.0
     for colour, width, dashed, words in entries:
-        yield _arrow([(x, y), (x + 44, y)], colour, width, dashed=dashed)
+        yield _arrow_path([(x, y), (x + 44, y)], colour, width, dashed=dashed)
         yield f'<text x="{x + 52:.1f}" y="{y + 5:.1f}">{words}</text>'
         x += 52 + 7 * len(words) + 36

@@ -69,7 +69,7 @@ def lay_out_structure(structure: ControlStructureModel, lines: int = 1) -> Struc
         if tail.row == tip.row:
             points[name] = _sideways_points(tail, tip)
         elif _is_blocked(ports[name], tail, tip, boxes.values()):
-            points[name] = _points_around(tail, tip)
+            points[name] = _margin_points(tail, tip)
         elif ports[name][0] == ports[name][1]:
             points[name] = _straight_points(ports[name][0], tail, tip)
         else:
@@ -230,6 +230,6 @@ def _sideways_points(tail: ComponentBox, tip: ComponentBox) -> tuple[Point, ...]
     return (x1, y), (x2, y)
 
 
-def _points_around(tail: ComponentBox, tip: ComponentBox) -> tuple[Point, ...]:
+def _margin_points(tail: ComponentBox, tip: ComponentBox) -> tuple[Point, ...]:
     x, y = DRAWING_EDGE + LEFT_MARGIN / 2.0, tail.y + tail.height / 2.0
     return (tail.x, y), (x, y), (x, tip.y if tail.row < tip.row else tip.bottom)

@@ -71,7 +71,7 @@ def build_channels(
 ) -> tuple[Channel, ...]:
     """Read a manifest's channels, in order; MutatorError for an invalid trace or channel."""
     suffix = Path(trace.file).suffix.removeprefix(".")
-    if Path(trace.file).name != trace.file or not (suffix and IMPORTERS.has(suffix)):
+    if Path(trace.file).name != trace.file or not (suffix and IMPORTERS.has_name(suffix)):
         suffixes = ", ".join(f".{name}" for name in IMPORTERS.names())
         raise source.error(
             ("trace", "file"),
@@ -115,5 +115,5 @@ def _build_channel(name: str, model: ChannelModel, trace: TraceModel, source: Ya
             remedy="leave it out",
         )
     plain = model.model_dump(exclude={"from_", "tolerance"})
-    tolerance = model.role.tolerance if model.tolerance is None else model.tolerance
+    tolerance = model.role.default_tolerance if model.tolerance is None else model.tolerance
     return Channel(name=name, other_trace_name=model.from_, tolerance=tolerance, **plain)

@@ -16,7 +16,7 @@ class Role(StrEnum):
     INTERNAL = "internal"
 
     @property
-    def tolerance(self) -> float:
+    def default_tolerance(self) -> float:
         return 0.0 if self is Role.ACTUATOR else ROUNDING_TOLERANCE
 
 

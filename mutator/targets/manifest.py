@@ -237,7 +237,7 @@ def _names_in_criteria(
 ) -> set[str]:
     texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal)]
     texts += [text for metric in metrics for text in (metric.formula, metric.where)]
-    in_stl = (name for rule in rules for name in temporal_logic.names_in(rule.stl, names))
+    in_stl = (name for rule in rules for name in temporal_logic.names_in_stl(rule.stl, names))
     return {name.removeprefix(GOLDEN_PREFIX) for text in texts if text for name in names_in(text)}.union(
         in_stl
     )

@@ -21,9 +21,9 @@ from mutator.targets.required_packages import parse_requirements
 from mutator.targets.roots import (
     INSTALLED_PREFIX,
     check_only_installed_package,
+    checked_package_names,
     find_overlay,
     find_root,
-    package_names,
 )
 from mutator.targets.scene_model import SceneModel, build_scene
 from mutator.targets.severity_model import check_contact
@@ -142,7 +142,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
     _check_record_name(model, source)
     _check_event_names(model, source)
     check_environment(model.env, source)
-    packages = package_names(model.package, model.packages, source)
+    packages = checked_package_names(model.package, model.packages, source)
     check_only_installed_package(model.root, packages, model.files or (), source)
     changes = model.entry.changes
     trace = model.trace or TraceModel.model_validate({})
@@ -222,7 +222,7 @@ def _check_criteria_recorded(source: YamlSource, unrecorded: Collection[str]) ->
         entries = source.data.get(key)
         for name, entry in entries.items() if isinstance(entries, dict) else ():
             for field, text in entry.items() if isinstance(entry, dict) else ():
-                names = temporal_logic.names_in(text, unrecorded) if isinstance(text, str) else ()
+                names = temporal_logic.names_in_stl(text, unrecorded) if isinstance(text, str) else ()
                 if names and field not in ("about", "unit", "source"):
                     raise source.error(
                         (key, name, field),

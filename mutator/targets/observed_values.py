@@ -32,7 +32,7 @@ class Observation:
     derived: tuple[ObservedValue, ...]
 
     @property
-    def expressions(self) -> tuple[tuple[str, str], ...]:
+    def name_expression_pairs(self) -> tuple[tuple[str, str], ...]:
         time = () if self.time is None else ((TIME, self.time),)
         return (*time, *((value.name, value.text) for value in self.values))
 

@@ -55,7 +55,7 @@ def check_requirements(manifest: "TargetManifest") -> None:
         first = manifest.requires.index(next(iter(problems)))
         raise manifest.source.error(
             ("requires", first),
-            "; ".join(f"{wanted.name}: {problem}" for wanted, problem in problems.items()),
+            "; ".join(f"{requirement.name}: {problem}" for requirement, problem in problems.items()),
             expected=f"the packages that target {manifest.name} requires",
             remedy=pip_install_command(problems),
         )

@@ -61,7 +61,9 @@ def find_overlay(overlay: str | None, source: YamlSource) -> Path | None:
     )
 
 
-def package_names(package: str | None, packages: Sequence[str] | None, source: YamlSource) -> tuple[str, ...]:
+def checked_package_names(
+    package: str | None, packages: Sequence[str] | None, source: YamlSource
+) -> tuple[str, ...]:
     """Read the target's packages and modules, without duplicates."""
     if (package is None) == (packages is None):
         raise source.error(

@@ -7,7 +7,7 @@ ActorShape = Literal["box", "circle"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Actor:
+class SceneActor:
     """Something that moves. Formulas over channels give its centre (`x`, `y`) in m and `heading` (rad, left
     positive).
 
@@ -42,7 +42,7 @@ class Scene:
     `speed` is a formula for the speed (m/s) at which the origin moves along x.
     """
 
-    actors: tuple[Actor, ...]
+    actors: tuple[SceneActor, ...]
     lines: tuple[GroundLine, ...]
     follow: str
     speed: str

@@ -8,7 +8,7 @@ from pydantic import Field
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.targets.manifest_formulas import manifest_condition, manifest_formula
-from mutator.targets.scene import Actor, ActorShape, GroundLine, Scene
+from mutator.targets.scene import ActorShape, GroundLine, Scene, SceneActor
 
 
 class _ActorModel(StrictModel, title="An actor"):
@@ -73,13 +73,13 @@ def build_scene(model: SceneModel, names: Collection[str], source: YamlSource) -
     return Scene(actors=actors, lines=lines, follow=model.follow or "", speed=speed)
 
 
-def _build_actor(name: str, model: _ActorModel, names: Collection[str], source: YamlSource) -> Actor:
+def _build_actor(name: str, model: _ActorModel, names: Collection[str], source: YamlSource) -> SceneActor:
     keys: KeyPath = ("scene", "actors", name)
     if model.shape == "circle" and model.width_m is not None:
         raise source.error(
             (*keys, "width_m"), "the width of a circle", expected="`length_m` alone", remedy="remove it"
         )
-    return Actor(
+    return SceneActor(
         name=name,
         shape=model.shape,
         length=model.length_m,

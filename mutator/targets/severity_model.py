@@ -15,7 +15,7 @@ SCHEMA = "severity/1"
 _MPS_PER_KPH = UNITS["kph"].si_factor
 
 
-class _ClassModel(StrictModel, title="A class"):
+class _SeverityClassModel(StrictModel, title="A class"):
     from_kph: float = Field(
         ge=0.0, allow_inf_nan=False, description="The smallest delta-v in the class; 0 for S0."
     )
@@ -27,7 +27,7 @@ class SeverityScaleModel(StrictModel, title="severity/*.yaml"):
 
     about: str = Field("", description="The purpose of the scale.")
     source: str = Field(description="The source of the bounds.")
-    classes: dict[str, _ClassModel] = Field(
+    classes: dict[str, _SeverityClassModel] = Field(
         description="The classes S0, S1, S2 and S3; each begins at a higher delta-v than the one before."
     )
 
@@ -77,5 +77,8 @@ def load_severity_scale(path: Path) -> SeverityScale:
         name=path.stem,
         about=model.about,
         source=model.source,
-        classes=tuple((name, one.from_kph * _MPS_PER_KPH, one.about) for name, one in model.classes.items()),
+        classes=tuple(
+            (name, severity_class.from_kph * _MPS_PER_KPH, severity_class.about)
+            for name, severity_class in model.classes.items()
+        ),
     )

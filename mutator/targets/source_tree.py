@@ -59,14 +59,14 @@ class SourceTree:
             self._derived_by_file[key] = make(path, self.files[path], root)
         return cast("T", self._derived_by_file[key])
 
-    def relative_name(self, where: str) -> str:
+    def relative_name(self, path: str) -> str:
         """Return the path of a file as a spec names it, relative to the root or the overlay."""
         for folder in (self.root, self.overlay or self.root):
-            where = where.removeprefix(f"{folder}{os.sep}")
-        return where
+            path = path.removeprefix(f"{folder}{os.sep}")
+        return path
 
     @property
-    def digests(self) -> dict[str, str]:
+    def digest_by_path(self) -> dict[str, str]:
         return {path: digest(data) for path, data in self.files.items()}
 
     def digest_with(self, changed: Mapping[str, bytes]) -> str:

@@ -9,7 +9,7 @@ from mutator.targets.criteria import Hazard
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import TIME, divide, names_in, parse_expression, to_python
 
-_REMEDY = "leave `after_hazard` out of the campaign, so that runs continue"
+_STOP_REMEDY = "leave `after_hazard` out of the campaign, so that runs continue"
 
 
 def stop_function_source(manifest: TargetManifest) -> str:
@@ -72,4 +72,4 @@ def _stop_condition(manifest: TargetManifest, hazard: Hazard) -> str:
 
 def _cannot_stop_error(manifest: TargetManifest, keys: KeyPath, got: str, expected: str) -> MutatorError:
     got = f"runs cannot stop at a terminal hazard: {got}"
-    return manifest.source.error(keys, got, expected=expected, remedy=_REMEDY)
+    return manifest.source.error(keys, got, expected=expected, remedy=_STOP_REMEDY)

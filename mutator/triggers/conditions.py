@@ -72,7 +72,9 @@ def _canonical_text(
     try:
         writer = _ExpressionWriter(text, constants, variables, divide="({} / {})", over_time=over_time)
         canonical = (
-            writer.number(parse_expression(text)) if number else writer.boolean(parse_expression(text))
+            writer.write_number(parse_expression(text))
+            if number
+            else writer.write_boolean(parse_expression(text))
         )
         # the probe must be able to compile it, too
         if over_time:
@@ -93,7 +95,11 @@ def names_in(text: str) -> tuple[str, ...]:
 def to_python(text: str, *, number: bool = False) -> str:
     """Convert a checked condition or formula to Python that cannot raise and uses `_div` and `math`."""
     writer = _ExpressionWriter(text, {}, None, divide="_div({}, {})", infinity="math.inf", hypot="math.hypot")
-    return writer.number(parse_expression(text)) if number else writer.boolean(parse_expression(text))
+    return (
+        writer.write_number(parse_expression(text))
+        if number
+        else writer.write_boolean(parse_expression(text))
+    )
 
 
 def evaluate_condition(condition: str, values: Mapping[str, float]) -> bool:
@@ -132,13 +138,13 @@ def parse_expression(text: str) -> ast.expr:
         raise MutatorError(f"a condition of {len(text)} characters", expected=f"at most {_MOST_LENGTH}")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
-        return _GoldenNames().visit(tree) if GOLDEN_PREFIX in text else tree
+        return _GoldenNameJoiner().visit(tree) if GOLDEN_PREFIX in text else tree
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         hint = operator_hint(text) or "rewrite it"
         raise _syntax_error(f"{getattr(error, 'msg', error)}", text, None, hint) from None
 
 
-class _GoldenNames(ast.NodeTransformer):
+class _GoldenNameJoiner(ast.NodeTransformer):
     """Turns `golden.gap` into one name."""
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
@@ -170,70 +176,71 @@ class _ExpressionWriter:
         self.replacements = {"inf": infinity, "hypot": hypot}
         self.over_time = over_time
 
-    def boolean(self, node: ast.expr) -> str:
+    def write_boolean(self, node: ast.expr) -> str:
         if isinstance(node, ast.Constant) and isinstance(node.value, bool):
             return str(node.value)
         if isinstance(node, ast.BoolOp):
             word = " and " if isinstance(node.op, ast.And) else " or "
-            return word.join(self._boolean_operand(value) for value in node.values)
+            return word.join(self._write_boolean_operand(value) for value in node.values)
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-            return f"not {self._boolean_operand(node.operand)}"
+            return f"not {self._write_boolean_operand(node.operand)}"
         if isinstance(node, ast.Compare):
-            return self._compare(node)
+            return self._write_comparison(node)
         if isinstance(node, ast.Call) and self.over_time and ast.unparse(node.func) == "ever":
             if len(node.args) != 1 or node.keywords:
-                raise self._refuse(f"{ast.unparse(node)!r}", "write ever(CONDITION)")
-            return f"ever({self.boolean(node.args[0])})"
-        raise self._refuse(
+                raise self._error_in_text(f"{ast.unparse(node)!r}", "write ever(CONDITION)")
+            return f"ever({self.write_boolean(node.args[0])})"
+        raise self._error_in_text(
             f"{ast.unparse(node)!r} is not a truth value", "compare it with a value, e.g. t <= 2.0"
         )
 
-    def number(self, node: ast.expr) -> str:
+    def write_number(self, node: ast.expr) -> str:
         if isinstance(node, ast.IfExp):
-            return f"{self._term(node.body)} if {self.boolean(node.test)} else {self.number(node.orelse)}"
-        return self._term(node)
+            value, test = self._write_term(node.body), self.write_boolean(node.test)
+            return f"{value} if {test} else {self.write_number(node.orelse)}"
+        return self._write_term(node)
 
-    def _boolean_operand(self, node: ast.expr) -> str:
-        text = self.boolean(node)
+    def _write_boolean_operand(self, node: ast.expr) -> str:
+        text = self.write_boolean(node)
         return f"({text})" if isinstance(node, ast.BoolOp) else text
 
-    def _compare(self, node: ast.Compare) -> str:
-        parts = [self._term(node.left)]
+    def _write_comparison(self, node: ast.Compare) -> str:
+        parts = [self._write_term(node.left)]
         for operator, value in zip(node.ops, node.comparators, strict=True):
             if type(operator) not in _COMPARISON_SIGNS:
-                raise self._refuse(f"{ast.unparse(node)!r}")
-            parts += [_COMPARISON_SIGNS[type(operator)], self._term(value)]
+                raise self._error_in_text(f"{ast.unparse(node)!r}")
+            parts += [_COMPARISON_SIGNS[type(operator)], self._write_term(value)]
         return " ".join(parts)
 
-    def _term(self, node: ast.expr) -> str:
+    def _write_term(self, node: ast.expr) -> str:
         if isinstance(node, ast.Constant):
-            return self._constant(node)
+            return self._write_constant(node)
         if isinstance(node, ast.Name):
-            return self._name(node.id)
+            return self._write_name(node.id)
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
             sign = "-" if isinstance(node.op, ast.USub) else ""
-            return f"{sign}{self._term(node.operand)}"
+            return f"{sign}{self._write_term(node.operand)}"
         if isinstance(node, ast.BinOp) and type(node.op) in _ARITHMETIC_SIGNS:
-            left, right = self._term(node.left), self._term(node.right)
+            left, right = self._write_term(node.left), self._write_term(node.right)
             if isinstance(node.op, ast.Div):
                 return self.division_format.format(left, right)
             return f"({left} {_ARITHMETIC_SIGNS[type(node.op)]} {right})"
         if isinstance(node, ast.Call):
-            return self._call(node)
-        raise self._refuse(f"{ast.unparse(node)!r}")
+            return self._write_call(node)
+        raise self._error_in_text(f"{ast.unparse(node)!r}")
 
-    def _constant(self, node: ast.Constant) -> str:
+    def _write_constant(self, node: ast.Constant) -> str:
         if isinstance(node.value, bool) or not isinstance(node.value, int | float):
-            raise self._refuse(f"{node.value!r}")
+            raise self._error_in_text(f"{node.value!r}")
         try:
             number = float(node.value)
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise self._refuse("a number that is too large")
+            raise self._error_in_text("a number that is too large")
         return repr(number)
 
-    def _name(self, name: str) -> str:
+    def _write_name(self, name: str) -> str:
         if name in self.constants:
             return repr(float(self.constants[name]))
         if name == "inf":
@@ -245,17 +252,17 @@ class _ExpressionWriter:
         remedy = (
             f"the known constants are {', '.join(self.constants)}" if self.constants else "check its spelling"
         )
-        raise self._refuse(f"unknown name '{name}'", remedy)
+        raise self._error_in_text(f"unknown name '{name}'", remedy)
 
-    def _call(self, node: ast.Call) -> str:
+    def _write_call(self, node: ast.Call) -> str:
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         allowed = (*_ALLOWED_FUNCTIONS, "rate") if self.over_time else _ALLOWED_FUNCTIONS
         if name not in allowed or node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
-            raise self._refuse(f"a call of '{name}'")
+            raise self._error_in_text(f"a call of '{name}'")
         least, most = _ARGUMENT_COUNTS.get(name, (2, math.inf))
         if not least <= len(node.args) <= most:
-            raise self._refuse(f"{name} with {counted(len(node.args), 'argument')}")
-        return f"{self.replacements.get(name, name)}({', '.join(self._term(a) for a in node.args)})"
+            raise self._error_in_text(f"{name} with {counted(len(node.args), 'argument')}")
+        return f"{self.replacements.get(name, name)}({', '.join(self._write_term(a) for a in node.args)})"
 
-    def _refuse(self, what: str, remedy: str = "rewrite it") -> MutatorError:
+    def _error_in_text(self, what: str, remedy: str = "rewrite it") -> MutatorError:
         return _syntax_error(what, self.text, self.variables, remedy)

@@ -31,12 +31,12 @@ def check_stl_formula(formula: str, variables: Collection[str], step_s: float) -
     _evaluate(formula, {name: np.full(1, np.nan) for name in (*variables, TIME)}, step_s)
 
 
-def names_in(formula: str, variables: Collection[str]) -> tuple[str, ...]:
+def names_in_stl(formula: str, variables: Collection[str]) -> tuple[str, ...]:
     allowed = set(variables)
     return tuple(dict.fromkeys(name for name in _NAME_PATTERN.findall(formula) if name in allowed))
 
 
-def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
+def robustness_at_each_step(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
     """Return how far each step is from violating the formula (below 0: violated).
 
     `values` has an array for each variable, and the time of each step. If the formula looks n steps ahead,
@@ -58,13 +58,13 @@ def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
 def _evaluate(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
     if len(formula) > _MOST_LENGTH:
         raise MutatorError(f"a formula of {len(formula)} characters", expected=f"at most {_MOST_LENGTH}")
-    specification = _specification(step_s)
+    specification = _new_specification(step_s)
     formula = " ".join(formula.split())
-    names, steps = names_in(formula, values), len(values[TIME])
+    names, steps = names_in_stl(formula, values), len(values[TIME])
     # rtamt needs at least two steps, so the last one is repeated, and its second value is dropped
     rows = {name: [*values[name].tolist(), *values[name][-1:].tolist()] for name in names}
     try:
-        _parse(specification, formula, names)
+        _parse_formula(specification, formula, names)
         _check_intervals(specification.ast.specs[-1], specification.offline_interpreter)
         steps_ahead = _steps_ahead(specification.ast.specs[-1], specification.offline_interpreter)
         robustness_by_step = specification.evaluate({**rows, "time": [*range(steps + 1)]}) if steps else []
@@ -74,7 +74,7 @@ def _evaluate(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> 
     return np.array([np.inf] * min(steps_ahead, steps) + judged, dtype=float)
 
 
-def _specification(step_s: float) -> Any:
+def _new_specification(step_s: float) -> Any:
     try:
         import rtamt  # type: ignore[import-untyped]
     except ImportError:
@@ -88,7 +88,7 @@ def _specification(step_s: float) -> Any:
     return specification
 
 
-def _parse(specification: Any, formula: str, names: Collection[str]) -> None:
+def _parse_formula(specification: Any, formula: str, names: Collection[str]) -> None:
     declared = {*names, _OUTPUT_NAME}
     for name in declared:
         specification.declare_var(name, "float")

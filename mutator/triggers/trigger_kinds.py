@@ -11,12 +11,12 @@ from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
 from mutator.triggers.conditions import canonical_condition
 
-ALWAYS = "always"  # the trigger of a permanent fault
+ALWAYS_NAME = "always"  # the trigger of a permanent fault
 
 
 def always_trigger(*, armed_after_s: float = 0.0) -> Trigger:
     """Return a trigger that fires at the first observation after arming and stays active."""
-    return Trigger(name=ALWAYS, condition="True", hold=Hold.TO_END, armed_after_s=armed_after_s)
+    return Trigger(name=ALWAYS_NAME, condition="True", hold=Hold.TO_END, armed_after_s=armed_after_s)
 
 
 def trigger_at_time(time_s: float, *, name: str = "random", hold_s: float | None = None) -> Trigger:
@@ -39,7 +39,7 @@ def time_of(trigger: Trigger) -> float | None:
         return None
 
 
-def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: float) -> float:
+def draw_trigger_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: float) -> float:
     """Draw the time of a step from `first_s` to `last_s` (both included). All steps are equally likely.
 
     `seed` and `key` determine the result, which is rounded to nine decimals for readability.
@@ -53,7 +53,7 @@ def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: flo
 
 
 def _parse_always(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger | None:
-    return always_trigger(armed_after_s=armed_after_s) if text == ALWAYS else None
+    return always_trigger(armed_after_s=armed_after_s) if text == ALWAYS_NAME else None
 
 
 def _parse_time(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger | None:

@@ -26,7 +26,7 @@ def declare(workspace: Workspace, first: str, second: str) -> None:
 def test_the_first_reading_is_the_default(toy: Workspace) -> None:
     declare(toy, "printed", "measured")
     readings = load_readings(toy.library)
-    assert (readings.names, readings.default) == (("printed", "measured"), "printed")
+    assert (readings.names, readings.default_name) == (("printed", "measured"), "printed")
     assert readings.descriptions == ("The first.", "The second.")
 
 

@@ -29,5 +29,5 @@ def test_a_trace_of_another_package_is_read(tmp_path: Path, door_examples: Path)
 
 
 def test_a_suffix_is_only_accepted_while_its_package_is_installed(door_examples: Path) -> None:
-    assert IMPORTERS.has("jsonl")
-    assert not IMPORTERS.has("jsonl2")
+    assert IMPORTERS.has_name("jsonl")
+    assert not IMPORTERS.has_name("jsonl2")

@@ -23,7 +23,7 @@ def test_a_manifest_is_read(toy: Workspace) -> None:
     assert manifest.step_s == 0.1
     assert [(c.name, c.unit, c.tolerance) for c in manifest.compared_channels] == [("speed", "m/s", 0.5)]
     assert manifest.observation.location.anchor.kind is AnchorKind.AFTER_ASSIGN
-    assert dict(manifest.observation.expressions)["v_lead"] == "now.lead_speed"
+    assert dict(manifest.observation.name_expression_pairs)["v_lead"] == "now.lead_speed"
 
 
 def test_actuators_have_no_default_tolerance(toy: Workspace) -> None:
@@ -39,7 +39,7 @@ def test_ground_truth_can_be_computed(toy: Workspace) -> None:
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("is: now.gap", "is: 'now[\"lead\"].x[-1] - (now.x + 4.5)'")
     path.write_text(text.replace("is: now.lead_speed", "is: 'hypot(now.v[0], now.v[1]) > 3'"))
-    expressions = dict(toy.manifest("toy").observation.expressions)
+    expressions = dict(toy.manifest("toy").observation.name_expression_pairs)
     assert expressions["d_rel"] == "now['lead'].x[-1] - (now.x + 4.5)"
     assert expressions["v_lead"] == "_fi.hypot(now.v[0], now.v[1]) > 3"
 

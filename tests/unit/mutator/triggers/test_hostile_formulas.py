@@ -52,7 +52,7 @@ def test_a_hostile_temporal_formula_ends_soon(formula: str) -> None:
     pytest.importorskip("rtamt")
     is_cheap(lambda: temporal_logic.check_stl_formula(formula, ("x",), 0.01))
     steps = np.arange(3000) * 0.01
-    is_cheap(lambda: temporal_logic.robustness(formula, {"x": steps, "t": steps}, 0.01))
+    is_cheap(lambda: temporal_logic.robustness_at_each_step(formula, {"x": steps, "t": steps}, 0.01))
 
 
 def test_a_long_interval_is_refused_with_the_longest() -> None:

@@ -83,7 +83,7 @@ def test_robustness_equals_the_definition(formula: Formula, rows: list[tuple[int
     """A formula has a value at a step only after its whole window was observed."""
     x, y = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
     time = np.arange(len(rows)) * STEP
-    found = temporal_logic.robustness(text(formula), {"t": time, "x": x, "y": y}, STEP)
+    found = temporal_logic.robustness_at_each_step(text(formula), {"t": time, "x": x, "y": y}, STEP)
     ahead = far(formula)
     values = {"x": x.tolist(), "y": y.tolist()}
     expected = [np.inf] * ahead + [defined(formula, i, values) for i in range(len(rows) - ahead)]
@@ -92,7 +92,7 @@ def test_robustness_equals_the_definition(formula: Formula, rows: list[tuple[int
 
 def test_a_predicate_and_a_future_operator_can_be_combined() -> None:
     x = np.array([1.0, 6, 6, 6, 6])
-    found = temporal_logic.robustness(
+    found = temporal_logic.robustness_at_each_step(
         "(x > 5) implies eventually[0,2](x < 5)", {"t": np.arange(5.0), "x": x}, 1.0
     )
     assert found.tolist() == [np.inf, np.inf, 4, -1, -1]
@@ -104,7 +104,9 @@ def test_a_predicate_and_a_future_operator_can_be_combined() -> None:
 def test_bounds_count_whole_steps(step_s: float, bound: str, steps: int) -> None:
     """The length of a step need not have a short decimal form."""
     time = np.arange(40) * step_s
-    found = temporal_logic.robustness(f"always[0:{bound}](x < 1)", {"t": time, "x": np.zeros(40)}, step_s)
+    found = temporal_logic.robustness_at_each_step(
+        f"always[0:{bound}](x < 1)", {"t": time, "x": np.zeros(40)}, step_s
+    )
     assert found.tolist() == [np.inf] * steps + [1.0] * (40 - steps)
 
 
@@ -113,7 +115,7 @@ def test_uneven_steps_are_refused(third: float) -> None:
     """The logic counts steps."""
     values = {"t": np.array([0.0, 0.1, third]), "x": np.zeros(3)}
     with pytest.raises(MutatorError, match=r"a step of \S+ s at 0.1 s.*expected steps of 0.1 s"):
-        temporal_logic.robustness("x < 1", values, 0.1)
+        temporal_logic.robustness_at_each_step("x < 1", values, 0.1)
 
 
 @pytest.mark.parametrize(
@@ -146,4 +148,4 @@ def test_a_check_accepts_arithmetic_that_some_values_make_invalid(formula: str) 
 
 def test_arithmetic_that_rtamt_cannot_compute_is_reported() -> None:
     with pytest.raises(MutatorError, match="division by zero in '1 / x < 3'"):
-        temporal_logic.robustness("1 / x < 3", {"t": np.zeros(1), "x": np.zeros(1)}, STEP)
+        temporal_logic.robustness_at_each_step("1 / x < 3", {"t": np.zeros(1), "x": np.zeros(1)}, STEP)

@@ -7,7 +7,7 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.model import Hold
 from mutator.triggers.conditions import evaluate_condition
-from mutator.triggers.trigger_kinds import always_trigger, draw_time, parse_trigger, trigger_at_time
+from mutator.triggers.trigger_kinds import always_trigger, draw_trigger_time, parse_trigger, trigger_at_time
 
 FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0}
 
@@ -37,15 +37,17 @@ def test_always_and_a_time_last_to_the_end_of_the_run() -> None:
 
 
 def test_random_times_are_starts_of_steps() -> None:
-    times = [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
-    assert times == [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
+    times = [draw_trigger_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
+    assert times == [
+        draw_trigger_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)
+    ]
     assert all(1.5 <= t <= 29.5 and t == round(t * 100) / 100 for t in times)
     assert min(times) < 3.0 and max(times) > 28.0
-    assert {draw_time(i, "k", first_s=0.1, last_s=0.2, step_s=0.1) for i in range(50)} == {0.1, 0.2}
+    assert {draw_trigger_time(i, "k", first_s=0.1, last_s=0.2, step_s=0.1) for i in range(50)} == {0.1, 0.2}
 
 
 def test_random_times_need_a_valid_seed_and_interval() -> None:
     with pytest.raises(MutatorError, match="seed -1; expected a number from 0 to "):
-        draw_time(-1, "k", first_s=1.0, last_s=2.0, step_s=0.01)
+        draw_trigger_time(-1, "k", first_s=1.0, last_s=2.0, step_s=0.01)
     with pytest.raises(MutatorError, match="expected an end that is not before"):
-        draw_time(1, "k", first_s=2.0, last_s=1.0, step_s=0.01)
+        draw_trigger_time(1, "k", first_s=2.0, last_s=1.0, step_s=0.01)
