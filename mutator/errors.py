@@ -17,7 +17,7 @@ Code in a target's process has its exceptions beside it, because it cannot impor
 from pathlib import Path
 from typing import Any
 
-_MOST_PART_LENGTH = 2000  # longest part of an error, in characters
+_MOST_PART_LENGTH = 2000  # characters of a part of an error; a value from a file can be megabytes
 EXIT_OK = 0
 EXIT_CHECK_FAILED = 1
 EXIT_WRONG_INPUT = 2

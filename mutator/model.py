@@ -297,9 +297,8 @@ class Record:
     #: (name, first time in s) of each alert after the activation, sorted by time
     alerts: tuple[tuple[str, float], ...]
     trace_digest: str  #: digest of the trace
-    error: RunError | None = added_field(
-        None
-    )  #: the exception that ended the run: `kind`, `message`, `place`
+    #: the exception that ended the run: `kind`, `message`, `place`
+    error: RunError | None = added_field(None)
     patch: str = ""  #: digest of the stored patch; empty without a mutant, and in old records
     t_end: float | None = added_field(None)  #: when a terminal hazard ended the drive, in s
     dev: tuple[tuple[str, float], ...] = added_field(())  #: `max_dev` up to `t_end`; empty without `t_end`

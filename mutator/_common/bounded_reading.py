@@ -21,8 +21,8 @@ MOST_JSON_BYTES = 6_000_000  # bytes of a JSON object; as Python objects they ca
 MOST_DATA_BYTES = 8_000_000_000  # bytes of a file that grows with the number of experiments
 MOST_LINE_BYTES = 4_000_000  # bytes of a line
 _NO_HOLES_FROM_BYTES = 64_000_000  # from this size, a file must not have holes
-_FURTHER_READ_BYTES = 1_000_000
-_GZIP_WBITS = zlib.MAX_WBITS | 16
+_FURTHER_READ_BYTES = 1_000_000  # at a time, so that a file that grows without end is noticed early
+_GZIP_WBITS = zlib.MAX_WBITS | 16  # zlib's flag for data with a header of gzip
 
 
 def read_bounded(path: Path, most_bytes: int = MOST_FILE_BYTES) -> bytes:
@@ -50,9 +50,8 @@ def read_open_file(file: BinaryIO, where: Path, most_bytes: int = MOST_FILE_BYTE
     check_file_size(file, where, most_bytes)
     remaining = os.fstat(file.fileno()).st_size - file.tell()
     data = file.read(max(remaining, 0) + 1)  # not `most_bytes`, because that many bytes would be reserved
-    while len(data) <= most_bytes and (
-        more := file.read(_FURTHER_READ_BYTES)
-    ):  # it grows, or does not have a size
+    # a file that grows, or one that has no size, such as those in /proc
+    while len(data) <= most_bytes and (more := file.read(_FURTHER_READ_BYTES)):
         data += more
     if len(data) > most_bytes:
         raise _too_large_error(len(data), where, most_bytes)

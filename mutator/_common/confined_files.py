@@ -23,8 +23,11 @@ from mutator._common.bounded_reading import read_open_file
 from mutator._common.files import make_accessible, raising_disk_full, remove_anything_at
 from mutator.errors import MutatorError, Outside
 
+# The kernel refuses a link (O_NOFOLLOW), so that nothing can be exchanged between a look and the opening.
 _OPEN_FOLDER_FLAGS = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+# Without O_NONBLOCK, opening a pipe would wait until somebody opens its other end.
 _NO_LINK_NO_WAIT_FLAGS = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+# O_EXCL: a file that somebody puts there meanwhile is not written to.
 _NEW_FILE_FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 _MOST_DEPTH, _MOST_OUTPUT_DEPTH = 30, 20  # folders in each other; an output lies in a few others
 _MOST_NAME_BYTES = 220  # bytes; Linux allows 255, and a half-written file has a longer name
@@ -114,7 +117,7 @@ def writing_below(root: Path, name: str) -> Iterator[BinaryIO]:
             with os.fdopen(file, "wb") as writer:
                 yield writer
                 writer.flush()
-                os.fsync(file)
+                os.fsync(file)  # before it takes the name, or a crash could leave an empty file of that name
             os.replace(temporary, last_part, src_dir_fd=parent, dst_dir_fd=parent)
         except BaseException as err:
             with suppress(OSError):
@@ -199,7 +202,7 @@ def move_plain_files(source: int, target: int, depth: int = 0) -> None:
     """
     if depth >= _MOST_OUTPUT_DEPTH:
         return
-    with suppress(OSError):
+    with suppress(OSError):  # a run can take its user the permission to list a folder
         os.fchmod(source, stat.S_IRWXU)
     with os.scandir(source) as entries:
         names = [entry.name for entry in entries if entry.name.isprintable()]

@@ -163,7 +163,7 @@ def _shipped_names(folder: str) -> tuple[str, ...]:
 
 @cache
 def _load_shipped(package: str, attribute: str, name: str) -> Any:
-    module = name.replace("-", "_") + "_" * iskeyword(name)
+    module = name.replace("-", "_") + "_" * iskeyword(name)  # no module can be named `return`
     return getattr(import_module(f"{package}.{module}"), attribute)
 
 

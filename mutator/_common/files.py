@@ -17,8 +17,9 @@ from typing import Any, BinaryIO
 from mutator._common.bounded_reading import MOST_JSON_BYTES, read_bounded
 from mutator.errors import DiskFull, MutatorError
 
-_DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
+_DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)  # the disk, or the user's quota of it
 _OPEN_FOLDER_FLAGS = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
+# missing; below a file; a folder; a circle of links; a pipe, socket or device
 _NO_FILE_ERRNOS = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO)
 
 
@@ -82,7 +83,7 @@ def make_folder(path: Path) -> None:
     try:
         with raising_disk_full(path):
             path.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=path):
+            with tempfile.TemporaryFile(dir=path):  # only this shows that one can write there
                 return
     except OSError as err:
         raise MutatorError(
@@ -204,7 +205,7 @@ def writing_temporary_path(path: Path) -> Iterator[Path]:
         try:
             yield temporary
             with temporary.open("rb+") as file:
-                os.fsync(file.fileno())
+                os.fsync(file.fileno())  # otherwise a crash could leave an empty file of this name
             temporary.replace(path)
         except BaseException:
             temporary.unlink(missing_ok=True)

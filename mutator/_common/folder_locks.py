@@ -14,8 +14,8 @@ from mutator._common.confined_files import open_descriptor_below, unlink_below
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError, Outside
 
-OWNER_LOCK_FILE = "owner.lock"
-WORKERS_FOLDER = "workers"
+OWNER_LOCK_FILE = "owner.lock"  # locked by the owner; its content, a process id, only serves the error
+WORKERS_FOLDER = "workers"  # a locked file for each living worker, named after its process id
 _WORKER_PATIENCE_S = 15.0  # workers of a dead command exit well within this time
 
 
@@ -95,7 +95,7 @@ def wait_for_workers(run: Path, patience_s: float = _WORKER_PATIENCE_S) -> list[
     """Wait until no worker is left in `run`; return the process ids of workers that outlive `patience_s`."""
     deadline = time.monotonic() + patience_s
     while (living := living_worker_pids(run)) and time.monotonic() <= deadline:
-        time.sleep(0.1)
+        time.sleep(0.1)  # usually they end within a few of these
     return living
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import orjson
 
 _ADDED_KEY = "added"  # metadata key of a field
-_SCALAR_TYPES = frozenset((str, int, float, bool, type(None)))
+_SCALAR_TYPES = frozenset((str, int, float, bool, type(None)))  # exact types: an enum of texts is converted
 
 
 def added_field(default: Any, metadata: dict[str, Any] | None = None) -> Any:

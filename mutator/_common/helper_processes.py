@@ -59,7 +59,7 @@ def _started_workers(
     compute: Callable[[T], R], items: Sequence[T], process_count: int
 ) -> Iterator[list[Connection]]:
     """Start worker processes, which end with the block, and yield the connections to their results."""
-    context = get_context("fork")
+    context = get_context("fork")  # items and `compute` are inherited, and need not be pickled
     pipes = [context.Pipe(duplex=False) for _ in range(process_count)]
     workers = [
         context.Process(

@@ -25,6 +25,7 @@ def describe_value(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     text = repr(value)
+    # with place, expectation and remedy around it, a longer value would bury them
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -47,7 +48,7 @@ def operator_hint(text: str) -> str:
 
 _NAME_BEFORE_VALUE_PATTERN = re.compile(r"[^\s:]+(?: [^\s:]+)*  +")  # `name   ` before a value
 _COMMAND_PATTERN = re.compile(r"`[^`]*`")
-_UNBREAKABLE_SPACE = "\0"
+_UNBREAKABLE_SPACE = "\0"  # no message contains it, and textwrap does not break lines there
 
 
 def wrap_text(text: str, width: int) -> str:
@@ -63,6 +64,7 @@ def _wrap_line(line: str, width: int) -> str:
     if line.startswith("|"):  # a row of a Markdown table
         return line
     start = _NAME_BEFORE_VALUE_PATTERN.match(line)
+    # values far to the right would leave too little room for their lines
     indent = len(start[0]) if start and len(start[0]) <= width // 2 else _indentation(line) + 2
     unbroken = _COMMAND_PATTERN.sub(lambda command: command[0].replace(" ", _UNBREAKABLE_SPACE), line)
     lines = textwrap.wrap(

@@ -6,7 +6,7 @@ import numpy as np
 
 from mutator.errors import MutatorError
 
-_WORD_VALUES = 2**32
+_WORD_VALUES = 2**32  # NumPy seeds its generators with words of 32 bits
 
 
 def random_generator(seed: int, key: str) -> np.random.Generator:

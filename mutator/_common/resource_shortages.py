@@ -6,11 +6,9 @@ import os
 from mutator.errors import Shortage
 
 _OPEN_FILES_ERRNOS = (errno.EMFILE, errno.ENFILE)
-_NO_THREAD_MESSAGE = "can't start new thread"
-_NO_MEMORY_TO_LOAD_MESSAGES = (
-    "failed to map segment",
-    "cannot allocate memory",
-)  # errors when there is too little memory to load a library
+_NO_THREAD_MESSAGE = "can't start new thread"  # Python's RuntimeError has no number
+# of an ImportError, when there is too little memory to load a library; it has no number either
+_NO_MEMORY_TO_LOAD_MESSAGES = ("failed to map segment", "cannot allocate memory")
 _RUN_AGAIN = "run the same command again; finished experiments are kept and not repeated"
 
 

@@ -24,7 +24,7 @@ from mutator._common.hashing import content_id
 
 CHECKS, GOLDENS, RUNS = "checks", "goldens", "runs"
 LINES, PICTURES, PAGES, TARGETS = "lines", "pictures", "pages", "targets"
-_MOST_NAME_LENGTH = 200
+_MOST_NAME_LENGTH = 200  # file systems allow 255 bytes
 MOST_TARGET_BYTES = 4_000_000_000  # size limit for one target, enforced between seeds
 MOST_PAGES_BYTES = 500_000_000  # size limit for all reports that the server built
 
@@ -152,7 +152,9 @@ def _build_entry(what: str, path: Path) -> CacheEntry:
     return CacheEntry(
         what=what,
         path=path,
-        size=sum(state.st_blocks * 512 for state in states),  # a sparse file takes less space than its size
+        # st_blocks counts units of 512 bytes; a sparse file takes less space than its size
+        size=sum(state.st_blocks * 512 for state in states),
+        # the later of both, because many systems update the time of access once a day at most
         used=max((max(state.st_atime, state.st_mtime) for state in states), default=0.0),
     )
 

@@ -83,6 +83,7 @@ def _unpacking_folder() -> Path:
 
 @lru_cache(maxsize=1)
 def _unpacked_folder(archive: Path, home: Path) -> Path:
+    # a folder for each content: processes of an older version may still read theirs
     folder = home / digest(archive.read_bytes())[:16]
     if not folder.is_dir():
         _unpack(archive, folder)

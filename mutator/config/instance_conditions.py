@@ -4,7 +4,8 @@ import ast
 
 from mutator.config.location_syntax import PROBE_NAME
 
-_MOST_LENGTH = 1000
+_MOST_LENGTH = 1000  # characters; the condition becomes part of one line of the mutant
+# no calls: the condition is evaluated in the controller's function, and must not change anything
 _ALLOWED_NODES = (
     *(ast.Expression, ast.BoolOp, ast.And, ast.Or, ast.UnaryOp, ast.Not, ast.USub, ast.Compare, ast.cmpop),
     *(ast.Name, ast.Load, ast.Attribute, ast.Subscript, ast.Constant, ast.Tuple),
@@ -21,6 +22,7 @@ def canonical_instance_condition(text: str) -> str:
     except (SyntaxError, RecursionError, MemoryError):
         tree = None
     plain = tree is not None and all(isinstance(node, _ALLOWED_NODES) for node in ast.walk(tree))
+    # `ast` ignores a comment, which would swallow what follows the condition in the mutant's line
     if tree is None or not plain or PROBE_NAME in names_in_condition(text) or "#" in text:
         raise ValueError(text)
     return ast.unparse(tree)

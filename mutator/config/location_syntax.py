@@ -9,12 +9,8 @@ from mutator.model import AnchorKind, FaultLocation
 
 PROBE_NAME = "_fi"  # reserved for the probe's module in every mutant (mutants/probe.py)
 
-_INVALID_SOURCE_ERRORS = (
-    SyntaxError,
-    ValueError,
-    RecursionError,
-    MemoryError,
-)  # what `ast` raises for invalid source
+# what `ast` raises for invalid or too deeply nested source
+_INVALID_SOURCE_ERRORS = (SyntaxError, ValueError, RecursionError, MemoryError)
 
 
 def location_as_yaml(location: FaultLocation) -> dict[str, Any]:

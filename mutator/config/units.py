@@ -64,7 +64,7 @@ def split_unit(key: str) -> tuple[str, Unit | None]:
     """Split `offset_m` into (`offset`, metre), at the longest suffix. A key without a unit is returned with
     None.
     """
-    for words in range(_MOST_SUFFIX_PARTS, 0, -1):
+    for words in range(_MOST_SUFFIX_PARTS, 0, -1):  # the longest first: `per_m` ends in `m`, too
         stem, *parts = key.rsplit("_", words)
         suffix = "_".join(parts)
         if stem and suffix in UNITS:
@@ -76,6 +76,6 @@ def convert_unit(number: float, source: Unit, target: Unit) -> float:
     """Convert a number to another unit; ValueError if the dimensions differ."""
     if source.dimension != target.dimension:
         raise ValueError(f"{source.symbol} is not a unit of {target.dimension}")
-    if source.si_factor == target.si_factor:
+    if source.si_factor == target.si_factor:  # dividing by the same factor could change the last digit
         return float(number)
     return number * source.si_factor / target.si_factor

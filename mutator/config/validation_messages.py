@@ -23,6 +23,7 @@ _EXPECTED_AND_REMEDY_BY_ERROR = {
     "dataclass_type": ("a mapping", "write `key: value` lines beneath it"),
     "finite_number": ("a finite number", "write an ordinary number"),
 }
+# if a key accepts several shapes, pydantic reports one of these for each that the value does not have
 _WRONG_SHAPE_ERRORS = ("list_type", "tuple_type", "dict_type", "model_type", "dataclass_type")
 _UNKNOWN_KEY_ERRORS = ("extra_forbidden", "unexpected_keyword_argument")  # of a model, of a dataclass
 

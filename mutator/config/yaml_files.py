@@ -26,6 +26,7 @@ T = TypeVar("T")
 MOST_YAML_BYTES = 1_000_000
 MOST_YAML_DEPTH = 40  # nested lists and mappings
 MOST_YAML_VALUES = 100_000  # keys, texts, numbers, lists and mappings
+# YAML ends a line also at these, unlike an editor; line numbers count as the parser does
 _LINE_BREAK_PATTERN = re.compile(r"\r\n|[\r\n\x85\u2028\u2029]")
 _DIRECTIVE_PATTERN = re.compile(r"(?:\A\ufeff?|[\r\n\x85\u2028\u2029])%")
 _SCALAR_PATTERNS = {
@@ -57,6 +58,7 @@ YamlRecord = Annotated[T, _AsMapping()]
 """A dataclass in a file model, with fields of `yaml_metadata` and a configuration of `mapping_config`."""
 
 
+# the loader in C is many times as fast, but an installation of PyYAML can lack it
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
     """The safe loader with the scalars of YAML 1.2: `on`, `no` and `1:30` are text."""
 

@@ -100,7 +100,7 @@ def load_fault_models(folder: Path) -> FaultModels:
     return _load_cached(folder, contents)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=4)  # a process rarely uses more folders
 def _load_cached(folder: Path, contents: tuple[tuple[Path, bytes], ...]) -> FaultModels:
     """Load a folder. `contents` of its files only distinguishes cached results."""
     return _load_all(folder)

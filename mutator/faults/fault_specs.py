@@ -19,7 +19,7 @@ from mutator.model import Hold
 
 SCHEMA = "fault_spec/1"
 _NAME_PATTERN = re.compile(r"[a-z][a-z0-9_]*\Z")
-_MOST_RANGES = 1000
+_MOST_RANGES = 1000  # of a sweep; more mean a mistyped step, and each range is a fault
 _MOST_DRAWN_NUMBER = 1e15  # limit of a drawn number: whole numbers up to it are exact
 
 
@@ -138,6 +138,7 @@ class SweepModel(StrictModel, title="A sweep"):
         if steps >= _MOST_RANGES:
             raise ValueError(f"at most {_MOST_RANGES} ranges")
         ranges = tuple((low + i * self.step, high + i * self.step) for i in range(round(steps) + 1))
+        # the step times a number is not exact in binary: 3 * 0.1 is not 0.3
         if not ranges or any(abs(a - b) > 1e-9 for a, b in zip(ranges[-1], self.last, strict=True)):
             raise ValueError("a last range that is a whole number of steps above the first")
         return ranges

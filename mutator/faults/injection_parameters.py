@@ -56,6 +56,7 @@ def resolve_injection(
             )
     for schema in model.params:
         if schema.type == "seed":
+            # up to 2**53, every whole number is exact as a float, too
             params[schema.name] = int(random_generator(seed, f"{key}/{schema.name}").random() * 2**53)
         elif schema.name == "target" and spec.location.anchor.kind in _ANCHOR_KINDS_WITH_DEFAULT_TARGET:
             params.setdefault("target", spec.location.anchor.name)

@@ -16,6 +16,7 @@ from mutator.targets.relative_paths import clean_relative_path
 from mutator.triggers.conditions import RESERVED_NAMES, TIME, canonical_formula
 
 _MOST_LENGTH = 1000  # characters in an expression, at most
+# an expression runs in the target at every step, and must not change anything there
 _ALLOWED_NODES = (
     *(ast.BinOp, ast.UnaryOp, ast.Compare, ast.Load, ast.Subscript, ast.Call),
     *(ast.operator, ast.unaryop, ast.cmpop),

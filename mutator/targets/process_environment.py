@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 from mutator.config.yaml_sources import YamlSource
 
+# Sums in another order differ in their last digits, so the libraries of linear algebra use one thread.
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 INHERITED_VARIABLES = ("PATH", "LD_LIBRARY_PATH", "HOME")  # the user's own values, needed to start Python
 FIXED_VARIABLES = {

@@ -213,7 +213,7 @@ def matches_any_glob(path: str, globs: Iterable[str]) -> bool:
     return any(_glob_pattern(glob).match(path) for glob in globs)
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=1024)  # each glob is matched with every path
 def _glob_pattern(glob: str) -> re.Pattern[str]:
     parts = _WILDCARD_PATTERN.split(glob)
     special = {"**/": r"(?:.*/)?", "**": r".*", "*": r"[^/]*", "?": r"[^/]"}

@@ -17,21 +17,14 @@ TIME = "t"  # s; every target has it
 GOLDEN_PREFIX = "golden."  # before a name: its value in the golden run
 _ALLOWED_FUNCTIONS = ("abs", "min", "max", "hypot")
 _FUNCTIONS_OVER_TIME = ("ever", "rate")  # whether a condition has held so far; a number's change per second
-_ARGUMENT_COUNTS = {
-    "abs": (1, 1),
-    "hypot": (2, 2),
-    "rate": (1, 1),
-}  # minimum, maximum; others take two or more
+# minimum and maximum; other functions take two or more
+_ARGUMENT_COUNTS = {"abs": (1, 1), "hypot": (2, 2), "rate": (1, 1)}
 _BUILT_IN_NAMES = (*_ALLOWED_FUNCTIONS, *_FUNCTIONS_OVER_TIME, "inf", "True", "False")  # not variables
 _COMPARISON_SIGNS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _ARITHMETIC_SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-RESERVED_NAMES = (
-    *_ALLOWED_FUNCTIONS,
-    *_FUNCTIONS_OVER_TIME,
-    "inf",
-    TIME,
-)  # names in formulas that are not the target's values
-_MOST_LENGTH = 1000
+# names in formulas that are not the target's values
+RESERVED_NAMES = (*_ALLOWED_FUNCTIONS, *_FUNCTIONS_OVER_TIME, "inf", TIME)
+_MOST_LENGTH = 1000  # characters; bounds what a hostile condition costs Python's parser
 _ALLOWED_SYNTAX = "comparisons, and/or/not, + - * /, abs/min/max/hypot, numbers, True, and "
 
 
@@ -114,6 +107,7 @@ def divide(a: float, b: float) -> float:
     """Divide as IEEE 754 does: infinite or NaN for b = 0. The probe contains the same function."""
     if b:
         return a / b
+    # the sign of a zero counts: 1 / -0.0 is -inf
     return math.nan if a == 0.0 or a != a else math.copysign(math.inf, a) * math.copysign(1.0, b)
 
 
@@ -234,7 +228,7 @@ class _ExpressionWriter:
             raise self._error_in_text(f"{node.value!r}")
         try:
             number = float(node.value)
-        except OverflowError:
+        except OverflowError:  # an integer of more than 308 digits
             number = math.inf
         if not math.isfinite(number):
             raise self._error_in_text("a number that is too large")

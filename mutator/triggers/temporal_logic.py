@@ -13,15 +13,15 @@ from mutator.errors import MutatorError
 from mutator.triggers.conditions import TIME
 
 _NAME_PATTERN = re.compile(r"\b[A-Za-z_]\w*\b")
-_OUTPUT_NAME = "robustness_of_it"
-_SYNTAX_ERROR_PATTERN = re.compile(r"1:(\d+): Syntax")
+_OUTPUT_NAME = "robustness_of_it"  # rtamt wants `name = formula`; no channel is named like this
+_SYNTAX_ERROR_PATTERN = re.compile(r"1:(\d+): Syntax")  # of rtamt, with the column
+# names of rtamt's classes of operators that look ahead: to the end of an interval, for ever, one step
 _BOUNDED_OPERATORS = ("TimedAlways", "TimedEventually", "TimedUntil")
 _UNBOUNDED_OPERATORS = ("Always", "Eventually", "Until")
 _NEXT_OPERATORS = ("Next", "StrongNext")
 _MOST_LENGTH = 1000  # characters of a formula
-MOST_INTERVAL_STEPS = (
-    3000  # of all intervals of a formula together; rtamt's time grows with the square of some
-)
+# of all intervals of a formula together; for some operators, rtamt's time grows with the square of it
+MOST_INTERVAL_STEPS = 3000
 _STEP_TOLERANCE = 0.01  # tolerance in steps; times are sums of steps, or rounded
 
 

@@ -29,7 +29,7 @@ _FUNCTIONS_OF_MANY: Mapping[str, np.ufunc] = {"min": np.minimum, "max": np.maxim
 
 def condition_at_each_step(condition: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return for each step whether a checked condition holds. `values` includes the time (s)."""
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):  # inf and NaN are values here, as in the probe
         return _repeated_for_each_step(
             _TraceEvaluation(values).evaluate_boolean(parse_expression(condition)), values
         )
@@ -99,5 +99,6 @@ class _TraceEvaluation:
             return reduce(_FUNCTIONS_OF_MANY[name], arguments)
         if name == "rate":
             values = _repeated_for_each_step(arguments[0], self._values)
+            # the first step has no earlier one, and a comparison with NaN is false
             return np.concatenate(([np.nan], np.diff(values) / np.diff(self._time)))[: len(values)]
         return _NUMPY_FUNCTIONS[name](*arguments)
