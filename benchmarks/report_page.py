@@ -30,7 +30,7 @@ from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.report import experiment_list as report_browse
 from mutator.report import markdown_and_html as report_page
 from mutator.report.experiment_facts import PLACE, UNTIMED_PATH
-from mutator.report.experiment_list import Browse
+from mutator.report.experiment_list import ExperimentListData
 from mutator.report.glossary import words_of
 from mutator.report.markdown_and_html import Content
 from mutator.report.panels.answers_panel import build_answers_panel
@@ -144,7 +144,9 @@ def write(size: int, out: Path) -> dict[str, float]:
     began = process_time()
     run = ReportedRun.open(RunFolder.open(out), None)
     more = {PLACE: run.seen.places, UNTIMED_PATH: run.seen.path_numbers}
-    table = embedded(report_browse.table(run.results.assign(**more), run.faults, run.paths), "table")
+    table = embedded(
+        report_browse.results_table_data(run.results.assign(**more), run.faults, run.paths), "table"
+    )
     assert run.paths is not None
     ids = run.results["experiment_id"].tolist()
     paths = embedded(run.paths.data(ids), "paths")
@@ -152,11 +154,11 @@ def write(size: int, out: Path) -> dict[str, float]:
     shown = [experiments[name] for name in ids]
     records = [record(e, n) for n, e in enumerate(shown)]
     traces = [one.trace_digest for one in records]
-    details = report_browse.details(shown, shapes_of_patches(patches(workspace, shown)), ids, traces)
+    details = report_browse.details_data(shown, shapes_of_patches(patches(workspace, shown)), ids, traces)
     detail = embedded(details, "details")
     index_kb = write_series(workspace, records, out)
-    browse = Browse(
-        facts=Markup(json.dumps({"filmed": True, "series": {"packed": True, "kept": []}})),
+    browse = ExperimentListData(
+        facts_json=Markup(json.dumps({"filmed": True, "series": {"packed": True, "kept": []}})),
         scripts=tuple(map(Markup, (table, detail, paths, embedded({}, "media")))),
     )
     content = Content(

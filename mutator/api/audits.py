@@ -18,7 +18,7 @@ from mutator.audit.signatures import sign as write_signature
 from mutator.audit.signatures import verified_signer
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import draw_experiments, rerun_and_compare
-from mutator.report.report_audit import pages
+from mutator.report.report_audit import audit_report
 from mutator.store.run_folder import RunFolder
 from mutator.store.work_stretches import describe_stretches, package_versions
 from mutator.workspace import Workspace
@@ -138,7 +138,7 @@ def verify(
     if report:
         checks.append(
             AuditCheck.from_problems(
-                "pages of the report that follow from the run", *pages(folder, opened_workspace)
+                "pages of the report that follow from the run", *audit_report(folder, opened_workspace)
             )
         )
     damaged = any(check.differences for check in checks)

@@ -79,7 +79,7 @@ class RunExperiment(StoredExperiment):
 
         MutatorError for a target that cannot be filmed, and for a faulty run that left no film.
         """
-        return Filming.of(self.run.workspace, self.run.folder).take(self.experiment, self.record, shots)
+        return Filming.of(self.run.workspace, self.run.folder).take_shots(self.experiment, self.record, shots)
 
     def _load_traces(self) -> tuple[Trace, Trace]:
         if self.record is None:

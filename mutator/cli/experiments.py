@@ -159,14 +159,14 @@ def _rerun_and_film(
     terminal: Terminal, experiment: "RunExperiment", video: Path | None, stills: list[str]
 ) -> list[Path]:
     shots = [_parse_still(text, experiment) for text in stills]
-    shots += [mutator.Shot(out=video)] if video else []
+    shots += [mutator.Shot(path=video)] if video else []
     if not shots:
         return []
     with terminal.show_spinner("rerunning and filming"):
         is_same = experiment.film(shots)
     if not is_same:
         terminal.print_note(DIFFERS_NOTE)
-    return [shot.out for shot in shots]
+    return [shot.path for shot in shots]
 
 
 def _parse_still(text: str, experiment: "RunExperiment") -> "mutator.Shot":
@@ -181,7 +181,7 @@ def _parse_still(text: str, experiment: "RunExperiment") -> "mutator.Shot":
             f"'{text}'", where="--still", expected="a time in s, alone or with a file: 14.5 or 14.5=early.png"
         )
     default_path = experiment.plot_file.with_name(f"{experiment.id}-{time:.2f}s.jpg")
-    return mutator.Shot(out=Path(name) if name else default_path, t=time)
+    return mutator.Shot(path=Path(name) if name else default_path, t=time)
 
 
 RERUN_EXAMPLES = """\b

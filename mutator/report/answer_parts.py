@@ -11,98 +11,98 @@ import pandas as pd
 
 from mutator.results.outcome_counting import hazard_times
 
-FIRST = "alert before the hazard"
-NO_ALERT, LATE = "no alert at all", "alert only after the hazard"
-SILENT = (NO_ALERT, LATE)  # silent hazards: no alert before the hazard
+ALERT_BEFORE_HAZARD = "alert before the hazard"
+NO_ALERT, ALERT_AFTER_HAZARD = "no alert at all", "alert only after the hazard"
+SILENT_HAZARD_WARNINGS = (NO_ALERT, ALERT_AFTER_HAZARD)  # silent hazards: no alert before the hazard
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class PageLink:
     """A text that links to a place on the page. `to` is the URL fragment, without #."""
 
     text: str
-    to: str
+    fragment: str
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ShareBar:
     """A bar that shows `part` as a share of `of`."""
 
     part: float
-    of: float
+    whole: float
     text: str
 
 
 @dataclass(frozen=True, slots=True)
-class Codes:
+class ExplainedCodes:
     """Codes of hazards or of a severity class, whose meanings the page explains. `word` precedes them."""
 
-    names: tuple[str, ...]
-    word: str = ""
+    codes: tuple[str, ...]
+    prefix: str = ""
 
     @property
     def text(self) -> str:
-        return f"{self.word} {', '.join(self.names)}".lstrip()
+        return f"{self.prefix} {', '.join(self.codes)}".lstrip()
 
 
-Cell = str | Link | Part | Codes
+Cell = str | PageLink | ShareBar | ExplainedCodes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Listing:
+class AnswerTable:
     """A small table."""
 
     heads: tuple[str, ...]
-    lines: Sequence[tuple[Cell, ...]]
+    rows: Sequence[tuple[Cell, ...]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class ReportAnswer:
     """The answer to a question. `wide`: its tables have many columns."""
 
     name: str
     title: str
-    says: str
-    listings: tuple[Listing, ...] = ()  # listings without lines are not shown
-    links: tuple[Link, ...] = ()
-    wide: bool = False
+    paragraph: str
+    tables: tuple[AnswerTable, ...] = ()  # listings without lines are not shown
+    links: tuple[PageLink, ...] = ()
+    is_wide: bool = False
 
 
-def to_list(facets: Mapping[str, Sequence[str]], sort: str = "") -> str:
+def filtered_list_fragment(filters: Mapping[str, Sequence[str]], sort: str = "") -> str:
     """Return the URL fragment that opens the list of experiments with these filters."""
-    parts = [f"{name}={','.join(quote(v, safe='') for v in values)}" for name, values in facets.items()]
+    parts = [f"{name}={','.join(quote(v, safe='') for v in values)}" for name, values in filters.items()]
     return "&".join((*parts, *([f"sort={sort}"] if sort else ())))
 
 
-def share(part: int, of: int, what: str) -> str:
+def describe_share(part: int, whole: int, plural_noun: str) -> str:
     """Return a share as text, for example `20 of 96 activated faults (21 %)`."""
-    noun = what.removesuffix("s") if of == 1 else what
-    return f"{part:,} of {of:,} {noun}" + (f" ({100 * part / of:.0f} %)" if of else "")
+    noun = plural_noun.removesuffix("s") if whole == 1 else plural_noun
+    return f"{part:,} of {whole:,} {noun}" + (f" ({100 * part / whole:.0f} %)" if whole else "")
 
 
-def were(count: int) -> str:
+def was_or_were(count: int) -> str:
     return "was" if count == 1 else "were"
 
 
-def by_kind(part: pd.DataFrame, of: pd.DataFrame) -> list[tuple[str, int, int]]:
+def fault_type_counts(part: pd.DataFrame, whole: pd.DataFrame) -> list[tuple[str, int, int]]:
     """Each fault type with its number of rows in `part` and in `of`, largest first."""
     parts = part["kind"].value_counts()
-    counts = [(str(k), int(parts.get(k, 0)), int(n)) for k, n in of["kind"].value_counts().items()]
+    counts = [(str(k), int(parts.get(k, 0)), int(n)) for k, n in whole["kind"].value_counts().items()]
     return sorted(counts, key=lambda c: (-c[1], -c[2], c[0]))
 
 
-def kind_link(kind: str, **facets: Sequence[str]) -> Link:
-    return Link(kind, to_list({"kind": [kind], **facets}))
+def fault_type_link(fault_type: str, **filters: Sequence[str]) -> PageLink:
+    return PageLink(fault_type, filtered_list_fragment({"kind": [fault_type], **filters}))
 
 
-def bar(part: int, of: int) -> Part:
-    return Part(part, of, f"{part:,} of {of:,}")
+def share_bar(part: int, whole: int) -> ShareBar:
+    return ShareBar(part, whole, f"{part:,} of {whole:,}")
 
 
-def warnings_of(frame: pd.DataFrame) -> np.ndarray:
+def hazard_warnings(frame: pd.DataFrame) -> np.ndarray:
     """Return the value of the page's filter `warning` for each row of a frame of results; '' without a
     hazard.
     """
-    late = np.where(frame["reaction_time"].isna(), LATE, FIRST)
+    late = np.where(frame["reaction_time"].isna(), ALERT_AFTER_HAZARD, ALERT_BEFORE_HAZARD)
     hazard = np.where(frame["alerts"] == "", NO_ALERT, late)
     return np.where(hazard_times(frame).notna().any(axis=1), hazard, "")

@@ -17,8 +17,8 @@ from mutator.store.run_folder import RunFolder
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-LISTED = 20  # maximum number of listed reasons for using the reference engine, most frequent first
-_WORDS = {
+MOST_REASONS = 20  # maximum number of listed reasons for using the reference engine, most frequent first
+_MODE_DESCRIPTIONS = {
     RunMode.FORK: "a fork of the golden run, just before the fault is first active",
     RunMode.GOLDEN: "no run: the trigger never holds, so the golden run's result is used",
     RunMode.WARM: "a fork of the loaded program, from the start of the run",
@@ -32,54 +32,56 @@ class EngineSummary:
     """How many experiments each mode executed, and the equivalence check as a sentence and in brief."""
 
     table: TextTable
-    proof: str
-    state: str
-    failed: bool  # an experiment had a different result on the reference engine
+    equivalence_text: str
+    equivalence_state: str
+    has_failed_equivalence: bool  # an experiment had a different result on the reference engine
 
 
 def summarize_engines(
     folder: RunFolder, records: Mapping[str, Record], timings: "DataFrame"
 ) -> EngineSummary | None:
     """Summarize a run's `timings` (as in `Seen`) and `proof/`. None without timings and without `proof/`."""
-    ways = _ways(timings)
-    if not ways and not (folder.path / PROOF_FOLDER).is_dir():
+    counts_by_mode = _count_modes(timings)
+    if not counts_by_mode and not (folder.path / PROOF_FOLDER).is_dir():
         return None
-    sentence, state, failed = _proof(folder, records)
-    table = TextTable(heads=("how", "experiments"), rows=list(_lines(ways)))
-    return EngineSummary(table=table, proof=sentence, state=state, failed=failed)
+    sentence, state, failed = _describe_equivalence(folder, records)
+    table = TextTable(heads=("how", "experiments"), rows=list(_table_rows(counts_by_mode)))
+    return EngineSummary(
+        table=table, equivalence_text=sentence, equivalence_state=state, has_failed_equivalence=failed
+    )
 
 
-def _ways(timings: "DataFrame") -> Counter[tuple[str | None, str]]:
+def _count_modes(timings: "DataFrame") -> Counter[tuple[str | None, str]]:
     engines = (None if name is None or name != name else str(name) for name in timings["engine"])
     return Counter(zip(engines, map(str, timings["why"]), strict=True))
 
 
-def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
-    for how, words in _WORDS.items():
-        reasons = {why: count for (name, why), count in ways.items() if name == how}
+def _table_rows(counts_by_mode: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
+    for mode, description in _MODE_DESCRIPTIONS.items():
+        reasons = {reason: count for (name, reason), count in counts_by_mode.items() if name == mode}
         if count := reasons.pop("", 0):
-            yield [words, str(count)]
+            yield [description, str(count)]
         by_count = sorted(reasons.items(), key=lambda item: (-item[1], item[0]))
-        for why, count in by_count[:LISTED]:
-            yield [f"{words}, because the run cannot be forked: {why}", str(count)]
-        if rest := sum(count for _, count in by_count[LISTED:]):
-            yield [f"{words}, for other reasons (see timings/)", str(rest)]
+        for why, count in by_count[:MOST_REASONS]:
+            yield [f"{description}, because the run cannot be forked: {why}", str(count)]
+        if rest := sum(count for _, count in by_count[MOST_REASONS:]):
+            yield [f"{description}, for other reasons (see timings/)", str(rest)]
 
 
-def _proof(folder: RunFolder, records: Mapping[str, Record]) -> tuple[str, str, bool]:
+def _describe_equivalence(folder: RunFolder, records: Mapping[str, Record]) -> tuple[str, str, bool]:
     try:
-        found = equivalence_check.compare_sample(folder, records)
+        check = equivalence_check.compare_sample(folder, records)
     except CheckFailed as err:
-        said = f"The equivalence check failed. Do not trust these results: {err.got}."
-        return said, f"FAILED: {err.got}", True
-    if found is None:
-        said = "All experiments ran on the reference engine, so no equivalence check is needed."
+        text = f"The equivalence check failed. Do not trust these results: {err.got}."
+        return text, f"FAILED: {err.got}", True
+    if check is None:
+        text = "All experiments ran on the reference engine, so no equivalence check is needed."
         if folder.head.experiments < MIN_EXPERIMENTS_TO_FORK:
-            said += f" Forking pays off only with {MIN_EXPERIMENTS_TO_FORK} or more experiments."
-        return said, "none needed", False
-    same = f"{found.same} of {found.sampled} same"
-    if not found.is_complete:
-        said = f"The equivalence check is not finished: so far, {found}, byte for byte. The rest of the "
-        said += "sample has not been rerun."
-        return said, f"not finished: {same}", False
-    return f"Equivalence check: of a sample rerun from the start, {found}, byte for byte.", same, False
+            text += f" Forking pays off only with {MIN_EXPERIMENTS_TO_FORK} or more experiments."
+        return text, "none needed", False
+    same = f"{check.same} of {check.sampled} same"
+    if not check.is_complete:
+        text = f"The equivalence check is not finished: so far, {check}, byte for byte. The rest of the "
+        text += "sample has not been rerun."
+        return text, f"not finished: {same}", False
+    return f"Equivalence check: of a sample rerun from the start, {check}, byte for byte.", same, False

@@ -18,7 +18,7 @@ from mutator.config.location_syntax import location_as_yaml
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.readable_patches import readable_patch
-from mutator.report.answer_parts import warnings_of
+from mutator.report.answer_parts import hazard_warnings
 from mutator.report.experiment_facts import PLACE, UNTIMED_PATH
 from mutator.report.fault_path_data import RunPaths
 from mutator.report.glossary import meanings_of
@@ -48,63 +48,65 @@ if TYPE_CHECKING:
 
     from mutator.workspace import Workspace
 
-SCHEMA = "report-table/1"
-READING_ORDER = ["module", "fault_type", "scenario", "method", "trigger", "experiment_id"]
+TABLE_SCHEMA = "report-table/1"
+LIST_ORDER = ["module", "fault_type", "scenario", "method", "trigger", "experiment_id"]
 DETAILS_SCHEMA = "report-details/1"
-_OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns that need a target with alerts
-STILLS_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
-_TRACE = 16  # hex digits of the digest of a trace
-LISTED = 50_000  # maximum number of experiments that the page lists, so that it opens quickly
+_ALERT_COLUMNS = ("alerts", "t_alert", "reaction_time")  # columns that need a target with alerts
+MOST_EMBEDDED_STILL_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
+_TRACE_DIGEST_DIGITS = 16  # hex digits of the digest of a trace
+MOST_LISTED_EXPERIMENTS = (
+    50_000  # maximum number of experiments that the page lists, so that it opens quickly
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Browse:
+class ExperimentListData:
     """Data for the page's scripts: `facts` as JSON, the rest as script elements. `listed` says which
     experiments the page lists; '' if all.
     """
 
-    facts: Markup
+    facts_json: Markup
     scripts: tuple[Markup, ...]
-    listed: str = ""
+    truncation_note: str = ""
 
 
-def browse_data(run: ReportedRun) -> Browse:
+def build_list_data(run: ReportedRun) -> ExperimentListData:
     """Return the page data of a run. Paths in it are relative to the report's folder."""
     folder, workspace = run.folder, run.workspace
-    listed = _listed(run)
+    listed = _listed_results(run)
     ids = listed["experiment_id"].tolist()
-    data: dict[str, Any] = {"table": _table(run, listed), "details": _details(run, ids)}
-    data["media"] = media(folder, folder.path / FOLDER, STILLS_BYTES)
+    data: dict[str, Any] = {"table": _list_table_data(run, listed), "details": _list_details_data(run, ids)}
+    data["media"] = media_by_experiment(folder, folder.path / FOLDER, MOST_EMBEDDED_STILL_BYTES)
     if run.paths:
         data["paths"] = run.paths.data(ids)
     facts = {
-        **_of_target(folder, workspace),
+        **_target_facts(folder, workspace),
         "series": series_facts(folder),
         "metrics": folder.head.metrics,
         "severity": as_json_types(folder.head.severity),
         "hazards": as_json_types(folder.head.about_hazards),
         "meanings": meanings_of(run),
     }
-    return Browse(
-        facts=Markup(json.dumps(facts).replace("<", "\\u003c")),
+    return ExperimentListData(
+        facts_json=Markup(json.dumps(facts).replace("<", "\\u003c")),
         scripts=tuple(Markup(embedded(value, name)) for name, value in data.items()),
-        listed=_which(run),
+        truncation_note=_describe_truncation(run),
     )
 
 
-def _which(run: ReportedRun) -> str:
+def _describe_truncation(run: ReportedRun) -> str:
     count, path = len(run.results), run.folder.path.name
-    if count <= LISTED:
+    if count <= MOST_LISTED_EXPERIMENTS:
         return ""
     return (
-        f"The list has the {LISTED:,} worst of {count:,} experiments (by rank). All other parts of this page "
-        f"cover all experiments. To see another experiment: `mutator show ID --run {path}`. To list the "
-        f"worst that match a filter: `mutator show --run {path} --only 'FILTER'`. All experiments are in "
+        f"The list has the {MOST_LISTED_EXPERIMENTS:,} worst of {count:,} experiments (by rank). All other "
+        "parts of this page cover all experiments. To see another experiment: "
+        f"`mutator show ID --run {path}`. To list the worst that match a filter: `mutator show --run {path} --only 'FILTER'`. All experiments are in "
         "results.parquet."
     )
 
 
-def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
+def _target_facts(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
     """Whether films can be made (true without a manifest), and the scene for the replay."""
     try:
         manifest = workspace.manifest(folder.head.target) if workspace else None
@@ -114,82 +116,94 @@ def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, An
     return {"filmed": filmed, "scene": scene_facts(manifest) if manifest else None}
 
 
-def _listed(run: ReportedRun) -> "DataFrame":
+def _listed_results(run: ReportedRun) -> "DataFrame":
     """Return the results that the page lists, in reading order, with rank and path."""
-    chosen = run.seen.places < LISTED
-    more = {PLACE: run.seen.places[chosen], UNTIMED_PATH: run.seen.path_numbers[chosen]}
-    return run.results[chosen].assign(**more).sort_values(READING_ORDER)
+    is_listed = run.seen.places < MOST_LISTED_EXPERIMENTS
+    extra_columns = {PLACE: run.seen.places[is_listed], UNTIMED_PATH: run.seen.path_numbers[is_listed]}
+    return run.results[is_listed].assign(**extra_columns).sort_values(LIST_ORDER)
 
 
-def _table(run: ReportedRun, listed: "DataFrame") -> dict[str, Any]:
-    made = table(listed, run.faults, run.paths, alerts=run.folder.has_alerts, source=run.source)
+def _list_table_data(run: ReportedRun, listed: "DataFrame") -> dict[str, Any]:
+    data = results_table_data(
+        listed, run.faults, run.paths, has_alerts=run.folder.has_alerts, source=run.source
+    )
     if len(listed) < len(run.results):
-        made |= {"of": len(run.results), "map": map_of(run)}
-    return made
+        data |= {"of": len(run.results), "map": map_of(run)}
+    return data
 
 
-def _details(run: ReportedRun, ids: Sequence[str]) -> dict[str, Any]:
+def _list_details_data(run: ReportedRun, ids: Sequence[str]) -> dict[str, Any]:
     records = map(run.records.get, ids)
-    traces = [record.trace_digest[:_TRACE] if record else "" for record in records]
-    return details(list(map(run.experiments.get, ids)), shapes_of_patches(_patches(run, ids)), ids, traces)
+    traces = [record.trace_digest[:_TRACE_DIGEST_DIGITS] if record else "" for record in records]
+    return details_data(list(map(run.experiments.get, ids)), shapes_of_patches(_readable_patches(run, ids)), ids, traces)
 
 
-def table(
+def results_table_data(
     results: "DataFrame",
     faults: Mapping[str, Fault],
     paths: RunPaths | None = None,
     *,
-    alerts: bool = True,
+    has_alerts: bool = True,
     source: SourceLines | None = None,
 ) -> dict[str, Any]:
     """Return the results by column, with derived columns such as `rank` (1: the worst). Alert columns need a
     target with `alerts`; `line` (of the fault) and `lasting` need a `source`. `faults` are those of the plan.
     """
-    left_out = {PLACE, UNTIMED_PATH, *(() if alerts else _OF_ALERTS)}
+    omitted_columns = {PLACE, UNTIMED_PATH, *(() if has_alerts else _ALERT_COLUMNS)}
     columns: dict[str, Iterable[Any]] = {
-        str(name): results[name] for name in results.columns if name not in left_out
+        str(name): results[name] for name in results.columns if name not in omitted_columns
     }
     columns["kind"] = fault_types_of(results)
     rows = rows_of(results, faults)
     columns["fault"] = [row.fault for row in rows]
     columns["ending"] = endings_of_rows(results)
     columns["hazards"] = joined_hazards(results)
-    if alerts:
-        columns["warning"] = warnings_of(results)
+    if has_alerts:
+        columns["warning"] = hazard_warnings(results)
     columns["rank"] = results[PLACE] + 1
     columns["t_hazard"] = hazard_times(results).min(axis=1)
     if paths:
         columns["through"] = paths.through(results[UNTIMED_PATH])
     if source:
-        columns |= _of_operators(source, results, rows)
-    made = [{"name": name, **column(name, values)} for name, values in columns.items()]
+        columns |= _operator_columns(source, results, rows)
+    columns_data = [{"name": name, **column_data(name, values)} for name, values in columns.items()]
     labels = {name: facts["label"] for name, facts in paths.components.items()} if paths else {}
-    checked = list(hazard_names(results))
-    return {"schema": SCHEMA, "count": len(results), "checked": checked, "labels": labels, "columns": made}
+    checked_hazards = list(hazard_names(results))
+    return {
+        "schema": TABLE_SCHEMA,
+        "count": len(results),
+        "checked": checked_hazards,
+        "labels": labels,
+        "columns": columns_data,
+    }
 
 
-def _of_operators(
+def _operator_columns(
     source: SourceLines, results: "DataFrame", rows: Sequence[ResultRow]
 ) -> dict[str, list[str]]:
     """Return the columns that differ for mutants of operators. Their `value` is the change in the source."""
     faults = results["fault_id"].tolist()
     changes = [source.changes.get(name, "") for name in faults]
-    both = list(zip(rows, changes, strict=True))
+    rows_and_changes = list(zip(rows, changes, strict=True))
     return {
-        "value": [change or ("" if row.value is None else str(row.value)) for row, change in both],
-        "variant": [row.variant.removesuffix(f" {change}" if change else "") for row, change in both],
+        "value": [
+            change or ("" if row.value is None else str(row.value)) for row, change in rows_and_changes
+        ],
+        "variant": [
+            row.variant.removesuffix(f" {change}" if change else "") for row, change in rows_and_changes
+        ],
         "line": [source.places.get(name, "") for name in faults],
         "lasting": [PERMANENT if row.trigger == ALWAYS_NAME else TRANSIENT for row in rows],
     }
 
 
-def column(name: str, values: Iterable[Any]) -> dict[str, Any]:
+def column_data(name: str, values: Iterable[Any]) -> dict[str, Any]:
     """Return a column's data: numbers (None: no value), ids as texts, otherwise codes of the distinct
     texts.
     """
     cells = list(values)
     if any(not isinstance(cell, str) for cell in cells):
-        numbers = list(map(_number, cells))
+        numbers = list(map(_json_number, cells))
         if any(number is not None for number in numbers):
             return {"numbers": numbers}
         cells = [""] * len(cells)
@@ -200,7 +214,7 @@ def column(name: str, values: Iterable[Any]) -> dict[str, Any]:
     return {"words": words, "codes": [code[text] for text in cells]}
 
 
-def _number(value: float) -> float | int | str | None:
+def _json_number(value: float) -> float | int | str | None:
     """Return the value for JSON, which has no infinities; None for NaN."""
     if math.isnan(value):
         return None
@@ -209,55 +223,55 @@ def _number(value: float) -> float | int | str | None:
     return int(value) if abs(value) < 2**53 and value == int(value) else float(value)
 
 
-def details(
+def details_data(
     experiments: Sequence[Experiment | None],
-    found: Sequence[PatchShape],
+    diff_shapes: Sequence[PatchShape],
     ids: Sequence[str],
-    traces: list[str],
+    trace_digests: list[str],
 ) -> dict[str, Any]:
     """For each of the `ids`, the codes of its spec and trigger setting (-1: not in the plan), the index of
     its diff's shape (-1: no diff), and the start of its trace's digest, which its series must name. A shape
     has a list of values for each hole in its text, in row order.
     """
-    specs, settings = _Codes(), _Codes()
+    specs, settings = _TextCodes(), _TextCodes()
     faults = {e.fault.id: e.fault for e in experiments if e}
-    spec = {name: _spec(fault) for name, fault in faults.items()}
-    shape_of = {member: i for i, shape in enumerate(found) for member in shape.member_ids}
+    spec = {name: _spec_yaml(fault) for name, fault in faults.items()}
+    shape_of = {member: i for i, shape in enumerate(diff_shapes) for member in shape.member_ids}
     return {
         "schema": DETAILS_SCHEMA,
-        "spec": [specs.code(spec[e.fault.id]) if e else -1 for e in experiments],
-        "setting": [settings.code(_setting(e)) if e else -1 for e in experiments],
+        "spec": [specs.code_of(spec[e.fault.id]) if e else -1 for e in experiments],
+        "setting": [settings.code_of(_trigger_setting_json(e)) if e else -1 for e in experiments],
         "shape": [shape_of.get(name, -1) for name in ids],
-        "trace": traces,
-        "specs": specs.known,
-        "settings": [json.loads(text) for text in settings.known],
+        "trace": trace_digests,
+        "specs": specs.texts,
+        "settings": [json.loads(text) for text in settings.texts],
         "shapes": [
             {
                 "parts": s.parts,
                 "places": s.hole_indices,
                 "values": list(zip(*s.values_by_member, strict=True)),
             }
-            for s in found
+            for s in diff_shapes
         ],
     }
 
 
-class _Codes:
+class _TextCodes:
     def __init__(self) -> None:
         self._codes: dict[str, int] = {}
 
-    def code(self, text: str) -> int:
+    def code_of(self, text: str) -> int:
         return self._codes.setdefault(text, len(self._codes))
 
     @property
-    def known(self) -> list[str]:
+    def texts(self) -> list[str]:
         return list(self._codes)
 
 
-def _spec(fault: Fault) -> str:
+def _spec_yaml(fault: Fault) -> str:
     """Return the fault with its drawn value, as a spec in YAML."""
-    told = {name: value for name, value in as_json_types(fault).items() if value not in (None, [], "")}
-    told["injections"] = [
+    spec = {name: value for name, value in as_json_types(fault).items() if value not in (None, [], "")}
+    spec["injections"] = [
         {
             "at": location_as_yaml(i.location),
             "model": i.model,
@@ -266,17 +280,17 @@ def _spec(fault: Fault) -> str:
         }
         for i in fault.injections
     ]
-    return yaml.safe_dump(told, sort_keys=False, allow_unicode=True, width=100)
+    return yaml.safe_dump(spec, sort_keys=False, allow_unicode=True, width=100)
 
 
-def _setting(experiment: Experiment) -> str:
+def _trigger_setting_json(experiment: Experiment) -> str:
     trigger = asdict(experiment.trigger)
     hold = experiment.fault.hold or experiment.trigger.hold
-    told = {name: trigger[name] for name in ("hold_s", "armed_after_s")}
-    return json.dumps({"hold": hold.value, **told, "changes": experiment.changes})
+    times = {name: trigger[name] for name in ("hold_s", "armed_after_s")}
+    return json.dumps({"hold": hold.value, **times, "changes": experiment.changes})
 
 
-def _patches(run: ReportedRun, ids: Iterable[str]) -> Iterator[tuple[str, str, str]]:
+def _readable_patches(run: ReportedRun, ids: Iterable[str]) -> Iterator[tuple[str, str, str]]:
     """Yield each experiment's id, an empty grouping key, and the patch without the probe."""
     for name in ids:
         data = run.folder.read_patch(name, run.records.get(name))
@@ -284,28 +298,30 @@ def _patches(run: ReportedRun, ids: Iterable[str]) -> Iterator[tuple[str, str, s
             yield name, "", readable_patch(data.decode("utf-8", "replace"))[0]
 
 
-def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str, Any]]:
+def media_by_experiment(
+    folder: RunFolder, page_folder: Path, most_embedded_bytes: int
+) -> dict[str, dict[str, Any]]:
     """Return the stills, films and exact plots in plots/, by experiment. Stills are embedded up to `budget`
     bytes in total; the rest become links relative to `seen_from`.
     """
-    found: dict[str, dict[str, Any]] = {}
+    files_by_experiment: dict[str, dict[str, Any]] = {}
     files = filter(Path.is_file, (folder.path / "plots").glob("*"))
     for path in sorted(files, key=lambda p: (len(p.name), p.name)):
         name, _, time = path.stem.partition("-")
-        link = Path(os.path.relpath(path, seen_from)).as_posix()
-        here = found.setdefault(name, {"stills": [], "films": []})
+        link = Path(os.path.relpath(path, page_folder)).as_posix()
+        media_of_experiment = files_by_experiment.setdefault(name, {"stills": [], "films": []})
         if path.suffix in (".mp4", ".gif"):
-            here["films"].append(link)
+            media_of_experiment["films"].append(link)
         elif path.suffix == ".svg" and not time:
-            here["plot"] = link
+            media_of_experiment["plot"] = link
         elif path.suffix in (".jpg", ".png") and time:
             size = path.stat().st_size
-            if size <= budget:
-                budget -= size
+            if size <= most_embedded_bytes:
+                most_embedded_bytes -= size
                 kind = "jpeg" if path.suffix == ".jpg" else "png"
                 link = f"data:image/{kind};base64,{base64.b64encode(read_bounded(path)).decode()}"
-            here["stills"].append([time.removesuffix("s"), link])
-    return {name: kept for name, kept in found.items() if any(kept.values())}
+            media_of_experiment["stills"].append([time.removesuffix("s"), link])
+    return {name: kept for name, kept in files_by_experiment.items() if any(kept.values())}
 
 
 def scene_facts(manifest: TargetManifest) -> dict[str, Any] | None:
@@ -316,12 +332,13 @@ def scene_facts(manifest: TargetManifest) -> dict[str, Any] | None:
     channels = {channel.name for channel in manifest.channels}
     derived = {v.name: v.text for v in manifest.observation.derived if v.name not in channels}
 
-    def made(text: str) -> JsonTree:
+    def expression_tree(text: str) -> JsonTree:
         return formula_as_json(text, derived)
 
     actors = [
-        asdict(actor) | {key: made(getattr(actor, key)) for key in ("x", "y", "heading", "visible")}
+        asdict(actor)
+        | {key: expression_tree(getattr(actor, key)) for key in ("x", "y", "heading", "visible")}
         for actor in scene.actors
     ]
-    lines = [asdict(line) | {"y": made(line.y) if line.y else None} for line in scene.lines]
-    return {"actors": actors, "lines": lines, "follow": scene.follow, "speed": made(scene.speed)}
+    lines = [asdict(line) | {"y": expression_tree(line.y) if line.y else None} for line in scene.lines]
+    return {"actors": actors, "lines": lines, "follow": scene.follow, "speed": expression_tree(scene.speed)}

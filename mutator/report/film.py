@@ -31,7 +31,7 @@ EVENTS_SCHEMA = "film-events/1"
 class Shot:
     """A still at time `t` (s) or a video to write."""
 
-    out: Path  #: the file to write; its suffix selects the format
+    path: Path  #: the file to write; its suffix selects the format
     t: float | None = None  #: the time of a still in s; None for a video
 
 
@@ -42,7 +42,7 @@ class Filming:
     workspace: Workspace
     folder: RunFolder
     target: TargetManifest
-    filmed: TargetManifest  # the same target, with film recording switched on
+    filming_target: TargetManifest  # the same target, with film recording switched on
 
     @classmethod
     def of(cls, workspace: Workspace, folder: RunFolder) -> "Filming":
@@ -52,14 +52,14 @@ class Filming:
         manifest = manifest_of_unchanged_target(workspace, folder)
         return cls(workspace, folder, manifest, manifest.with_film_recording())
 
-    def golden(self, experiment: Experiment, out: Path) -> Path:
+    def rerun_golden(self, experiment: Experiment, out: Path) -> Path:
         """Rerun an experiment's golden run into the folder `out`."""
-        return run_golden(self.workspace, self.filmed, experiment, out, limits=self.folder.limits)
+        return run_golden(self.workspace, self.filming_target, experiment, out, limits=self.folder.limits)
 
-    def take(
+    def take_shots(
         self,
         experiment: Experiment,
-        known: Record | None,
+        stored_record: Record | None,
         shots: Sequence[Shot],
         *,
         golden: Path | None = None,
@@ -71,7 +71,7 @@ class Filming:
         with ScratchFolder("mutator-film-") as scratch:
             single = run_single(
                 self.workspace,
-                self.filmed,
+                self.filming_target,
                 experiment,
                 scratch,
                 limits=self.folder.limits,
@@ -84,34 +84,36 @@ class Filming:
                     remedy="choose an experiment whose run finishes",
                 )
             events = scratch / "events.json"
-            names = hazards_in_words(self.workspace, self.target)
-            events.write_text(json.dumps(_events(record, _title(experiment), names)), encoding="utf-8")
-            places = {
+            names = describe_hazards(self.workspace, self.target)
+            events.write_text(
+                json.dumps(_film_events(record, _film_title(experiment), names)), encoding="utf-8"
+            )
+            film_paths = {
                 "golden": str(single.golden / FILM_FOLDER),
                 "faulty": str(single.faulty / FILM_FOLDER),
                 "events": str(events),
             }
             for shot in shots:
-                _show(self.target, scratch, places, shot)
-        return is_same_record(self.folder, known, record)
+                _write_shot(self.target, scratch, film_paths, shot)
+        return is_same_record(self.folder, stored_record, record)
 
 
-def hazards_in_words(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:
+def describe_hazards(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:
     """Return a short text for each hazard, from the manifest or the hazard analysis (up to its first
     bracket).
     """
-    known = workspace.hazards()
-    about = known.hazards if known else {}
+    analysis = workspace.hazards()
+    about = analysis.hazards if analysis else {}
     names = {name: words.partition(" (")[0].rstrip(".") for name, words in about.items()}
     return names | {rule.name: rule.about for rule in manifest.hazard_rules if rule.about}
 
 
-def _title(experiment: Experiment) -> str:
+def _film_title(experiment: Experiment) -> str:
     trigger = f"{experiment.trigger.name}: {experiment.trigger.condition}".removesuffix(": True")
     return "   ".join((experiment.fault.label, " ".join((experiment.scenario, *experiment.changes)), trigger))
 
 
-def _events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, object]:
+def _film_events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, object]:
     activation = record.activation
     return {
         "schema": EVENTS_SCHEMA,
@@ -124,7 +126,7 @@ def _events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, o
     }
 
 
-def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], shot: Shot) -> None:
+def _write_shot(manifest: TargetManifest, folder: Path, film_paths: Mapping[str, str], shot: Shot) -> None:
     """Write one file with the target's command."""
     film = manifest.film
     assert film is not None  # callers checked this
@@ -132,31 +134,31 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
     if manifest.overlay is not None:
         tree = folder / "tree"
         bytecode.replace_files(manifest.tree.files, tree)
-    out, made = shot.out.absolute(), path_below(folder / "shown", shot.out.name)
-    here = {**places, "out": str(made), "t": str(shot.t)}
-    for place in (out, made):
+    out, scratch_file = shot.path.absolute(), path_below(folder / "shown", shot.path.name)
+    placeholders = {**film_paths, "out": str(scratch_file), "t": str(shot.t)}
+    for place in (out, scratch_file):
         make_folder(place.parent)
     arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
-    command = [sys.executable, "-P", "-s", "-m", film.module, *fill_placeholders(arguments, here)]
-    films = (Path(places["golden"]), Path(places["faulty"]))
+    command = [sys.executable, "-P", "-s", "-m", film.module, *fill_placeholders(arguments, placeholders)]
+    films = (Path(film_paths["golden"]), Path(film_paths["faulty"]))
     if sandbox := Sandbox.of_target(manifest, folder, [*films, tree]):
         command = sandbox.wrap_command(command)
         sandbox.close()
-    done = subprocess.run(
+    process = subprocess.run(
         command,
-        cwd=made.parent,
+        cwd=scratch_file.parent,
         env={**run_environment(0, folder, manifest.env), "PYTHONPATH": str(tree)},
         capture_output=True,
         text=True,
         check=False,
     )
-    if done.returncode != 0 or not made.is_file():
-        said = done.stderr.strip().splitlines() or ["no message"]
-        complaint = said[-1].removeprefix("error: ").replace(str(made), str(out))
+    if process.returncode != 0 or not scratch_file.is_file():
+        error_lines = process.stderr.strip().splitlines() or ["no message"]
+        complaint = error_lines[-1].removeprefix("error: ").replace(str(scratch_file), str(out))
         raise MutatorError(complaint, where=f"{film.module}")
     # copying can be interrupted, and the command can leave a link
     with (
-        open_below(made.parent, made.name) as source,
+        open_below(scratch_file.parent, scratch_file.name) as source,
         writing_temporary_path(out) as half,
         half.open("wb") as target,
     ):

@@ -7,116 +7,151 @@ from math import inf
 import pandas as pd
 
 from mutator.outcomes.fault_paths import UntimedPath
-from mutator.report.answer_parts import FIRST, SILENT, Answer, Cell, Link, Listing, kind_link, share, to_list
+from mutator.report.answer_parts import (
+    ALERT_BEFORE_HAZARD,
+    SILENT_HAZARD_WARNINGS,
+    AnswerTable,
+    Cell,
+    PageLink,
+    ReportAnswer,
+    describe_share,
+    fault_type_link,
+    filtered_list_fragment,
+)
 from mutator.report.fault_path_data import RunPaths, link_text
-from mutator.report.most_dangerous import NO_CONTACT, SEVERITY
+from mutator.report.most_dangerous import NO_CONTACT_VALUE, SEVERITY_COLUMN
 
-LISTED = 5  # maximum number of fault types listed
+MOST_FAULT_TYPES = 5  # maximum number of fault types listed
 
 
-def first_to_fix(frame: pd.DataFrame, paths: RunPaths | None, *, has_alerts: bool) -> Answer:
+def fix_first_answer(frame: pd.DataFrame, paths: RunPaths | None, *, has_alerts: bool) -> ReportAnswer:
     """Say which fault types to fix first: those with the most silent hazards in the highest severity
     class; ties are broken by the next lower classes, then by hazards without contact, then by the shortest
     time from activation to hazard. If the target has no alerts, all hazards are counted. `frame` must have at
     least one hazard.
     """
     hazards = frame[frame["outcome"] == "hazard"]
-    counted = hazards[hazards["warning"] != FIRST] if has_alerts else hazards
-    if counted.empty:  # all hazards came after an alert, so count all
-        counted, has_alerts = hazards, False
-    classes = _classes(counted)
-    order = _order(counted, classes)
-    what = "silent hazards" if has_alerts else "hazards"
-    heads = ["fault type", f"{what} by severity" if SEVERITY in counted else what, "shortest time to hazard"]
-    heads += ["passed on to an actuator by", "stopped by, of all active"] if paths else []
-    only: Mapping[str, Sequence[str]] = {"warning": SILENT} if has_alerts else {"outcome": ["hazard"]}
-    lines = [
-        _line(kind, frame[frame["kind"] == kind], counted[counted["kind"] == kind], classes, only, paths)
-        for kind in order[:LISTED]
+    counted_hazards = hazards[hazards["warning"] != ALERT_BEFORE_HAZARD] if has_alerts else hazards
+    if counted_hazards.empty:  # all hazards came after an alert, so count all
+        counted_hazards, has_alerts = hazards, False
+    classes = _severity_classes(counted_hazards)
+    order = _fault_types_in_order(counted_hazards, classes)
+    plural_noun = "silent hazards" if has_alerts else "hazards"
+    heads = [
+        "fault type",
+        f"{plural_noun} by severity" if SEVERITY_COLUMN in counted_hazards else plural_noun,
+        "shortest time to hazard",
     ]
-    return Answer(
+    heads += ["passed on to an actuator by", "stopped by, of all active"] if paths else []
+    list_filter: Mapping[str, Sequence[str]] = (
+        {"warning": SILENT_HAZARD_WARNINGS} if has_alerts else {"outcome": ["hazard"]}
+    )
+    rows = [
+        _table_row(
+            kind,
+            frame[frame["kind"] == kind],
+            counted_hazards[counted_hazards["kind"] == kind],
+            classes,
+            list_filter,
+            paths,
+        )
+        for kind in order[:MOST_FAULT_TYPES]
+    ]
+    return ReportAnswer(
         name="first",
         title="What to fix first",
-        wide=True,
-        says=_says(order, counted, classes, what),
-        listings=(Listing(heads=tuple(heads), lines=lines),),
+        is_wide=True,
+        paragraph=_rule_paragraph(order, counted_hazards, classes, plural_noun),
+        tables=(AnswerTable(heads=tuple(heads), rows=rows),),
     )
 
 
-def _classes(hazards: pd.DataFrame) -> list[str]:
+def _severity_classes(hazards: pd.DataFrame) -> list[str]:
     """Return the severity classes that occur, highest first; no contact ('') is last."""
-    return sorted(hazards[SEVERITY].unique(), reverse=True) if SEVERITY in hazards else [""]
+    return sorted(hazards[SEVERITY_COLUMN].unique(), reverse=True) if SEVERITY_COLUMN in hazards else [""]
 
 
-def _of_class(hazards: pd.DataFrame, name: str) -> pd.DataFrame:
-    return hazards[hazards[SEVERITY] == name] if SEVERITY in hazards else hazards
+def _hazards_of_class(hazards: pd.DataFrame, name: str) -> pd.DataFrame:
+    return hazards[hazards[SEVERITY_COLUMN] == name] if SEVERITY_COLUMN in hazards else hazards
 
 
-def _after(hazards: pd.DataFrame) -> pd.Series:
+def _times_to_hazard(hazards: pd.DataFrame) -> pd.Series:
     """Return the times from activation to hazard, s."""
     return hazards["t_hazard"] - hazards["t_activation"]
 
 
-def _order(hazards: pd.DataFrame, classes: Sequence[str]) -> list[str]:
+def _fault_types_in_order(hazards: pd.DataFrame, classes: Sequence[str]) -> list[str]:
     groups = {str(kind): group for kind, group in hazards.groupby("kind")}
     key = {
-        kind: (*(-len(_of_class(group, name)) for name in classes), float(_after(group).min()), kind)
+        kind: (
+            *(-len(_hazards_of_class(group, name)) for name in classes),
+            float(_times_to_hazard(group).min()),
+            kind,
+        )
         for kind, group in groups.items()
     }
     return sorted(groups, key=key.__getitem__)
 
 
-def _says(order: Sequence[str], counted: pd.DataFrame, classes: Sequence[str], what: str) -> str:
-    mine = counted["kind"] == order[0]
-    says = f"Start with {order[0]}: {share(int(mine.sum()), len(counted), what)}"
+def _rule_paragraph(
+    order: Sequence[str], counted_hazards: pd.DataFrame, classes: Sequence[str], plural_noun: str
+) -> str:
+    is_first_type = counted_hazards["kind"] == order[0]
+    first_share = describe_share(int(is_first_type.sum()), len(counted_hazards), plural_noun)
+    paragraph = f"Start with {order[0]}: {first_share}"
     if classes[0]:
-        of_class = counted[SEVERITY] == classes[0]
-        part, all_ = int((mine & of_class).sum()), int(of_class.sum())
-        says += f", and {'the only one' if all_ == 1 else f'{part} of {all_}'} of severity {classes[0]}"
-        says += f", the highest among the {what}"
-    says += f". The rule: fault types with the most {what}"
+        of_class = counted_hazards[SEVERITY_COLUMN] == classes[0]
+        part, all_ = int((is_first_type & of_class).sum()), int(of_class.sum())
+        paragraph += f", and {'the only one' if all_ == 1 else f'{part} of {all_}'} of severity {classes[0]}"
+        paragraph += f", the highest among the {plural_noun}"
+    paragraph += f". The rule: fault types with the most {plural_noun}"
     if len(classes) > 1:
-        says += " of the highest severity come first; ties are broken by the next lower class, then by"
+        paragraph += " of the highest severity come first; ties are broken by the next lower class, then by"
     else:
-        says += " come first; ties are broken by"
-    says += " the shortest time from fault to hazard."
-    if len(order) > LISTED:
-        says += f" The table shows the first {LISTED} of {len(order)} fault types."
-    return says
+        paragraph += " come first; ties are broken by"
+    paragraph += " the shortest time from fault to hazard."
+    if len(order) > MOST_FAULT_TYPES:
+        paragraph += f" The table shows the first {MOST_FAULT_TYPES} of {len(order)} fault types."
+    return paragraph
 
 
-def _line(
+def _table_row(
     kind: str,
-    all_of_kind: pd.DataFrame,
-    counted: pd.DataFrame,
+    results_of_type: pd.DataFrame,
+    counted_hazards: pd.DataFrame,
     classes: Sequence[str],
-    only: Mapping[str, Sequence[str]],
+    list_filter: Mapping[str, Sequence[str]],
     paths: RunPaths | None,
 ) -> tuple[Cell, ...]:
-    told = [(name, len(_of_class(counted, name))) for name in classes]
-    if SEVERITY in counted:
-        named = [f"{n} severity {name}" if name else f"{n} without contact" for name, n in told if n]
+    counts_by_class = [(name, len(_hazards_of_class(counted_hazards, name))) for name in classes]
+    if SEVERITY_COLUMN in counted_hazards:
+        named = [
+            f"{n} severity {name}" if name else f"{n} without contact" for name, n in counts_by_class if n
+        ]
         numbers = ", ".join(named)
     else:
-        numbers = f"{len(counted):,}"
-    after = _after(counted)
-    fastest = str(counted["experiment_id"].iloc[int(after.fillna(inf).argmin())])
-    worst = next((name for name, n in told if n), "")
-    facets = {"kind": [kind], **only}
-    severe = {SEVERITY: [worst or NO_CONTACT]} if SEVERITY in counted else {}
-    line: list[Cell] = [
-        kind_link(kind, **only),
-        Link(numbers, to_list({**facets, **severe}, "rank")),
-        Link(f"{after.min():.2f} s", f"e={fastest}&{to_list(facets, 'rank')}"),
+        numbers = f"{len(counted_hazards):,}"
+    times_to_hazard = _times_to_hazard(counted_hazards)
+    fastest = str(counted_hazards["experiment_id"].iloc[int(times_to_hazard.fillna(inf).argmin())])
+    worst = next((name for name, n in counts_by_class if n), "")
+    filters = {"kind": [kind], **list_filter}
+    severe = {SEVERITY_COLUMN: [worst or NO_CONTACT_VALUE]} if SEVERITY_COLUMN in counted_hazards else {}
+    row: list[Cell] = [
+        fault_type_link(kind, **list_filter),
+        PageLink(numbers, filtered_list_fragment({**filters, **severe}, "rank")),
+        PageLink(f"{times_to_hazard.min():.2f} s", f"e={fastest}&{filtered_list_fragment(filters, 'rank')}"),
     ]
     if paths:
-        active = all_of_kind[all_of_kind["is_activated"]]
-        line += [_let_through(kind, counted, only, paths), _stopped(kind, active, paths)]
-    return tuple(line)
+        active = results_of_type[results_of_type["is_activated"]]
+        row += [
+            _component_that_passed_most(kind, counted_hazards, list_filter, paths),
+            _component_that_stopped_most(kind, active, paths),
+        ]
+    return tuple(row)
 
 
-def _let_through(
-    kind: str, hazards: pd.DataFrame, only: Mapping[str, Sequence[str]], paths: RunPaths
+def _component_that_passed_most(
+    kind: str, hazards: pd.DataFrame, list_filter: Mapping[str, Sequence[str]], paths: RunPaths
 ) -> Cell:
     """Return the component that most often let this fault type through to the first changed actuator."""
     passed: Counter[str] = Counter()
@@ -128,8 +163,10 @@ def _let_through(
     if not passed:
         return "-"
     component = min(passed, key=lambda name: (-passed[name], name))
-    to = to_list({"kind": [kind], **only, "through": sorted(links[component])}, "rank")
-    return Link(f"{paths.label(component)}: {passed[component]} of {len(hazards)}", to)
+    fragment = filtered_list_fragment(
+        {"kind": [kind], **list_filter, "through": sorted(links[component])}, "rank"
+    )
+    return PageLink(f"{paths.label(component)}: {passed[component]} of {len(hazards)}", fragment)
 
 
 def _untimed_paths(frame: pd.DataFrame, paths: RunPaths) -> Iterator[tuple[UntimedPath, int]]:
@@ -138,7 +175,7 @@ def _untimed_paths(frame: pd.DataFrame, paths: RunPaths) -> Iterator[tuple[Untim
             yield paths.untimed_paths[place], int(count)
 
 
-def _stopped(kind: str, active: pd.DataFrame, paths: RunPaths) -> Cell:
+def _component_that_stopped_most(kind: str, active: pd.DataFrame, paths: RunPaths) -> Cell:
     """Return the component that stopped most faults of this type, a candidate for stopping the rest."""
     stopped: Counter[str] = Counter()
     for untimed_path, count in _untimed_paths(active, paths):
@@ -148,4 +185,4 @@ def _stopped(kind: str, active: pd.DataFrame, paths: RunPaths) -> Cell:
         return f"none of {len(active):,}"
     component = min(stopped, key=lambda name: (-stopped[name], name))
     text = f"{paths.label(component)}: {stopped[component]:,} of {len(active):,}"
-    return Link(text, to_list({"kind": [kind], "stopped_at": [component]}))
+    return PageLink(text, filtered_list_fragment({"kind": [kind], "stopped_at": [component]}))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from mutator._common.message_text import counted
 from mutator.model import Outcome
 from mutator.mutants.injected_lines import tags_for_scripts
-from mutator.report.experiment_list import Browse
+from mutator.report.experiment_list import ExperimentListData
 from mutator.report.glossary import Words
 from mutator.report.panel import Panel, rendered
 from mutator.web import asset, load_order, plainly_embedded
@@ -27,13 +27,13 @@ class Content:
     study: str
     answers: Panel
     panels: Sequence[Panel]
-    browse: Browse  # the list of experiments, which only the page has
+    browse: ExperimentListData  # the list of experiments, which only the page has
 
 
 def markdown(content: Content) -> str:
     total = sum(content.outcomes.values())
     endings = ", ".join(f"{n} {name}" for name, n in content.outcomes.items())
-    which = "the worst of them" if content.browse.listed else "them"
+    which = "the worst of them" if content.browse.truncation_note else "them"
     parts = [
         f"# {content.name}",
         f"**{content.alarm}**" if content.alarm else "",

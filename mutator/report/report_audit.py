@@ -10,16 +10,18 @@ from mutator.report.report_digests import FILE
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
-_APART = "compare-"  # folders of comparisons with other runs
+_COMPARISON_PREFIX = "compare-"  # folders of comparisons with other runs
 
 
-def pages(folder: RunFolder, workspace: Workspace | None) -> tuple[int, Iterator[MutatorError]]:
+def audit_report(folder: RunFolder, workspace: Workspace | None) -> tuple[int, Iterator[MutatorError]]:
     """Return the number of files in the report's folder, and their differences from the report that this
     version of mutator makes of the run. Comparisons with other runs are not counted.
     """
     out = folder.path / FOLDER
     names = (path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())
-    stored = {name for name in names if not name.startswith(_APART)} - {FILE.removeprefix(f"{FOLDER}/")}
+    stored = {name for name in names if not name.startswith(_COMPARISON_PREFIX)} - {
+        FILE.removeprefix(f"{FOLDER}/")
+    }
     return len(stored), _differences(folder, workspace, stored)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from mutator._common.helper_processes import computing_meanwhile, process_count_for
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
-from mutator.report.experiment_list import Browse, browse_data
+from mutator.report.experiment_list import ExperimentListData, build_list_data
 from mutator.report.glossary import words_of
 from mutator.report.markdown_and_html import Content, markdown, page_html, study_html, study_markdown
 from mutator.report.page_series import sample_kept_traces
@@ -75,7 +75,7 @@ def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
     """Build the report of a run folder whose tables are up to date, without writing anything."""
     reported = ReportedRun.open(folder, workspace)
     with computing_meanwhile(
-        lambda: browse_data(reported), process_count_for(len(reported.results))
+        lambda: build_list_data(reported), process_count_for(len(reported.results))
     ) as browse:
         study = build_study_panels(reported)
         content = _build_content(replace(reported, compared=bool(study)), browse)
@@ -94,11 +94,11 @@ def _written_report(run: Path, rows: int, summaries: tuple[TextTable, ...] = ())
     return WrittenReport(markdown=out / MARKDOWN_FILE, page=out / PAGE_FILE, rows=rows, summaries=summaries)
 
 
-def _build_content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:
+def _build_content(run: ReportedRun, browse: Callable[[], ExperimentListData]) -> Content:
     panels = [panel for panel_of in PANELS if (panel := panel_of(run)) is not None]
     return Content(
         name=run.folder.head.campaign,
-        alarm=run.engines.proof if run.engines and run.engines.failed else "",
+        alarm=run.engines.equivalence_text if run.engines and run.engines.has_failed_equivalence else "",
         outcomes=count_endings(run.results),
         planned=_describe_plan(run.folder),
         words=words_of(run),

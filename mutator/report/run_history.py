@@ -21,8 +21,8 @@ from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.web import asset
 
-FILES = ("HISTORY.md", "history.html")
-_HEADS = (
+HISTORY_FILES = ("HISTORY.md", "history.html")
+_COLUMN_HEADS = (
     "run",
     "date (UTC)",
     "commit",
@@ -40,8 +40,8 @@ class PastRun:
 
     folder: RunFolder
     date: datetime
-    commit: str
-    rows: Mapping[str, ResultRow]
+    target_commit: str
+    rows_by_id: Mapping[str, ResultRow]
     cpu_s: float
 
     @property
@@ -50,11 +50,11 @@ class PastRun:
 
     @property
     def hazards(self) -> list[ResultRow]:
-        return [row for row in self.rows.values() if row.outcome is Outcome.HAZARD]
+        return [row for row in self.rows_by_id.values() if row.outcome is Outcome.HAZARD]
 
     @property
-    def activated(self) -> int:
-        return sum(row.usable and row.t_activation is not None for row in self.rows.values())
+    def activated_count(self) -> int:
+        return sum(row.usable and row.t_activation is not None for row in self.rows_by_id.values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,24 +73,26 @@ def _run_folders(folder: Path) -> list[Path]:
 
 def write_history(folder: Path) -> History:
     """Write the history of the runs in a folder. Raise MutatorError if none has results."""
-    runs, left_out = [], []
+    runs, omission_reasons = [], []
     for path in _run_folders(folder):
         try:
             runs.append(_past_run(path))
         except MutatorError as err:
-            left_out.append(f"{path.name}: {err.got}")
+            omission_reasons.append(f"{path.name}: {err.got}")
     if not runs:
         raise MutatorError(
-            f"no run with results ({'; '.join(left_out)})" if left_out else "there is no run folder here",
+            f"no run with results ({'; '.join(omission_reasons)})"
+            if omission_reasons
+            else "there is no run folder here",
             where=folder,
             expected="a run folder, or a folder of run folders",
             remedy="check the path",
         )
     runs.sort(key=lambda run: (run.date, run.name))
-    text, page = (folder / name for name in FILES)
-    write_atomic(text, _markdown(runs, left_out).encode())
-    write_atomic(page, _page(folder, runs, left_out).encode())
-    return History(markdown=text, page=page, runs=len(runs), left_out=tuple(left_out))
+    text, page = (folder / name for name in HISTORY_FILES)
+    write_atomic(text, _history_markdown(runs, omission_reasons).encode())
+    write_atomic(page, _history_html(folder, runs, omission_reasons).encode())
+    return History(markdown=text, page=page, runs=len(runs), left_out=tuple(omission_reasons))
 
 
 def _past_run(path: Path) -> PastRun:
@@ -103,71 +105,84 @@ def _past_run(path: Path) -> PastRun:
     commit = f"{state.commit[:8]}{' with changes' if state.changed else ''}" if state else "-"
     cpu_s = sum(float(line["cpu_s"]) for line in folder.timings().values())
     date = datetime.fromtimestamp(last, UTC)
-    return PastRun(folder=folder, date=date, commit=commit, rows=rows, cpu_s=cpu_s)
+    return PastRun(folder=folder, date=date, target_commit=commit, rows_by_id=rows, cpu_s=cpu_s)
 
 
-def _plans(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
+def _group_by_plan(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
     """Return the runs by campaign and plan, the plan of the latest run first."""
-    found: dict[str, list[PastRun]] = {}
+    runs_by_plan: dict[str, list[PastRun]] = {}
     for run in runs:
-        found.setdefault(f"{run.folder.head.campaign}, plan {run.folder.head.plan[:8]}", []).append(run)
-    return dict(sorted(found.items(), key=lambda item: item[1][-1].date, reverse=True))
+        runs_by_plan.setdefault(f"{run.folder.head.campaign}, plan {run.folder.head.plan[:8]}", []).append(
+            run
+        )
+    return dict(sorted(runs_by_plan.items(), key=lambda item: item[1][-1].date, reverse=True))
 
 
-def _cells(run: PastRun) -> list[str]:
+def _table_cells(run: PastRun) -> list[str]:
     hazards = run.hazards
     classes = Counter(row.severity or "no contact" for row in hazards)
     order = sorted((name for name in classes if name != "no contact"), reverse=True)
-    told = ", ".join(f"{name} {classes[name]}" for name in (*order, "no contact") if classes[name])
+    severity_text = ", ".join(f"{name} {classes[name]}" for name in (*order, "no contact") if classes[name])
     silent = sum(row.reaction_time is None for row in hazards)
     return [
         f"{run.date:%Y-%m-%d %H:%M}",
-        run.commit,
-        f"{len(run.rows)} of {run.folder.planned_count}",
-        f"{len(hazards)} of {run.activated} activated",
-        told if run.folder.severity_scale and hazards else "-",
+        run.target_commit,
+        f"{len(run.rows_by_id)} of {run.folder.planned_count}",
+        f"{len(hazards)} of {run.activated_count} activated",
+        severity_text if run.folder.severity_scale and hazards else "-",
         f"{silent} of {len(hazards)}" if run.folder.has_alerts else "-",
         describe_duration(run.cpu_s),
     ]
 
 
-def _changes(before: PastRun, after: PastRun) -> str:
-    shared = before.rows.keys() & after.rows.keys()
-    pairs = [(before.rows[name], after.rows[name]) for name in shared]
-    new = sum(b.outcome is Outcome.HAZARD is not a.outcome for a, b in pairs)
-    gone = sum(a.outcome is Outcome.HAZARD is not b.outcome for a, b in pairs)
-    other = sum(a.ending != b.ending for a, b in pairs) - new - gone
-    if not new + gone + other:
+def _describe_changes(before: PastRun, after: PastRun) -> str:
+    shared = before.rows_by_id.keys() & after.rows_by_id.keys()
+    pairs = [(before.rows_by_id[name], after.rows_by_id[name]) for name in shared]
+    new_hazards = sum(b.outcome is Outcome.HAZARD is not a.outcome for a, b in pairs)
+    resolved = sum(a.outcome is Outcome.HAZARD is not b.outcome for a, b in pairs)
+    other = sum(a.ending != b.ending for a, b in pairs) - new_hazards - resolved
+    if not new_hazards + resolved + other:
         return f"{counted(len(shared), 'shared experiment')}, no difference"
-    return f"{counted(new, 'new hazard')}, {gone} gone, {other} changed otherwise, of {len(shared):,} shared"
+    changes = f"{counted(new_hazards, 'new hazard')}, {resolved} gone, {other} changed otherwise"
+    return f"{changes}, of {len(shared):,} shared"
 
 
-def _steps(runs: Sequence[PastRun]) -> Iterator[tuple[PastRun, PastRun]]:
+def _consecutive_runs(runs: Sequence[PastRun]) -> Iterator[tuple[PastRun, PastRun]]:
     """Pairs of consecutive runs of one plan, newest first."""
     return zip(runs[-2::-1], runs[:0:-1], strict=True)
 
 
-def _command(before: PastRun, after: PastRun) -> str:
+def _compare_command(before: PastRun, after: PastRun) -> str:
     return shlex.join(["mutator", "compare", str(before.folder.path), str(after.folder.path)])
 
 
-def _markdown(runs: Sequence[PastRun], left_out: Sequence[str]) -> str:
+def _history_markdown(runs: Sequence[PastRun], omission_reasons: Sequence[str]) -> str:
     parts = ["# Runs"]
-    for title, group in _plans(runs).items():
-        rows = [[run.name, *_cells(run)] for run in reversed(group)]
-        parts += [f"## {title}", TextTable(heads=_HEADS, rows=rows).as_markdown()]
-        parts += [f"{a.name} to {b.name}: {_changes(a, b)}. `{_command(a, b)}`" for a, b in _steps(group)]
-    if left_out:
-        parts += ["## Left out", *(f"* {why}" for why in left_out)]
+    for title, group in _group_by_plan(runs).items():
+        rows = [[run.name, *_table_cells(run)] for run in reversed(group)]
+        parts += [f"## {title}", TextTable(heads=_COLUMN_HEADS, rows=rows).as_markdown()]
+        parts += [
+            f"{a.name} to {b.name}: {_describe_changes(a, b)}. `{_compare_command(a, b)}`"
+            for a, b in _consecutive_runs(group)
+        ]
+    if omission_reasons:
+        parts += ["## Left out", *(f"* {why}" for why in omission_reasons)]
     return "\n\n".join(parts) + "\n"
 
 
-def _page(folder: Path, runs: Sequence[PastRun], left_out: Sequence[str]) -> str:
+def _history_html(folder: Path, runs: Sequence[PastRun], omission_reasons: Sequence[str]) -> str:
     from markupsafe import Markup
 
     plans = [
-        (title, _linked(group), [(a, b, _changes(a, b), _comparison(folder, a, b)) for a, b in _steps(group)])
-        for title, group in _plans(runs).items()
+        (
+            title,
+            _linked_table(group),
+            [
+                (a, b, _describe_changes(a, b), _comparison_link(folder, a, b))
+                for a, b in _consecutive_runs(group)
+            ],
+        )
+        for title, group in _group_by_plan(runs).items()
     ]
     styles = [Markup(asset(name)) for name in ("shared/base.css", "report/report.css")]
     page = rendered(
@@ -175,14 +190,14 @@ def _page(folder: Path, runs: Sequence[PastRun], left_out: Sequence[str]) -> str
         name=folder.resolve().name,
         count=counted(len(runs), "run"),
         plans=plans,
-        left_out=left_out,
+        left_out=omission_reasons,
         styles=styles,
-        command=_command,
+        command=_compare_command,
     )
     return str(page)
 
 
-def _linked(group: Sequence[PastRun]) -> TextTable:
+def _linked_table(group: Sequence[PastRun]) -> TextTable:
     """Return the table of runs, newest first, with links to their reports."""
     from markupsafe import Markup
 
@@ -192,13 +207,13 @@ def _linked(group: Sequence[PastRun]) -> TextTable:
     for run in reversed(group):
         report = run.folder.path / FOLDER / "index.html"
         name = link(f"{quote(run.name)}/{FOLDER}/index.html", run.name) if report.exists() else run.name
-        cells = _cells(run)
-        cells[3] = bar(len(run.hazards) / run.activated if run.activated else 0.0, cells[3])
+        cells = _table_cells(run)
+        cells[3] = bar(len(run.hazards) / run.activated_count if run.activated_count else 0.0, cells[3])
         rows.append([name, *cells])
-    return TextTable(heads=_HEADS, rows=rows)
+    return TextTable(heads=_COLUMN_HEADS, rows=rows)
 
 
-def _comparison(folder: Path, before: PastRun, after: PastRun) -> str:
+def _comparison_link(folder: Path, before: PastRun, after: PastRun) -> str:
     """Return the path of an existing comparison page, relative to the folder; '' if there is none."""
     page = Path(after.name, FOLDER, f"compare-{before.name}", "index.html")
     return quote(page.as_posix()) if path_below(folder, page.as_posix()).exists() else ""

@@ -44,7 +44,7 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
         if time.monotonic() > ends:
             return ""
         try:
-            same = filming.take(experiments[name], records[name], due[name], golden=golden.result())
+            same = filming.take_shots(experiments[name], records[name], due[name], golden=golden.result())
         except MutatorError as error:
             return f"{name}: {error}"
         return "" if same else f"{name}: the rerun differs from the campaign's result"
@@ -55,7 +55,8 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
             driven = {_golden_key(experiments[name]): experiments[name] for name in due}
             # golden runs are submitted first; otherwise all threads could wait for one that has not started
             goldens = {
-                key: pool.submit(filming.golden, one, path_below(scratch, key)) for key, one in driven.items()
+                key: pool.submit(filming.rerun_golden, one, path_below(scratch, key))
+                for key, one in driven.items()
             }
             found = [pool.submit(wrong, name, goldens[_golden_key(experiments[name])]) for name in due]
             pace = StagePace("pictures", len(found))
@@ -91,8 +92,8 @@ def _due(
 
 def _missing(folder: RunFolder, experiment_id: str, record: Record) -> list[Shot]:
     names = {f"{experiment_id}-{t:.2f}s.jpg": t for t in _times(record)}
-    shots = [Shot(out=path_below(folder.path / "plots", name), t=t) for name, t in names.items()]
-    return [shot for shot in shots if not shot.out.exists()]
+    shots = [Shot(path=path_below(folder.path / "plots", name), t=t) for name, t in names.items()]
+    return [shot for shot in shots if not shot.path.exists()]
 
 
 def _times(record: Record) -> Iterable[float]:

@@ -19,7 +19,7 @@ LISTED = 10
 @pytest.fixture
 def large(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copytree(run, tmp_path / "run")
-    monkeypatch.setattr(experiment_list, "LISTED", LISTED)
+    monkeypatch.setattr(experiment_list, "MOST_LISTED_EXPERIMENTS", LISTED)
     monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())
     report_builder.write_report(tmp_path / "run", None)
     return tmp_path / "run"

@@ -14,7 +14,7 @@ _NOTE = "The seal does not cover this. Whoever can write to the run folder can c
 _HTML = """\
 {% if engines %}
 <h2>How the experiments were run</h2>
-<p>{{ engines.proof }}</p>
+<p>{{ engines.equivalence_text }}</p>
 {{ engines.table.as_html("plain") }}
 {% endif %}
 <h2>Origin of the results</h2>
@@ -31,7 +31,7 @@ def build_provenance_panel(run: ReportedRun) -> Panel:
     unsealed = list(unsealed_facts(run.folder).items())
     parts = []
     if engines:
-        parts += ["## How the experiments were run", engines.proof, engines.table.as_markdown()]
+        parts += ["## How the experiments were run", engines.equivalence_text, engines.table.as_markdown()]
     parts += ["## Origin of the results", TextTable(heads=("what", "value"), rows=facts).as_markdown()]
     parts += ["### Not sealed", _NOTE, TextTable(heads=("what", "value"), rows=unsealed).as_markdown()]
     tables = {"facts": facts, "unsealed": unsealed}
@@ -53,7 +53,7 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
     chosen = without_keys(head.as_json(), UNSEALED_KEYS[HEAD])["choices"]
     facts = {
         "experiments": f"{len(run.results)} of {folder.planned_count} planned",
-        **({"proof": run.engines.state} if run.engines else {}),
+        **({"proof": run.engines.equivalence_state} if run.engines else {}),
         **({"reviewed": reviewed} if reviewed else {}),
         **digests_or_why_no_seal(folder),
         "campaign": head.campaign,

@@ -10,11 +10,18 @@ import pandas as pd
 import pytest
 
 from mutator.outcomes.fault_paths import LinkState, PathLink, UntimedPath
-from mutator.report.answer_parts import NO_ALERT, Answer, Codes, Link, Part, to_list
-from mutator.report.answers import answers_of
+from mutator.report.answer_parts import (
+    NO_ALERT,
+    ExplainedCodes,
+    PageLink,
+    ReportAnswer,
+    ShareBar,
+    filtered_list_fragment,
+)
+from mutator.report.answers import build_answers
 from mutator.report.fault_path_data import RunPaths
-from mutator.report.fix_order import first_to_fix
-from mutator.report.most_dangerous import dangerous
+from mutator.report.fix_order import fix_first_answer
+from mutator.report.most_dangerous import most_dangerous_answer
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.reported_run import ReportedRun
 from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
@@ -70,63 +77,65 @@ def run(tmp_path: Path) -> ReportedRun:
 
 
 @pytest.fixture
-def answer_by_name(run: ReportedRun) -> dict[str, Answer]:
-    return {answer.name: answer for answer in answers_of(run)}
+def answer_by_name(run: ReportedRun) -> dict[str, ReportAnswer]:
+    return {answer.name: answer for answer in build_answers(run)}
 
 
-def test_the_worst_experiment_is_first(answer_by_name: dict[str, Answer]) -> None:
+def test_the_worst_experiment_is_first(answer_by_name: dict[str, ReportAnswer]) -> None:
     answer = answer_by_name["dangerous"]
     assert (
-        answer.says
+        answer.paragraph
         == "4 of 7 activated faults (57 %) led to a hazard. 2 of 4 hazards (50 %) involved contact."
     )
-    worst, kinds = answer.listings
-    assert [line[0] for line in worst.lines] == [
-        Link("radar/chaff/x", f"e={'1' * 16}&outcome=hazard&sort=rank"),
-        Link("radar/chaff/x", f"e={'0' * 16}&outcome=hazard&sort=rank"),
-        Link("car/speed/x", f"e={'4' * 16}&outcome=hazard&sort=rank"),
-        Link("car/speed/x", f"e={'3' * 16}&outcome=hazard&sort=rank"),
+    worst, kinds = answer.tables
+    assert [line[0] for line in worst.rows] == [
+        PageLink("radar/chaff/x", f"e={'1' * 16}&outcome=hazard&sort=rank"),
+        PageLink("radar/chaff/x", f"e={'0' * 16}&outcome=hazard&sort=rank"),
+        PageLink("car/speed/x", f"e={'4' * 16}&outcome=hazard&sort=rank"),
+        PageLink("car/speed/x", f"e={'3' * 16}&outcome=hazard&sort=rank"),
     ]
     assert worst.heads[3:] == ("measure", "time to hazard", "alert before hazard")
-    assert [line[3:] for line in worst.lines] == [
+    assert [line[3:] for line in worst.rows] == [
         ("contact at 9.00 m/s", "4.00 s", "fcw, 1.0 s"),
         ("contact at 4.00 m/s", "3.00 s", "none"),
         ("margin -0.50 m", "7.00 s", "none"),
         ("margin -0.25 m", "5.00 s", "only after"),
     ]
-    assert [line[1] for line in kinds.lines] == [Part(2, 3, "2 of 3"), Part(2, 3, "2 of 3")]
-    assert answer.links == (Link("All 4 hazards", "outcome=hazard&sort=rank"),)
+    assert [line[1] for line in kinds.rows] == [ShareBar(2, 3, "2 of 3"), ShareBar(2, 3, "2 of 3")]
+    assert answer.links == (PageLink("All 4 hazards", "outcome=hazard&sort=rank"),)
 
 
-def test_an_alert_after_the_hazard_is_not_a_warning(answer_by_name: dict[str, Answer]) -> None:
+def test_an_alert_after_the_hazard_is_not_a_warning(answer_by_name: dict[str, ReportAnswer]) -> None:
     answer = answer_by_name["unwarned"]
-    assert answer.says == (
+    assert answer.paragraph == (
         "3 of 4 hazards (75 %) were silent (no alert before the hazard): 2 with no alert at all, 1 with an "
         "alert only after the hazard."
     )
-    assert [line[2] for line in answer.listings[0].lines] == ["1", "1"]
-    assert [line[1] for line in answer.listings[0].lines] == [Part(2, 2, "2 of 2"), Part(1, 2, "1 of 2")]
-    assert [link.to for link in answer.links] == [
+    assert [line[2] for line in answer.tables[0].rows] == ["1", "1"]
+    assert [line[1] for line in answer.tables[0].rows] == [ShareBar(2, 2, "2 of 2"), ShareBar(1, 2, "1 of 2")]
+    assert [link.fragment for link in answer.links] == [
         "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard",
         "warning=no%20alert%20at%20all",
         "warning=alert%20only%20after%20the%20hazard",
     ]
 
 
-def test_without_severity_the_number_of_silent_hazards_decides(answer_by_name: dict[str, Answer]) -> None:
+def test_without_severity_the_number_of_silent_hazards_decides(
+    answer_by_name: dict[str, ReportAnswer],
+) -> None:
     answer = answer_by_name["first"]
-    assert answer.says.startswith("Start with car/speed: 2 of 3 silent hazards (67 %). The rule: ")
+    assert answer.paragraph.startswith("Start with car/speed: 2 of 3 silent hazards (67 %). The rule: ")
     silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
-    assert [line[:3] for line in answer.listings[0].lines] == [
+    assert [line[:3] for line in answer.tables[0].rows] == [
         (
-            Link("car/speed", f"kind=car%2Fspeed&{silent}"),
-            Link("2", f"kind=car%2Fspeed&{silent}&sort=rank"),
-            Link("5.00 s", f"e={'3' * 16}&kind=car%2Fspeed&{silent}&sort=rank"),
+            PageLink("car/speed", f"kind=car%2Fspeed&{silent}"),
+            PageLink("2", f"kind=car%2Fspeed&{silent}&sort=rank"),
+            PageLink("5.00 s", f"e={'3' * 16}&kind=car%2Fspeed&{silent}&sort=rank"),
         ),
         (
-            Link("radar/chaff", f"kind=radar%2Fchaff&{silent}"),
-            Link("1", f"kind=radar%2Fchaff&{silent}&sort=rank"),
-            Link("3.00 s", f"e={'0' * 16}&kind=radar%2Fchaff&{silent}&sort=rank"),
+            PageLink("radar/chaff", f"kind=radar%2Fchaff&{silent}"),
+            PageLink("1", f"kind=radar%2Fchaff&{silent}&sort=rank"),
+            PageLink("3.00 s", f"e={'0' * 16}&kind=radar%2Fchaff&{silent}&sort=rank"),
         ),
     ]
 
@@ -146,15 +155,15 @@ def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
 def test_severity_and_then_time_decide_what_to_fix_first() -> None:
     many = [("a/many", "S1", 1.0)] * 5
     some = [("b/slow", "S3", 9.0), ("c/fast", "S3", 8.0), ("d/both", "S3", 9.5), ("d/both", "", 9.0)]
-    answer = first_to_fix(hazards(*some, *many), None, has_alerts=True)
-    lines = answer.listings[0].lines
-    kinds = [line[0].text for line in lines if isinstance(line[0], Link)]
+    answer = fix_first_answer(hazards(*some, *many), None, has_alerts=True)
+    lines = answer.tables[0].rows
+    kinds = [line[0].text for line in lines if isinstance(line[0], PageLink)]
     assert kinds == ["d/both", "c/fast", "b/slow", "a/many"]
-    assert lines[0][1] == Link(
+    assert lines[0][1] == PageLink(
         "1 severity S3, 1 without contact",
         "kind=d%2Fboth&warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard&severity=S3&sort=rank",
     )
-    assert "and 1 of 3 of severity S3, the highest among the silent hazards." in answer.says
+    assert "and 1 of 3 of severity S3, the highest among the silent hazards." in answer.paragraph
 
 
 def untimed_path(by: str = "", stopped_at: tuple[str, ...] = ()) -> UntimedPath:
@@ -171,50 +180,54 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
     structure = {"label": {"feet": "Feet", "eyes": "Eyes"}.__getitem__, "untimed_paths": untimed_paths}
     frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(untimed_path=[0, 0, 1, -1])
     masked = frame[:1].assign(experiment_id="masked", outcome="masked", untimed_path=2)
-    answer = first_to_fix(
+    answer = fix_first_answer(
         pd.concat([frame, masked]), cast(RunPaths, SimpleNamespace(**structure)), has_alerts=True
     )
-    [line] = answer.listings[0].lines
+    [line] = answer.tables[0].rows
     silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
     assert line[3:] == (
-        Link("Feet: 2 of 4", f"kind=a%2Fb&{silent}&through=feet%E2%86%92pedals&sort=rank"),
-        Link("Eyes: 1 of 5", "kind=a%2Fb&stopped_at=eyes"),
+        PageLink("Feet: 2 of 4", f"kind=a%2Fb&{silent}&through=feet%E2%86%92pedals&sort=rank"),
+        PageLink("Eyes: 1 of 5", "kind=a%2Fb&stopped_at=eyes"),
     )
 
 
 def test_six_contacts_and_four_other_hazards_are_listed() -> None:
     frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
     metrics = [MetricFacts("margin_h1", "m", "", "lower"), MetricFacts("margin_h2", "s", "", "lower")]
-    hit, missed, _ = dangerous(frame, metrics, has_alerts=True).listings
-    assert (len(hit.lines), len(missed.lines)) == (6, 4)
+    hit, missed, _ = most_dangerous_answer(frame, metrics, has_alerts=True).tables
+    assert (len(hit.rows), len(missed.rows)) == (6, 4)
     assert "severity" in hit.heads and "severity" not in missed.heads
-    assert hit.lines[0][0] == Link("a/hit", "e=e0&outcome=hazard&severity=S1&sort=rank")
-    assert missed.lines[0][0] == Link("b/miss", "e=e12&outcome=hazard&severity=no%20contact&sort=rank")
-    assert hit.lines[0][2:5] == (Codes(("H1", "H2")), Codes(("S1",), "severity"), "margin -2.00 s")
-    assert missed.lines[0][2:4] == (Codes(("H1", "H2")), "margin -2.00 s")
-    assert len(dangerous(frame[:12], metrics, has_alerts=True).listings[0].lines) == 10
+    assert hit.rows[0][0] == PageLink("a/hit", "e=e0&outcome=hazard&severity=S1&sort=rank")
+    assert missed.rows[0][0] == PageLink("b/miss", "e=e12&outcome=hazard&severity=no%20contact&sort=rank")
+    assert hit.rows[0][2:5] == (
+        ExplainedCodes(("H1", "H2")),
+        ExplainedCodes(("S1",), "severity"),
+        "margin -2.00 s",
+    )
+    assert missed.rows[0][2:4] == (ExplainedCodes(("H1", "H2")), "margin -2.00 s")
+    assert len(most_dangerous_answer(frame[:12], metrics, has_alerts=True).tables[0].rows) == 10
 
 
-def test_tolerated_faults_are_a_share_of_the_activated_ones(answer_by_name: dict[str, Answer]) -> None:
+def test_tolerated_faults_are_a_share_of_the_activated_ones(answer_by_name: dict[str, ReportAnswer]) -> None:
     answer = answer_by_name["survived"]
-    assert answer.says == (
+    assert answer.paragraph == (
         "3 of 7 activated faults (43 %) led to no hazard: 2 changed no actuator (masked), 1 did (sdc). "
         "1 of 3 fault types (33 %) never led to a hazard."
     )
-    weak, never = answer.listings
-    assert [line[1] for line in weak.lines] == [Part(1, 3, "1 of 3"), Part(1, 3, "1 of 3")]
-    assert never.lines == [(Link("car/steer", "kind=car%2Fsteer&outcome=masked,sdc"), "1")]
+    weak, never = answer.tables
+    assert [line[1] for line in weak.rows] == [ShareBar(1, 3, "1 of 3"), ShareBar(1, 3, "1 of 3")]
+    assert never.rows == [(PageLink("car/steer", "kind=car%2Fsteer&outcome=masked,sdc"), "1")]
 
 
-def test_cpu_time_is_added_up_by_fault_type(answer_by_name: dict[str, Answer]) -> None:
+def test_cpu_time_is_added_up_by_fault_type(answer_by_name: dict[str, ReportAnswer]) -> None:
     answer = answer_by_name["time"]
-    assert answer.says == (
+    assert answer.paragraph == (
         "The experiments took 2 min 07 s of CPU time on 2 workers: 7 of 8 experiments (88 %) were "
         "simulated; for 1, the trigger never held, so the golden run's result was used. Median 8.00 s, "
         "longest 64.00 s. Checks, golden runs and the equivalence check are not timed."
     )
-    [first, *_] = answer.listings[0].lines
-    assert first == (Link("car/steer", "kind=car%2Fsteer"), Part(64.0, 127.0, "1 min 04 s (50 %)"))
+    [first, *_] = answer.tables[0].rows
+    assert first == (PageLink("car/steer", "kind=car%2Fsteer"), ShareBar(64.0, 127.0, "1 min 04 s (50 %)"))
 
 
 def part_of(run: ReportedRun, names: set[str]) -> ReportedRun:
@@ -239,31 +252,32 @@ def test_a_report_without_hazards_has_no_empty_table(run: ReportedRun) -> None:
 
 def test_a_report_without_activated_faults_calls_none_tolerated(run: ReportedRun) -> None:
     idle = part_of(run, names_of(run, "t_activation"))
-    found = {answer.name: answer for answer in answers_of(idle)}
-    assert found["dangerous"].says == found["survived"].says == "No fault was activated."
+    found = {answer.name: answer for answer in build_answers(idle)}
+    assert found["dangerous"].paragraph == found["survived"].paragraph == "No fault was activated."
     assert not any(answer.links for answer in found.values())
-    assert found["time"].says.startswith(
+    assert found["time"].paragraph.startswith(
         "The experiments took 0 s of CPU time on 2 workers: 0 of 1 experiment (0 %) were simulated"
     )
 
 
 def test_a_crash_is_not_tolerated(run: ReportedRun) -> None:
     frame = run.frame.assign(outcome=run.frame["outcome"].where(run.frame["kind"] != "car/steer", ""))
-    found = {answer.name: answer for answer in answers_of(replace(run, frame=frame))}
-    assert found["survived"].says == (
+    found = {answer.name: answer for answer in build_answers(replace(run, frame=frame))}
+    assert found["survived"].paragraph == (
         "2 of 7 activated faults (29 %) led to no hazard: 1 changed no actuator (masked), 1 did (sdc). "
         "1 crashed or timed out. 0 of 3 fault types (0 %) never led to a hazard, a crash or a timeout."
     )
 
 
 def test_counts_of_one_use_the_singular(run: ReportedRun) -> None:
-    found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16, "1" * 16}))}
-    assert found["unwarned"].says.startswith("1 of 2 hazards (50 %) was silent")
-    found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16}))}
-    assert "1 of 1 experiment (100 %) was simulated" in found["time"].says
+    found = {answer.name: answer for answer in build_answers(part_of(run, {"0" * 16, "1" * 16}))}
+    assert found["unwarned"].paragraph.startswith("1 of 2 hazards (50 %) was silent")
+    found = {answer.name: answer for answer in build_answers(part_of(run, {"0" * 16}))}
+    assert "1 of 1 experiment (100 %) was simulated" in found["time"].paragraph
 
 
 def test_link_values_are_escaped_and_the_sort_key_comes_last() -> None:
     assert (
-        to_list({"kind": ["a/b,c"], "outcome": ["sdc"]}, "-t_end") == "kind=a%2Fb%2Cc&outcome=sdc&sort=-t_end"
+        filtered_list_fragment({"kind": ["a/b,c"], "outcome": ["sdc"]}, "-t_end")
+        == "kind=a%2Fb%2Cc&outcome=sdc&sort=-t_end"
     )

@@ -103,7 +103,7 @@ def test_less_frequent_reasons_share_a_line(finish: Finish) -> None:
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, more)
     told = summary(run)
     assert told is not None
-    assert len(told.table.rows) == 3 + engine_summary.LISTED + 1
+    assert len(told.table.rows) == 3 + engine_summary.MOST_REASONS + 1
     assert sum(int(count) for _, count in told.table.rows) == 34
 
 
@@ -142,10 +142,10 @@ def test_complete_partial_and_missing_proofs_are_distinguished(
 ) -> None:
     told = summary(finish(proven))
     assert told is not None
-    assert said in told.proof
-    assert told.proof.endswith(said) == (proven != 3)
-    assert told.state == state
-    assert not told.failed
+    assert said in told.equivalence_text
+    assert told.equivalence_text.endswith(said) == (proven != 3)
+    assert told.equivalence_state == state
+    assert not told.has_failed_equivalence
 
 
 def test_a_large_campaign_without_forks_has_no_note_on_its_size(
@@ -154,7 +154,7 @@ def test_a_large_campaign_without_forks_has_no_note_on_its_size(
     monkeypatch.setattr(engine_summary, "MIN_EXPERIMENTS_TO_FORK", 4)
     told = summary(finish(None))
     assert told is not None
-    assert told.proof.endswith("so no equivalence check is needed.")
+    assert told.equivalence_text.endswith("so no equivalence check is needed.")
 
 
 def test_a_failed_proof_is_reported_first(finish: Finish) -> None:
@@ -195,7 +195,7 @@ def test_a_changed_trace_digest_makes_a_report_out_of_date(
 def test_a_failed_proof_is_reported_without_timings(finish: Finish) -> None:
     told = summary(finish(4, lambda r: replace(r, tree="x"), ways=()))
     assert told is not None
-    assert told.failed
+    assert told.has_failed_equivalence
 
 
 def test_without_timings_and_proof_the_report_names_no_engine(finish: Finish) -> None:

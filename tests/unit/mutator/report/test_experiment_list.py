@@ -10,7 +10,7 @@ from mutator._common.files import write_json
 from mutator.model import Experiment
 from mutator.report import experiment_list
 from mutator.report.experiment_facts import PLACE
-from mutator.report.experiment_list import column, details, media, table
+from mutator.report.experiment_list import column_data, details_data, media_by_experiment, results_table_data
 from mutator.review.patch_shapes import shapes_of_patches
 from mutator.store.run_folder import RunFolder
 from tests.made_head import made_head
@@ -44,14 +44,17 @@ diff --git a/pkg/radar.py b/pkg/radar.py
     ],
 )
 def test_columns_are_numbers_dictionaries_or_texts(name: str, values: list[object], made: object) -> None:
-    assert column(name, values) == made
+    assert column_data(name, values) == made
 
 
 def test_a_target_without_alerts_has_no_alert_columns() -> None:
     line = {"fault_type": "chaff"}
     frame = results(line).assign(reading="", variant="", value=nan, unit="", detail="", outcome="")
     frame = frame.assign(reaction_time=nan, **{PLACE: 0})
-    names = [{made["name"] for made in table(frame, {}, alerts=has)["columns"]} for has in (True, False)]
+    names = [
+        {made["name"] for made in results_table_data(frame, {}, has_alerts=has)["columns"]}
+        for has in (True, False)
+    ]
     assert names[0] - names[1] == {"alerts", "t_alert", "reaction_time", "warning"}
     assert "detail" in names[1]
 
@@ -60,7 +63,7 @@ def test_diffs_are_stored_as_shapes_and_values(experiment: Callable[..., Experim
     one, two = experiment(3.0), experiment(4.0)
     ids = [two.id, "none", one.id]
     patches = [(two.id, "", PATCH.format(4)), (one.id, "", PATCH.format(3))]
-    made = details([two, None, one], shapes_of_patches(patches), ids, ["2" * 16, "", "1" * 16])
+    made = details_data([two, None, one], shapes_of_patches(patches), ids, ["2" * 16, "", "1" * 16])
     assert made["shape"] == [0, -1, 0] and made["trace"] == ["2" * 16, "", "1" * 16]
     [shape] = made["shapes"]
     values = list(zip(*shape["values"], strict=True))
@@ -79,7 +82,7 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
     plots.mkdir()
     for name in ("aa-2.00s.jpg", "aa-10.00s.jpg", "aa.mp4", "bb.svg"):
         (plots / name).write_bytes(b"1234")
-    made = media(RunFolder.open_unverified(tmp_path), tmp_path / "report", budget=5)
+    made = media_by_experiment(RunFolder.open_unverified(tmp_path), tmp_path / "report", most_embedded_bytes=5)
     assert made == {
         "aa": {
             "stills": [["2.00", "data:image/jpeg;base64,MTIzNA=="], ["10.00", "../plots/aa-10.00s.jpg"]],
@@ -91,5 +94,5 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
 
 def test_the_list_does_not_depend_on_the_order_of_results() -> None:
     frame = results({"experiment_id": "b"}, {"experiment_id": "a"}, {"module": "car"})
-    listed = frame.sort_values(experiment_list.READING_ORDER)
+    listed = frame.sort_values(experiment_list.LIST_ORDER)
     assert list(listed["experiment_id"]) == ["2", "a", "b"]

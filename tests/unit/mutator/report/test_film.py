@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from mutator.report.film import hazards_in_words
+from mutator.report.film import describe_hazards
 from mutator.workspace import Workspace
 
 
 def test_a_film_describes_a_hazard_as_the_page_does() -> None:
     workspace = Workspace.find(root=Path(__file__).parents[4])
     manifest = workspace.manifest("openpilot")
-    assert hazards_in_words(workspace, manifest) == {rule.name: rule.about for rule in manifest.hazard_rules}
-    assert "touches" in hazards_in_words(workspace, manifest)["H1"]
+    assert describe_hazards(workspace, manifest) == {rule.name: rule.about for rule in manifest.hazard_rules}
+    assert "touches" in describe_hazards(workspace, manifest)["H1"]

@@ -8,7 +8,7 @@ import pytest
 
 from mutator.api.runs import load_run
 from mutator.model import Experiment, Outcome, Status
-from mutator.report.experiment_list import _listed, _table
+from mutator.report.experiment_list import _list_table_data, _listed_results
 from mutator.report.panels.mutation_score_panel import build_mutation_score_panel
 from mutator.report.panels.source_panel import build_source_panel
 from mutator.report.reported_run import ReportedRun
@@ -76,7 +76,7 @@ def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
     assert {wanted, f"{wanted}%20lasting%3Dpermanent", f"{wanted}%20lasting%3Dtransient"} <= set(page.links)
     assert "H 5/6" in page.texts
     assert f"| {DRIVER}:{line} |" in panel.markdown
-    columns = {c["name"]: c for c in _table(reported, _listed(reported))["columns"]}
+    columns = {c["name"]: c for c in _list_table_data(reported, _listed_results(reported))["columns"]}
     assert f"{DRIVER}:{line}" in columns["line"]["words"]
     assert columns["lasting"]["words"] == ["permanent", "transient"]
     assert "1.2 * closing -> -(1.2 * closing)" in columns["value"]["words"]
@@ -119,4 +119,6 @@ def test_a_run_without_operators_has_no_source_view_and_no_score(
     table_building.build_tables(out)
     reported = ReportedRun.open(RunFolder.open(out), toycar)
     assert build_source_panel(reported) is None and build_mutation_score_panel(reported) is None
-    assert not {"line", "lasting"} & {c["name"] for c in _table(reported, _listed(reported))["columns"]}
+    assert not {"line", "lasting"} & {
+        c["name"] for c in _list_table_data(reported, _listed_results(reported))["columns"]
+    }

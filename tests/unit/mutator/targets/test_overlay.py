@@ -11,7 +11,7 @@ from mutator.errors import MutatorError
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Outcome
 from mutator.mutants.mutant_building import build
-from mutator.report.film import Shot, _show
+from mutator.report.film import Shot, _write_shot
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
@@ -130,7 +130,7 @@ def test_the_film_command_has_the_overlay_and_the_root_in_one_folder(pole: Works
     film = 'film: {run: [], module: show, args: ["{out}"], still: []}\n'
     manifest = pole.library / MANIFEST
     manifest.write_text(manifest.read_text() + film)
-    shot = Shot(out=tmp_path / "out.txt")
+    shot = Shot(path=tmp_path / "out.txt")
     films = dict.fromkeys(("golden", "faulty"), str(tmp_path))
-    _show(pole.manifest("pole"), tmp_path / "scratch", films, shot)
-    assert shot.out.read_text() == str(tmp_path / "scratch" / "tree" / "drive.py")
+    _write_shot(pole.manifest("pole"), tmp_path / "scratch", films, shot)
+    assert shot.path.read_text() == str(tmp_path / "scratch" / "tree" / "drive.py")
