@@ -17,7 +17,7 @@ import numpy as np
 
 from mutator.report.experiment_list import scene_facts
 from mutator.targets.manifest import TargetManifest
-from mutator.web import asset, load_order
+from mutator.web import asset_text, load_order
 from mutator.workspace import Workspace
 
 GOAL = 30  # frames a second
@@ -89,8 +89,8 @@ def main() -> int:
     data = {"series": made_series(manifest), "facts": {"scene": scene_facts(manifest), "hazards": []}}
     replay = [name for name in load_order("report", ".js") if name.startswith(("shared/dom", "replay/"))]
     text = PAGE.format(
-        styles="".join(f"<style>{asset(name)}</style>" for name in load_order("report", ".css")),
-        scripts="".join(f"<script>{asset(name)}</script>" for name in replay),
+        styles="".join(f"<style>{asset_text(name)}</style>" for name in load_order("report", ".css")),
+        scripts="".join(f"<script>{asset_text(name)}</script>" for name in replay),
         data=json.dumps(data).replace("<", "\\u003c"),
     )
     slowest = float("inf")

@@ -29,10 +29,10 @@ from mutator.mutants.readable_patches import readable_patch
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.report import experiment_list as report_browse
 from mutator.report import markdown_and_html as report_page
-from mutator.report.experiment_facts import PLACE, UNTIMED_PATH
+from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
 from mutator.report.experiment_list import ExperimentListData
-from mutator.report.glossary import words_of
-from mutator.report.markdown_and_html import Content
+from mutator.report.glossary import glossary_of
+from mutator.report.markdown_and_html import ReportContent
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.panels.fault_paths_panel import build_fault_paths_panel
 from mutator.report.reported_run import ReportedRun
@@ -44,7 +44,7 @@ from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series
-from mutator.web import embedded
+from mutator.web import packed_script_element
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -143,36 +143,36 @@ def write(size: int, out: Path) -> dict[str, float]:
     experiments = {e.id: e for e in written_run(workspace, size, out)}
     began = process_time()
     run = ReportedRun.open(RunFolder.open(out), None)
-    more = {PLACE: run.seen.places, UNTIMED_PATH: run.seen.path_numbers}
-    table = embedded(
+    more = {RANK_COLUMN: run.seen.places, UNTIMED_PATH_COLUMN: run.seen.path_numbers}
+    table = packed_script_element(
         report_browse.results_table_data(run.results.assign(**more), run.faults, run.paths), "table"
     )
     assert run.paths is not None
     ids = run.results["experiment_id"].tolist()
-    paths = embedded(run.paths.data(ids), "paths")
+    paths = packed_script_element(run.paths.data(ids), "paths")
     table_s = process_time() - began
     shown = [experiments[name] for name in ids]
     records = [record(e, n) for n, e in enumerate(shown)]
     traces = [one.trace_digest for one in records]
     details = report_browse.details_data(shown, shapes_of_patches(patches(workspace, shown)), ids, traces)
-    detail = embedded(details, "details")
+    detail = packed_script_element(details, "details")
     index_kb = write_series(workspace, records, out)
     browse = ExperimentListData(
         facts_json=Markup(json.dumps({"filmed": True, "series": {"packed": True, "kept": []}})),
-        scripts=tuple(map(Markup, (table, detail, paths, embedded({}, "media")))),
+        scripts=tuple(map(Markup, (table, detail, paths, packed_script_element({}, "media")))),
     )
-    content = Content(
+    content = ReportContent(
         name=f"{size} experiments",
         alarm="",
         outcomes=count_endings(run.results),
         planned="",
-        words=words_of(run),
+        words=glossary_of(run),
         study="",
         answers=build_answers_panel(run),
         panels=[panel for panel in (build_fault_paths_panel(run),) if panel],
         browse=browse,
     )
-    page = report_page.page_html(content)
+    page = report_page.report_html(content)
     (out / "report").mkdir()
     (out / "report" / "index.html").write_text(page)
     sizes = {"page_kb": page, "table_kb": table, "details_kb": detail, "paths_kb": paths}

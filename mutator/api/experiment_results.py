@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from mutator.api.notebook_html import diff_html, facts_html, text_html
-from mutator.figures.run_plot import draw_run, marks_of
+from mutator.figures.run_plot import draw_run, event_marks
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.readable_patches import readable_patch
 from mutator.outcomes.golden_comparison import Trace, values_on_steps
@@ -142,7 +142,7 @@ class ExperimentResult(ABC):
         golden, faulty = self._load_traces()
         facts = experiment_facts(self.experiment)
         title = f"{facts['fault']}   {facts['scenario']}   {facts['trigger']}   [{self.id}]"
-        marks = marks_of(self.record) if self.record else ()
+        marks = event_marks(self.record) if self.record else ()
         end = self.record.t_end if self.record else None
         return draw_run(golden, faulty, self._manifest(), title=title, marks=marks, end=end)
 

@@ -18,8 +18,8 @@ from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.session import ProgressCallback, Summary
 from mutator.execution.shard_merging import merge_shards
-from mutator.exports import Format, Parts, find_export
-from mutator.exports import Table as ExportedTable
+from mutator.exports import ExportSelection, Format, find_export
+from mutator.exports import ExportTable as ExportedTable
 from mutator.exports.write import export
 from mutator.model import OPERATORS_MODULE
 from mutator.outcomes.fault_free_runs import (
@@ -187,7 +187,7 @@ class Run(RunContents):
         Return the reason for the first experiment without stills; empty if all have stills.
         """
         notify = progress or (lambda _: None)
-        return take_stills(self.workspace, self.folder, workers=workers, notify=notify)
+        return take_stills(self.workspace, self.folder, workers=workers, on_progress=notify)
 
     def export(
         self,
@@ -211,7 +211,7 @@ class Run(RunContents):
         if exporter.uses_library:
             workspace = self._workspace_if_any()
         out_path = None if out is None else Path(out)
-        parts = Parts(failures=failures, only=only, table=ExportedTable(table))
+        parts = ExportSelection(failures=failures, only=only, table=ExportedTable(table))
         return export(self.path, str(format), out_path, workspace=workspace, parts=parts)
 
     def check_equivalence(self) -> None:

@@ -12,7 +12,7 @@ from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_
 from mutator.api.selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.execution.single_run import SingleRun, run_single
-from mutator.figures.run_plot import save
+from mutator.figures.run_plot import save_figure
 from mutator.model import Experiment, Method, Record
 from mutator.outcomes.golden_comparison import Trace, load_trace
 from mutator.outcomes.hazards_and_metrics import load_judged_run
@@ -75,7 +75,7 @@ class Trial(ExperimentResult):
         """Write `plot()` to an .svg or .png file; return None if the faulty run left no trace."""
         if not self.has_trace:
             return None
-        save(self.plot(), [path])
+        save_figure(self.plot(), [path])
         return path
 
     def _channels(self) -> Sequence[ChannelFacts]:

@@ -10,7 +10,7 @@ from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, WorkspaceOptions, with_workspace_options
 from mutator.cli.run_folders import workspace_if_any
-from mutator.exports import Format, Table, find_export
+from mutator.exports import ExportTable, Format, find_export
 
 
 def register(app: typer.Typer) -> None:
@@ -60,7 +60,7 @@ def export(
             help="MCAP: only experiments whose result columns match, e.g. 'outcome == \"hazard\"'.",
         ),
     ] = None,
-    table: Annotated[Table, typer.Option(help="CSV and Parquet: which table.")] = Table.RESULTS,
+    table: Annotated[ExportTable, typer.Option(help="CSV and Parquet: which table.")] = ExportTable.RESULTS,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,

@@ -16,7 +16,7 @@ from mutator.comparison.pairs import ExperimentPair, ResultChange, time_to_hazar
 from mutator.comparison.run_comparison import Comparison, Gate, describe_ending_change
 from mutator.results.plan_columns import plan_row
 from mutator.results.result_rows import ResultRow
-from mutator.web import asset, load_order
+from mutator.web import asset_text, load_order
 
 MOST_LISTED_EXPERIMENTS = (
     50  # number of experiments that the Markdown lists for each change; the page and the CSV list all
@@ -147,7 +147,7 @@ def render_page(comparison: Comparison) -> str:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     counts = Counter(change for pair in comparison.pairs for change in pair.changes)
-    return environment.from_string(asset("comparison/comparison.html")).render(
+    return environment.from_string(asset_text("comparison/comparison.html")).render(
         c=comparison,
         summary=summary_text(comparison),
         differing=_facts_table(comparison, [fact for fact in comparison.facts if fact.is_different]),
@@ -158,12 +158,13 @@ def render_page(comparison: Comparison) -> str:
         changed=_changed_table(comparison),
         limit=MOST_SHOWN_ROWS,
         style=Markup(page_style()),
-        script=Markup(asset("comparison/comparison.js")),
+        script=Markup(asset_text("comparison/comparison.js")),
     )
 
 
 def page_style() -> str:
-    return "".join(map(asset, load_order("comparison", ".css"))).replace("LIMIT", str(MOST_SHOWN_ROWS + 1))
+    styles = "".join(map(asset_text, load_order("comparison", ".css")))
+    return styles.replace("LIMIT", str(MOST_SHOWN_ROWS + 1))
 
 
 def _changed_table(comparison: Comparison) -> TextTable:

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from mutator.workspace import Workspace
 
 
-class _Members(EnumType):
+class _FormatMembers(EnumType):
     if TYPE_CHECKING:  # members come from the folder of formats
 
         def __getattr__(cls, name: str) -> "Format": ...
 
 
-class Format(StrEnum, metaclass=_Members):
+class Format(StrEnum, metaclass=_FormatMembers):
     """The formats that a run can be written in. Other packages can add more, which have names only."""
 
     _ignore_ = "name"
@@ -38,7 +38,7 @@ class Format(StrEnum, metaclass=_Members):
         return find_export(self).about
 
 
-class Table(StrEnum):
+class ExportTable(StrEnum):
     """The tables that can be exported."""
 
     RESULTS = "results"
@@ -47,14 +47,14 @@ class Table(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parts:
+class ExportSelection:
     """The part of a run to write: the outcomes that are reported as failures, a filter over the columns of
     the results, the table.
     """
 
     failures: Sequence[str] = ()
     only: str | None = None
-    table: Table = Table.RESULTS
+    table: ExportTable = ExportTable.RESULTS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,7 @@ class ExportRequest:
     folder: "RunFolder"
     out: Path
     workspace: "Workspace | None"
-    parts: Parts
+    parts: ExportSelection
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,23 +88,23 @@ class Export:
 
 def find_export(name: str) -> Export:
     """Return the format of that name; MutatorError if there is none, or if its package is broken."""
-    found = EXPORTS.load(name)
-    assert isinstance(found, Export)
-    if name not in EXPORTS.shipped_names() and not fnmatchcase(found.file, f"{name}.?*"):
+    export = EXPORTS.load(name)
+    assert isinstance(export, Export)
+    if name not in EXPORTS.shipped_names() and not fnmatchcase(export.file, f"{name}.?*"):
         raise MutatorError(  # `mutator clean` knows an export by this name
-            f"export '{name}' writes the file '{found.file}'",
+            f"export '{name}' writes the file '{export.file}'",
             expected=f"the name '{name}' with a suffix",
             remedy="correct `file` in the package that adds it",
         )
-    return found
+    return export
 
 
-def check_options(name: str, export: Export, parts: Parts) -> None:
+def check_options(name: str, export: Export, parts: ExportSelection) -> None:
     """Raise MutatorError for a part of a run that this format cannot write."""
     chosen = {
         "failures": bool(parts.failures),
         "only": parts.only is not None,
-        "table": parts.table is not Table.RESULTS,
+        "table": parts.table is not ExportTable.RESULTS,
     }
     for option, is_chosen in chosen.items():
         if is_chosen and option not in export.options:

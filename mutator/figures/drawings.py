@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mutator.figures import hazards_by_fault_type, heat_map, propagation_times
-from mutator.figures.run_plot import images
+from mutator.figures.run_plot import render_images
 from mutator.statistics.results_frame import select_common_columns
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FOLDER, FORMATS = "figures", ("svg", "png")
+FIGURES_FOLDER, FIGURE_FORMATS = "figures", ("svg", "png")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,20 +29,20 @@ class Drawing:
     codes: tuple[tuple[str, str], ...] = ()
 
     def link(self, suffix: str) -> str:
-        return f"{FOLDER}/{self.name}.{suffix}"
+        return f"{FIGURES_FOLDER}/{self.name}.{suffix}"
 
 
 def draw_figures(frame: pd.DataFrame) -> tuple[Drawing, ...]:
     frame = select_common_columns(frame)
     kinds, scenarios = frame["kind"].nunique(), frame["scenario"].nunique()
-    made = []
+    drawings = []
     if kinds > 1:
-        made.append(_hazards(frame))
+        drawings.append(_draw_hazards(frame))
     if scenarios > 1:
-        made.append(_propagation(frame))
+        drawings.append(_draw_propagation_times(frame))
     if kinds > 1 and scenarios > 1:
-        made.append(_heat_map(frame))
-    return tuple(made)
+        drawings.append(_draw_heat_map(frame))
+    return tuple(drawings)
 
 
 def drawing_files(drawings: Sequence[Drawing]) -> dict[str, bytes]:
@@ -50,12 +50,12 @@ def drawing_files(drawings: Sequence[Drawing]) -> dict[str, bytes]:
     files: dict[str, bytes] = {}
     for drawing in drawings:
         if drawing.figure is not None:
-            names = [drawing.link(suffix) for suffix in FORMATS]
-            files |= dict(zip(names, images(drawing.figure, FORMATS), strict=True))
+            names = [drawing.link(suffix) for suffix in FIGURE_FORMATS]
+            files |= dict(zip(names, render_images(drawing.figure, FIGURE_FORMATS), strict=True))
     return files
 
 
-def _hazards(frame: pd.DataFrame) -> Drawing:
+def _draw_hazards(frame: pd.DataFrame) -> Drawing:
     return Drawing(
         name="hazards_by_fault_type",
         title="Hazards by fault type",
@@ -65,7 +65,7 @@ def _hazards(frame: pd.DataFrame) -> Drawing:
     )
 
 
-def _propagation(frame: pd.DataFrame) -> Drawing:
+def _draw_propagation_times(frame: pd.DataFrame) -> Drawing:
     return Drawing(
         name="propagation_by_scenario",
         title="Propagation times by scenario",
@@ -75,7 +75,7 @@ def _propagation(frame: pd.DataFrame) -> Drawing:
     )
 
 
-def _heat_map(frame: pd.DataFrame) -> Drawing:
+def _draw_heat_map(frame: pd.DataFrame) -> Drawing:
     return Drawing(
         name="fault_type_by_scenario",
         title="Fault type and scenario",

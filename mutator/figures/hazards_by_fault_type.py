@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SEVERAL = "several"
+SEVERAL_HAZARDS = "several"
 
 
-def hazard_sets(frame: pd.DataFrame) -> pd.Series:
+def hazard_labels(frame: pd.DataFrame) -> pd.Series:
     """Return each run's hazard, `several` if it has more than one, or '' if it has none."""
     names = hazard_names(frame)
-    had = frame[[f"t_{name.lower()}" for name in names]].notna().to_numpy()
-    count = had.sum(axis=1)
-    found = np.array([*names, "", SEVERAL], dtype=object)[
-        np.where(count > 1, -1, np.where(count == 1, had.argmax(axis=1), -2))
+    has_hazard = frame[[f"t_{name.lower()}" for name in names]].notna().to_numpy()
+    count = has_hazard.sum(axis=1)
+    labels = np.array([*names, "", SEVERAL_HAZARDS], dtype=object)[
+        np.where(count > 1, -1, np.where(count == 1, has_hazard.argmax(axis=1), -2))
     ]
-    return pd.Series(found, index=frame.index, dtype=str)
+    return pd.Series(labels, index=frame.index, dtype=str)
 
 
 @style.shipped_style()
@@ -35,58 +35,73 @@ def draw(frame: pd.DataFrame) -> "Figure":
     methods = sorted({method for method, _ in tallies})
     hazards = frame.groupby("kind")["is_hazard"].sum()
     kinds = sorted(hazards.index, key=lambda kind: (-hazards[kind], kind))
-    figure, axes = style.blank(1.5 + 0.33 * len(kinds), 1, len(methods) + 1, sharey=True)
+    figure, axes = style.blank_figure(1.5 + 0.33 * len(kinds), 1, len(methods) + 1, sharey=True)
     most = max(1, *(tallies[key].hazards for key in tallies))
     for axis, method in zip(axes, methods, strict=False):
-        _counts(axis, frame[frame["method"] == method], kinds)
-        axis.set_title(f"{method}: runs with a hazard", fontsize=style.TEXT, loc="left")
+        _draw_counts(axis, frame[frame["method"] == method], kinds)
+        axis.set_title(f"{method}: runs with a hazard", fontsize=style.TEXT_POINTS, loc="left")
         axis.set_xlim(0, 1.3 * most)
     axes[0].set_yticks(range(len(kinds)), kinds)
     axes[0].set_ylim(len(kinds) - 0.4, -0.6)
-    _coverage(axes[-1], tallies, methods, kinds)
+    _draw_hazard_shares(axes[-1], tallies, methods, kinds)
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=6, fontsize=style.SMALL, frameon=False)
+    figure.legend(
+        handles, labels, loc="outside lower left", ncols=6, fontsize=style.SMALL_TEXT_POINTS, frameon=False
+    )
     handles, labels = axes[-1].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower right", ncols=4, fontsize=style.SMALL, frameon=False)
+    figure.legend(
+        handles, labels, loc="outside lower right", ncols=4, fontsize=style.SMALL_TEXT_POINTS, frameon=False
+    )
     return figure
 
 
-def _counts(axis: "Axes", frame: pd.DataFrame, kinds: list[str]) -> None:
+def _draw_counts(axis: "Axes", frame: pd.DataFrame, kinds: list[str]) -> None:
     names = hazard_names(frame)
-    counts = pd.crosstab(frame["kind"], hazard_sets(frame)).reindex(kinds, fill_value=0)
+    counts = pd.crosstab(frame["kind"], hazard_labels(frame)).reindex(kinds, fill_value=0)
     injected = frame["kind"].value_counts().reindex(kinds, fill_value=0)
-    left = [0] * len(kinds)
-    for i, name in enumerate((*names, SEVERAL)):
+    bar_starts = [0] * len(kinds)
+    for i, name in enumerate((*names, SEVERAL_HAZARDS)):
         colour = (
-            style.SEVERAL_COLOUR if name == SEVERAL else style.HAZARD_COLOURS[i % len(style.HAZARD_COLOURS)]
+            style.SEVERAL_COLOUR
+            if name == SEVERAL_HAZARDS
+            else style.HAZARD_COLOURS[i % len(style.HAZARD_COLOURS)]
         )
         width = counts[name].tolist() if name in counts else [0] * len(kinds)
-        label = "more than one" if name == SEVERAL else f"{name} alone"
+        label = "more than one" if name == SEVERAL_HAZARDS else f"{name} alone"
         axis.barh(
-            range(len(kinds)), width, 0.7, left, color=colour, edgecolor=style.INK, linewidth=0.5, label=label
+            range(len(kinds)),
+            width,
+            0.7,
+            bar_starts,
+            color=colour,
+            edgecolor=style.INK_COLOUR,
+            linewidth=0.5,
+            label=label,
         )
-        left = [a + b for a, b in zip(left, width, strict=True)]
-    for i, (count, of) in enumerate(zip(left, injected, strict=True)):
+        bar_starts = [a + b for a, b in zip(bar_starts, width, strict=True)]
+    for i, (count, of) in enumerate(zip(bar_starts, injected, strict=True)):
         axis.annotate(
             f"{count} of {of}",
             (count, i),
             xytext=(4, 0),
             textcoords="offset points",
             va="center",
-            fontsize=style.SMALL,
+            fontsize=style.SMALL_TEXT_POINTS,
         )
     axis.locator_params(axis="x", integer=True)
-    axis.set_xlabel("runs", fontsize=style.TEXT)
+    axis.set_xlabel("runs", fontsize=style.TEXT_POINTS)
 
 
-def _coverage(
+def _draw_hazard_shares(
     axis: "Axes", tallies: dict[tuple[str, str], Tally], methods: Sequence[str], kinds: Sequence[str]
 ) -> None:
     for m, method in enumerate(methods):
-        colour, marker = style.method_look(method)
+        colour, marker = style.colour_and_marker(method)
         height = 0.18 * (2 * m - len(methods) + 1)
-        told = [(i, tallies[method, kind]) for i, kind in enumerate(kinds) if (method, kind) in tallies]
-        shares = [(i + height, share(t.hazards, t.activated)) for i, t in told if t.activated]
+        tally_by_row = [
+            (i, tallies[method, kind]) for i, kind in enumerate(kinds) if (method, kind) in tallies
+        ]
+        shares = [(i + height, share(t.hazards, t.activated)) for i, t in tally_by_row if t.activated]
         rates = [100 * s.rate for _, s in shares]
         ends = [
             [max(0.0, 100 * (s.rate - s.low)) for _, s in shares],
@@ -102,8 +117,8 @@ def _coverage(
             elinewidth=1.2,
             label=method,
         )
-    axis.set_title("hazards per activated fault", fontsize=style.TEXT, loc="left")
+    axis.set_title("hazards per activated fault", fontsize=style.TEXT_POINTS, loc="left")
     axis.set_xlim(-3, 103)
-    axis.set_xlabel("% (95 % Wilson interval)", fontsize=style.TEXT)
+    axis.set_xlabel("% (95 % Wilson interval)", fontsize=style.TEXT_POINTS)
     axis.grid(visible=True, linewidth=0.4, alpha=0.5)
     axis.set_axisbelow(True)

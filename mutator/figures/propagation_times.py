@@ -18,45 +18,49 @@ def draw(frame: pd.DataFrame) -> "Figure":
     methods, scenarios = sorted(frame["method"].unique()), sorted(frame["scenario"].unique())
     spreads = {(m, s): propagation_times(group) for (m, s), group in frame.groupby(["method", "scenario"])}
     steps = list(next(iter(spreads.values())))
-    figure, axes = style.blank(6.2, 2, 2)
+    figure, axes = style.blank_figure(6.2, 2, 2)
     for axis, step in zip(axes, steps, strict=True):
         for m, method in enumerate(methods):
             offset = 0.36 * (m - (len(methods) - 1) / 2)
-            told = [(i + offset, spreads.get((method, s))) for i, s in enumerate(scenarios)]
-            _method(axis, [(x, spread[step]) for x, spread in told if spread], str(method))
-        axis.set_title(step, fontsize=style.TEXT, loc="left")
+            spread_by_x = [(i + offset, spreads.get((method, s))) for i, s in enumerate(scenarios)]
+            _draw_method(axis, [(x, spread[step]) for x, spread in spread_by_x if spread], str(method))
+        axis.set_title(step, fontsize=style.TEXT_POINTS, loc="left")
         axis.set_xticks(range(len(scenarios)), scenarios)
         axis.set_xlim(-0.6, len(scenarios) - 0.4)
-        axis.set_ylabel("s", fontsize=style.TEXT)
+        axis.set_ylabel("s", fontsize=style.TEXT_POINTS)
         top = axis.dataLim.y1 if axis.has_data() else 1.0
         axis.set_ylim(0, 1.2 * max(top, 0.01))
         axis.grid(visible=True, axis="y", linewidth=0.4, alpha=0.5)
         axis.set_axisbelow(True)
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=6, fontsize=style.SMALL, frameon=False)
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=6, fontsize=style.SMALL_TEXT_POINTS, frameon=False
+    )
     return figure
 
 
-def _method(axis: "Axes", spreads: Sequence[tuple[float, TimeSpread]], method: str) -> None:
-    colour, marker = style.method_look(method)
-    known = [(x, spread) for x, spread in spreads if spread.n]
-    xs = [x for x, _ in known]
-    lower = [s.lower_quartile for _, s in known]
-    upper = [s.upper_quartile for _, s in known]
+def _draw_method(axis: "Axes", spreads: Sequence[tuple[float, TimeSpread]], method: str) -> None:
+    colour, marker = style.colour_and_marker(method)
+    with_runs = [(x, spread) for x, spread in spreads if spread.n]
+    xs = [x for x, _ in with_runs]
+    lower = [s.lower_quartile for _, s in with_runs]
+    upper = [s.upper_quartile for _, s in with_runs]
     height = [b - a for a, b in zip(lower, upper, strict=True)]
     axis.bar(
         xs, height, 0.28, lower, color=colour, alpha=0.35, edgecolor=colour, label=f"{method}: quartiles"
     )
-    medians = [s.median for _, s in known]
+    medians = [s.median for _, s in with_runs]
     axis.plot(xs, medians, "_", color=colour, markersize=17, markeredgewidth=2.2, label=f"{method}: median")
-    means = [s.mean for _, s in known]
-    axis.plot(xs, means, marker, color=style.INK, markersize=4, label=f"{method}: mean", linestyle="none")
-    for x, s in known:
+    means = [s.mean for _, s in with_runs]
+    axis.plot(
+        xs, means, marker, color=style.INK_COLOUR, markersize=4, label=f"{method}: mean", linestyle="none"
+    )
+    for x, s in with_runs:
         axis.annotate(
             str(s.n),
             (x, max(s.upper_quartile, s.mean)),
             xytext=(0, 4),
             textcoords="offset points",
             ha="center",
-            fontsize=style.SMALL,
+            fontsize=style.SMALL_TEXT_POINTS,
         )

@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 GOLDEN_COLOUR = "#0072b2"  # blue and vermilion are distinct in greyscale and to colour-blind people
 FAULTY_COLOUR = "#d55e00"
 LATER_COLOUR = "#999999"  # for data after the end of the drive
-PANEL_HEIGHT = 1.1  # inches
-WIDTH = 9.0
+PANEL_HEIGHT_INCHES = 1.1  # inches
+FIGURE_WIDTH_INCHES = 9.0
 PNG_DPI = 110
 
 
-class MarkKind(StrEnum):
+class EventKind(StrEnum):
     """The event at a marked time."""
 
     TRIGGER = "trigger"
@@ -43,29 +43,34 @@ class MarkKind(StrEnum):
 
 
 MARK_COLOURS = {
-    MarkKind.TRIGGER: "#555555",
-    MarkKind.MANIFEST: "#009e73",
-    MarkKind.ALERT: "#b8860b",
-    MarkKind.HAZARD: "#b00020",
+    EventKind.TRIGGER: "#555555",
+    EventKind.MANIFEST: "#009e73",
+    EventKind.ALERT: "#b8860b",
+    EventKind.HAZARD: "#b00020",
 }
-MARK_LINES = {MarkKind.TRIGGER: "-", MarkKind.MANIFEST: ":", MarkKind.ALERT: "--", MarkKind.HAZARD: "-"}
+MARK_LINE_STYLES = {
+    EventKind.TRIGGER: "-",
+    EventKind.MANIFEST: ":",
+    EventKind.ALERT: "--",
+    EventKind.HAZARD: "-",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mark:
-    kind: MarkKind
+class EventMark:
+    kind: EventKind
     t: float
     label: str
 
 
-def marks_of(record: Record) -> tuple[Mark, ...]:
+def event_marks(record: Record) -> tuple[EventMark, ...]:
     marks = []
     if record.activation is not None:
-        marks.append(Mark(kind=MarkKind.TRIGGER, t=record.activation.first, label="activated"))
+        marks.append(EventMark(kind=EventKind.TRIGGER, t=record.activation.first, label="activated"))
     if record.t_manifest is not None:
-        marks.append(Mark(kind=MarkKind.MANIFEST, t=record.t_manifest, label="manifested"))
-    marks += [Mark(kind=MarkKind.ALERT, t=t, label=name) for name, t in record.alerts]
-    marks += [Mark(kind=MarkKind.HAZARD, t=t, label=name) for name, t in record.hazards]
+        marks.append(EventMark(kind=EventKind.MANIFEST, t=record.t_manifest, label="manifested"))
+    marks += [EventMark(kind=EventKind.ALERT, t=t, label=name) for name, t in record.alerts]
+    marks += [EventMark(kind=EventKind.HAZARD, t=t, label=name) for name, t in record.hazards]
     return tuple(sorted(marks, key=lambda m: m.t))
 
 
@@ -76,7 +81,7 @@ def draw_run(
     manifest: TargetManifest,
     *,
     title: str,
-    marks: Iterable[Mark] = (),
+    marks: Iterable[EventMark] = (),
     end: float | None = None,
 ) -> "Figure":
     """Draw the manifest's channels of two runs, one panel each, compared channels (actuators) first.
@@ -91,17 +96,19 @@ def draw_run(
     ]
     if not channels:
         raise MutatorError("no channel of the manifest is in both traces", where=manifest.path)
-    figure, axes = _figure(len(channels))
+    figure, axes = _new_figure(len(channels))
     time = manifest.time_channel
     for axis, channel in zip(axes, channels, strict=True):
         lines = [(times_of(trace, channel.name, time), trace[channel.name]) for trace in (golden, faulty)]
-        _panel(axis, channel, lines[0], lines[1], np.inf if end is None else end)
-    _decorate(figure, axes, title, tuple(marks), end)
+        _draw_channel(axis, channel, lines[0], lines[1], np.inf if end is None else end)
+    _draw_marks(figure, axes, title, tuple(marks), end)
     return figure
 
 
-def _figure(rows: int) -> tuple["Figure", list["Axes"]]:
-    figure = _figure_type()(figsize=(WIDTH, 1.1 + PANEL_HEIGHT * rows), layout="constrained")
+def _new_figure(rows: int) -> tuple["Figure", list["Axes"]]:
+    figure = _figure_type()(
+        figsize=(FIGURE_WIDTH_INCHES, 1.1 + PANEL_HEIGHT_INCHES * rows), layout="constrained"
+    )
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     return figure, list(axes)
 
@@ -119,19 +126,19 @@ def _figure_type() -> type["Figure"]:
     return RunFigure
 
 
-def _panel(
+def _draw_channel(
     axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tuple[Any, Any], end: float
 ) -> None:
     """Draw one channel: a wide golden line below a narrow faulty line, so that both show if equal."""
     looks = ((golden, GOLDEN_COLOUR, 2.4, 0.55, "golden"), (faulty, FAULTY_COLOUR, 1.1, 1.0, "faulty"))
     axis.margins(x=0.01, y=0.12)
     for (time, values), colour, width, alpha, label in looks:
-        driven = np.where(time <= end, finite(values), np.nan)
+        driven = np.where(time <= end, infinities_as_gaps(values), np.nan)
         axis.plot(time, driven, color=colour, linewidth=width, alpha=alpha, label=label)
     axis.set_ylim(axis.get_ylim())  # only the drive sets the limits
     for (time, values), _, width, alpha, _ in looks:
         if (time > end).any():
-            later = np.where(time >= end, finite(values), np.nan)
+            later = np.where(time >= end, infinities_as_gaps(values), np.nan)
             axis.plot(time, later, color=LATER_COLOUR, linewidth=width, alpha=alpha)
     unit = f"\n[{channel.unit}]" if channel.unit not in ("", "-") else ""
     axis.set_ylabel(channel.name + unit, fontsize=8)
@@ -139,14 +146,14 @@ def _panel(
     axis.grid(visible=True, linewidth=0.4, alpha=0.5)
 
 
-def _decorate(
-    figure: "Figure", axes: list["Axes"], title: str, marks: tuple[Mark, ...], end: float | None
+def _draw_marks(
+    figure: "Figure", axes: list["Axes"], title: str, marks: tuple[EventMark, ...], end: float | None
 ) -> None:
     colours = [LATER_COLOUR if end is not None and m.t > end else MARK_COLOURS[m.kind] for m in marks]
     left, right = axes[0].get_xlim()
     for axis in axes:
         for mark, colour in zip(marks, colours, strict=True):
-            axis.axvline(mark.t, color=colour, linestyle=MARK_LINES[mark.kind], linewidth=1.0)
+            axis.axvline(mark.t, color=colour, linestyle=MARK_LINE_STYLES[mark.kind], linewidth=1.0)
         if end is not None:
             axis.axvspan(end, right, color=LATER_COLOUR, alpha=0.15, linewidth=0)
     axes[0].set_xlim(left, right)
@@ -167,15 +174,15 @@ def _decorate(
     figure.suptitle(title, fontsize=10, x=0.01, ha="left")
 
 
-def save(figure: "Figure", paths: Sequence[Path]) -> None:
+def save_figure(figure: "Figure", paths: Sequence[Path]) -> None:
     """Write a figure to each of `paths` as .svg or .png, by suffix, deterministically."""
-    for path, image in zip(paths, images(figure, [path.suffix[1:] for path in paths]), strict=True):
+    for path, image in zip(paths, render_images(figure, [path.suffix[1:] for path in paths]), strict=True):
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomic(path, image)
 
 
 @shipped_style()
-def images(figure: "Figure", formats: Sequence[str]) -> list[bytes]:
+def render_images(figure: "Figure", formats: Sequence[str]) -> list[bytes]:
     """Draw a figure in each format, `svg` or `png`, deterministically."""
     if figure.get_layout_engine() is not None:  # once for all files, because layout takes as long as drawing
         figure.draw_without_rendering()
@@ -188,7 +195,7 @@ def images(figure: "Figure", formats: Sequence[str]) -> list[bytes]:
     return drawn
 
 
-def finite(values: Any) -> Any:
+def infinities_as_gaps(values: Any) -> Any:
     """Replace infinities, such as the headway time at standstill, with gaps."""
     array = np.asarray(values, dtype=float)
     return np.where(np.isfinite(array), array, np.nan)

@@ -9,7 +9,7 @@ from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.execution.run_traces import RunTraces
 from mutator.figures.drawings import Drawing
-from mutator.figures.run_plot import marks_of
+from mutator.figures.run_plot import event_marks
 from mutator.outcomes.series_sampling import MOST_SAMPLES_PER_S
 from mutator.paper.run_pair_plot import plot_run_pair
 from mutator.paper.unsafe_actions import ACTION_FIGURES, ActionFigure, RunPair
@@ -80,7 +80,7 @@ def _build_drawing(frame: pd.DataFrame, traces: RunTraces | None, figure: Action
                 name=figure.name,
                 title=figure.title,
                 note=_describe_example(figure, row, faults[row["fault_id"]].label, rank, len(rows)),
-                figure=plot_run_pair(pair, steps, figure, marks_of(record), manifest),
+                figure=plot_run_pair(pair, steps, figure, event_marks(record), manifest),
                 codes=(
                     (QUERY_LABEL, figure.query),
                     (

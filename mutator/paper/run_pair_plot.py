@@ -10,10 +10,10 @@ from mutator.figures.run_plot import (
     FAULTY_COLOUR,
     GOLDEN_COLOUR,
     MARK_COLOURS,
-    MARK_LINES,
-    Mark,
-    MarkKind,
-    finite,
+    MARK_LINE_STYLES,
+    EventMark,
+    EventKind,
+    infinities_as_gaps,
 )
 from mutator.paper.unsafe_actions import ActionFigure, RunPair, StepFlags
 from mutator.targets.manifest import TargetManifest
@@ -33,7 +33,7 @@ def plot_run_pair(
     pair: RunPair,
     steps: StepFlags,
     figure_spec: ActionFigure,
-    marks: Iterable[Mark],
+    marks: Iterable[EventMark],
     manifest: TargetManifest,
 ) -> "Figure":
     """Draw the panels of `figure_spec` that both runs have. In its action channels, shade `steps`."""
@@ -44,31 +44,33 @@ def plot_run_pair(
     first_s = max(float(pair.times_s[0]), pair.start_s - SHOWN_BEFORE_S)
     last_s = min(float(pair.times_s[-1]), pair.end_s + SHOWN_AFTER_S)
     # inches: legend and time axis, then each panel
-    figure, axes = style.blank(1.1 + 1.35 * len(panels), len(panels), 1)
+    figure, axes = style.blank_figure(1.1 + 1.35 * len(panels), len(panels), 1)
     is_visible = (pair.times_s >= first_s) & (pair.times_s <= last_s)
     for axis, (channel, what) in zip(axes, panels, strict=True):
         _plot_channel(axis, pair, channel, is_visible)
-        axis.set_ylabel(f"{what} [{units.get(channel) or '-'}]", fontsize=style.TEXT)
+        axis.set_ylabel(f"{what} [{units.get(channel) or '-'}]", fontsize=style.TEXT_POINTS)
         axis.set_xlim(first_s, last_s)
         if channel in figure_spec.action_channels:
             _shade_steps(axis, pair.times_s, steps)
         low, high = axis.get_ylim()
         axis.set_ylim(low, max(high, low + MIN_AXIS_RANGE))
         axis.tick_params(labelbottom=axis is axes[-1])
-    axes[-1].set_xlabel("time [s]", fontsize=style.TEXT)
+    axes[-1].set_xlabel("time [s]", fontsize=style.TEXT_POINTS)
     _draw_marks(
         axes, [mark for mark in without_later_alerts(marks) if first_s <= mark.t <= last_s], last_s - first_s
     )
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=2, fontsize=style.SMALL, frameon=False)
+    figure.legend(
+        handles, labels, loc="outside lower left", ncols=2, fontsize=style.SMALL_TEXT_POINTS, frameon=False
+    )
     figure.align_ylabels(axes)
     return figure
 
 
-def without_later_alerts(marks: Iterable[Mark]) -> list[Mark]:
-    shown_marks: list[Mark] = []
+def without_later_alerts(marks: Iterable[EventMark]) -> list[EventMark]:
+    shown_marks: list[EventMark] = []
     for mark in marks:
-        if mark.kind is not MarkKind.ALERT or all(m.kind is not MarkKind.ALERT for m in shown_marks):
+        if mark.kind is not EventKind.ALERT or all(m.kind is not EventKind.ALERT for m in shown_marks):
             shown_marks.append(mark)
     return shown_marks
 
@@ -77,11 +79,16 @@ def _plot_channel(axis: "Axes", pair: RunPair, channel: str, is_visible: np.ndar
     """Draw the golden line dashed above the solid faulty line, so that both are visible if they coincide."""
     t = pair.times_s[is_visible]
     axis.plot(
-        t, finite(pair.faulty[channel][is_visible]), "-", color=FAULTY_COLOUR, linewidth=1.6, label="faulty"
+        t,
+        infinities_as_gaps(pair.faulty[channel][is_visible]),
+        "-",
+        color=FAULTY_COLOUR,
+        linewidth=1.6,
+        label="faulty",
     )
     axis.plot(
         t,
-        finite(pair.golden[channel][is_visible]),
+        infinities_as_gaps(pair.golden[channel][is_visible]),
         "--",
         color=GOLDEN_COLOUR,
         linewidth=1.6,
@@ -98,7 +105,7 @@ def _shade_steps(axis: "Axes", times_s: np.ndarray, steps: StepFlags) -> None:
         axis.axvspan(times_s[begin], times_s[end - 1], color=SHADE_COLOUR, alpha=0.45, linewidth=0)
 
 
-def _draw_marks(axes: Sequence["Axes"], marks: Sequence[Mark], time_span_s: float) -> None:
+def _draw_marks(axes: Sequence["Axes"], marks: Sequence[EventMark], time_span_s: float) -> None:
     """Draw a line through all panels for each mark. Its name is above, on the lowest free level."""
     level_ends: list[float] = []  # the end of the last name on each level
     end, label_width = axes[0].get_xlim()[1], LABEL_WIDTH_SHARE * time_span_s
@@ -107,14 +114,14 @@ def _draw_marks(axes: Sequence["Axes"], marks: Sequence[Mark], time_span_s: floa
             axis.axvline(
                 mark.t,
                 color=MARK_COLOURS[mark.kind],
-                linestyle=MARK_LINES[mark.kind],
-                linewidth=1.8 if mark.kind is MarkKind.HAZARD else 1.1,
+                linestyle=MARK_LINE_STYLES[mark.kind],
+                linewidth=1.8 if mark.kind is EventKind.HAZARD else 1.1,
             )
         fits = mark.t + label_width <= end  # else the name ends at its mark instead of beginning there
         begin = mark.t if fits else mark.t - label_width
         level = next((i for i, name_end in enumerate(level_ends) if name_end <= begin), len(level_ends))
         level_ends[level : level + 1] = [begin + label_width]
-        label = f"first alert, {mark.label}" if mark.kind is MarkKind.ALERT else mark.label
+        label = f"first alert, {mark.label}" if mark.kind is EventKind.ALERT else mark.label
         axes[0].annotate(
             f"{label} {mark.t:.2f} s",
             (mark.t, 1.0),
@@ -122,6 +129,6 @@ def _draw_marks(axes: Sequence["Axes"], marks: Sequence[Mark], time_span_s: floa
             xytext=(0, 3 + 11 * level),  # points; a line of text is 11 high
             textcoords="offset points",
             ha="left" if fits else "right",
-            fontsize=style.SMALL,
+            fontsize=style.SMALL_TEXT_POINTS,
             color=MARK_COLOURS[mark.kind],
         )

@@ -24,7 +24,7 @@ from mutator.report.answer_parts import (
     share_bar,
     was_or_were,
 )
-from mutator.report.experiment_facts import PLACE, UNTIMED_PATH
+from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
 from mutator.report.fix_order import fix_first_answer
 from mutator.report.most_dangerous import most_dangerous_answer, worst_hazard_ids
 from mutator.report.reported_run import ReportedRun
@@ -54,7 +54,7 @@ def _frame_for_answers(run: ReportedRun) -> pd.DataFrame:
     """
     frame = run.frame
     extended = frame.assign(
-        place=frame[PLACE], untimed_path=frame[UNTIMED_PATH], warning=hazard_warnings(frame)
+        place=frame[RANK_COLUMN], untimed_path=frame[UNTIMED_PATH_COLUMN], warning=hazard_warnings(frame)
     )
     listed_ids = worst_hazard_ids(extended)
     rows = rows_of(run.results[run.results["experiment_id"].isin(listed_ids)], run.faults)
@@ -176,7 +176,9 @@ def time_spent_answer(frame: pd.DataFrame, timings: pd.DataFrame) -> ReportAnswe
     cpu = frame["experiment_id"].map(timings.set_index("experiment_id")["cpu_s"]).astype(float)
     total, ran = float(cpu.sum()), int((cpu > 0).sum())
     workers = timings["worker"].nunique()
-    paragraph = f"The experiments took {describe_duration(total)} of CPU time on {counted(workers, 'worker')}: "
+    paragraph = (
+        f"The experiments took {describe_duration(total)} of CPU time on {counted(workers, 'worker')}: "
+    )
     paragraph += f"{describe_share(ran, len(frame), 'experiments')} {was_or_were(ran)} simulated"
     paragraph += f"{_describe_unsimulated(frame, cpu, timings)}."
     if ran:

@@ -16,14 +16,14 @@ from mutator.store.run_folder import RunFolder
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-_PIECE = 5_000  # number of experiments in a batch
+_EXPERIMENTS_IN_BATCH = 5_000  # number of experiments in a batch
 # extra columns of a frame of results; no metric has such a name
-PLACE, UNTIMED_PATH = "#place", "#untimed_path"
-_Alerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
+RANK_COLUMN, UNTIMED_PATH_COLUMN = "#place", "#untimed_path"
+_TimedAlerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seen:
+class ExperimentFacts:
     """`places` (the rank, from 0) and `path_numbers` (an index into `untimed_paths`, -1: none) have a number
     for each row of the results. `alerts` are those of experiments with a hazard. `timings` has a row for each
     timed experiment; its engine is '' if not recorded.
@@ -43,14 +43,16 @@ class Seen:
         records: Mapping[str, Record],
         faults: Mapping[str, Fault],
         fault_paths: FaultPaths | None,
-    ) -> "Seen":
+    ) -> "ExperimentFacts":
         codes: dict[int, int] = {}  # compared by identity, because equal untimed paths are one object
         untimed_paths: list[UntimedPath] = []
         path_numbers = np.full(len(results), -1, dtype=np.int32)
-        alerts: dict[str, _Alerts] = {}
-        for number, (all_inputs, told) in enumerate(_looks(results, records, faults, fault_paths)):
-            alerts |= told
-            for row, inputs in enumerate(all_inputs, start=number * _PIECE):
+        alerts: dict[str, _TimedAlerts] = {}
+        for number, (all_inputs, batch_alerts) in enumerate(
+            _inputs_and_alerts_by_batch(results, records, faults, fault_paths)
+        ):
+            alerts |= batch_alerts
+            for row, inputs in enumerate(all_inputs, start=number * _EXPERIMENTS_IN_BATCH):
                 untimed_path = fault_paths.untimed_path_from(inputs) if fault_paths and inputs else None
                 if untimed_path is not None:
                     path_numbers[row] = code = codes.setdefault(id(untimed_path), len(codes))
@@ -61,20 +63,20 @@ class Seen:
             path_numbers=path_numbers,
             untimed_paths=tuple(untimed_paths),
             alerts=alerts,
-            timings=timings_of(folder),
+            timings=timings_frame(folder),
         )
 
 
-def _looks(
+def _inputs_and_alerts_by_batch(
     results: "DataFrame",
     records: Mapping[str, Record],
     faults: Mapping[str, Fault],
     fault_paths: FaultPaths | None,
-) -> Iterator[tuple[list[PathInputs | None], dict[str, _Alerts]]]:
+) -> Iterator[tuple[list[PathInputs | None], dict[str, _TimedAlerts]]]:
     """Yield, for each batch of experiments, their `PathInputs`, and the alerts of those with a hazard."""
     pairs = results[["experiment_id", "fault_id"]]
 
-    def looked_at(piece: "DataFrame") -> tuple[list[PathInputs | None], dict[str, _Alerts]]:
+    def inputs_and_alerts(piece: "DataFrame") -> tuple[list[PathInputs | None], dict[str, _TimedAlerts]]:
         all_inputs: list[PathInputs | None] = []
         alerts = {}
         for name, fault in zip(piece["experiment_id"], piece["fault_id"], strict=True):
@@ -87,17 +89,19 @@ def _looks(
             all_inputs.append(inputs)
         return all_inputs, alerts
 
-    pieces = [pairs[begin : begin + _PIECE] for begin in range(0, len(pairs), _PIECE)]
-    return map_in_processes(looked_at, pieces, process_count_for(len(pairs)))
+    batches = [
+        pairs[begin : begin + _EXPERIMENTS_IN_BATCH] for begin in range(0, len(pairs), _EXPERIMENTS_IN_BATCH)
+    ]
+    return map_in_processes(inputs_and_alerts, batches, process_count_for(len(pairs)))
 
 
-def timings_of(folder: RunFolder) -> "DataFrame":
+def timings_frame(folder: RunFolder) -> "DataFrame":
     import pandas as pd
 
     newest = folder.timings()
-    told = [
+    rows = [
         (float(str(line["cpu_s"])), line["worker"], line["engine"], line["why"]) for line in newest.values()
     ]
-    cpu_s, *words = zip(*told, strict=True) if told else ((), (), (), ())
+    cpu_s, *words = zip(*rows, strict=True) if rows else ((), (), (), ())
     columns = dict(zip(("worker", "engine", "why"), map(pd.Categorical, words), strict=True))
     return pd.DataFrame({"experiment_id": list(newest), "cpu_s": np.array(cpu_s, dtype=float), **columns})

@@ -19,12 +19,12 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.readable_patches import readable_patch
 from mutator.report.answer_parts import hazard_warnings
-from mutator.report.experiment_facts import PLACE, UNTIMED_PATH
-from mutator.report.fault_path_data import RunPaths
-from mutator.report.glossary import meanings_of
-from mutator.report.heat_map_data import map_of
+from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
+from mutator.report.fault_path_data import RunFaultPaths
+from mutator.report.glossary import code_meanings
+from mutator.report.heat_map_data import build_heat_map
 from mutator.report.page_series import series_facts
-from mutator.report.panel import FOLDER
+from mutator.report.panel import REPORT_FOLDER
 from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines import SourceLines
 from mutator.results.outcome_counting import (
@@ -41,7 +41,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.formula_json import JsonTree, formula_as_json
 from mutator.triggers.trigger_kinds import ALWAYS_NAME
-from mutator.web import embedded
+from mutator.web import packed_script_element
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -76,7 +76,7 @@ def build_list_data(run: ReportedRun) -> ExperimentListData:
     listed = _listed_results(run)
     ids = listed["experiment_id"].tolist()
     data: dict[str, Any] = {"table": _list_table_data(run, listed), "details": _list_details_data(run, ids)}
-    data["media"] = media_by_experiment(folder, folder.path / FOLDER, MOST_EMBEDDED_STILL_BYTES)
+    data["media"] = media_by_experiment(folder, folder.path / REPORT_FOLDER, MOST_EMBEDDED_STILL_BYTES)
     if run.paths:
         data["paths"] = run.paths.data(ids)
     facts = {
@@ -85,11 +85,11 @@ def build_list_data(run: ReportedRun) -> ExperimentListData:
         "metrics": folder.head.metrics,
         "severity": as_json_types(folder.head.severity),
         "hazards": as_json_types(folder.head.about_hazards),
-        "meanings": meanings_of(run),
+        "meanings": code_meanings(run),
     }
     return ExperimentListData(
         facts_json=Markup(json.dumps(facts).replace("<", "\\u003c")),
-        scripts=tuple(Markup(embedded(value, name)) for name, value in data.items()),
+        scripts=tuple(Markup(packed_script_element(value, name)) for name, value in data.items()),
         truncation_note=_describe_truncation(run),
     )
 
@@ -101,8 +101,8 @@ def _describe_truncation(run: ReportedRun) -> str:
     return (
         f"The list has the {MOST_LISTED_EXPERIMENTS:,} worst of {count:,} experiments (by rank). All other "
         "parts of this page cover all experiments. To see another experiment: "
-        f"`mutator show ID --run {path}`. To list the worst that match a filter: `mutator show --run {path} --only 'FILTER'`. All experiments are in "
-        "results.parquet."
+        f"`mutator show ID --run {path}`. To list the worst that match a filter: "
+        f"`mutator show --run {path} --only 'FILTER'`. All experiments are in results.parquet."
     )
 
 
@@ -119,7 +119,10 @@ def _target_facts(folder: RunFolder, workspace: "Workspace | None") -> dict[str,
 def _listed_results(run: ReportedRun) -> "DataFrame":
     """Return the results that the page lists, in reading order, with rank and path."""
     is_listed = run.seen.places < MOST_LISTED_EXPERIMENTS
-    extra_columns = {PLACE: run.seen.places[is_listed], UNTIMED_PATH: run.seen.path_numbers[is_listed]}
+    extra_columns = {
+        RANK_COLUMN: run.seen.places[is_listed],
+        UNTIMED_PATH_COLUMN: run.seen.path_numbers[is_listed],
+    }
     return run.results[is_listed].assign(**extra_columns).sort_values(LIST_ORDER)
 
 
@@ -128,20 +131,22 @@ def _list_table_data(run: ReportedRun, listed: "DataFrame") -> dict[str, Any]:
         listed, run.faults, run.paths, has_alerts=run.folder.has_alerts, source=run.source
     )
     if len(listed) < len(run.results):
-        data |= {"of": len(run.results), "map": map_of(run)}
+        data |= {"of": len(run.results), "map": build_heat_map(run)}
     return data
 
 
 def _list_details_data(run: ReportedRun, ids: Sequence[str]) -> dict[str, Any]:
     records = map(run.records.get, ids)
     traces = [record.trace_digest[:_TRACE_DIGEST_DIGITS] if record else "" for record in records]
-    return details_data(list(map(run.experiments.get, ids)), shapes_of_patches(_readable_patches(run, ids)), ids, traces)
+    return details_data(
+        list(map(run.experiments.get, ids)), shapes_of_patches(_readable_patches(run, ids)), ids, traces
+    )
 
 
 def results_table_data(
     results: "DataFrame",
     faults: Mapping[str, Fault],
-    paths: RunPaths | None = None,
+    paths: RunFaultPaths | None = None,
     *,
     has_alerts: bool = True,
     source: SourceLines | None = None,
@@ -149,7 +154,7 @@ def results_table_data(
     """Return the results by column, with derived columns such as `rank` (1: the worst). Alert columns need a
     target with `alerts`; `line` (of the fault) and `lasting` need a `source`. `faults` are those of the plan.
     """
-    omitted_columns = {PLACE, UNTIMED_PATH, *(() if has_alerts else _ALERT_COLUMNS)}
+    omitted_columns = {RANK_COLUMN, UNTIMED_PATH_COLUMN, *(() if has_alerts else _ALERT_COLUMNS)}
     columns: dict[str, Iterable[Any]] = {
         str(name): results[name] for name in results.columns if name not in omitted_columns
     }
@@ -160,10 +165,10 @@ def results_table_data(
     columns["hazards"] = joined_hazards(results)
     if has_alerts:
         columns["warning"] = hazard_warnings(results)
-    columns["rank"] = results[PLACE] + 1
+    columns["rank"] = results[RANK_COLUMN] + 1
     columns["t_hazard"] = hazard_times(results).min(axis=1)
     if paths:
-        columns["through"] = paths.through(results[UNTIMED_PATH])
+        columns["through"] = paths.through(results[UNTIMED_PATH_COLUMN])
     if source:
         columns |= _operator_columns(source, results, rows)
     columns_data = [{"name": name, **column_data(name, values)} for name, values in columns.items()]

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
-SCHEMA = "report-paths/1"
-ALL = "all fault types"
+PATHS_SCHEMA = "report-paths/1"
+ALL_FAULT_TYPES = "all fault types"
 
 
-class _PathsById(Mapping[str, FaultPath]):
+class _LazyFaultPaths(Mapping[str, FaultPath]):
     """The paths of experiments, computed on access."""
 
     def __init__(
@@ -46,7 +46,7 @@ class _PathsById(Mapping[str, FaultPath]):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunPaths:
+class RunFaultPaths:
     """The known paths of a run, and the distinct untimed paths of its experiments."""
 
     fault_paths: FaultPaths
@@ -63,8 +63,8 @@ class RunPaths:
         planned: Mapping[str, Experiment],
         records: Mapping[str, Record],
         untimed_paths: Sequence[UntimedPath],
-    ) -> "RunPaths":
-        by_id = _PathsById(fault_paths, planned, records)
+    ) -> "RunFaultPaths":
+        by_id = _LazyFaultPaths(fault_paths, planned, records)
         return cls(
             fault_paths=fault_paths,
             channels=folder.head.channels,
@@ -76,7 +76,7 @@ class RunPaths:
     def through(self, path_numbers: Iterable[int]) -> list[str]:
         """Return the links that each fault got through, joined by `;`. The page filters by them."""
         texts = [
-            ";".join(link_text(c.tail, c.tip) for c in path.links if c.state is LinkState.THROUGH)
+            ";".join(link_name(c.tail, c.tip) for c in path.links if c.state is LinkState.THROUGH)
             for path in self.untimed_paths
         ]
         return [texts[number] if number >= 0 else "" for number in path_numbers]
@@ -88,36 +88,40 @@ class RunPaths:
         """
         shapes: dict[str, int] = {}
         columns: dict[str, Any] = {}
-        codes, by, names = [], {}, [channel.name for channel in self.channels]
-        first: list[list[float | None]] = [[] for _ in names]
-        largest: list[list[float | str | None]] = [[] for _ in names]
+        shape_codes, latest_times_by_row, names = [], {}, [channel.name for channel in self.channels]
+        first_times: list[list[float | None]] = [[] for _ in names]
+        largest_deviations: list[list[float | str | None]] = [[] for _ in names]
         for row, name in enumerate(ids):
             path = self.by_id.get(name)
-            components = [[s.name, s.state.value, column] for s, column in _placed(path)] if path else []
+            components = (
+                [[s.name, s.state.value, column] for s, column in _components_with_columns(path)]
+                if path
+                else []
+            )
             key = repr(components)
-            codes.append(shapes.setdefault(key, len(shapes)) if components else -1)
+            shape_codes.append(shapes.setdefault(key, len(shapes)) if components else -1)
             columns.setdefault(key, components)
-            if late := self._late(path):
-                by[row] = late
+            if latest_times := self._latest_times(path):
+                latest_times_by_row[row] = latest_times
             departures = self.records[name].left if name in self.records else ()
-            left = {channel: (time, most) for channel, time, most in departures}
+            departures_by_channel = {channel: (time, most) for channel, time, most in departures}
             for place, channel in enumerate(names):
-                time, most = left.get(channel, (None, None))
-                first[place].append(None if time is None else round(time, 4))
-                largest[place].append(None if most is None else _short(most))
+                time, most = departures_by_channel.get(channel, (None, None))
+                first_times[place].append(None if time is None else round(time, 4))
+                largest_deviations[place].append(None if most is None else _rounded(most))
         return {
-            "schema": SCHEMA,
+            "schema": PATHS_SCHEMA,
             "components": self.components,
             "channels": [[c.name, c.unit, c.component, c.about] for c in self.channels],
-            "by": by,
+            "by": latest_times_by_row,
             "shapes": [columns[key] for key in shapes],
-            "shape": codes,
-            "first": first,
-            "largest": largest,
+            "shape": shape_codes,
+            "first": first_times,
+            "largest": largest_deviations,
         }
 
     @staticmethod
-    def _late(path: FaultPath | None) -> dict[str, float]:
+    def _latest_times(path: FaultPath | None) -> dict[str, float]:
         return {s.name: round(s.t_by, 4) for s in (path.components if path else ()) if s.t_by is not None}
 
     def label(self, component: str) -> str:
@@ -133,16 +137,16 @@ class RunPaths:
         return {name: {"label": c.label, "about": c.about} for name, c in structure.components.items()}
 
 
-def link_text(tail: str, tip: str) -> str:
+def link_name(tail: str, tip: str) -> str:
     """Return the name of a link in lists and filters."""
     return f"{tail}→{tip}"
 
 
-def _short(value: float) -> float | str:
+def _rounded(value: float) -> float | str:
     return float(f"{value:.3g}") if math.isfinite(value) else "Infinity"
 
 
-def _placed(path: FaultPath) -> Iterator[tuple[Any, int]]:
+def _components_with_columns(path: FaultPath) -> Iterator[tuple[Any, int]]:
     """Yield each component and its column on the page, to the right of all that feed it."""
     columns: dict[str, int] = {}
     for component in path.components:
@@ -186,16 +190,16 @@ class PathCounts:
             self.ends[path.stopped_at] += count
 
 
-def counts_by_fault_type(
-    kinds: "pd.Series[str]", codes: "np.ndarray", paths: RunPaths
+def path_counts_by_fault_type(
+    kinds: "pd.Series[str]", path_numbers: "np.ndarray", paths: RunFaultPaths
 ) -> Mapping[str, PathCounts]:
     """Return the counts of all faults, then those by fault type. `codes` has each row's path (-1: none)."""
     import pandas as pd
 
-    found: dict[str, PathCounts] = defaultdict(PathCounts)
-    rows = pd.DataFrame({"kind": kinds.to_numpy(), "untimed_path": codes})
+    counts: dict[str, PathCounts] = defaultdict(PathCounts)
+    rows = pd.DataFrame({"kind": kinds.to_numpy(), "untimed_path": path_numbers})
     for kind, group in rows[rows["untimed_path"] >= 0].groupby("kind"):
         for code, count in group["untimed_path"].value_counts(sort=False).items():
-            for name in (ALL, str(kind)):
-                found[name].add(paths.untimed_paths[int(str(code))], int(count))
-    return dict(found)
+            for name in (ALL_FAULT_TYPES, str(kind)):
+                counts[name].add(paths.untimed_paths[int(str(code))], int(count))
+    return dict(counts)

@@ -18,13 +18,13 @@ from mutator.report.answer_parts import (
     fault_type_link,
     filtered_list_fragment,
 )
-from mutator.report.fault_path_data import RunPaths, link_text
+from mutator.report.fault_path_data import RunFaultPaths, link_name
 from mutator.report.most_dangerous import NO_CONTACT_VALUE, SEVERITY_COLUMN
 
 MOST_FAULT_TYPES = 5  # maximum number of fault types listed
 
 
-def fix_first_answer(frame: pd.DataFrame, paths: RunPaths | None, *, has_alerts: bool) -> ReportAnswer:
+def fix_first_answer(frame: pd.DataFrame, paths: RunFaultPaths | None, *, has_alerts: bool) -> ReportAnswer:
     """Say which fault types to fix first: those with the most silent hazards in the highest severity
     class; ties are broken by the next lower classes, then by hazards without contact, then by the shortest
     time from activation to hazard. If the target has no alerts, all hazards are counted. `frame` must have at
@@ -121,7 +121,7 @@ def _table_row(
     counted_hazards: pd.DataFrame,
     classes: Sequence[str],
     list_filter: Mapping[str, Sequence[str]],
-    paths: RunPaths | None,
+    paths: RunFaultPaths | None,
 ) -> tuple[Cell, ...]:
     counts_by_class = [(name, len(_hazards_of_class(counted_hazards, name))) for name in classes]
     if SEVERITY_COLUMN in counted_hazards:
@@ -151,7 +151,7 @@ def _table_row(
 
 
 def _component_that_passed_most(
-    kind: str, hazards: pd.DataFrame, list_filter: Mapping[str, Sequence[str]], paths: RunPaths
+    kind: str, hazards: pd.DataFrame, list_filter: Mapping[str, Sequence[str]], paths: RunFaultPaths
 ) -> Cell:
     """Return the component that most often let this fault type through to the first changed actuator."""
     passed: Counter[str] = Counter()
@@ -159,7 +159,7 @@ def _component_that_passed_most(
     for untimed_path, count in _untimed_paths(hazards, paths):
         if link := untimed_path.entry_link:
             passed[link.tail] += count
-            links.setdefault(link.tail, set()).add(link_text(link.tail, link.tip))
+            links.setdefault(link.tail, set()).add(link_name(link.tail, link.tip))
     if not passed:
         return "-"
     component = min(passed, key=lambda name: (-passed[name], name))
@@ -169,13 +169,13 @@ def _component_that_passed_most(
     return PageLink(f"{paths.label(component)}: {passed[component]} of {len(hazards)}", fragment)
 
 
-def _untimed_paths(frame: pd.DataFrame, paths: RunPaths) -> Iterator[tuple[UntimedPath, int]]:
+def _untimed_paths(frame: pd.DataFrame, paths: RunFaultPaths) -> Iterator[tuple[UntimedPath, int]]:
     for code, count in frame["untimed_path"].value_counts(sort=False).items():
         if (place := int(str(code))) >= 0:
             yield paths.untimed_paths[place], int(count)
 
 
-def _component_that_stopped_most(kind: str, active: pd.DataFrame, paths: RunPaths) -> Cell:
+def _component_that_stopped_most(kind: str, active: pd.DataFrame, paths: RunFaultPaths) -> Cell:
     """Return the component that stopped most faults of this type, a candidate for stopping the rest."""
     stopped: Counter[str] = Counter()
     for untimed_path, count in _untimed_paths(active, paths):

@@ -8,9 +8,9 @@ from mutator.model import Method
 from mutator.report.reported_run import ReportedRun
 from mutator.targets.contact_severity import SeverityScale
 
-Words = Mapping[str, Mapping[str, str]]  # heading -> term -> meaning
+Glossary = Mapping[str, Mapping[str, str]]  # heading -> term -> meaning
 
-_RUNS = {
+_COUNTING_TERMS = {
     "golden run": "the fault-free run that an experiment is compared with: same scenario, same seed",
     "injected": "experiments with a valid result: no harness error, no invalid mutant",
     "activated": "a changed statement ran while its trigger held",
@@ -21,7 +21,7 @@ _RUNS = {
     "and fault paths leave out later steps",
     "rank": "1 is the worst; contacts rank by severity and delta-v, the others by outcome and margin",
 }
-_ENDINGS = {
+_ENDING_TERMS = {
     "hazard": "a hazard occurred at or after activation",
     "sdc": "silent data corruption: the fault changed an actuator, without a hazard",
     "masked": "the fault was activated but changed no actuator, without a hazard",
@@ -29,70 +29,72 @@ _ENDINGS = {
     "crashed, timeout": "the fault crashed the program, or prevented it from finishing in time",
     "harness error, invalid mutant": "the experiment says nothing about the fault, so no share includes it",
 }
-_ALERTS = {
+_ALERT_TERMS = {
     "silent hazard": "a hazard with no alert before it: either no alert at all, or only a later one",
     "hazard, no alert": "a silent hazard with no alert at all, not even a later one",
     "reaction time": "the time from the first alert to the hazard that follows it",
 }
-_METHODS = {
+_METHOD_MEANINGS = {
     Method.GUIDED.value: "the trigger is a condition, such as a context of the hazard analysis",
     Method.RANDOM.value: "the fault begins at a time drawn at random; random/C1 is the counterpart of C1",
 }
 
 
-def words_of(run: ReportedRun) -> Words:
+def glossary_of(run: ReportedRun) -> Glossary:
     """Return the terms that the page explains. Terms that the run does not use are left out."""
     head = run.folder.head
-    found = {
-        "How an experiment ends": _ENDINGS,
-        "What is counted": _RUNS,
-        "Alerts": _ALERTS if run.folder.has_alerts else {},
-        "Hazards": {one.name: one.about for one in head.about_hazards if one.about},
-        "Severity": _severity(head.severity, "severity "),
-        "Scenarios": _scenarios(run),
-        "Triggers": _triggers(run),
+    sections = {
+        "How an experiment ends": _ENDING_TERMS,
+        "What is counted": _COUNTING_TERMS,
+        "Alerts": _ALERT_TERMS if run.folder.has_alerts else {},
+        "Hazards": {hazard.name: hazard.about for hazard in head.about_hazards if hazard.about},
+        "Severity": _severity_meanings(head.severity, "severity "),
+        "Scenarios": _scenario_meanings(run),
+        "Triggers": _trigger_meanings(run),
     }
-    return {title: words for title, words in found.items() if words}
+    return {title: terms for title, terms in sections.items() if terms}
 
 
-def meanings_of(run: ReportedRun) -> Words:
+def code_meanings(run: ReportedRun) -> Glossary:
     """Return the meanings of the codes in the list of experiments: column -> code -> meaning."""
-    words = words_of(run)
-    triggers = words.get("Triggers", {})
+    glossary = glossary_of(run)
+    triggers = glossary.get("Triggers", {})
     drawn = run.results[run.results["method"] == Method.RANDOM.value]["trigger"].unique()
     at_random = {
         name: "a time drawn at random" + (f", as the counterpart of {of}" if of else "")
         for name, of in ((name, name.partition("/")[2]) for name in sorted(drawn))
     }
     endings = {
-        name.replace(" ", "_"): about for names, about in _ENDINGS.items() for name in names.split(", ")
+        name.replace(" ", "_"): about for names, about in _ENDING_TERMS.items() for name in names.split(", ")
     }
     return {
-        "scenario": words.get("Scenarios", {}),
+        "scenario": glossary.get("Scenarios", {}),
         "trigger": {**triggers, **at_random},
         "method": triggers,
         "ending": endings,
         "outcome": endings,
-        "hazards": words.get("Hazards", {}),
-        "severity": _severity(run.folder.head.severity),
+        "hazards": glossary.get("Hazards", {}),
+        "severity": _severity_meanings(run.folder.head.severity),
     }
 
 
-def _severity(scale: SeverityScale | None, before: str = "") -> dict[str, str]:
+def _severity_meanings(scale: SeverityScale | None, before: str = "") -> dict[str, str]:
     if not scale:
         return {}
-    told = {
+    meanings = {
         f"{before}{name}": f"delta-v of {low:.2f} m/s or more: {about}" for name, low, about in scale.classes
     }
-    return told | {"no contact": "no severity class; these runs rank by margin, alternating between hazards"}
+    return meanings | {
+        "no contact": "no severity class; these runs rank by margin, alternating between hazards"
+    }
 
 
-def _scenarios(run: ReportedRun) -> dict[str, str]:
+def _scenario_meanings(run: ReportedRun) -> dict[str, str]:
     names = sorted(run.results["scenario"].unique())
-    return {name: about for name in names if (about := _title(run, name))}
+    return {name: about for name in names if (about := _scenario_title(run, name))}
 
 
-def _title(run: ReportedRun, name: str) -> str:
+def _scenario_title(run: ReportedRun, name: str) -> str:
     """Return the `title` or `about` in a scenario's file; empty if the file has a format of its own."""
     if run.workspace is None:
         return ""
@@ -100,30 +102,30 @@ def _title(run: ReportedRun, name: str) -> str:
         data = load_yaml(run.workspace.scenario(name)).data
     except MutatorError:
         return ""
-    told = (data.get("title") or data.get("about")) if isinstance(data, dict) else ""
-    return " ".join(told.split()) if isinstance(told, str) else ""
+    title = (data.get("title") or data.get("about")) if isinstance(data, dict) else ""
+    return " ".join(title.split()) if isinstance(title, str) else ""
 
 
-def _triggers(run: ReportedRun) -> dict[str, str]:
+def _trigger_meanings(run: ReportedRun) -> dict[str, str]:
     """Return the trigger methods, then the condition of each guided trigger."""
     methods = set(run.results["method"].unique())
-    told = {name: about for name, about in _METHODS.items() if name in methods}
-    abouts = _contexts(run)
+    meanings = {name: about for name, about in _METHOD_MEANINGS.items() if name in methods}
+    context_meanings = _context_meanings(run)
     guided = run.frame[run.frame["method"] == Method.GUIDED.value] if "condition" in run.frame else None
     if guided is None:
-        return told
+        return meanings
     pairs = guided[["trigger", "condition"]].drop_duplicates().sort_values("trigger")
     for name, condition in pairs.itertuples(index=False):
-        about = abouts.get(name)
-        told[name] = f"{about} ({condition})" if about else str(condition)
-    return told
+        about = context_meanings.get(name)
+        meanings[name] = f"{about} ({condition})" if about else str(condition)
+    return meanings
 
 
-def _contexts(run: ReportedRun) -> dict[str, str]:
+def _context_meanings(run: ReportedRun) -> dict[str, str]:
     """Return the contexts in the campaign's context table; empty if the table is not found."""
     try:
-        table = load_yaml(run.folder.path / "campaign.yaml").data["triggers"]["table"]
-        found = run.workspace.context_table(table) if run.workspace and table else None
+        table_name = load_yaml(run.folder.path / "campaign.yaml").data["triggers"]["table"]
+        context_table = run.workspace.context_table(table_name) if run.workspace and table_name else None
     except (MutatorError, KeyError, TypeError):
         return {}
-    return {row.id: " ".join(row.about.split()) for row in found.rows} if found else {}
+    return {row.id: " ".join(row.about.split()) for row in context_table.rows} if context_table else {}

@@ -7,13 +7,13 @@ from mutator._common.message_text import counted
 from mutator.model import Outcome
 from mutator.mutants.injected_lines import tags_for_scripts
 from mutator.report.experiment_list import ExperimentListData
-from mutator.report.glossary import Words
+from mutator.report.glossary import Glossary
 from mutator.report.panel import Panel, rendered
-from mutator.web import asset, load_order, plainly_embedded
+from mutator.web import asset_text, json_script_element, load_order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Content:
+class ReportContent:
     """The content of both forms of a report. `alarm` is shown first. `outcomes` counts outcomes and
     statuses. `study` cites the study that has its own page. `answers` come before the list of experiments,
     `panels` after it.
@@ -23,14 +23,14 @@ class Content:
     alarm: str
     outcomes: Mapping[str, int]
     planned: str
-    words: Words
+    words: Glossary
     study: str
     answers: Panel
     panels: Sequence[Panel]
     browse: ExperimentListData  # the list of experiments, which only the page has
 
 
-def markdown(content: Content) -> str:
+def report_markdown(content: ReportContent) -> str:
     total = sum(content.outcomes.values())
     endings = ", ".join(f"{n} {name}" for name, n in content.outcomes.items())
     which = "the worst of them" if content.browse.truncation_note else "them"
@@ -48,28 +48,28 @@ def markdown(content: Content) -> str:
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
-def page_html(content: Content) -> str:
+def report_html(content: ReportContent) -> str:
     """Return the report as one self-contained HTML page. All text is escaped."""
     from markupsafe import Markup
 
     html = rendered(
-        asset("report/report.html"),
+        asset_text("report/report.html"),
         content=content,
-        tags=Markup(plainly_embedded(tags_for_scripts(), "tags")),
+        tags=Markup(json_script_element(tags_for_scripts(), "tags")),
         outcome_names=[outcome.value for outcome in Outcome],
         styles=[
-            Markup(asset(name))
+            Markup(asset_text(name))
             for name in (
                 *load_order("report", ".css"),
                 *dict.fromkeys(p.style for p in content.panels if p.style),
             )
         ],
-        scripts=[Markup(asset(name)) for name in load_order("report", ".js")],
+        scripts=[Markup(asset_text(name)) for name in load_order("report", ".js")],
     )
     return str(html)
 
 
-def study_markdown(content: Content, panels: Sequence[Panel]) -> str:
+def study_markdown(content: ReportContent, panels: Sequence[Panel]) -> str:
     parts = (
         f"# {content.name}, compared with its study",
         f"{content.study}.",
@@ -78,8 +78,8 @@ def study_markdown(content: Content, panels: Sequence[Panel]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def study_html(content: Content, panels: Sequence[Panel]) -> str:
+def study_html(content: ReportContent, panels: Sequence[Panel]) -> str:
     from markupsafe import Markup
 
-    styles = [Markup(asset(name)) for name in load_order("report", ".css")]
-    return str(rendered(asset("report/study.html"), content=content, panels=panels, styles=styles))
+    styles = [Markup(asset_text(name)) for name in load_order("report", ".css")]
+    return str(rendered(asset_text("report/study.html"), content=content, panels=panels, styles=styles))

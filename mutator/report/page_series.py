@@ -24,7 +24,7 @@ def series_facts(folder: RunFolder) -> dict[str, Any]:
     return {"packed": series.is_packed, "kept": series.kept_ids(), "deviations": columns}
 
 
-def sample_kept_traces(folder: RunFolder, workspace: "Workspace") -> None:
+def write_missing_series(folder: RunFolder, workspace: "Workspace") -> None:
     """Write the missing or damaged series of experiments whose traces are kept."""
     traces, series = RunTraces(workspace, folder), SeriesFolder(folder.path)
     for name in sorted(path.name for path in (folder.path / "traces").glob("*")):

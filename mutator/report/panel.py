@@ -10,7 +10,7 @@ from mutator._common.table_rendering import TextTable
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-FOLDER = "report"  # the report's folder in a run folder
+REPORT_FOLDER = "report"  # the report's folder in a run folder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,11 +36,11 @@ def rendered(template: str, **values: Any) -> "Markup":
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["marked"] = marked
+    environment.filters["marked"] = render_note
     return Markup(environment.from_string(template).render(**values))
 
 
-def marked(text: str) -> "Markup":
+def render_note(text: str) -> "Markup":
     """Render a Markdown note as HTML; only `code` and *emphasis* are supported."""
     from markupsafe import Markup, escape
 

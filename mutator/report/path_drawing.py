@@ -7,14 +7,14 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
-from mutator.report.fault_path_data import PathCounts, link_text
+from mutator.report.fault_path_data import PathCounts, link_name
 from mutator.stpa import svg_shapes
 from mutator.stpa.analysis_files import ControlStructureModel, LinkModel
 from mutator.stpa.structure_layout import ComponentBox, LinkArrow, lay_out_structure
 from mutator.stpa.svg_shapes import path_data
 
-_WIDEST = 7.0  # px, width of a link that passed all its faults
-_THIN = 1.8
+_WIDEST_LINE_PX = 7.0  # px, width of a link that passed all its faults
+_THINNEST_LINE_PX = 1.8
 
 
 def draw_path_counts(structure: ControlStructureModel, counts: PathCounts, links: Collection[str]) -> str:
@@ -35,16 +35,16 @@ def draw_path_counts(structure: ControlStructureModel, counts: PathCounts, links
     ]
     for name, link in structure.links.items():
         if name not in links:
-            lines += _idle(layout.arrows[name], link)
+            lines += _idle_link_svg(layout.arrows[name], link)
     for name, link in structure.links.items():
         if name in links:
-            lines += _link(name, layout.arrows[name], link, counts)
+            lines += _link_svg(name, layout.arrows[name], link, counts)
     for name, component in plain.items():
-        lines += _box(name, layout.boxes[name], component.label, component.about, counts)
+        lines += _box_svg(name, layout.boxes[name], component.label, component.about, counts)
     return "\n".join((*lines, "</svg>"))
 
 
-def drawn_counts(
+def counts_for_drawing(
     structure: ControlStructureModel, counts: PathCounts, links: Collection[str]
 ) -> dict[str, Any]:
     """Return what path_counts.js changes in the drawing to show other counts."""
@@ -58,9 +58,9 @@ def drawn_counts(
     }
 
 
-def share_text(through: int, came: int) -> str:
+def describe_passed_share(passed: int, reached: int) -> str:
     """For example `12 of 40, 30 %`; '' if no fault reached the link."""
-    return f"{through} of {came}, {100 * through / came:.0f} %" if came else ""
+    return f"{passed} of {reached}, {100 * passed / reached:.0f} %" if reached else ""
 
 
 def _is_short(arrow: LinkArrow) -> bool:
@@ -68,20 +68,20 @@ def _is_short(arrow: LinkArrow) -> bool:
     return arrow.points[0][1] == arrow.points[-1][1]
 
 
-def _idle(arrow: LinkArrow, link: LinkModel) -> Iterator[str]:
+def _idle_link_svg(arrow: LinkArrow, link: LinkModel) -> Iterator[str]:
     yield (
         f'<g class="idle"><path d="{path_data(arrow.points)}" stroke-dasharray="3 4" '
         f'marker-end="url(#path-tip-quiet)"/>{svg_shapes.label_line(arrow, escape(link.label))}</g>'
     )
 
 
-def _link(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
+def _link_svg(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
     kind, width, share = _link_look(counts.through[name], counts.came[name])
     short = _is_short(arrow)
     first, _, last = share.partition(", ") if short else (share, "", "")
     yield (
         f'<a class="link is-{kind}" data-link="{escape(name)}"{" data-short" if short else ""} '
-        f'href="#through={quote(link_text(link.from_, link.to))}">'
+        f'href="#through={quote(link_name(link.from_, link.to))}">'
         f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}</title>"
         f'<path class="hit" d="{path_data(arrow.points)}"/><path class="line" d="{path_data(arrow.points)}" '
         f'style="stroke-width: {width}" marker-end="url(#path-tip-{kind})"/>'
@@ -91,11 +91,11 @@ def _link(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) -> I
     )
 
 
-def _link_look(through: int, came: int) -> tuple[str, str, str]:
+def _link_look(passed: int, reached: int) -> tuple[str, str, str]:
     """Return a link's kind, the width of its line, and its count."""
-    kind = "through" if through else "stopped" if came else "quiet"
-    width = _THIN + (_WIDEST - _THIN) * (through / came if came else 0.0)
-    return kind, f"{width:.1f}px", share_text(through, came)
+    kind = "through" if passed else "stopped" if reached else "quiet"
+    width = _THINNEST_LINE_PX + (_WIDEST_LINE_PX - _THINNEST_LINE_PX) * (passed / reached if reached else 0.0)
+    return kind, f"{width:.1f}px", describe_passed_share(passed, reached)
 
 
 def _box_look(injected: int, stopped: int, masked: int) -> tuple[str, str, str]:
@@ -106,7 +106,7 @@ def _box_look(injected: int, stopped: int, masked: int) -> tuple[str, str, str]:
     return f"box{has}", first, f"{masked} masked" if masked else ""
 
 
-def _box(name: str, box: ComponentBox, label: str, about: str, counts: PathCounts) -> Iterator[str]:
+def _box_svg(name: str, box: ComponentBox, label: str, about: str, counts: PathCounts) -> Iterator[str]:
     classes, first, last = _box_look(counts.injected[name], counts.stopped[name], counts.masked[name])
     middle, top = box.x + box.width / 2, box.y + box.height / 2
     yield (

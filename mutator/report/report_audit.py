@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 from mutator._common.confined_files import path_below, read_below
 from mutator.errors import MutatorError
-from mutator.report.panel import FOLDER
+from mutator.report.panel import REPORT_FOLDER
 from mutator.report.report_builder import build_report
-from mutator.report.report_digests import FILE
+from mutator.report.report_digests import STAMP_FILE
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -17,10 +17,10 @@ def audit_report(folder: RunFolder, workspace: Workspace | None) -> tuple[int, I
     """Return the number of files in the report's folder, and their differences from the report that this
     version of mutator makes of the run. Comparisons with other runs are not counted.
     """
-    out = folder.path / FOLDER
+    out = folder.path / REPORT_FOLDER
     names = (path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())
     stored = {name for name in names if not name.startswith(_COMPARISON_PREFIX)} - {
-        FILE.removeprefix(f"{FOLDER}/")
+        STAMP_FILE.removeprefix(f"{REPORT_FOLDER}/")
     }
     return len(stored), _differences(folder, workspace, stored)
 
@@ -28,12 +28,12 @@ def audit_report(folder: RunFolder, workspace: Workspace | None) -> tuple[int, I
 def _differences(folder: RunFolder, workspace: Workspace | None, stored: set[str]) -> Iterator[MutatorError]:
     built = build_report(folder, workspace).files
     for name in sorted({*built, *stored}):
-        path = path_below(folder.path / FOLDER, name)
+        path = path_below(folder.path / REPORT_FOLDER, name)
         if name not in built:
             yield MutatorError("not part of the report", where=path, remedy="delete it")
         elif name not in stored:
             yield MutatorError("missing", where=path, expected="a page", remedy="`mutator report` builds it")
-        elif read_below(folder.path, f"{FOLDER}/{name}") != built[name]:
+        elif read_below(folder.path, f"{REPORT_FOLDER}/{name}") != built[name]:
             yield MutatorError(
                 "differs from the page built now",
                 where=path,

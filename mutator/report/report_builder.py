@@ -11,13 +11,19 @@ from mutator._common.helper_processes import computing_meanwhile, process_count_
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
 from mutator.report.experiment_list import ExperimentListData, build_list_data
-from mutator.report.glossary import words_of
-from mutator.report.markdown_and_html import Content, markdown, page_html, study_html, study_markdown
-from mutator.report.page_series import sample_kept_traces
-from mutator.report.panel import FOLDER
+from mutator.report.glossary import glossary_of
+from mutator.report.markdown_and_html import (
+    ReportContent,
+    report_html,
+    report_markdown,
+    study_html,
+    study_markdown,
+)
+from mutator.report.page_series import write_missing_series
+from mutator.report.panel import REPORT_FOLDER
 from mutator.report.panels import PANELS, build_study_panels
 from mutator.report.panels.answers_panel import build_answers_panel
-from mutator.report.report_digests import is_current, made_from, write_files
+from mutator.report.report_digests import inputs_digest, is_current, write_report_files
 from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import count_endings
 from mutator.results.table_reader import Results
@@ -52,7 +58,7 @@ class BuiltReport:
 
 def ensure_report(run: Path, workspace: Workspace | None) -> WrittenReport:
     """Write the report of a run folder unless it is up to date."""
-    if not is_current(run, made_from(RunFolder.open(run), workspace)):
+    if not is_current(run, inputs_digest(RunFolder.open(run), workspace)):
         return write_report(run, workspace)
     return _written_report(run, Results(run).row_count())
 
@@ -64,10 +70,10 @@ def write_report(run: Path, workspace: Workspace | None) -> WrittenReport:
     """
     folder = RunFolder.open(run)
     if workspace:
-        sample_kept_traces(folder, workspace)
-    sources = made_from(folder, workspace)
+        write_missing_series(folder, workspace)
+    sources = inputs_digest(folder, workspace)
     built = build_report(folder, workspace)
-    write_files(run, sources, built.files)
+    write_report_files(run, sources, built.files)
     return _written_report(run, built.rows, built.summaries)
 
 
@@ -81,7 +87,7 @@ def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
         content = _build_content(replace(reported, compared=bool(study)), browse)
     panels = (*content.panels, *study)
     files = {name: data for panel in panels for name, data in panel.files.items()}
-    files |= {MARKDOWN_FILE: markdown(content).encode(), PAGE_FILE: page_html(content).encode()}
+    files |= {MARKDOWN_FILE: report_markdown(content).encode(), PAGE_FILE: report_html(content).encode()}
     if study:
         files |= {"STUDY.md": study_markdown(content, study).encode()}
         files |= {"study.html": study_html(content, study).encode()}
@@ -90,18 +96,18 @@ def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
 
 
 def _written_report(run: Path, rows: int, summaries: tuple[TextTable, ...] = ()) -> WrittenReport:
-    out = run / FOLDER
+    out = run / REPORT_FOLDER
     return WrittenReport(markdown=out / MARKDOWN_FILE, page=out / PAGE_FILE, rows=rows, summaries=summaries)
 
 
-def _build_content(run: ReportedRun, browse: Callable[[], ExperimentListData]) -> Content:
+def _build_content(run: ReportedRun, browse: Callable[[], ExperimentListData]) -> ReportContent:
     panels = [panel for panel_of in PANELS if (panel := panel_of(run)) is not None]
-    return Content(
+    return ReportContent(
         name=run.folder.head.campaign,
         alarm=run.engines.equivalence_text if run.engines and run.engines.has_failed_equivalence else "",
         outcomes=count_endings(run.results),
         planned=_describe_plan(run.folder),
-        words=words_of(run),
+        words=glossary_of(run),
         study=run.study.about if run.study and run.compared else "",
         answers=build_answers_panel(run),
         panels=panels,

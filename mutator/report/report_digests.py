@@ -11,7 +11,7 @@ from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 from mutator.report.page_series import series_facts
-from mutator.report.panel import FOLDER
+from mutator.report.panel import REPORT_FOLDER
 from mutator.store import file_digests
 from mutator.store import series_folder as series_store
 from mutator.store.allowed_contents import (
@@ -24,10 +24,10 @@ from mutator.store.allowed_contents import (
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
-SCHEMA = "report/1"
-FILE = f"{FOLDER}/made_from.json"
-_NOT_READ = {
-    FOLDER,
+STAMP_SCHEMA = "report/1"
+STAMP_FILE = f"{REPORT_FOLDER}/made_from.json"
+_TOP_NAMES_NOT_READ = {
+    REPORT_FOLDER,
     "exports",
     series_store.FOLDER,
     TRACES_FOLDER,
@@ -36,51 +36,63 @@ _NOT_READ = {
     "workers",
     *SIGNATURE_FILES,
 }
-_ASSETS = (".css", ".html", ".js", ".txt")
-_LINKED = (".mp4", ".gif")  # the report contains only the names of such files
+_ASSET_SUFFIXES = (".css", ".html", ".js", ".txt")
+_LINKED_SUFFIXES = (".mp4", ".gif")  # the report contains only the names of such files
 
 
-def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
+def inputs_digest(folder: RunFolder, workspace: Workspace | None) -> str:
     """Return the digest of all inputs of a report, including the sources of mutator."""
     run = folder.path
     series = [
         series_facts(folder),
         file_digests.sha256_of_file(run / series_store.FOLDER / f"{series_store.INDEX_NAME}.js"),
     ]
-    return digest([SCHEMA, _sources(), run.name, list(_files_of(run)), series, _library(folder, workspace)])
+    return digest(
+        [
+            STAMP_SCHEMA,
+            _mutator_digests(),
+            run.name,
+            list(_input_files(run)),
+            series,
+            _library_digests(folder, workspace),
+        ]
+    )
 
 
-def is_current(run: Path, made_from: str) -> bool:
+def is_current(run: Path, inputs: str) -> bool:
     """Whether the report of a run was made from these inputs and has not changed since."""
-    stamp = _stamp(run)
-    if stamp.get("made_from") != made_from or not stamp["files"]:
+    stamp = _read_stamp(run)
+    if stamp.get("made_from") != inputs or not stamp["files"]:
         return False
     try:
         return all(
-            digest(read_below(run, f"{FOLDER}/{name}")) == wanted for name, wanted in stamp["files"].items()
+            digest(read_below(run, f"{REPORT_FOLDER}/{name}")) == expected
+            for name, expected in stamp["files"].items()
         )
     except (OSError, MutatorError):
         return False
 
 
-def write_files(run: Path, made_from: str, files: Mapping[str, bytes]) -> None:
+def write_report_files(run: Path, inputs: str, files: Mapping[str, bytes]) -> None:
     """Write a report and its digests. Delete files of the report before that are no longer part of it."""
-    for name in _stamp(run)["files"].keys() - files.keys():
-        unlink_below(run, f"{FOLDER}/{name}")
+    for name in _read_stamp(run)["files"].keys() - files.keys():
+        unlink_below(run, f"{REPORT_FOLDER}/{name}")
     for name, data in files.items():
-        write_below(run, f"{FOLDER}/{name}", data)
-    written = {name: digest(data) for name, data in sorted(files.items())}
-    stamp = {"schema": SCHEMA, "made_from": made_from, "files": written}
-    write_below(run, FILE, json_bytes(stamp))  # last, so that an interrupted report does not pass as current
+        write_below(run, f"{REPORT_FOLDER}/{name}", data)
+    digests_by_name = {name: digest(data) for name, data in sorted(files.items())}
+    stamp = {"schema": STAMP_SCHEMA, "made_from": inputs, "files": digests_by_name}
+    write_below(
+        run, STAMP_FILE, json_bytes(stamp)
+    )  # last, so that an interrupted report does not pass as current
 
 
-def _stamp(run: Path) -> dict[str, Any]:
+def _read_stamp(run: Path) -> dict[str, Any]:
     """Return the stamp of the report before; without files if it cannot be read."""
     try:
-        stamp = parse_json_object(read_below(run, FILE), run / FILE, SCHEMA)
+        stamp = parse_json_object(read_below(run, STAMP_FILE), run / STAMP_FILE, STAMP_SCHEMA)
         if isinstance(files := stamp.get("files"), dict):
             for name in files:
-                check_name(name, run / FILE)
+                check_name(name, run / STAMP_FILE)
             return stamp
     except (OSError, MutatorError):
         pass
@@ -88,43 +100,49 @@ def _stamp(run: Path) -> dict[str, Any]:
 
 
 @cache
-def _sources() -> object:
+def _mutator_digests() -> object:
     root = Path(__file__).parents[1]
     return [
         VERSION,
-        _digests(root, "**/*.py"),
-        *(_digests(root / "web", f"*/*{suffix}") for suffix in _ASSETS),
+        _matching_digests(root, "**/*.py"),
+        *(_matching_digests(root / "web", f"*/*{suffix}") for suffix in _ASSET_SUFFIXES),
     ]
 
 
-def _files_of(run: Path) -> Iterator[tuple[str, str]]:
+def _input_files(run: Path) -> Iterator[tuple[str, str]]:
     """Yield the names and digests of the files that a report can read. What does not belong in a run folder
     is not opened.
     """
-    tops = [top for top in sorted(run.iterdir()) if top.name not in _NOT_READ and is_allowed_name(top.name)]
+    tops = [
+        top
+        for top in sorted(run.iterdir())
+        if top.name not in _TOP_NAMES_NOT_READ and is_allowed_name(top.name)
+    ]
     for top in tops:
         inside = sorted(top.rglob("*")) if top.is_dir() else [top]
         for path in (path for path in inside if not path.is_dir() and not path.name.startswith(".")):
             name = path.relative_to(run).as_posix()
-            yield name, "" if path.suffix in _LINKED else file_digests.sha256_of_file(path)
+            yield name, "" if path.suffix in _LINKED_SUFFIXES else file_digests.sha256_of_file(path)
 
 
-def _library(folder: RunFolder, workspace: Workspace | None) -> object:
+def _library_digests(folder: RunFolder, workspace: Workspace | None) -> object:
     """Return the digests of what a report reads of a library and of the run's target."""
     if workspace is None:
         return None
     files: list[tuple[str, str]] = []
     try:
         paths = files_inside(workspace.library, "", "*.yaml")
-        files += [one for one in _named(workspace.library, paths) if not one[0].startswith("reviews/")]
+        files += [
+            file for file in _digests_by_name(workspace.library, paths) if not file[0].startswith("reviews/")
+        ]
         return [files, workspace.manifest(folder.head.target).tree.digest]
     except (MutatorError, KeyError):
         return [files, None]
 
 
-def _digests(folder: Path, pattern: str) -> list[tuple[str, str]]:
-    return _named(folder, folder.glob(pattern))
+def _matching_digests(folder: Path, pattern: str) -> list[tuple[str, str]]:
+    return _digests_by_name(folder, folder.glob(pattern))
 
 
-def _named(folder: Path, paths: Iterable[Path]) -> list[tuple[str, str]]:
+def _digests_by_name(folder: Path, paths: Iterable[Path]) -> list[tuple[str, str]]:
     return sorted((p.relative_to(folder).as_posix(), file_digests.sha256_of_file(p)) for p in paths)

@@ -12,8 +12,8 @@ from mutator.outcomes.fault_free_runs import FaultFreeRun, load_fault_free_runs
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.outcomes.golden_comparison import load_trace
 from mutator.report.engine_summary import EngineSummary, summarize_engines
-from mutator.report.experiment_facts import PLACE, UNTIMED_PATH, Seen
-from mutator.report.fault_path_data import RunPaths
+from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN, ExperimentFacts
+from mutator.report.fault_path_data import RunFaultPaths
 from mutator.report.panel import Panel
 from mutator.report.source_lines import SourceLines
 from mutator.results.result_rows import ResultRow, rows_of
@@ -42,10 +42,10 @@ class ReportedRun:
     results: "DataFrame"
     frame: "DataFrame"
     study: "PublishedWork | None"
-    seen: Seen
+    seen: ExperimentFacts
     engines: EngineSummary | None = None
     compared: bool = False
-    paths: RunPaths | None = None
+    paths: RunFaultPaths | None = None
     source: SourceLines | None = None
     faults: Mapping[str, Fault] = field(default_factory=dict)
     experiments: Mapping[str, Experiment] = field(default_factory=dict)
@@ -57,17 +57,19 @@ class ReportedRun:
         experiments, records = PlannedExperiments(folder.path), folder.records()
         faults, fault_paths = plan_file.load_faults(folder.path), fault_paths_of(folder)
         results = Results(folder.path).frame()
-        seen = Seen.of(folder, results, records, faults, fault_paths)
+        seen = ExperimentFacts.of(folder, results, records, faults, fault_paths)
         return cls(
             folder=folder,
             workspace=workspace,
             results=results,
-            frame=prepare_results(results.assign(**{PLACE: seen.places, UNTIMED_PATH: seen.path_numbers})),
+            frame=prepare_results(
+                results.assign(**{RANK_COLUMN: seen.places, UNTIMED_PATH_COLUMN: seen.path_numbers})
+            ),
             engines=summarize_engines(folder, records, seen.timings),
             study=_find_published_work(folder) if workspace else None,
             seen=seen,
             faults=faults,
-            paths=RunPaths.of(folder, fault_paths, experiments, records, seen.untimed_paths)
+            paths=RunFaultPaths.of(folder, fault_paths, experiments, records, seen.untimed_paths)
             if fault_paths
             else None,
             source=SourceLines.of(folder, workspace, results, faults),
@@ -103,10 +105,10 @@ class ReportedRun:
         ends: dict[str, float] = {}
         try:
             manifest = self.workspace.manifest(self.folder.head.target)
-            for one in self.folder.golden_runs:
-                trace = load_trace(manifest, self.folder.golden_folder(*one), [])
+            for golden_run in self.folder.golden_runs:
+                trace = load_trace(manifest, self.folder.golden_folder(*golden_run), [])
                 end = float(trace[manifest.time_channel][-1])
-                ends[one.scenario] = max(end, ends.get(one.scenario, end))
+                ends[golden_run.scenario] = max(end, ends.get(golden_run.scenario, end))
         except (MutatorError, KeyError):
             return None
         return ends
@@ -130,8 +132,8 @@ class PublishedWork:
     def __post_init__(self) -> None:
         parts = {"check": self.check, "published": self.published, "drawings": self.drawings}
         parts |= {f"panels[{i}]": panel for i, panel in enumerate(self.panels)}
-        if idle := [name for name, part in parts.items() if not callable(part)]:
-            raise TypeError(f"of a study, {', '.join(idle)} must be a function")
+        if not_callable := [name for name, part in parts.items() if not callable(part)]:
+            raise TypeError(f"of a study, {', '.join(not_callable)} must be a function")
 
 
 def _find_published_work(folder: RunFolder) -> PublishedWork | None:

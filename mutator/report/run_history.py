@@ -15,11 +15,11 @@ from mutator._common.table_rendering import TextTable
 from mutator.errors import MutatorError
 from mutator.execution.progress_text import describe_duration
 from mutator.model import Outcome
-from mutator.report.panel import FOLDER, rendered
+from mutator.report.panel import REPORT_FOLDER, rendered
 from mutator.results.result_rows import ResultRow
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
-from mutator.web import asset
+from mutator.web import asset_text
 
 HISTORY_FILES = ("HISTORY.md", "history.html")
 _COLUMN_HEADS = (
@@ -184,9 +184,9 @@ def _history_html(folder: Path, runs: Sequence[PastRun], omission_reasons: Seque
         )
         for title, group in _group_by_plan(runs).items()
     ]
-    styles = [Markup(asset(name)) for name in ("shared/base.css", "report/report.css")]
+    styles = [Markup(asset_text(name)) for name in ("shared/base.css", "report/report.css")]
     page = rendered(
-        asset("report/history.html"),
+        asset_text("report/history.html"),
         name=folder.resolve().name,
         count=counted(len(runs), "run"),
         plans=plans,
@@ -205,8 +205,10 @@ def _linked_table(group: Sequence[PastRun]) -> TextTable:
     bar = Markup('<span class="meter" style="--share: {:.3f}"></span>{}').format
     rows = []
     for run in reversed(group):
-        report = run.folder.path / FOLDER / "index.html"
-        name = link(f"{quote(run.name)}/{FOLDER}/index.html", run.name) if report.exists() else run.name
+        report = run.folder.path / REPORT_FOLDER / "index.html"
+        name = (
+            link(f"{quote(run.name)}/{REPORT_FOLDER}/index.html", run.name) if report.exists() else run.name
+        )
         cells = _table_cells(run)
         cells[3] = bar(len(run.hazards) / run.activated_count if run.activated_count else 0.0, cells[3])
         rows.append([name, *cells])
@@ -215,5 +217,5 @@ def _linked_table(group: Sequence[PastRun]) -> TextTable:
 
 def _comparison_link(folder: Path, before: PastRun, after: PastRun) -> str:
     """Return the path of an existing comparison page, relative to the folder; '' if there is none."""
-    page = Path(after.name, FOLDER, f"compare-{before.name}", "index.html")
+    page = Path(after.name, REPORT_FOLDER, f"compare-{before.name}", "index.html")
     return quote(page.as_posix()) if path_below(folder, page.as_posix()).exists() else ""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 # Worst first, without harness errors and invalid mutants.
-ENDINGS = (
+ENDINGS_WORST_FIRST = (
     Outcome.HAZARD.value,
     Status.CRASHED.value,
     Status.TIMEOUT.value,
@@ -28,13 +28,13 @@ ENDINGS = (
     Outcome.MASKED.value,
     Outcome.NOT_ACTIVATED.value,
 )
-LASTING = (PERMANENT, TRANSIENT)
-_AROUND = 2  # lines shown before and after a marked line outside functions
-_JOINED = 3  # gaps of up to this many lines are shown, too
+LASTING_VALUES = (PERMANENT, TRANSIENT)
+_CONTEXT_LINES = 2  # lines shown before and after a marked line outside functions
+_MOST_GAP_LINES = 3  # gaps of up to this many lines are shown, too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mark:
+class LineMark:
     """The outcomes of a line's `mutants`: the worst one, and the number of mutants with it."""
 
     ending: str
@@ -42,7 +42,7 @@ class Mark:
     mutants: int
 
 
-Marks = Mapping[int, Mapping[str, Mark]]  # line (from 1) -> permanent or transient -> mark
+MarksByLine = Mapping[int, Mapping[str, LineMark]]  # line (from 1) -> permanent or transient -> mark
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,12 +53,15 @@ class MarkedFile:
     data: bytes
     lines: Sequence[str]
     shown: tuple[range, ...]
-    marks: Marks
+    marks: MarksByLine
 
     def worst_lines(self) -> dict[str, int]:
         """Return the number of lines by the worst outcome or status of their mutants, worst first."""
-        worst = [min((m.ending for m in here.values()), key=ENDINGS.index) for here in self.marks.values()]
-        return {ending: worst.count(ending) for ending in ENDINGS if ending in worst}
+        worst = [
+            min((m.ending for m in here.values()), key=ENDINGS_WORST_FIRST.index)
+            for here in self.marks.values()
+        ]
+        return {ending: worst.count(ending) for ending in ENDINGS_WORST_FIRST if ending in worst}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,9 +87,9 @@ class SourceLines:
         """Return the source of a run; None if it has no operators. `faults` are those of the plan."""
         if not (results["module"] == OPERATORS_MODULE).any():
             return None
-        known = {name: faults[name] for name in results["fault_id"].unique() if name in faults}
+        faults_with_results = {name: faults[name] for name in results["fault_id"].unique() if name in faults}
         changes = {
-            name: str(fault.value) for name, fault in known.items() if fault.module == OPERATORS_MODULE
+            name: str(fault.value) for name, fault in faults_with_results.items() if fault.module == OPERATORS_MODULE
         }
         try:
             manifest = workspace.manifest(folder.head.target) if workspace else None
@@ -100,81 +103,91 @@ class SourceLines:
                 why="The target has changed since this run was planned, so line numbers do not match and its "
                 "source is not shown. Restore the target and rebuild the report (`mutator report`).",
             )
-        return cls._marked(manifest, known, results, changes)
+        return cls._with_marks(manifest, faults_with_results, results, changes)
 
     @classmethod
-    def _marked(
+    def _with_marks(
         cls,
         manifest: TargetManifest,
         faults: Mapping[str, Fault],
         results: "DataFrame",
         changes: Mapping[str, str],
     ) -> "SourceLines":
-        at = {name: _place(manifest, fault) for name, fault in faults.items()}
-        marks: dict[str, dict[int, dict[str, Mark]]] = {path: {} for path, _ in at.values()}
-        for (path, line), lasting, mark in _marks(at, results):
+        line_by_fault = {name: _line_of(manifest, fault) for name, fault in faults.items()}
+        marks: dict[str, dict[int, dict[str, LineMark]]] = {path: {} for path, _ in line_by_fault.values()}
+        for (path, line), lasting, mark in _line_marks(line_by_fault, results):
             marks[path].setdefault(line, {})[lasting] = mark
-        files = (_file(parsed_file(manifest.tree, path), found) for path, found in marks.items() if found)
+        files = (
+            _marked_file(parsed_file(manifest.tree, path), file_marks)
+            for path, file_marks in marks.items()
+            if file_marks
+        )
         return cls(
-            files=tuple(sorted(files, key=_badness)),
-            places={name: f"{path}:{line}" for name, (path, line) in at.items()},
+            files=tuple(sorted(files, key=_worst_first_key)),
+            places={name: f"{path}:{line}" for name, (path, line) in line_by_fault.items()},
             changes=changes,
         )
 
 
-def _place(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
+def _line_of(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
     location = fault.injections[0].location
     return location.path, parsed_file(manifest.tree, location.path).line_span(location)[0] + 1
 
 
-def _marks(
-    at: Mapping[str, tuple[str, int]], results: "DataFrame"
-) -> Iterator[tuple[tuple[str, int], str, Mark]]:
+def _line_marks(
+    line_by_fault: Mapping[str, tuple[str, int]], results: "DataFrame"
+) -> Iterator[tuple[tuple[str, int], str, LineMark]]:
     """Yield the marks of each line, for permanent and transient faults. Each fault is counted once, with its
     worst experiment.
     """
-    found: dict[tuple[tuple[str, int], str], dict[str, int]] = {}
+    ranks_by_line: dict[tuple[tuple[str, int], str], dict[str, int]] = {}
     for name, trigger, ending in zip(
         results["fault_id"], results["trigger"], endings_of_rows(results), strict=True
     ):
-        if name in at and ending in ENDINGS:
-            ranks = found.setdefault((at[name], PERMANENT if trigger == ALWAYS_NAME else TRANSIENT), {})
-            ranks[name] = min(ENDINGS.index(ending), ranks.get(name, len(ENDINGS)))
-    for (place, lasting), ranks in sorted(found.items()):
+        if name in line_by_fault and ending in ENDINGS_WORST_FIRST:
+            ranks = ranks_by_line.setdefault(
+                (line_by_fault[name], PERMANENT if trigger == ALWAYS_NAME else TRANSIENT), {}
+            )
+            ranks[name] = min(ENDINGS_WORST_FIRST.index(ending), ranks.get(name, len(ENDINGS_WORST_FIRST)))
+    for (place, lasting), ranks in sorted(ranks_by_line.items()):
         worst = min(ranks.values())
-        many = sum(rank == worst for rank in ranks.values())
-        yield place, lasting, Mark(ending=ENDINGS[worst], worst=many, mutants=len(ranks))
+        worst_count = sum(rank == worst for rank in ranks.values())
+        yield (
+            place,
+            lasting,
+            LineMark(ending=ENDINGS_WORST_FIRST[worst], worst=worst_count, mutants=len(ranks)),
+        )
 
 
-def _file(file: ParsedFile, marks: Marks) -> MarkedFile:
+def _marked_file(file: ParsedFile, marks: MarksByLine) -> MarkedFile:
     return MarkedFile(
         path=file.path,
         data=file.data,
         lines=[line.rstrip(b"\r\n").decode(file.encoding) for line in file.lines],
-        shown=_joined(_around(file, line) for line in marks),
+        shown=_merge_ranges(_lines_around(file, line) for line in marks),
         marks=marks,
     )
 
 
-def _around(file: ParsedFile, line: int) -> range:
+def _lines_around(file: ParsedFile, line: int) -> range:
     """Return the outermost function around `line`; outside functions, a few lines."""
     function = file.outermost_function_at(line - 1)
     if function is not None:
         return range(function.start + 1, function.stop + 1)
-    return range(max(1, line - _AROUND), min(len(file.lines), line + _AROUND) + 1)
+    return range(max(1, line - _CONTEXT_LINES), min(len(file.lines), line + _CONTEXT_LINES) + 1)
 
 
-def _joined(parts: Iterable[range]) -> tuple[range, ...]:
+def _merge_ranges(parts: Iterable[range]) -> tuple[range, ...]:
     """Return the ranges in order, joined if they almost touch."""
-    found: list[range] = []
+    merged: list[range] = []
     for part in sorted(parts, key=lambda part: (part.start, part.stop)):
-        if found and part.start <= found[-1].stop + _JOINED:
-            found[-1] = range(found[-1].start, max(found[-1].stop, part.stop))
+        if merged and part.start <= merged[-1].stop + _MOST_GAP_LINES:
+            merged[-1] = range(merged[-1].start, max(merged[-1].stop, part.stop))
         else:
-            found.append(part)
-    return tuple(found)
+            merged.append(part)
+    return tuple(merged)
 
 
-def _badness(file: MarkedFile) -> tuple[object, ...]:
+def _worst_first_key(file: MarkedFile) -> tuple[object, ...]:
     counts = file.worst_lines()
-    return (*(-counts.get(ending, 0) for ending in ENDINGS), file.path)
+    return (*(-counts.get(ending, 0) for ending in ENDINGS_WORST_FIRST), file.path)

@@ -18,33 +18,38 @@ from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_progress import Progress, StagePace
 from mutator.workspace import Workspace
 
-MOST, ONE_IN = 10, 20  # at most 10 experiments, and at most one in 20 of the planned ones
+MOST_EXPERIMENTS, PLANNED_PER_EXPERIMENT = (
+    10,
+    20,
+)  # at most 10 experiments, and at most one in 20 of the planned ones
 BUDGET_S = 120.0  # no further experiment starts after this time
 
-Notify = Callable[[Progress], None]
+OnProgress = Callable[[Progress], None]
 
 
-def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify: Notify) -> str:
+def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, on_progress: OnProgress) -> str:
     """Take the run's missing stills. Return why the first experiment without stills has none, or ''."""
     manifest = workspace.manifest(folder.head.target)
     if manifest.film is None or not manifest.film.pictures:
         return ""
     experiments = PlannedExperiments(folder.path)
     records = folder.records()
-    due = _due(folder, manifest.film.pictures, experiments, records)
-    if not due:
+    missing_stills = _missing_stills_by_id(folder, manifest.film.pictures, experiments, records)
+    if not missing_stills:
         return ""
     try:
         filming = Filming.of(workspace, folder)
     except MutatorError as error:
-        return f"{next(iter(due))}: {error}"
-    ends = time.monotonic() + BUDGET_S
+        return f"{next(iter(missing_stills))}: {error}"
+    deadline = time.monotonic() + BUDGET_S
 
-    def wrong(name: str, golden: Future[Path]) -> str:
-        if time.monotonic() > ends:
+    def take_and_report_problem(name: str, golden: Future[Path]) -> str:
+        if time.monotonic() > deadline:
             return ""
         try:
-            same = filming.take_shots(experiments[name], records[name], due[name], golden=golden.result())
+            same = filming.take_shots(
+                experiments[name], records[name], missing_stills[name], golden=golden.result()
+            )
         except MutatorError as error:
             return f"{name}: {error}"
         return "" if same else f"{name}: the rerun differs from the campaign's result"
@@ -52,18 +57,23 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
     pool = ThreadPoolExecutor(max(1, workers))
     with ScratchFolder("mutator-stills-") as scratch:
         try:
-            driven = {_golden_key(experiments[name]): experiments[name] for name in due}
+            experiment_by_golden = {
+                _golden_key(experiments[name]): experiments[name] for name in missing_stills
+            }
             # golden runs are submitted first; otherwise all threads could wait for one that has not started
             goldens = {
-                key: pool.submit(filming.rerun_golden, one, path_below(scratch, key))
-                for key, one in driven.items()
+                key: pool.submit(filming.rerun_golden, future, path_below(scratch, key))
+                for key, future in experiment_by_golden.items()
             }
-            found = [pool.submit(wrong, name, goldens[_golden_key(experiments[name])]) for name in due]
-            pace = StagePace("pictures", len(found))
-            notify(pace.progress_at(0))
-            for done, _ in enumerate(as_completed(found), 1):
-                notify(pace.progress_at(done))
-            return next(filter(None, (one.result() for one in found)), "")
+            futures = [
+                pool.submit(take_and_report_problem, name, goldens[_golden_key(experiments[name])])
+                for name in missing_stills
+            ]
+            pace = StagePace("pictures", len(futures))
+            on_progress(pace.progress_at(0))
+            for done_count, _ in enumerate(as_completed(futures), 1):
+                on_progress(pace.progress_at(done_count))
+            return next(filter(None, (future.result() for future in futures)), "")
         finally:
             pool.shutdown(cancel_futures=True)
 
@@ -72,31 +82,31 @@ def _golden_key(experiment: Experiment) -> str:
     return GoldenRun.for_experiment(experiment, several_seeds=True).key
 
 
-def _due(
+def _missing_stills_by_id(
     folder: RunFolder,
     pictures: Collection[str],
     experiments: Mapping[str, Experiment],
     records: Mapping[str, Record],
 ) -> dict[str, list[Shot]]:
     """Return the missing stills of the worst experiments with one of the changes `pictures`, worst first."""
-    seeing = set(pictures)
+    change_names = set(pictures)
     frame = Results(folder.path).frame()
-    moved = ((frame["status"] == Status.OK.value) & frame["t_manifest"].notna()).to_numpy()
-    order = [row for row in ranks_of_rows(frame).argsort() if moved[row]]
+    is_manifested = ((frame["status"] == Status.OK.value) & frame["t_manifest"].notna()).to_numpy()
+    order = [row for row in ranks_of_rows(frame).argsort() if is_manifested[row]]
     ids = (str(frame["experiment_id"].iloc[row]) for row in order)
-    wanted = (name for name in ids if seeing & set(experiments[name].changes))
-    chosen = islice(wanted, min(MOST, folder.planned_count // ONE_IN))
-    due = {name: _missing(folder, name, records[name]) for name in chosen}
-    return {name: shots for name, shots in due.items() if shots}
+    with_pictures = (name for name in ids if change_names & set(experiments[name].changes))
+    worst_ids = islice(with_pictures, min(MOST_EXPERIMENTS, folder.planned_count // PLANNED_PER_EXPERIMENT))
+    stills_by_id = {name: _missing_stills(folder, name, records[name]) for name in worst_ids}
+    return {name: shots for name, shots in stills_by_id.items() if shots}
 
 
-def _missing(folder: RunFolder, experiment_id: str, record: Record) -> list[Shot]:
-    names = {f"{experiment_id}-{t:.2f}s.jpg": t for t in _times(record)}
+def _missing_stills(folder: RunFolder, experiment_id: str, record: Record) -> list[Shot]:
+    names = {f"{experiment_id}-{t:.2f}s.jpg": t for t in _still_times(record)}
     shots = [Shot(path=path_below(folder.path / "plots", name), t=t) for name, t in names.items()]
     return [shot for shot in shots if not shot.path.exists()]
 
 
-def _times(record: Record) -> Iterable[float]:
+def _still_times(record: Record) -> Iterable[float]:
     """Yield the times of the activation, the first alert and the first hazard."""
     if record.activation:
         yield record.activation.first

@@ -16,7 +16,7 @@ from mutator.review.decisions import Review, ReviewState
 from mutator.review.effect_pictures import has_pictures
 from mutator.review.mutant_groups import Group
 from mutator.review.readable_groups import condition_lines, value_table
-from mutator.web import asset, embedded, load_order, plainly_embedded
+from mutator.web import asset_text, json_script_element, load_order, packed_script_element
 
 
 def write_review_page(out: Path, review: Review, groups: Sequence[Group], options: Sequence[str]) -> None:
@@ -52,14 +52,14 @@ def render_review_page(data: dict[str, Any]) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    return environment.from_string(asset("review/review.html")).render(
+    return environment.from_string(asset_text("review/review.html")).render(
         target=data["target"],
         count=len(data["groups"]),
         served=data.get("served") is not None,
-        styles=[Markup(asset(name)) for name in load_order("review", ".css")],
-        tags=Markup(plainly_embedded(tags_for_scripts(), "tags")),
-        data=Markup(embedded(data, "review")),
-        scripts=[Markup(asset(name)) for name in load_order("review", ".js")],
+        styles=[Markup(asset_text(name)) for name in load_order("review", ".css")],
+        tags=Markup(json_script_element(tags_for_scripts(), "tags")),
+        data=Markup(packed_script_element(data, "review")),
+        scripts=[Markup(asset_text(name)) for name in load_order("review", ".js")],
     )
 
 

@@ -24,7 +24,7 @@ from mutator.serve.report_pages import Shown
 from mutator.serve.responses import OpenFile, kind_of, on_error
 from mutator.serve.served_reviews import Reviews
 from mutator.serve.served_runs import Runs, open_file, report_of, told
-from mutator.web import asset, assets
+from mutator.web import asset_names, asset_text
 from mutator.workspace import Workspace
 
 _PLOT = "plot.svg"
@@ -146,6 +146,6 @@ def _pages(site: Site) -> list[Route]:
 
 def _own(request: Request) -> Response:
     name = request.path_params["name"]
-    if name not in (*assets(".js"), *assets(".css")):
+    if name not in (*asset_names(".js"), *asset_names(".css")):
         raise NotServed("no such file")
-    return Response(asset(name), media_type=kind_of(name))
+    return Response(asset_text(name), media_type=kind_of(name))

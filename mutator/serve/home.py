@@ -7,7 +7,7 @@ from urllib.parse import quote
 from jinja2 import Environment, StrictUndefined
 
 from mutator.errors import MutatorError
-from mutator.web import asset
+from mutator.web import asset_text
 from mutator.workspace import Workspace
 
 _MOST_PAIRS = 20  # pairs of runs offered for comparison
@@ -60,5 +60,5 @@ def _rendered(name: str, **content: Any) -> str:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["quoted"] = lambda text: quote(text, safe="")
-    text = asset(f"serve/{name}")
+    text = asset_text(f"serve/{name}")
     return environment.from_string(text).render(content)

@@ -15,8 +15,8 @@ from mutator.comparison import run_comparison as comparing
 from mutator.errors import MutatorError, NotServed
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note, load_fault_free_runs
 from mutator.report import report_builder
-from mutator.report.panel import FOLDER
-from mutator.report.report_digests import made_from
+from mutator.report.panel import REPORT_FOLDER
+from mutator.report.report_digests import inputs_digest
 from mutator.results.table_reader import Results
 from mutator.serve.page_tokens import PageTokens, run_page
 from mutator.serve.report_cache import ReportCache
@@ -47,8 +47,8 @@ class Shown:
     def file(self, key: str, name: str) -> Response:
         """Open a file of a run, or a part of its report; Absent if it is not served."""
         run = self._runs.folder(key)
-        if name.startswith(f"{FOLDER}/"):
-            return self._of_report(run, name.removeprefix(f"{FOLDER}/"))
+        if name.startswith(f"{REPORT_FOLDER}/"):
+            return self._of_report(run, name.removeprefix(f"{REPORT_FOLDER}/"))
         if name.endswith(".js"):
             return Response(_series(run, name), media_type=kind_of(name), headers=STORED)
         return OpenFile(open_in_run(run, name), name)
@@ -72,7 +72,7 @@ class Shown:
         """Build the report if it is not cached, whatever report the run folder contains."""
         folder = RunFolder.open(run)
         with self._making:
-            key = made_from(folder, self._workspace)
+            key = inputs_digest(folder, self._workspace)
             data = self._reports.file(key, name, lambda: self._built(folder))
         if data is None:
             raise NotServed("no such file", expected="a file of the report")

@@ -17,7 +17,7 @@ from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mutator.comparison import comparison_files
-from mutator.web import asset, assets
+from mutator.web import asset_names, asset_text
 
 HOST = "127.0.0.1"
 MOST_BYTES = 1_000_000  # the longest body of a request
@@ -153,8 +153,8 @@ def _with_policy(send: Send) -> Send:
 @cache
 def policy() -> str:
     """Return the policy for pages: they can run only code from `mutator.web`, as files or inline by hash."""
-    scripts = [_hash(f"\n{asset(name)}") for name in assets(".js")]
-    styles = [_hash(f"\n{asset(name)}") for name in assets(".css")] + [
+    scripts = [_hash(f"\n{asset_text(name)}") for name in asset_names(".js")]
+    styles = [_hash(f"\n{asset_text(name)}") for name in asset_names(".css")] + [
         _hash(f"\n{comparison_files.page_style()}")
     ]
     return "; ".join(

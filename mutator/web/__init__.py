@@ -14,7 +14,7 @@ from typing import Any
 
 
 @cache
-def asset(name: str) -> str:
+def asset_text(name: str) -> str:
     """Return the text of a file such as `shared/dom.js`, which is safe inside `<style>` and `<script>`."""
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
     if not name.endswith(".html") and ("</script" in text or "</style" in text):
@@ -25,24 +25,24 @@ def asset(name: str) -> str:
 @cache
 def load_order(page: str, suffix: str) -> tuple[str, ...]:
     """Return the names of the scripts (suffix `.js`) or style sheets (`.css`) of a page in load order."""
-    return tuple(name for name in asset(f"{page}/order.txt").split() if name.endswith(suffix))
+    return tuple(name for name in asset_text(f"{page}/order.txt").split() if name.endswith(suffix))
 
 
 @cache
-def assets(suffix: str) -> tuple[str, ...]:
+def asset_names(suffix: str) -> tuple[str, ...]:
     """Return the names of all files with a suffix, sorted."""
     folders = [folder for folder in files(__package__).iterdir() if folder.is_dir()]
     names = [f"{folder.name}/{file.name}" for folder in folders for file in folder.iterdir()]
     return tuple(sorted(name for name in names if name.endswith(suffix)))
 
 
-def packed(value: Any) -> str:
+def pack_json(value: Any) -> str:
     """Pack `value` as compressed JSON in base64, which packed.js reads. Equal values give equal text."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return base64.b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode("ascii")
 
 
-def plainly_embedded(value: Any, name: str) -> str:
+def json_script_element(value: Any, name: str) -> str:
     """Return a script element with id `name` that contains `value` as plain JSON, for scripts that need it
     immediately.
     """
@@ -50,6 +50,6 @@ def plainly_embedded(value: Any, name: str) -> str:
     return f'<script type="application/json" id="{name}">{text}</script>'
 
 
-def embedded(value: Any, name: str) -> str:
+def packed_script_element(value: Any, name: str) -> str:
     """Return a script element with id `name` with `value`, compressed. `Packed.read(name)` reads it."""
-    return f'<script type="application/octet-stream+gzip" id="{name}">{packed(value)}</script>'
+    return f'<script type="application/octet-stream+gzip" id="{name}">{pack_json(value)}</script>'

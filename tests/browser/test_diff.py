@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from mutator.mutants.injected_lines import tags_for_scripts
-from mutator.web import asset
+from mutator.web import asset_text
 
 CHANGED = 'x = (1 if _fi.active("a0") else "a\u2028b")  '
 TAG = '# fi:a0 was:    x = "a\u2028b" # c'
@@ -21,7 +21,7 @@ def test_a_tag_extends_to_the_end_of_its_line(browser: Any, end: str) -> None:
         f'<script type="application/json" id="tags">{json.dumps(tags_for_scripts())}</script><p></p>'
     )
     page.add_script_tag(
-        content=f"{asset('shared/dom.js')}\n{asset('shared/diff.js')}\nglobalThis.Diff = Diff;"
+        content=f"{asset_text('shared/dom.js')}\n{asset_text('shared/diff.js')}\nglobalThis.Diff = Diff;"
     )
     (file,) = page.evaluate("(patch) => Diff.injected(patch)", patch)
     assert file["lines"] == [CHANGED.rstrip(), "y = 1"]

@@ -9,7 +9,7 @@ import pytest
 from mutator.triggers.conditions import canonical_condition, canonical_formula
 from mutator.triggers.formula_json import formula_as_json
 from mutator.triggers.trace_formulas import condition_at_each_step, formula_at_each_step
-from mutator.web import asset
+from mutator.web import asset_text
 
 NAMES = ("t", "gap", "speed", "closing")
 ODD = [0.0, -0.0, 1.0, -2.5, 1e-300, 1e300, np.inf, -np.inf, np.nan]
@@ -51,7 +51,7 @@ def test_python_and_the_page_agree_on_formulas(browser: Any, values: dict[str, n
     formulas = [canonical_formula(formula(rng), NAMES, over_time=True) for _ in range(COUNT)]
     conditions = [canonical_condition(condition(rng), variables=NAMES, over_time=True) for _ in range(COUNT)]
     page = browser.new_page()
-    page.add_script_tag(content=asset("replay/formula.js") + "\nglobalThis.Formula = Formula;")
+    page.add_script_tag(content=asset_text("replay/formula.js") + "\nglobalThis.Formula = Formula;")
     given = {name: array.tolist() for name, array in values.items()}
     script = "([trees, values]) => trees.map((tree) => Formula.evaluate(tree, values))"
     found = page.evaluate(script, [[formula_as_json(text, {}) for text in (*formulas, *conditions)], given])

@@ -13,7 +13,7 @@ import pytest
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, write_kept_series
 from mutator.store.series_format import ExtraPoints, Series, encode_series
-from mutator.web import asset
+from mutator.web import asset_text
 
 TRACE = "0123456789abcdef"
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "run"
@@ -35,7 +35,9 @@ def run(tmp_path: Path) -> Path:
     facts = {"series": {"packed": True, "kept": SeriesFolder(tmp_path).kept_ids()}}
     (tmp_path / "report").mkdir()
     told = f'<script type="application/json" id="facts">{json.dumps(facts)}</script>'
-    page = f"<!doctype html><meta charset='utf-8'>{told}<script>{asset('replay/series_file.js')}</script>"
+    page = (
+        f"<!doctype html><meta charset='utf-8'>{told}<script>{asset_text('replay/series_file.js')}</script>"
+    )
     (tmp_path / "report" / "index.html").write_text(page)
     return tmp_path
 

@@ -10,7 +10,7 @@ import pytest
 
 from mutator._common.hashing import digest
 from mutator.report.panels import figures_panel
-from mutator.report.report_digests import made_from
+from mutator.report.report_digests import inputs_digest
 from mutator.review.decisions import load_review
 from mutator.review.mutant_groups import groups_of_library
 from mutator.review.review_page import review_page_html
@@ -72,7 +72,7 @@ def runs(run: Path, workspace: Workspace) -> Path:
         (report / name).write_text(text)
     (report / "made_from.json").unlink()
     files = {path.relative_to(report).as_posix(): digest(path.read_bytes()) for path in report.rglob("*.*")}
-    inputs = made_from(RunFolder.open(night), workspace)
+    inputs = inputs_digest(RunFolder.open(night), workspace)
     stamp = {"schema": "report/1", "made_from": inputs, "files": files}
     (report / "made_from.json").write_text(json.dumps(stamp))
     return place

@@ -16,16 +16,16 @@ from mutator.results.result_rows import ResultRow
 from mutator.results.table_reader import Results
 from mutator.store.plan_file import load_experiments
 
-ENDINGS = (Outcome.HAZARD, Outcome.SDC, Outcome.MASKED, Status.CRASHED, Status.TIMEOUT)
-_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+POSSIBLE_FAILURES = (Outcome.HAZARD, Outcome.SDC, Outcome.MASKED, Status.CRASHED, Status.TIMEOUT)
+_NOT_XML_PATTERN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def _content(request: ExportRequest) -> bytes:
     """Return the XML. MutatorError for an outcome that cannot be a failure."""
     folder, failures = request.folder, request.parts.failures
-    known = [ending.value for ending in ENDINGS]
-    if strangers := [name for name in failures if name not in known]:
-        raise MutatorError(f"'{strangers[0]}'", argument="failures", expected=f"one of {', '.join(known)}")
+    names = [ending.value for ending in POSSIBLE_FAILURES]
+    if unknown := [name for name in failures if name not in names]:
+        raise MutatorError(f"'{unknown[0]}'", argument="failures", expected=f"one of {', '.join(names)}")
     rows = {row.experiment_id: row for row in Results.up_to_date(folder.path).rows()}
     suites: dict[str, list[Experiment]] = {}
     for experiment in load_experiments(folder.path):
@@ -35,43 +35,45 @@ def _content(request: ExportRequest) -> bytes:
     for name in sorted(suites):
         suite = ET.SubElement(root, "testsuite", name=name)
         for experiment in suites[name]:
-            suite.append(_case(experiment, rows.get(experiment.id), failures))
-        _count(suite)
-    _count(root)
+            suite.append(_test_case(experiment, rows.get(experiment.id), failures))
+        _set_counts(suite)
+    _set_counts(root)
     ET.indent(root)
     data: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
     return data + b"\n"
 
 
-def _case(experiment: Experiment, row: ResultRow | None, failures: Collection[str]) -> ET.Element:
+def _test_case(experiment: Experiment, row: ResultRow | None, failures: Collection[str]) -> ET.Element:
     case = ET.Element("testcase", classname=experiment.fault.spec.replace("/", "."), name=experiment.label)
     facts = {"experiment": experiment.id, "ending": row.ending if row else "not run"}
     if row:
         facts |= {f"hazard {name} [s]": f"{t:.2f}" for name, t in row.hazards}
         facts |= {"alerts": ", ".join(row.alerts)} if row.alerts else {}
-    told = ET.SubElement(case, "properties")
+    properties = ET.SubElement(case, "properties")
     for name, value in facts.items():
-        ET.SubElement(told, "property", name=name, value=_clean(value))
+        ET.SubElement(properties, "property", name=name, value=_xml_text(value))
     if row is None:
         ET.SubElement(case, "skipped", message="not run yet")
     elif not row.usable:
-        ET.SubElement(case, "error", type=row.ending, message=_clean(row.detail))
+        ET.SubElement(case, "error", type=row.ending, message=_xml_text(row.detail))
     elif row.ending == Outcome.NOT_ACTIVATED:
         ET.SubElement(case, "skipped", message="the fault was never active")
     elif row.ending in failures:
         hazards = ", ".join(f"{name} at {t:.2f} s" for name, t in row.hazards)
-        ET.SubElement(case, "failure", type=row.ending, message=_clean(hazards or row.detail or row.ending))
+        ET.SubElement(
+            case, "failure", type=row.ending, message=_xml_text(hazards or row.detail or row.ending)
+        )
     return case
 
 
-def _count(element: ET.Element) -> None:
+def _set_counts(element: ET.Element) -> None:
     element.set("tests", str(len(list(element.iter("testcase")))))
     for attribute, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         element.set(attribute, str(len(list(element.iter(tag)))))
 
 
-def _clean(text: str) -> str:
-    return _NO_XML.sub("?", text)
+def _xml_text(text: str) -> str:
+    return _NOT_XML_PATTERN.sub("?", text)
 
 
 EXPORT = Export(

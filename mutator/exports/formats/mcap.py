@@ -33,18 +33,18 @@ from mutator.store.series_folder import SeriesFolder, rerun_command
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
-EVENTS = "/events"
-KINDS = ("activation", "last_active", "manifested", "alert", "hazard", "end_of_drive")
-_VALUE: dict[str, Any] = {"type": ["number", "null"]}  # null: missing or not finite
+EVENTS_TOPIC = "/events"
+EVENT_KINDS = ("activation", "last_active", "manifested", "alert", "hazard", "end_of_drive")
+_VALUE_SCHEMA: dict[str, Any] = {"type": ["number", "null"]}  # null: missing or not finite
 
-Values = list[tuple[float, float]]  # time (s) and value
+TimedValues = list[tuple[float, float]]  # time (s) and value
 
 
 @dataclass(frozen=True, kw_only=True)
 class Topic:
     name: str
     about: Mapping[str, str]  # unit, role, component, about
-    values: Values
+    values: TimedValues
 
 
 def _write_experiments(request: ExportRequest) -> None:
@@ -54,33 +54,33 @@ def _write_experiments(request: ExportRequest) -> None:
     MutatorError if the package mcap is missing or no experiment has data; MutatorWarning if some have none.
     """
     folder, out = request.folder, request.out
-    content = Content(folder, request.workspace)
-    wanted = _chosen(folder, request.parts.only)
-    found = [name for name in wanted if content.has(name)]
-    remedy = f"rerun one: `mutator rerun {(wanted or ['ID'])[0]} --run {folder.path} --trace`"
-    if not found:
+    builder = ExperimentFileBuilder(folder, request.workspace)
+    selected_ids = _selected_ids(folder, request.parts.only)
+    ids_with_data = [name for name in selected_ids if builder.has(name)]
+    remedy = f"rerun one: `mutator rerun {(selected_ids or ['ID'])[0]} --run {folder.path} --trace`"
+    if not ids_with_data:
         raise MutatorError(
-            f"{counted(len(wanted), 'experiment')}, none with a series",
+            f"{counted(len(selected_ids), 'experiment')}, none with a series",
             where=folder.path,
             argument="only",
             expected="experiments with stored series",
-            remedy=remedy if wanted else "widen `only`",
+            remedy=remedy if selected_ids else "widen `only`",
         )
-    if len(found) < len(wanted):
-        missing = next(name for name in wanted if name not in found)
+    if len(ids_with_data) < len(selected_ids):
+        missing = next(name for name in selected_ids if name not in ids_with_data)
         warnings.warn(
-            f"left out for lack of series: {len(wanted) - len(found)} of "
-            f"{counted(len(wanted), 'experiment')}, for example {missing}; "
-            f"{remedy.replace(wanted[0], missing)}",
+            f"left out for lack of series: {len(selected_ids) - len(ids_with_data)} of "
+            f"{counted(len(selected_ids), 'experiment')}, for example {missing}; "
+            f"{remedy.replace(selected_ids[0], missing)}",
             MutatorWarning,
             stacklevel=2,
         )
     make_folder(out)
-    for name in found:
-        write_atomic(path_below(out, f"{name}.mcap"), content.of(name))
+    for name in ids_with_data:
+        write_atomic(path_below(out, f"{name}.mcap"), builder.of(name))
 
 
-class Content:
+class ExperimentFileBuilder:
     """Builds the files of a run folder's experiments."""
 
     def __init__(self, folder: RunFolder, workspace: Workspace | None) -> None:
@@ -94,35 +94,35 @@ class Content:
         return {experiment.id: experiment for experiment in plan_file.load_experiments(self._folder.path)}
 
     def has(self, experiment_id: str) -> bool:
-        return self._series.has_series(experiment_id) or self._exact(experiment_id) is not None
+        return self._series.has_series(experiment_id) or self._kept_traces(experiment_id) is not None
 
     def of(self, experiment_id: str) -> bytes:
         """Return an experiment's file, from its exact traces if kept, else from its series."""
         experiment, record = self._experiments[experiment_id], self._records[experiment_id]
-        if (traces := self._exact(experiment_id)) is not None:
+        if (traces := self._kept_traces(experiment_id)) is not None:
             assert self._traces is not None
             manifest = self._traces.manifest
-            golden, faulty = (list(_of_trace(trace, manifest)) for trace in traces)
+            golden, faulty = (list(_trace_topics(trace, manifest)) for trace in traces)
         else:
-            golden, faulty = self._of_series(record)
-        written = _Written()
-        written.metadata("experiment", self._facts(experiment, record))
+            golden, faulty = self._series_topics(record)
+        writer = _McapWriter()
+        writer.metadata("experiment", self._experiment_facts(experiment, record))
         for run, topics in (("golden", golden), ("faulty", faulty)):
             for topic in topics:
-                written.channel(run, topic)
-        written.events(_events(record))
-        return written.finish()
+                writer.channel(run, topic)
+        writer.events(_record_events(record))
+        return writer.finish()
 
-    def _exact(self, experiment_id: str) -> tuple[Trace, Trace] | None:
+    def _kept_traces(self, experiment_id: str) -> tuple[Trace, Trace] | None:
         """Return the kept traces, if both runs have one. MutatorError if a trace does not match its record:
         using the coarser series instead would hide the mismatch.
         """
-        kept = self._folder.kept_traces_folder(experiment_id)
-        if self._traces is None or not kept.is_dir() or experiment_id not in self._records:
+        trace_folder = self._folder.kept_traces_folder(experiment_id)
+        if self._traces is None or not trace_folder.is_dir() or experiment_id not in self._records:
             return None
         golden = self._folder.golden_folder_of(self._experiments[experiment_id])
-        faulty = path_below(kept / "faulty", self._traces.manifest.trace_file)
-        if not (golden.is_dir() or (kept / "golden").is_dir()) or not faulty.is_file():
+        faulty = path_below(trace_folder / "faulty", self._traces.manifest.trace_file)
+        if not (golden.is_dir() or (trace_folder / "golden").is_dir()) or not faulty.is_file():
             return None
         if not self._traces.is_stored(experiment_id):
             raise MutatorError(
@@ -130,28 +130,30 @@ class Content:
                 where=faulty,
                 expected="the complete trace of the campaign's run",
                 remedy=f"rerun the experiment: {rerun_command(self._folder.path, experiment_id)}, "
-                f"or delete {kept}",
+                f"or delete {trace_folder}",
             )
         return self._traces.traces_of(experiment_id)
 
-    def _of_series(self, record: Record) -> tuple[list[Topic], list[Topic]]:
-        found = self._series.load_series(record.experiment_id, record)
-        assert found is not None  # `has` was checked
-        golden, faulty = found
+    def _series_topics(self, record: Record) -> tuple[list[Topic], list[Topic]]:
+        stored_series = self._series.load_series(record.experiment_id, record)
+        assert stored_series is not None  # `has` was checked
+        golden, faulty = stored_series
         points = faulty.points
         topics: tuple[list[Topic], list[Topic]] = ([], [])
         for row, about in enumerate(golden.facts["channels"]):
-            own = points.channel_numbers == row
+            is_of_channel = points.channel_numbers == row
             runs = ((golden, points.golden_values), (faulty, points.faulty_values))
-            for told, (run, more) in zip(topics, runs, strict=True):
+            for topics_of_run, (run, more) in zip(topics, runs, strict=True):
                 pairs = [
-                    *_pairs(run.times_of(row), run.channel_values[row]),
-                    *_pairs(points.t[own], more[own]),
+                    *_timed_values(run.times_of(row), run.channel_values[row]),
+                    *_timed_values(points.t[is_of_channel], more[is_of_channel]),
                 ]
-                told.append(Topic(name=about["name"], about=_described(about), values=sorted(pairs)))
+                topics_of_run.append(
+                    Topic(name=about["name"], about=_topic_metadata(about), values=sorted(pairs))
+                )
         return topics
 
-    def _facts(self, experiment: Experiment, record: Record) -> dict[str, str]:
+    def _experiment_facts(self, experiment: Experiment, record: Record) -> dict[str, str]:
         head = self._folder.head
         facts = {
             "id": experiment.id,
@@ -168,7 +170,7 @@ class Content:
         return facts | {name: f"{value:.9g}" for name, value in record.metrics}
 
 
-class _Written:
+class _McapWriter:
     """Collects messages, and writes them in time order."""
 
     def __init__(self) -> None:
@@ -191,7 +193,9 @@ class _Written:
     def channel(self, run: str, topic: Topic) -> None:
         unit = topic.about["unit"]
         text = f"{topic.about['about'] or topic.name} [{unit}]"
-        schema = self._schema(f"{topic.name} [{unit}]", {"value": {**_VALUE, "description": text}})
+        schema = self._register_schema(
+            f"{topic.name} [{unit}]", {"value": {**_VALUE_SCHEMA, "description": text}}
+        )
         number = self._writer.register_channel(
             topic=f"/{run}/{topic.name}",
             message_encoding="json",
@@ -199,14 +203,14 @@ class _Written:
             metadata=dict(topic.about),
         )
         for t, value in topic.values:
-            self._add(number, t, {"value": value if math.isfinite(value) else None})
+            self._add_message(number, t, {"value": value if math.isfinite(value) else None})
 
     def events(self, events: Iterable[tuple[float, str, str]]) -> None:
-        fields = {"kind": {"enum": list(KINDS)}, "name": {"type": "string"}, "t": {"type": "number"}}
-        schema = self._schema("event", fields)
-        number = self._writer.register_channel(topic=EVENTS, message_encoding="json", schema_id=schema)
+        fields = {"kind": {"enum": list(EVENT_KINDS)}, "name": {"type": "string"}, "t": {"type": "number"}}
+        schema = self._register_schema("event", fields)
+        number = self._writer.register_channel(topic=EVENTS_TOPIC, message_encoding="json", schema_id=schema)
         for t, kind, name in events:
-            self._add(number, t, {"kind": kind, "name": name, "t": t})
+            self._add_message(number, t, {"kind": kind, "name": name, "t": t})
 
     def finish(self) -> bytes:
         first = min((time for time, *_ in self._messages), default=0)
@@ -220,17 +224,17 @@ class _Written:
         self._writer.finish()  # type: ignore[no-untyped-call]
         return self._data.getvalue()
 
-    def _schema(self, name: str, fields: dict[str, Any]) -> int:
+    def _register_schema(self, name: str, fields: dict[str, Any]) -> int:
         schema = {"title": name, "type": "object", "properties": fields, "required": list(fields)}
         data = json.dumps(schema).encode()
         number: int = self._writer.register_schema(name=name, encoding="jsonschema", data=data)
         return number
 
-    def _add(self, channel: int, t: float, message: dict[str, Any]) -> None:
+    def _add_message(self, channel: int, t: float, message: dict[str, Any]) -> None:
         self._messages.append((round(t * 1e9), channel, message))
 
 
-def _chosen(folder: RunFolder, only: str | None) -> list[str]:
+def _selected_ids(folder: RunFolder, only: str | None) -> list[str]:
     frame = Results.up_to_date(folder.path).indexed_frame().reset_index()
     if only is None:
         return list(frame["experiment_id"])
@@ -239,25 +243,25 @@ def _chosen(folder: RunFolder, only: str | None) -> list[str]:
     return [row["experiment_id"] for row in rows if accepts({str(k): v for k, v in row.items()})]
 
 
-def _of_trace(trace: Trace, manifest: TargetManifest) -> Iterator[Topic]:
+def _trace_topics(trace: Trace, manifest: TargetManifest) -> Iterator[Topic]:
     for channel in (*manifest.compared_channels, *manifest.plotted_channels):
         if channel.name in trace:
             clock = own_times(channel.name)
             time = trace[clock if clock in trace else manifest.time_channel]
             about = {"unit": channel.unit, "role": channel.role.value}
             about |= {"component": channel.component, "about": channel.about}
-            yield Topic(name=channel.name, about=about, values=_pairs(time, trace[channel.name]))
+            yield Topic(name=channel.name, about=about, values=_timed_values(time, trace[channel.name]))
 
 
-def _described(about: Mapping[str, Any]) -> dict[str, str]:
+def _topic_metadata(about: Mapping[str, Any]) -> dict[str, str]:
     return {name: str(about[name]) for name in ("unit", "role", "component", "about")}
 
 
-def _pairs(time: np.ndarray, values: np.ndarray) -> Values:
+def _timed_values(time: np.ndarray, values: np.ndarray) -> TimedValues:
     return list(zip(time.tolist(), values.astype(float).tolist(), strict=True))
 
 
-def _events(record: Record) -> Iterator[tuple[float, str, str]]:
+def _record_events(record: Record) -> Iterator[tuple[float, str, str]]:
     if record.activation:
         yield record.activation.first, "activation", ""
         yield record.activation.last, "last_active", ""

@@ -30,17 +30,17 @@ def _content(request: ExportRequest) -> bytes:
     workspace = request.workspace
     assert workspace is not None
     manifest = single_run.manifest_of_unchanged_target(workspace, request.folder)
-    content = report(request.folder, manifest, workspace.fault_models())
+    content = mutation_report(request.folder, manifest, workspace.fault_models())
     return (json.dumps(content, ensure_ascii=False) + "\n").encode()
 
 
-def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> dict[str, Any]:
+def mutation_report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> dict[str, Any]:
     records = folder.records()
-    drives: dict[str, list[Experiment]] = {}
+    experiments_by_fault: dict[str, list[Experiment]] = {}
     for experiment in plan_file.load_experiments(folder.path):
-        drives.setdefault(experiment.fault.id, []).append(experiment)
+        experiments_by_fault.setdefault(experiment.fault.id, []).append(experiment)
     files: dict[str, dict[str, Any]] = {}
-    for experiments in drives.values():
+    for experiments in experiments_by_fault.values():
         fault = experiments[0].fault
         file = parsed_file(manifest.tree, fault.injections[0].location.path)
         source = file.data.decode(file.encoding)
@@ -62,7 +62,7 @@ def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> 
         "framework": {"name": "mutator", "version": VERSION},
         "config": config,
         "files": dict(sorted(files.items())),
-        "testFiles": _tests([e for group in drives.values() for e in group]),
+        "testFiles": _test_files([e for group in experiments_by_fault.values() for e in group]),
     }
 
 
@@ -74,37 +74,37 @@ def _mutant(
     records: Mapping[str, Record],
 ) -> dict[str, Any]:
     first, *others = fault.injections
-    also = [f"{i.location.path}:{_line(manifest, i)}" for i in others]
+    also = [f"{i.location.path}:{_line_number(manifest, i)}" for i in others]
     description = ", aims at ".join(filter(None, (fault.label, fault.aim)))
     description += f"; also at {', '.join(also)}" if also else ""
     return {
         "id": fault.id,
         "mutatorName": fault.fault_type if fault.module == OPERATORS_MODULE else first.model,
         "description": description,
-        **_change(manifest, models, fault),
-        **verdict(experiments, records),
+        **_replacement_of(manifest, models, fault),
+        **mutant_status(experiments, records),
     }
 
 
-def _line(manifest: TargetManifest, injection: Injection) -> int:
+def _line_number(manifest: TargetManifest, injection: Injection) -> int:
     return parsed_file(manifest.tree, injection.location.path).line_span(injection.location)[0] + 1
 
 
-def _change(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict[str, Any]:
+def _replacement_of(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict[str, Any]:
     first = fault.injections[0]
     file, model = parsed_file(manifest.tree, first.location.path), models.get(first.model)
     edit, span = edits_of(manifest, models, [first])[0].edit, file.line_span(first.location)
     if isinstance(edit, ValueEdit):
         # `parenthesized` adds parentheses if an adjacent operator could bind more tightly
-        return _located(file, edit.start, edit.end, parenthesized(edit.changed))
+        return _replacement_at(file, edit.start, edit.end, parenthesized(edit.changed))
     if fault.module == OPERATORS_MODULE and model.kind is SnippetKind.GUARD:  # the mutant omits the statement
         line, last = file.lines[span[0]], file.lines[span[1] - 1].rstrip(b"\r\n")
         start = len(line) - len(line.lstrip())
-        return _located(file, (span[0], start), (span[1] - 1, len(last)), "pass")
-    return _splice(file, span, [edit])
+        return _replacement_at(file, (span[0], start), (span[1] - 1, len(last)), "pass")
+    return _replacement_of_lines(file, span, [edit])
 
 
-def _located(
+def _replacement_at(
     file: ParsedFile, start: tuple[int, int], end: tuple[int, int], replacement: str
 ) -> dict[str, Any]:
     """Return a replacement of the text from `start` to `end` (line and byte, from 0), in the schema's
@@ -117,47 +117,52 @@ def _located(
     return {"location": {"start": first, "end": last}, "replacement": replacement}
 
 
-def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> dict[str, Any]:
+def _replacement_of_lines(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> dict[str, Any]:
     """Replace all anchored lines (at a function's entry, the line after the insertion)."""
     first = min(span[0], *(edit.line_index for edit in edits), len(file.lines) - 1)
     last = max(span[1], first + 1)
-    lines, new, done = file.lines[first:last], list[bytes](), 0
+    lines, new_lines, copied_to = file.lines[first:last], list[bytes](), 0
     for edit in sort_edits(edits):
         at = edit.line_index - first
-        gone = at + (1 if edit.rank is EditRank.INSTEAD else edit.indented_count)
-        new += [
-            *lines[done:at],
+        replaced_to = at + (1 if edit.rank is EditRank.INSTEAD else edit.indented_count)
+        new_lines += [
+            *lines[copied_to:at],
             *edit.lines,
             *(edit.indent_unit + line for line in lines[at : at + edit.indented_count]),
         ]
-        done = gone
-    new += lines[done:]
-    replacement = b"".join(new).rstrip(b"\r\n").decode(file.encoding)
-    return _located(file, (first, 0), (last - 1, len(lines[-1].rstrip(b"\r\n"))), replacement)
+        copied_to = replaced_to
+    new_lines += lines[copied_to:]
+    replacement = b"".join(new_lines).rstrip(b"\r\n").decode(file.encoding)
+    return _replacement_at(file, (first, 0), (last - 1, len(lines[-1].rstrip(b"\r\n"))), replacement)
 
 
-def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) -> dict[str, Any]:
+def mutant_status(experiments: Sequence[Experiment], records: Mapping[str, Record]) -> dict[str, Any]:
     """Return a fault's status over its runs, its reason, and the runs that activated it or had a hazard."""
-    known = {e: records[e.id] for e in experiments if e.id in records}
-    of = {status: [r for r in known.values() if r.status is status] for status in Status}
-    hazardous = [e for e, r in known.items() if r.hazards]
-    active = [e for e, r in known.items() if r.activation]
+    record_by_experiment = {e: records[e.id] for e in experiments if e.id in records}
+    records_by_status = {
+        status: [r for r in record_by_experiment.values() if r.status is status] for status in Status
+    }
+    hazardous = [e for e, r in record_by_experiment.items() if r.hazards]
+    active = [e for e, r in record_by_experiment.items() if r.activation]
     drives = counted(len(experiments), "drive")
     if hazardous:
-        names = sorted({name for e in hazardous for name, _ in known[e].hazards})
+        names = sorted({name for e in hazardous for name, _ in record_by_experiment[e].hazards})
         status, reason = "Killed", f"{', '.join(names)} in {len(hazardous)} of {drives}"
-    elif not known:
+    elif not record_by_experiment:
         status, reason = "Pending", f"not run yet: {drives}"
-    elif of[Status.INVALID_MUTANT]:
-        status, reason = "CompileError", of[Status.INVALID_MUTANT][0].detail
-    elif of[Status.CRASHED]:
-        status, reason = "RuntimeError", of[Status.CRASHED][0].detail
-    elif of[Status.TIMEOUT]:
-        status, reason = "Timeout", of[Status.TIMEOUT][0].detail
-    elif not of[Status.OK]:
-        status, reason = "Ignored", f"harness errors only: {of[Status.HARNESS_ERROR][0].detail}"
+    elif records_by_status[Status.INVALID_MUTANT]:
+        status, reason = "CompileError", records_by_status[Status.INVALID_MUTANT][0].detail
+    elif records_by_status[Status.CRASHED]:
+        status, reason = "RuntimeError", records_by_status[Status.CRASHED][0].detail
+    elif records_by_status[Status.TIMEOUT]:
+        status, reason = "Timeout", records_by_status[Status.TIMEOUT][0].detail
+    elif not records_by_status[Status.OK]:
+        status, reason = (
+            "Ignored",
+            f"harness errors only: {records_by_status[Status.HARNESS_ERROR][0].detail}",
+        )
     elif active:
-        differing = sum(r.outcome is Outcome.SDC for r in of[Status.OK])
+        differing = sum(r.outcome is Outcome.SDC for r in records_by_status[Status.OK])
         status, reason = "Survived", f"no hazard; an actuator output differed in {differing} of {drives}"
     else:
         status, reason = "NoCoverage", f"never active in {drives}"
@@ -166,11 +171,11 @@ def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) ->
         "statusReason": reason,
         "coveredBy": [e.drive_label for e in active],
         "killedBy": [e.drive_label for e in hazardous],
-        "testsCompleted": len(of[Status.OK]),
+        "testsCompleted": len(records_by_status[Status.OK]),
     }
 
 
-def _tests(experiments: Sequence[Experiment]) -> dict[str, Any]:
+def _test_files(experiments: Sequence[Experiment]) -> dict[str, Any]:
     files: dict[str, Any] = {}
     for scenario, name in sorted({(e.scenario, e.drive_label) for e in experiments}):
         files.setdefault(scenario, {"tests": []})["tests"].append({"id": name, "name": name})

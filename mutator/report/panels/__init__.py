@@ -37,10 +37,10 @@ def build_study_panels(run: ReportedRun) -> tuple[Panel, ...]:
     if not run.study:
         return ()
     with STUDIES.blaming_package(run.folder.head.study or ""):
-        said = [panel for panel_of in run.study.panels if (panel := panel_of(run))]
-        beside = (
+        panels = [panel for panel_of in run.study.panels if (panel := panel_of(run))]
+        general_panels = (
             (tables_panel.build_published_panel(run), figures_panel.build_study_figures_panel(run))
-            if said
+            if panels
             else ()
         )
-    return (*said, *(panel for panel in beside if panel))
+    return (*panels, *(panel for panel in general_panels if panel))

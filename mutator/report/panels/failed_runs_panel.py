@@ -10,9 +10,12 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.results.result_rows import ResultRow, rows_of
 
-_HEADS = ("status", "experiment", "fault", "scenario", "message")
-LISTED, PAGE_LISTED = 30, 200  # maximum number of runs in Markdown and on the page, whose search finds all
-_HTML = """\
+_COLUMN_HEADS = ("status", "experiment", "fault", "scenario", "message")
+MOST_RUNS_IN_MARKDOWN, MOST_RUNS_ON_PAGE = (
+    30,
+    200,
+)  # maximum number of runs in Markdown and on the page, whose search finds all
+_HTML_TEMPLATE = """\
 <h2>Runs that did not finish normally</h2>
 <p>A harness error says nothing about its fault, so no count includes it.</p>
 {{ table.as_html() }}
@@ -27,32 +30,45 @@ def build_failed_runs_panel(run: ReportedRun) -> Panel | None:
     results = run.results[run.results["status"] != Status.OK.value]
     if results.empty:
         return None
-    by = {"other": results["status"] != Status.HARNESS_ERROR.value, **results[["status", "experiment_id"]]}
-    order = DataFrame(by).sort_values([*by]).index[: max(LISTED, PAGE_LISTED)]
+    sort_keys = {
+        "other": results["status"] != Status.HARNESS_ERROR.value,
+        **results[["status", "experiment_id"]],
+    }
+    order = (
+        DataFrame(sort_keys).sort_values([*sort_keys]).index[: max(MOST_RUNS_IN_MARKDOWN, MOST_RUNS_ON_PAGE)]
+    )
     failed = rows_of(results.loc[order], run.faults)
     failings = [status.value for status in Status if status is not Status.OK]
     return Panel(
         anchor="failed",
         link="Failed runs",
-        markdown=f"## Runs that did not finish normally\n\n{_markdown(failed, len(results))}",
-        html=rendered(_HTML, table=_linked(failed), more=len(results) - PAGE_LISTED, failings=failings),
+        markdown=f"## Runs that did not finish normally\n\n{_failed_runs_markdown(failed, len(results))}",
+        html=rendered(
+            _HTML_TEMPLATE,
+            table=_linked_table(failed),
+            more=len(results) - MOST_RUNS_ON_PAGE,
+            failings=failings,
+        ),
     )
 
 
-def _markdown(failed: Sequence[ResultRow], count: int) -> str:
-    rows = [(r.status.value, r.experiment_id, r.fault, r.scenario, r.detail) for r in failed[:LISTED]]
-    table = TextTable(heads=_HEADS, rows=rows).as_markdown()
-    more = count - LISTED
+def _failed_runs_markdown(failed: Sequence[ResultRow], count: int) -> str:
+    rows = [
+        (r.status.value, r.experiment_id, r.fault, r.scenario, r.detail)
+        for r in failed[:MOST_RUNS_IN_MARKDOWN]
+    ]
+    table = TextTable(heads=_COLUMN_HEADS, rows=rows).as_markdown()
+    more = count - MOST_RUNS_IN_MARKDOWN
     return f"{table}\n\nOthers in `results.csv`: {more}." if more > 0 else table
 
 
-def _linked(failed: Sequence[ResultRow]) -> TextTable:
+def _linked_table(failed: Sequence[ResultRow]) -> TextTable:
     from markupsafe import Markup
 
     ending = Markup('<span class="ending {0}">{0}</span>').format
     link = Markup('<a href="#e={0}"><code>{0}</code></a>').format
     rows = [
         (ending(r.status.value), link(r.experiment_id), r.fault, r.scenario, r.detail)
-        for r in failed[:PAGE_LISTED]
+        for r in failed[:MOST_RUNS_ON_PAGE]
     ]
-    return TextTable(heads=_HEADS, rows=rows)
+    return TextTable(heads=_COLUMN_HEADS, rows=rows)

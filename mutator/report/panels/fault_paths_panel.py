@@ -3,19 +3,24 @@
 from collections.abc import Mapping, Sequence
 
 from mutator._common.table_rendering import TextTable
-from mutator.report.fault_path_data import ALL, PathCounts, RunPaths, counts_by_fault_type
+from mutator.report.fault_path_data import (
+    ALL_FAULT_TYPES,
+    PathCounts,
+    RunFaultPaths,
+    path_counts_by_fault_type,
+)
 from mutator.report.panel import Panel, rendered
-from mutator.report.path_drawing import draw_path_counts, drawn_counts, share_text
+from mutator.report.path_drawing import counts_for_drawing, describe_passed_share, draw_path_counts
 from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import fault_types_of
-from mutator.web import plainly_embedded
+from mutator.web import json_script_element
 
-_ABOUT = (
+_INTRODUCTION = (
     "Each link shows how many active faults reached it and how many got through it. A fault got through if "
     "recorded signals behind the link differ from the golden run."
 )
 _NONE_STOPPED = "None: every active fault changed an actuator."
-_HTML = """\
+_HTML_TEMPLATE = """\
 <h2>Fault paths</h2>
 <p>{{ about }}</p>
 {% if figure %}
@@ -60,30 +65,36 @@ names all components that stopped it.</p>
 def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the counts of links and components; None if no path is known."""
     paths = run.paths
-    counts = counts_by_fault_type(fault_types_of(run.results), run.seen.path_numbers, paths) if paths else {}
+    counts = (
+        path_counts_by_fault_type(fault_types_of(run.results), run.seen.path_numbers, paths) if paths else {}
+    )
     if paths is None or not counts:
         return None
-    links = _links(paths)
+    links = _links_in_order(paths)
     structure = paths.fault_paths.structure
-    stops = _stops(counts, paths)
-    parts = ["## Fault paths", _ABOUT, _table(links, counts[ALL], paths).as_markdown()]
+    stops = _masked_faults_table(counts, paths)
+    parts = [
+        "## Fault paths",
+        _INTRODUCTION,
+        _links_table(links, counts[ALL_FAULT_TYPES], paths).as_markdown(),
+    ]
     parts += ["### Where masked faults were stopped", stops.as_markdown() if stops else _NONE_STOPPED]
     figure = data = None
     if structure:
-        figure = draw_path_counts(structure, counts[ALL], links)
-        drawn = {kind: drawn_counts(structure, of_kind, links) for kind, of_kind in counts.items()}
-        data = plainly_embedded(drawn, "path-counts-data")
+        figure = draw_path_counts(structure, counts[ALL_FAULT_TYPES], links)
+        drawn = {kind: counts_for_drawing(structure, of_kind, links) for kind, of_kind in counts.items()}
+        data = json_script_element(drawn, "path-counts-data")
     html = rendered(
-        _HTML,
-        about=_ABOUT,
+        _HTML_TEMPLATE,
+        about=_INTRODUCTION,
         figure=figure and _markup(figure),
         kinds=list(counts),
-        all=ALL,
+        all=ALL_FAULT_TYPES,
         counts=counts,
         data=data and _markup(data),
         links=links,
         label=paths.label,
-        share=lambda through, came: share_text(through, came) or "none reached it",
+        share=lambda through, came: describe_passed_share(through, came) or "none reached it",
         stops=stops,
         none_stopped=_NONE_STOPPED,
     )
@@ -93,24 +104,28 @@ def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
 Links = Mapping[str, tuple[str, str, str]]  # tail, tip, and what the link carries
 
 
-def _links(paths: RunPaths) -> Links:
+def _links_in_order(paths: RunFaultPaths) -> Links:
     """Return the links that occur in any path, in the order of the control structure."""
     links = {c.name: c for untimed_path in paths.untimed_paths for c in untimed_path.links}
     structure = paths.fault_paths.structure
-    known = structure.links if structure else {}
+    structure_links = structure.links if structure else {}
     order = [
-        *(name for name in known if name in links),
-        *(name for name in links if name not in known),
+        *(name for name in structure_links if name in links),
+        *(name for name in links if name not in structure_links),
     ]
     return {
-        name: (links[name].tail, links[name].tip, known[name].label if name in known else "")
+        name: (
+            links[name].tail,
+            links[name].tip,
+            structure_links[name].label if name in structure_links else "",
+        )
         for name in order
     }
 
 
-def _table(links: Links, counts: PathCounts, paths: RunPaths) -> TextTable:
+def _links_table(links: Links, counts: PathCounts, paths: RunFaultPaths) -> TextTable:
     rows = [
-        (paths.label(tail), paths.label(tip), carries, share_text(counts.through[name], came))
+        (paths.label(tail), paths.label(tip), carries, describe_passed_share(counts.through[name], came))
         for name, (tail, tip, carries) in links.items()
         if (came := counts.came[name])
     ]
@@ -119,15 +134,15 @@ def _table(links: Links, counts: PathCounts, paths: RunPaths) -> TextTable:
     )
 
 
-def _stops(counts: Mapping[str, PathCounts], paths: RunPaths) -> TextTable | None:
+def _masked_faults_table(counts: Mapping[str, PathCounts], paths: RunFaultPaths) -> TextTable | None:
     """Return the table of masked faults by fault type, with a column for each set of components that stopped
     them. None if no fault was masked.
     """
-    ends = sorted(counts[ALL].ends, key=lambda names: (len(names), list(map(paths.label, names))))
+    ends = sorted(counts[ALL_FAULT_TYPES].ends, key=lambda names: (len(names), list(map(paths.label, names))))
     if not ends:
         return None
     heads = ["fault type", "active", "masked", *(" and ".join(map(paths.label, names)) for names in ends)]
-    order = [*(kind for kind in counts if kind != ALL), ALL]
+    order = [*(kind for kind in counts if kind != ALL_FAULT_TYPES), ALL_FAULT_TYPES]
     rows: list[Sequence[str]] = [
         (
             kind,

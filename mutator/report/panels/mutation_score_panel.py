@@ -13,7 +13,7 @@ from mutator.statistics.mutation_score import mutation_score_sheet
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import plan_file
 
-_HTML = """\
+_HTML_TEMPLATE = """\
 <h2>{{ score.title }}</h2>
 <p>{{ score.note | marked }}</p>
 {{ general.table().as_html("score") }}
@@ -35,7 +35,9 @@ def build_mutation_score_panel(run: ReportedRun) -> Panel | None:
         alerts_by_drive(runs) if runs else None,
         run.folder.head.operators,
     )
-    html = rendered(_HTML, score=score, general=_part(score, False), functions=_part(score, True))
+    html = rendered(
+        _HTML_TEMPLATE, score=score, general=_score_part(score, False), functions=_score_part(score, True)
+    )
     return Panel(
         anchor="score",
         link="Score",
@@ -46,6 +48,6 @@ def build_mutation_score_panel(run: ReportedRun) -> Panel | None:
     )
 
 
-def _part(score: Sheet, of_functions: bool) -> Sheet:
+def _score_part(score: Sheet, of_functions: bool) -> Sheet:
     """Return the lines of functions if `of_functions`; otherwise all other lines."""
     return replace(score, lines=tuple(line for line in score.lines if ("::" in str(line[0])) == of_functions))

@@ -9,9 +9,13 @@ from mutator.store.approvals import approval_summary
 from mutator.store.run_head import HEAD
 from mutator.store.work_stretches import describe_stretches, package_versions
 
-PACKAGES = ("jinja2", "libcst", "numpy")  # packages that build mutants and compare runs; run.json lists all
-_NOTE = "The seal does not cover this. Whoever can write to the run folder can change it unnoticed."
-_HTML = """\
+LISTED_PACKAGES = (
+    "jinja2",
+    "libcst",
+    "numpy",
+)  # packages that build mutants and compare runs; run.json lists all
+_UNSEALED_NOTE = "The seal does not cover this. Whoever can write to the run folder can change it unnoticed."
+_HTML_TEMPLATE = """\
 {% if engines %}
 <h2>How the experiments were run</h2>
 <p>{{ engines.equivalence_text }}</p>
@@ -27,18 +31,22 @@ _HTML = """\
 
 def build_provenance_panel(run: ReportedRun) -> Panel:
     """Return the panel with engines, equivalence check, plan, choices, sources and versions."""
-    engines, facts = run.engines, _facts(run)
+    engines, facts = run.engines, _provenance_facts(run)
     unsealed = list(unsealed_facts(run.folder).items())
     parts = []
     if engines:
         parts += ["## How the experiments were run", engines.equivalence_text, engines.table.as_markdown()]
     parts += ["## Origin of the results", TextTable(heads=("what", "value"), rows=facts).as_markdown()]
-    parts += ["### Not sealed", _NOTE, TextTable(heads=("what", "value"), rows=unsealed).as_markdown()]
+    parts += [
+        "### Not sealed",
+        _UNSEALED_NOTE,
+        TextTable(heads=("what", "value"), rows=unsealed).as_markdown(),
+    ]
     tables = {"facts": facts, "unsealed": unsealed}
     html = rendered(
-        _HTML,
+        _HTML_TEMPLATE,
         engines=engines,
-        note=_NOTE,
+        note=_UNSEALED_NOTE,
         **{
             name: TextTable(heads=("", ""), rows=rows, has_row_headings=True) for name, rows in tables.items()
         },
@@ -46,7 +54,7 @@ def build_provenance_panel(run: ReportedRun) -> Panel:
     return Panel(anchor="origin", link="Origin", markdown="\n\n".join(parts), html=html)
 
 
-def _facts(run: ReportedRun) -> list[tuple[str, str]]:
+def _provenance_facts(run: ReportedRun) -> list[tuple[str, str]]:
     folder = run.folder
     reviewed = approval_summary(folder.path)
     head, packages = folder.head, package_versions(folder.stretches)
@@ -57,7 +65,7 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
         **({"reviewed": reviewed} if reviewed else {}),
         **digests_or_why_no_seal(folder),
         "campaign": head.campaign,
-        **_study(run),
+        **_study_fact(run),
         "plan": head.plan,
         **(
             {"seed": seeds[0]} if len(seeds := folder.seeds) == 1 else {"seeds": f"{seeds[0]} to {seeds[-1]}"}
@@ -67,20 +75,22 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
         **{f"digest of {name}": value for name, value in head.sources.items()},
         "mutator": head.provenance.mutator,
         **{name: text for name, text in describe_stretches(folder.stretches).items() if name == "python"},
-        **{name: packages[name] for name in PACKAGES if name in packages},
+        **{name: packages[name] for name in LISTED_PACKAGES if name in packages},
     }
     return [(name, str(value)) for name, value in facts.items()]
 
 
-def _study(run: ReportedRun) -> dict[str, str]:
+def _study_fact(run: ReportedRun) -> dict[str, str]:
     """Return the study that the campaign names, and the reason if this report is not compared with it."""
     name = run.folder.head.study
     if not name:
         return {}
     if run.study and run.workspace:
         problems = study_problems(name, run.study, run.workspace)
-        silent = "" if run.compared else "; these results cannot be compared with it"
-        why = f"; problem with its data (see `mutator check`): {problems[0].got}" if problems else silent
+        not_compared = "" if run.compared else "; these results cannot be compared with it"
+        why = (
+            f"; problem with its data (see `mutator check`): {problems[0].got}" if problems else not_compared
+        )
         return {"study": f"{name} ({run.study.about}){why}"}
     why = "cannot be loaded here" if run.workspace else "needs a fault library, but none was found"
     return {"study": f"{name}, which {why}"}

@@ -7,7 +7,7 @@ from mutator.report.reported_run import ReportedRun
 from mutator.statistics.seed_spread import ALL_FAULTS, seeds_by_fault_type_sheet, seeds_of, seeds_sheet
 from mutator.statistics.statistics_sheet import Sheet, cell_text
 
-_HTML = """\
+_HTML_TEMPLATE = """\
 <h2>Seeds</h2>
 <p>{{ about }}</p>
 {% for sheet in sheets %}
@@ -28,18 +28,18 @@ def build_seeds_panel(run: ReportedRun) -> Panel | None:
     sheets = (seeds_sheet(run.frame, alerts=run.folder.has_alerts), seeds_by_fault_type_sheet(run.frame))
     about = f"{len(seeds)} seeds ({seeds[0]} to {seeds[-1]}). Each seed repeats the campaign with new draws."
     markdown = "\n\n".join(["## Seeds", about, *(f"#{sheet.as_markdown().rstrip()}" for sheet in sheets)])
-    html = rendered(_HTML, about=about, sheets=sheets)
+    html = rendered(_HTML_TEMPLATE, about=about, sheets=sheets)
     return Panel(
         anchor="seeds",
         link="Seeds",
         markdown=markdown,
         html=html,
-        summary=_summary(sheets[0]),
+        summary=_summary_table(sheets[0]),
         files=sheet_files(sheets),
     )
 
 
-def _summary(sheet: Sheet) -> TextTable:
+def _summary_table(sheet: Sheet) -> TextTable:
     """Return the lines over all faults, with fewer columns."""
     rows = []
     for faults, part, whole, share, *cells, _ in sheet.lines:

@@ -14,23 +14,23 @@ from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
-from mutator.report.source_lines import ENDINGS, LASTING, Mark, MarkedFile
+from mutator.report.source_lines import ENDINGS_WORST_FIRST, LASTING_VALUES, LineMark, MarkedFile
 
-_SIGNS = dict(zip(ENDINGS, "HCTAMN", strict=True))  # sign shown with a mark's colour
-_MEANINGS = dict(
+_ENDING_SIGNS = dict(zip(ENDINGS_WORST_FIRST, "HCTAMN", strict=True))  # sign shown with a mark's colour
+_ENDING_MEANINGS = dict(
     zip(
-        ENDINGS,
+        ENDINGS_WORST_FIRST,
         ("hazard", "crash", "timeout", "actuator changed", "masked: no actuator changed", "not activated"),
         strict=True,
     )
 )
-_LISTED = 20  # maximum number of lines listed in Markdown
-_ABOUT = (
+_MOST_LISTED_LINES = 20  # maximum number of lines listed in Markdown
+_INTRODUCTION = (
     "Functions with injected faults. Each line shows the worst outcome of its permanent mutants and, next to "
     "it, of its transient ones, with the number of mutants that had it. A mutant is counted by its worst "
     "experiment; harness errors are not counted."
 )
-_HTML = """\
+_HTML_TEMPLATE = """\
 <h2>Source</h2>
 {% if why %}
 <p>{{ why | marked }}</p>
@@ -42,7 +42,7 @@ _HTML = """\
 <span><b>H 2/5</b> a hazard for 2 of the line's 5 mutants</span></p>
 {% for file in files %}
 <details class="source-file"{{ " open" if loop.first }}>
-<summary><h3><code>{{ file.path }}</code></h3> <span class="quiet">{{ told(file) }}</span></summary>
+<summary><h3><code>{{ file.path }}</code></h3> <span class="quiet">{{ describe(file) }}</span></summary>
 <div class="scroll" tabindex="0" role="group" aria-label="Source of {{ file.path }}">
 <table class="plain source">
 <thead><tr><th scope="col">line</th>{% for name in lasting %}<th scope="col">{{ name }}</th>{% endfor %}
@@ -54,12 +54,12 @@ _HTML = """\
 {% endfor %}
 {% endif %}
 """
-_ROW = Markup('<tr><td class="no">{}</td>{}{}<td class="text"><code>{}</code></td></tr>\n')
-_GAP = Markup('<tr class="gap"><td colspan="4">{}</td></tr>\n')
-_EMPTY = Markup("<td></td>")
-_MARK = Markup('<td class="mark {}"><a href="#{}" title="{}" aria-label="{}">{}</a></td>')
-_PART = Markup('<span class="py-{}">{}</span>')
-_CLASSES = {tokenize.COMMENT: "comment", tokenize.NUMBER: "number", tokenize.STRING: "string"}
+_ROW_HTML = Markup('<tr><td class="no">{}</td>{}{}<td class="text"><code>{}</code></td></tr>\n')
+_GAP_HTML = Markup('<tr class="gap"><td colspan="4">{}</td></tr>\n')
+_EMPTY_CELL_HTML = Markup("<td></td>")
+_MARK_HTML = Markup('<td class="mark {}"><a href="#{}" title="{}" aria-label="{}">{}</a></td>')
+_TOKEN_HTML = Markup('<span class="py-{}">{}</span>')
+_CSS_CLASS_BY_TOKEN = {tokenize.COMMENT: "comment", tokenize.NUMBER: "number", tokenize.STRING: "string"}
 
 
 def build_source_panel(run: ReportedRun) -> Panel | None:
@@ -67,97 +67,102 @@ def build_source_panel(run: ReportedRun) -> Panel | None:
     source = run.source
     if source is None:
         return None
-    worst = _worst(source.files)
-    parts = ["## Source", source.why or _ABOUT, *([worst.as_markdown()] if worst.rows else ())]
+    worst = _worst_lines_table(source.files)
+    parts = ["## Source", source.why or _INTRODUCTION, *([worst.as_markdown()] if worst.rows else ())]
     html = rendered(
-        _HTML,
+        _HTML_TEMPLATE,
         why=source.why,
-        about=_ABOUT,
-        signs=_SIGNS,
-        meanings=_MEANINGS,
+        about=_INTRODUCTION,
+        signs=_ENDING_SIGNS,
+        meanings=_ENDING_MEANINGS,
         files=source.files,
-        lasting=LASTING,
-        told=_told,
-        rows=_rows,
+        lasting=LASTING_VALUES,
+        describe=_describe_file,
+        rows=_rows_html,
     )
     return Panel(
         anchor="source", link="Source", markdown="\n\n".join(parts), html=html, style="report/source.css"
     )
 
 
-def _told(file: MarkedFile) -> str:
-    endings = [f"{_MEANINGS[name].partition(':')[0]} {n}" for name, n in file.worst_lines().items()]
+def _describe_file(file: MarkedFile) -> str:
+    endings = [f"{_ENDING_MEANINGS[name].partition(':')[0]} {n}" for name, n in file.worst_lines().items()]
     return f"{counted(len(file.marks), 'line')} with mutants, by worst outcome: {', '.join(endings)}"
 
 
-def _worst(files: Sequence[MarkedFile]) -> TextTable:
-    found = [
-        (min(ENDINGS.index(mark.ending) for mark in here.values()), number, line, here)
+def _worst_lines_table(files: Sequence[MarkedFile]) -> TextTable:
+    ranked_lines = [
+        (min(ENDINGS_WORST_FIRST.index(mark.ending) for mark in marks.values()), number, line, marks)
         for number, file in enumerate(files)
-        for line, here in file.marks.items()
+        for line, marks in file.marks.items()
     ]
     rows = [
         (
             f"{files[number].path}:{line}",
             f"`{files[number].lines[line - 1].strip()}`",
-            *(_words(here[name]) if name in here else "-" for name in LASTING),
+            *(_describe_mark(marks[name]) if name in marks else "-" for name in LASTING_VALUES),
         )
-        for _, number, line, here in sorted(found, key=lambda one: one[:3])[:_LISTED]
+        for _, number, line, marks in sorted(ranked_lines, key=lambda ranked: ranked[:3])[:_MOST_LISTED_LINES]
     ]
-    return TextTable(heads=("line", "source (the worst lines)", *LASTING), rows=rows)
+    return TextTable(heads=("line", "source (the worst lines)", *LASTING_VALUES), rows=rows)
 
 
-def _words(mark: Mark) -> str:
-    return f"{_MEANINGS[mark.ending].partition(':')[0]} {mark.worst}/{mark.mutants}"
+def _describe_mark(mark: LineMark) -> str:
+    return f"{_ENDING_MEANINGS[mark.ending].partition(':')[0]} {mark.worst}/{mark.mutants}"
 
 
-def _rows(file: MarkedFile) -> Markup:
-    texts, rows, last = _coloured(file), list[Markup](), 0
+def _rows_html(file: MarkedFile) -> Markup:
+    texts, rows, last = _coloured_lines(file), list[Markup](), 0
     for part in file.shown:
-        if left := part.start - last - 1:
-            rows.append(_GAP.format(f"{counted(left, 'line')} without faults"))
+        if gap := part.start - last - 1:
+            rows.append(_GAP_HTML.format(f"{counted(gap, 'line')} without faults"))
         for line in part:
-            rows.append(_row(file, line, texts[line - 1]))
+            rows.append(_row_html(file, line, texts[line - 1]))
         last = part.stop - 1
     return Markup("").join(rows)
 
 
-def _row(file: MarkedFile, line: int, text: Markup) -> Markup:
-    here, place = file.marks.get(line, {}), f"{file.path}:{line}"
-    cells = [_mark(here[name], line, place, name) if name in here else _EMPTY for name in LASTING]
+def _row_html(file: MarkedFile, line: int, text: Markup) -> Markup:
+    marks, place = file.marks.get(line, {}), f"{file.path}:{line}"
+    cells = [
+        _mark_html(marks[name], line, place, name) if name in marks else _EMPTY_CELL_HTML
+        for name in LASTING_VALUES
+    ]
     number = Markup('<a href="#{}" title="list the experiments of line {}">{}</a>').format(
-        _query(place), line, line
+        _search_fragment(place), line, line
     )
-    return _ROW.format(number if here else line, *cells, text)
+    return _ROW_HTML.format(number if marks else line, *cells, text)
 
 
-def _mark(mark: Mark, line: int, place: str, lasting: str) -> Markup:
+def _mark_html(mark: LineMark, line: int, place: str, lasting: str) -> Markup:
     share = f"{mark.worst}/{mark.mutants}"
-    words = f"line {line}, {lasting}: {_MEANINGS[mark.ending]} for {mark.worst} of "
+    words = f"line {line}, {lasting}: {_ENDING_MEANINGS[mark.ending]} for {mark.worst} of "
     words += counted(mark.mutants, "mutant")
-    query = _query(place, f"lasting={lasting}")
-    return _MARK.format(mark.ending, query, words, words, f"{_SIGNS[mark.ending]} {share}")
+    query = _search_fragment(place, f"lasting={lasting}")
+    return _MARK_HTML.format(mark.ending, query, words, words, f"{_ENDING_SIGNS[mark.ending]} {share}")
 
 
-def _query(place: str, *more: str) -> str:
+def _search_fragment(place: str, *more: str) -> str:
     """Return the URL fragment that searches the list of experiments (web/report/state.js)."""
     return f"q={quote(' '.join((f'line={place}', *more)), safe='')}"
 
 
-def _coloured(file: MarkedFile) -> list[Markup]:
+def _coloured_lines(file: MarkedFile) -> list[Markup]:
     """Return the lines of a file as HTML, coloured as in diffs."""
-    made, done = [Markup("")] * len(file.lines), [0] * len(file.lines)
-    for line, start, end, name in _parts(file):
-        text, begin = file.lines[line], max(start, done[line])
-        made[line] += escape(text[done[line] : begin]) + _PART.format(name, text[begin:end])
-        done[line] = max(end, begin)
-    return [html + escape(text[end:]) for html, text, end in zip(made, file.lines, done, strict=True)]
+    coloured, coloured_to = [Markup("")] * len(file.lines), [0] * len(file.lines)
+    for line, start, end, name in _coloured_parts(file):
+        text, begin = file.lines[line], max(start, coloured_to[line])
+        coloured[line] += escape(text[coloured_to[line] : begin]) + _TOKEN_HTML.format(name, text[begin:end])
+        coloured_to[line] = max(end, begin)
+    return [
+        html + escape(text[end:]) for html, text, end in zip(coloured, file.lines, coloured_to, strict=True)
+    ]
 
 
-def _parts(file: MarkedFile) -> Iterator[tuple[int, int, int, str]]:
+def _coloured_parts(file: MarkedFile) -> Iterator[tuple[int, int, int, str]]:
     """Yield the coloured parts in source order: line (from 0), first and last column, and CSS class."""
     for token in tokenize.tokenize(io.BytesIO(file.data).readline):
-        name = _CLASSES.get(token.type, "")
+        name = _CSS_CLASS_BY_TOKEN.get(token.type, "")
         if token.type == tokenize.NAME and keyword.iskeyword(token.string):
             name = "keyword"
         elif tokenize.tok_name[token.type].startswith(("FSTRING", "TSTRING")):

@@ -15,20 +15,20 @@ from mutator.statistics.sheet_selection import run_sheets
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store.run_folder import RunFolder
 
-FOLDER = "tables"  # a folder of the report
-NOTES = (
+TABLES_FOLDER = "tables"  # a folder of the report
+COUNTS_NOTE = (
     "*Injected*: experiments with a valid result. Harness errors and invalid mutants are counted "
     "separately. *Activated*: an injected statement ran while the trigger held. "
     "*Manifested*: an actuator output then differed from the fault-free run."
 )
-NO_ALERT = " *Hazard, no alert*: no alert at all, before or after the hazard."
-FAULT_FREE = "The golden runs: first times of alerts and hazards, and the range of each plotted channel."
-_GROUPS = (
+NO_ALERT_NOTE = " *Hazard, no alert*: no alert at all, before or after the hazard."
+FAULT_FREE_NOTE = "The golden runs: first times of alerts and hazards, and the range of each plotted channel."
+_GROUPINGS = (
     ("By fault type", "fault type", fault_types_of),
     ("By scenario", "scenario", itemgetter("scenario")),
     ("By method", "method", itemgetter("method")),
 )
-_HTML = """\
+_HTML_TEMPLATE = """\
 <h2>{{ title }}</h2>
 {% for title, table in counts %}
 <details class="table"{{ " open" if loop.first }}>
@@ -56,9 +56,9 @@ _HTML = """\
 """
 
 
-def notes(folder: RunFolder) -> str:
+def counts_note(folder: RunFolder) -> str:
     note = f" {folder.stop_note}" if folder.stop_note else ""
-    return NOTES + (NO_ALERT + note if folder.has_alerts else "")
+    return COUNTS_NOTE + (NO_ALERT_NOTE + note if folder.has_alerts else "")
 
 
 def build_tables_panel(run: ReportedRun) -> Panel:
@@ -66,23 +66,29 @@ def build_tables_panel(run: ReportedRun) -> Panel:
     page.
     """
     runs = run.fault_free()
-    note = fault_free_alerts_note(runs)
-    own = () if run.compared else _statistics(run, None)
-    counts, sheets = _counts(run), [_noted(sheet, note) for sheet in (*own, *_spreads(run))]
-    parts = [notes(run.folder)]
+    golden_alerts_note = fault_free_alerts_note(runs)
+    statistic_sheets = () if run.compared else _statistic_sheets(run, None)
+    counts, sheets = (
+        _count_tables(run),
+        [
+            _with_alerts_note(sheet, golden_alerts_note)
+            for sheet in (*statistic_sheets, *_distribution_sheets(run))
+        ],
+    )
+    parts = [counts_note(run.folder)]
     for title, table in counts:
-        parts += filter(None, (f"## {title}", note, table.as_markdown()))
+        parts += filter(None, (f"## {title}", golden_alerts_note, table.as_markdown()))
     fault_free = fault_free_table(runs, alerts=run.folder.has_alerts) if runs else None
     if fault_free:
-        parts += ["## Fault-free runs", FAULT_FREE, fault_free.as_markdown()]
+        parts += ["## Fault-free runs", FAULT_FREE_NOTE, fault_free.as_markdown()]
     parts += [sheet.as_markdown().rstrip() for sheet in sheets]
     html = rendered(
-        _HTML,
+        _HTML_TEMPLATE,
         title="Tables",
         counts=counts,
-        note=note,
+        note=golden_alerts_note,
         fault_free=fault_free,
-        about=FAULT_FREE,
+        about=FAULT_FREE_NOTE,
         sheets=sheets,
     )
     return Panel(
@@ -98,42 +104,42 @@ def build_published_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of the run's statistics next to the published ones of its study; None if there are
     none.
     """
-    note = fault_free_alerts_note(run.fault_free())
+    golden_alerts_note = fault_free_alerts_note(run.fault_free())
     published = run.study.published(run) if run.study else None
-    sheets = [_noted(sheet, note) for sheet in _statistics(run, published)]
+    sheets = [_with_alerts_note(sheet, golden_alerts_note) for sheet in _statistic_sheets(run, published)]
     if not sheets:
         return None
     title = "Tables next to the published ones"
     markdown = "\n\n".join([f"## {title}", *(f"#{sheet.as_markdown().rstrip()}" for sheet in sheets)])
-    html = rendered(_HTML, title=title, counts=(), fault_free=None, sheets=sheets)
+    html = rendered(_HTML_TEMPLATE, title=title, counts=(), fault_free=None, sheets=sheets)
     return Panel(anchor="tables", link="Tables", markdown=markdown, html=html, files=sheet_files(sheets))
 
 
-def _counts(run: ReportedRun) -> list[tuple[str, TextTable]]:
+def _count_tables(run: ReportedRun) -> list[tuple[str, TextTable]]:
     hazards = hazard_names(run.results)
-    made = []
-    for title, head, groups in _GROUPS:
+    tables = []
+    for title, head, groups in _GROUPINGS:
         counts = count_outcomes(run.results, groups(run.results))
         heads, lines = count_table(counts, head, hazards, alerts=run.folder.has_alerts)
-        made.append((title, TextTable(heads=heads, rows=lines, right_aligned=range(1, len(heads)))))
-    return made
+        tables.append((title, TextTable(heads=heads, rows=lines, right_aligned=range(1, len(heads)))))
+    return tables
 
 
-def _statistics(run: ReportedRun, published: PublishedCounts | None) -> tuple[Sheet, ...]:
+def _statistic_sheets(run: ReportedRun, published: PublishedCounts | None) -> tuple[Sheet, ...]:
     alerts = run.seen.alerts if run.folder.has_alerts else None
     return run_sheets(run.frame, published, alerts, run.ends())
 
 
-def _spreads(run: ReportedRun) -> tuple[Sheet, ...]:
-    made = (
+def _distribution_sheets(run: ReportedRun) -> tuple[Sheet, ...]:
+    sheets = (
         severity_sheet(run.frame),
         fault_tolerant_times_sheet(run.frame, alerts=run.folder.has_alerts),
         metrics_sheet(run.frame, run.folder.head.metrics),
     )
-    return tuple(sheet for sheet in made if sheet.lines)
+    return tuple(sheet for sheet in sheets if sheet.lines)
 
 
-def _noted(sheet: Sheet, note: str) -> Sheet:
+def _with_alerts_note(sheet: Sheet, note: str) -> Sheet:
     words = (sheet.title, *sheet.heads, *(line[0] for line in sheet.lines))
     if not note or not any("alert" in str(word).lower() for word in words):
         return sheet
@@ -142,9 +148,9 @@ def _noted(sheet: Sheet, note: str) -> Sheet:
 
 def sheet_files(sheets: Collection[Sheet]) -> dict[str, bytes]:
     """Each table as tables/<name>.csv and <name>.md."""
-    texts = {f"{FOLDER}/{sheet.name}.md": sheet.as_markdown().encode() for sheet in sheets}
+    texts = {f"{TABLES_FOLDER}/{sheet.name}.md": sheet.as_markdown().encode() for sheet in sheets}
     return texts | csv_files(sheets)
 
 
 def csv_files(sheets: Collection[Sheet]) -> dict[str, bytes]:
-    return {f"{FOLDER}/{sheet.name}.csv": sheet.as_csv().encode() for sheet in sheets}
+    return {f"{TABLES_FOLDER}/{sheet.name}.csv": sheet.as_csv().encode() for sheet in sheets}

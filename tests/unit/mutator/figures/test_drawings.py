@@ -32,7 +32,7 @@ def texts(svg: bytes) -> list[str]:
 
 
 def test_each_run_with_a_hazard_is_in_exactly_one_part_of_a_bar(frame: pd.DataFrame) -> None:
-    assert list(hazards_by_fault_type.hazard_sets(frame)) == ["H1", "several", "", "", "", "H2"]
+    assert list(hazards_by_fault_type.hazard_labels(frame)) == ["H1", "several", "", "", "", "H2"]
 
 
 def test_hazard_bars_show_counts(frame: pd.DataFrame) -> None:

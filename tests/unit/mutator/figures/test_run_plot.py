@@ -12,11 +12,11 @@ from mutator.errors import MutatorError
 from mutator.figures.run_plot import (
     LATER_COLOUR,
     MARK_COLOURS,
-    Mark,
-    MarkKind,
+    EventKind,
+    EventMark,
     draw_run,
-    marks_of,
-    save,
+    event_marks,
+    save_figure,
 )
 from mutator.model import Activation, Outcome, Record, Status
 from mutator.targets.channels import Channel
@@ -39,9 +39,9 @@ def trace(offset: float = 0.0) -> dict[str, np.ndarray]:
 
 
 def test_an_svg_contains_channels_units_and_marks(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    mark = Mark(kind=MarkKind.HAZARD, t=1.5, label="H1")
+    mark = EventMark(kind=EventKind.HAZARD, t=1.5, label="H1")
     figure = draw_run(trace(), trace(0.1), manifest, title="chaff 35 m", marks=[mark])
-    save(figure, [tmp_path / "p.svg"])
+    save_figure(figure, [tmp_path / "p.svg"])
     root = ET.parse(tmp_path / "p.svg").getroot()
     text = " ".join("".join(e.itertext()) for e in root.iter("{http://www.w3.org/2000/svg}text"))
     for wanted in (
@@ -62,7 +62,7 @@ def test_an_svg_contains_channels_units_and_marks(tmp_path: Path, manifest: Simp
 def test_everything_after_the_end_of_the_drive_is_grey(manifest: SimpleNamespace) -> None:
     faulty = trace()
     faulty["gas"] = np.where(TIME > 2.0, -500.0, faulty["gas"])
-    marks = [Mark(kind=MarkKind.HAZARD, t=t, label="H") for t in (2.0, 2.5)]
+    marks = [EventMark(kind=EventKind.HAZARD, t=t, label="H") for t in (2.0, 2.5)]
     gas, _ = draw_run(trace(), faulty, manifest, title="x", marks=marks, end=2.0).axes
     golden_line, faulty_line, *later = gas.lines[:4]
     assert -1.0 < gas.get_ylim()[0] < 0.0 < 1.0 < gas.get_ylim()[1] < 2.0
@@ -70,19 +70,19 @@ def test_everything_after_the_end_of_the_drive_is_grey(manifest: SimpleNamespace
         assert np.nanmax(np.where(np.isnan(line.get_ydata()), np.nan, line.get_xdata())) == 2.0
     assert {line.get_color() for line in later} == {LATER_COLOUR}
     assert np.nanmin(later[1].get_ydata()) == -500.0
-    assert [line.get_color() for line in gas.lines[4:]] == [MARK_COLOURS[MarkKind.HAZARD], LATER_COLOUR]
+    assert [line.get_color() for line in gas.lines[4:]] == [MARK_COLOURS[EventKind.HAZARD], LATER_COLOUR]
     whole, _ = draw_run(trace(), faulty, manifest, title="x").axes
     assert (len(whole.lines), whole.get_ylim()[0] < -500.0) == (2, True)
 
 
 def test_a_plot_drawn_again_has_the_same_bytes(tmp_path: Path, manifest: SimpleNamespace) -> None:
     for name in ("a.svg", "b.svg"):
-        save(draw_run(trace(), trace(0.1), manifest, title="x"), [tmp_path / name])
+        save_figure(draw_run(trace(), trace(0.1), manifest, title="x"), [tmp_path / name])
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
 
 
 def test_a_file_with_the_suffix_png_is_a_png_image(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    save(draw_run(trace(), trace(), manifest, title="x"), [tmp_path / "p.png"])
+    save_figure(draw_run(trace(), trace(), manifest, title="x"), [tmp_path / "p.png"])
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -105,10 +105,10 @@ def test_marks_of_a_record_are_sorted_by_time() -> None:
         alerts=(("fcw", 16.0),),
         trace_digest="",
     )
-    kinds = [(m.kind, m.t) for m in marks_of(record)]
+    kinds = [(m.kind, m.t) for m in event_marks(record)]
     assert kinds == [
-        (MarkKind.TRIGGER, 6.94),
-        (MarkKind.MANIFEST, 7.0),
-        (MarkKind.ALERT, 16.0),
-        (MarkKind.HAZARD, 18.0),
+        (EventKind.TRIGGER, 6.94),
+        (EventKind.MANIFEST, 7.0),
+        (EventKind.ALERT, 16.0),
+        (EventKind.HAZARD, 18.0),
     ]

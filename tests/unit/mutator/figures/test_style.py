@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from mutator.figures import heat_map
-from mutator.figures.run_plot import save
-from mutator.figures.style import themed
+from mutator.figures.run_plot import save_figure
+from mutator.figures.style import with_page_theme
 
 _HOSTILE = "axes.facecolor: red\nfont.size: 30\nlines.linewidth: 9\nsvg.fonttype: path\ntext.usetex: True\n"
 _DRAW = """
@@ -31,7 +31,7 @@ def _draw(path: Path) -> bytes:
     line = {"kind": "a/b", "scenario": "S1", "method": "guided", "is_activated": True, "is_hazard": True}
     times = dict.fromkeys(("t_activation", "t_manifest", "t_hazard"), 1.0)
     flags = {"is_manifested": True, "is_alert": False}
-    save(heat_map.draw(pd.DataFrame([line | times | flags])), [path])
+    save_figure(heat_map.draw(pd.DataFrame([line | times | flags])), [path])
     return path.read_bytes()
 
 
@@ -76,7 +76,7 @@ def test_no_matplotlibrc_changes_a_figure(tmp_path: Path, kind: str) -> None:
 def test_a_figure_in_a_page_follows_the_theme(tmp_path: Path) -> None:
     _draw(tmp_path / "a.svg")
     svg = (tmp_path / "a.svg").read_text()
-    shown = themed(svg)
+    shown = with_page_theme(svg)
     assert 'style="fill: #ffffff"' in svg and "#000000" in svg
     assert 'style="fill: #ffffff"' not in shown and "#000000" not in shown
     assert "prefers-color-scheme: dark" in shown

@@ -3,7 +3,7 @@
 import re
 
 from mutator.mutants import injected_lines
-from mutator.web import asset
+from mutator.web import asset_text
 from mutator.workspace import Workspace
 
 
@@ -52,5 +52,5 @@ def test_pages_use_the_tags_defined_in_python() -> None:
     for tag in words["probe"]:
         assert injected_lines.tagged_line("x", tag) == f"x  {words['mark']}{tag}"
     assert words["probe"] == [injected_lines.IMPORT_TAG, injected_lines.OBSERVE_TAG]
-    assert "fi:" not in asset("shared/diff.js")
-    assert not re.search("|".join(rf"{tag}\W*\|" for tag in words["probe"]), asset("shared/diff.js"))
+    assert "fi:" not in asset_text("shared/diff.js")
+    assert not re.search("|".join(rf"{tag}\W*\|" for tag in words["probe"]), asset_text("shared/diff.js"))

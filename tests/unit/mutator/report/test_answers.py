@@ -19,7 +19,7 @@ from mutator.report.answer_parts import (
     filtered_list_fragment,
 )
 from mutator.report.answers import build_answers
-from mutator.report.fault_path_data import RunPaths
+from mutator.report.fault_path_data import RunFaultPaths
 from mutator.report.fix_order import fix_first_answer
 from mutator.report.most_dangerous import most_dangerous_answer
 from mutator.report.panels.answers_panel import build_answers_panel
@@ -181,7 +181,7 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
     frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(untimed_path=[0, 0, 1, -1])
     masked = frame[:1].assign(experiment_id="masked", outcome="masked", untimed_path=2)
     answer = fix_first_answer(
-        pd.concat([frame, masked]), cast(RunPaths, SimpleNamespace(**structure)), has_alerts=True
+        pd.concat([frame, masked]), cast(RunFaultPaths, SimpleNamespace(**structure)), has_alerts=True
     )
     [line] = answer.tables[0].rows
     silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"

@@ -11,7 +11,7 @@ from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.report import engine_summary, report_builder, report_digests
-from mutator.report.experiment_facts import timings_of
+from mutator.report.experiment_facts import timings_frame
 from mutator.results.table_building import build_tables
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.plan_choices import Choices
@@ -85,7 +85,7 @@ def write(path: Path, schema: str, lines: list[dict[str, object]]) -> None:
 
 def summary(run: Path) -> engine_summary.EngineSummary | None:
     folder = RunFolder.open(run)
-    return engine_summary.summarize_engines(folder, folder.records(), timings_of(folder))
+    return engine_summary.summarize_engines(folder, folder.records(), timings_frame(folder))
 
 
 def test_each_way_of_running_is_counted_with_its_reasons(finish: Finish) -> None:
@@ -171,10 +171,10 @@ def test_a_failed_proof_is_reported_first(finish: Finish) -> None:
 def test_new_results_of_the_proof_make_a_report_out_of_date(finish: Finish) -> None:
     run = finish(3)
     build_tables(run)
-    before = report_digests.made_from(RunFolder.open(run), None)
-    assert before == report_digests.made_from(RunFolder.open(run), None)
+    before = report_digests.inputs_digest(RunFolder.open(run), None)
+    assert before == report_digests.inputs_digest(RunFolder.open(run), None)
     write(run / "proof/0002-main.jsonl", SCHEMA, [])
-    assert before != report_digests.made_from(RunFolder.open(run), None)
+    assert before != report_digests.inputs_digest(RunFolder.open(run), None)
 
 
 def test_a_changed_trace_digest_makes_a_report_out_of_date(
@@ -183,13 +183,16 @@ def test_a_changed_trace_digest_makes_a_report_out_of_date(
     """The results do not contain the digests of traces."""
     run = finish(4)
     build_tables(run)
-    results, before = (run / "results.csv").read_bytes(), report_digests.made_from(RunFolder.open(run), None)
+    results, before = (
+        (run / "results.csv").read_bytes(),
+        report_digests.inputs_digest(RunFolder.open(run), None),
+    )
     path = run / "records/0001-main.jsonl"
     path.write_text(path.read_text().replace('"trace_digest":""', '"trace_digest":"0"'))
     reseal(run)
     build_tables(run)
     assert (run / "results.csv").read_bytes() == results
-    assert before != report_digests.made_from(RunFolder.open(run), None)
+    assert before != report_digests.inputs_digest(RunFolder.open(run), None)
 
 
 def test_a_failed_proof_is_reported_without_timings(finish: Finish) -> None:

@@ -9,7 +9,7 @@ import pytest
 from mutator._common.files import write_json
 from mutator.model import Experiment
 from mutator.report import experiment_list
-from mutator.report.experiment_facts import PLACE
+from mutator.report.experiment_facts import RANK_COLUMN
 from mutator.report.experiment_list import column_data, details_data, media_by_experiment, results_table_data
 from mutator.review.patch_shapes import shapes_of_patches
 from mutator.store.run_folder import RunFolder
@@ -50,7 +50,7 @@ def test_columns_are_numbers_dictionaries_or_texts(name: str, values: list[objec
 def test_a_target_without_alerts_has_no_alert_columns() -> None:
     line = {"fault_type": "chaff"}
     frame = results(line).assign(reading="", variant="", value=nan, unit="", detail="", outcome="")
-    frame = frame.assign(reaction_time=nan, **{PLACE: 0})
+    frame = frame.assign(reaction_time=nan, **{RANK_COLUMN: 0})
     names = [
         {made["name"] for made in results_table_data(frame, {}, has_alerts=has)["columns"]}
         for has in (True, False)
@@ -82,7 +82,9 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
     plots.mkdir()
     for name in ("aa-2.00s.jpg", "aa-10.00s.jpg", "aa.mp4", "bb.svg"):
         (plots / name).write_bytes(b"1234")
-    made = media_by_experiment(RunFolder.open_unverified(tmp_path), tmp_path / "report", most_embedded_bytes=5)
+    made = media_by_experiment(
+        RunFolder.open_unverified(tmp_path), tmp_path / "report", most_embedded_bytes=5
+    )
     assert made == {
         "aa": {
             "stills": [["2.00", "data:image/jpeg;base64,MTIzNA=="], ["10.00", "../plots/aa-10.00s.jpg"]],

@@ -14,8 +14,8 @@ from mutator.outcomes.fault_paths import (
     PathLink,
     UntimedPath,
 )
-from mutator.report.fault_path_data import PathCounts, RunPaths
-from mutator.report.path_drawing import draw_path_counts, drawn_counts
+from mutator.report.fault_path_data import PathCounts, RunFaultPaths
+from mutator.report.path_drawing import counts_for_drawing, draw_path_counts
 from mutator.stpa.analysis_files import load_hazard_analysis
 from mutator.targets.target_facts import ChannelFacts
 from mutator.workspace import Workspace
@@ -55,7 +55,9 @@ def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Recor
         "c": record("c", left=(("seen", 1.0, 2.0),)),
     }
     by_id = {"a": far, "c": held, "d": far}
-    found = RunPaths(fault_paths=FaultPaths(CHANNELS, None), channels=CHANNELS, by_id=by_id, records=records)
+    found = RunFaultPaths(
+        fault_paths=FaultPaths(CHANNELS, None), channels=CHANNELS, by_id=by_id, records=records
+    )
     data = found.data(["a", "b", "c", "d"])
     assert data["shape"] == [0, -1, 1, 0]
     assert data["shapes"][0] == [["eyes", "reached", 0], ["pedals", "reached", 1], ["car", "reached", 2]]
@@ -74,7 +76,7 @@ def test_the_page_filters_by_the_links_that_a_fault_got_through() -> None:
         )
         for one in (held, far)
     ]
-    found = RunPaths(
+    found = RunFaultPaths(
         fault_paths=FaultPaths(CHANNELS, None),
         channels=CHANNELS,
         by_id={},
@@ -115,7 +117,7 @@ def test_the_drawing_of_other_counts_is_the_one_that_the_page_changes_to(clone: 
     counts.through.update({links[0]: 1})
     counts.injected.update({name: 8})
     counts.masked.update({name: 2})
-    drawn = drawn_counts(structure, counts, links)
+    drawn = counts_for_drawing(structure, counts, links)
     assert drawn["active"] == 8
     assert drawn["links"][links[0]] == ("through", "2.5px", "1 of 8, 12 %")
     assert drawn["links"][links[1]] == ("stopped", "1.8px", "0 of 3, 0 %")

@@ -12,10 +12,10 @@ import pytest
 
 from mutator._common.files import write_json
 from mutator.errors import MutatorError, Outside
-from mutator.figures.style import themed
+from mutator.figures.style import with_page_theme
 from mutator.report import report_builder
 from mutator.report.panels import failed_runs_panel
-from mutator.report.report_digests import made_from
+from mutator.report.report_digests import inputs_digest
 from mutator.store import approvals
 from mutator.store.run_folder import STOP_NOTE, RunFolder
 from mutator.workspace import Workspace
@@ -86,7 +86,7 @@ def test_the_page_contains_results_diff_and_still_of_an_experiment(
 
 
 def test_a_link_leads_to_failed_runs_that_are_not_listed(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(failed_runs_panel, "PAGE_LISTED", 1)
+    monkeypatch.setattr(failed_runs_panel, "MOST_RUNS_ON_PAGE", 1)
     text = report_builder.write_report(run, None).page.read_text()
     assert "1 more: " in text
     assert "#status=crashed,timeout,invalid_mutant,harness_error" in text
@@ -127,7 +127,7 @@ def test_figures_are_in_the_markdown_and_in_the_page(run: Path) -> None:
     shown = [link for link in Page(written.page.read_text()).links if link.startswith("data:image/svg")]
     files = sorted((run / "report" / "figures").glob("*.svg"))
     embedded = [base64.b64decode(link.partition(",")[2]).decode() for link in shown]
-    assert sorted(embedded) == sorted(themed(file.read_text()) for file in files)
+    assert sorted(embedded) == sorted(with_page_theme(file.read_text()) for file in files)
     assert len(shown) == 3
     assert written.markdown.read_text().count("](figures/") == 3
 
@@ -222,9 +222,9 @@ def test_inputs_of_a_report_are_not_read_without_limit(run: Path) -> None:
         with (run / name).open("wb") as file:
             file.truncate(4_000_000_000_000)
     with pytest.raises(MutatorError, match=r"records/huge\.jsonl: 4,000,000,000,000 bytes"):
-        made_from(RunFolder.open_unverified(run), None)
+        inputs_digest(RunFolder.open_unverified(run), None)
     (run / "records/huge.jsonl").unlink()
-    assert made_from(RunFolder.open_unverified(run), None)
+    assert inputs_digest(RunFolder.open_unverified(run), None)
 
 
 @pytest.mark.parametrize("text", ["{", "[1]", '{"schema": "report/1"}', *STAMPS])

@@ -12,7 +12,7 @@ from mutator.report.experiment_list import _list_table_data, _listed_results
 from mutator.report.panels.mutation_score_panel import build_mutation_score_panel
 from mutator.report.panels.source_panel import build_source_panel
 from mutator.report.reported_run import ReportedRun
-from mutator.report.source_lines import Mark
+from mutator.report.source_lines import LineMark
 from mutator.results import table_building
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -58,8 +58,8 @@ def test_lines_have_the_worst_outcome_of_their_mutants(toycar: Workspace, run: P
     assert source is not None
     (file,) = source.files
     wanted = file.marks[at("wanted =")]
-    assert wanted["permanent"] == Mark(ending="hazard", worst=5, mutants=6)
-    assert wanted["transient"] == Mark(ending="masked", worst=6, mutants=6)
+    assert wanted["permanent"] == LineMark(ending="hazard", worst=5, mutants=6)
+    assert wanted["transient"] == LineMark(ending="masked", worst=6, mutants=6)
     assert at("gas =") not in file.marks and at("brake =") not in file.marks
     assert file.worst_lines() == {"hazard": 2}
     assert file.shown == (range(at("def drive"), len(file.lines) + 1),)

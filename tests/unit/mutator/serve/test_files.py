@@ -11,7 +11,7 @@ import pytest
 from mutator._common import shared_cache
 from mutator.errors import MutatorError
 from mutator.report import report_builder
-from mutator.report.report_digests import made_from, write_files
+from mutator.report.report_digests import inputs_digest, write_report_files
 from mutator.results import table_building
 from mutator.serve.page_tokens import PageTokens
 from mutator.serve.report_cache import ReportCache
@@ -203,7 +203,9 @@ def test_no_stored_report_is_served(client: Client, linked: Path, name: str) -> 
     path = linked / "report" / name
     path.parent.mkdir(parents=True)
     path.write_text(FORGED)
-    write_files(linked, made_from(RunFolder.open(linked), client.site.workspace), {name: FORGED.encode()})
+    write_report_files(
+        linked, inputs_digest(RunFolder.open(linked), client.site.workspace), {name: FORGED.encode()}
+    )
     answer = client.get(f"/runs/linked/report/{name}")
     assert answer.status == (200 if name in ("index.html", "REPORT.md") else 404)
     assert FORGED not in answer.text

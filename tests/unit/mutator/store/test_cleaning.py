@@ -10,7 +10,7 @@ from mutator._common.doors import EXPORTS
 from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
-from mutator.exports import Table, find_export
+from mutator.exports import ExportTable, find_export
 from mutator.store.allowed_contents import ALLOWED_FILE_GLOBS
 from mutator.store.cleaning import delete_run, finish_deletion
 from mutator.workspace import Workspace
@@ -44,7 +44,7 @@ def test_everything_that_a_run_wrote_is_deleted(run: Path) -> None:
 @pytest.mark.parametrize("name", EXPORTS.shipped_names())
 def test_the_file_of_each_export_is_no_stranger(run: Path, name: str) -> None:
     """A new format is one module, which cleaning need not know."""
-    for table in Table:
+    for table in ExportTable:
         made = run / "exports" / find_export(name).file.format(table=table.value)
         file = made if made.suffix else made / "1.mcap"
         file.parent.mkdir(parents=True, exist_ok=True)

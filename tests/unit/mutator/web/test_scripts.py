@@ -21,10 +21,10 @@ def test_scripts_pass_their_unit_tests() -> None:
     assert tests and done.returncode == 0, done.stdout
 
 
-@pytest.mark.parametrize("name", web.assets(".js"))
+@pytest.mark.parametrize("name", web.asset_names(".js"))
 def test_every_script_is_checked(name: str) -> None:
     """Editors check a script with this first line, as `tox -e lint` does."""
-    assert web.asset(name).startswith('// @ts-check\n"use strict";\n')
+    assert web.asset_text(name).startswith('// @ts-check\n"use strict";\n')
 
 
 def test_development_packages_are_pinned_without_the_address_of_a_registry() -> None:

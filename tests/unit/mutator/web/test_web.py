@@ -14,16 +14,16 @@ PAGES = ("comparison", "report", "review", "serve")
 def test_embedded_data_round_trip_and_are_reproducible() -> None:
     """Base64 cannot end a script element."""
     value = {"text": "</script> ⟨1⟩", "numbers": [0.1, None, 3]}
-    text = web.packed(value)
+    text = web.pack_json(value)
     assert json.loads(gzip.decompress(base64.b64decode(text))) == value
-    assert text == web.packed(value)
-    assert web.embedded(value, "here") == (
+    assert text == web.pack_json(value)
+    assert web.packed_script_element(value, "here") == (
         f'<script type="application/octet-stream+gzip" id="here">{text}</script>'
     )
 
 
 def test_plain_data_cannot_end_their_element() -> None:
-    element = web.plainly_embedded({"text": "</script><!--"}, "here")
+    element = web.json_script_element({"text": "</script><!--"}, "here")
     assert element.count("<") == 2
     text = element.removeprefix('<script type="application/json" id="here">').removesuffix("</script>")
     assert json.loads(text) == {"text": "</script><!--"}
@@ -32,18 +32,18 @@ def test_plain_data_cannot_end_their_element() -> None:
 def test_nan_is_refused() -> None:
     """A page cannot read NaN in JSON."""
     with pytest.raises(ValueError, match="JSON"):
-        web.packed([float("nan")])
+        web.pack_json([float("nan")])
 
 
-@pytest.mark.parametrize("name", [*web.assets(".css"), *web.assets(".js")])
+@pytest.mark.parametrize("name", [*web.asset_names(".css"), *web.asset_names(".js")])
 def test_assets_stay_small_and_cannot_end_their_element(name: str) -> None:
-    assert len(web.asset(name).splitlines()) <= 300
+    assert len(web.asset_text(name).splitlines()) <= 300
 
 
 def test_load_orders_name_every_script_once() -> None:
     """`home.html` loads start.js by its address. A report panel adds source.css."""
     orders = [web.load_order(page, ".js") for page in PAGES]
     assert all(len({*order}) == len(order) for order in orders)
-    assert {name for order in orders for name in order} == {*web.assets(".js")} - {"serve/start.js"}
+    assert {name for order in orders for name in order} == {*web.asset_names(".js")} - {"serve/start.js"}
     styles = {name for page in PAGES for name in web.load_order(page, ".css")}
-    assert styles == {*web.assets(".css")} - {"report/source.css"}
+    assert styles == {*web.asset_names(".css")} - {"report/source.css"}
