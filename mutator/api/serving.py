@@ -6,8 +6,8 @@ from pathlib import Path
 from mutator._common.folder_search import RUNS_FOLDER
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
-from mutator.serve.application import Site
-from mutator.serve.served_runs import Runs
+from mutator.serve.application import ServedSite
+from mutator.serve.served_runs import ServedRuns
 from mutator.serve.server import serve
 
 
@@ -30,5 +30,5 @@ def serve_runs(
         # runs/ appears with the first campaign, which can be started in the browser
         if not root.is_dir() and root != RUNS_FOLDER:
             raise MutatorError("no such folder", where=root, expected="a run folder, or a folder of them")
-    site = Site(workspace=open_workspace(workspace), runs=Runs(roots), at_once=most_parallel_jobs)
-    serve(site, port=port, ready=on_ready)
+    site = ServedSite(workspace=open_workspace(workspace), runs=ServedRuns(roots), most_parallel_jobs=most_parallel_jobs)
+    serve(site, port=port, on_ready=on_ready)

@@ -15,48 +15,48 @@ from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Re
 from starlette.routing import Route
 
 from mutator.errors import MutatorError, NotServed
-from mutator.serve.home import home_page, offered
-from mutator.serve.job_requests import TRIES, Desk, Work
-from mutator.serve.jobs import Jobs
-from mutator.serve.json_api import JobApi, ReviewApi, asked
-from mutator.serve.page_tokens import HOME, PageTokens, review_page
-from mutator.serve.report_pages import Shown
-from mutator.serve.responses import OpenFile, kind_of, on_error
-from mutator.serve.served_reviews import Reviews
-from mutator.serve.served_runs import Runs, open_file, report_of, told
+from mutator.serve.home import form_choices, home_page
+from mutator.serve.job_requests import TRIALS_FOLDER, JobCommand, RequestChecker
+from mutator.serve.jobs import ServeJobs
+from mutator.serve.json_api import JobApi, ReviewApi, selected_groups
+from mutator.serve.page_tokens import HOME_PAGE, PageTokens, review_page_name
+from mutator.serve.report_pages import RunPages
+from mutator.serve.responses import OpenFileResponse, media_type_of, on_error
+from mutator.serve.served_reviews import ServedReviews
+from mutator.serve.served_runs import ServedRuns, open_file, report_address, summarize_run
 from mutator.web import asset_names, asset_text
 from mutator.workspace import Workspace
 
-_PLOT = "plot.svg"
-Answer = Callable[[Request], Awaitable[Response]]
+_PLOT_FILE = "plot.svg"
+AsyncHandler = Callable[[Request], Awaitable[Response]]
 
 
 @dataclass(kw_only=True)
-class Site:
+class ServedSite:
     """The content of the server: a library, runs, and jobs (at most `at_once` at a time)."""
 
     workspace: Workspace
-    runs: Runs
+    runs: ServedRuns
     at_once: int = 1
     tokens: PageTokens = field(default_factory=PageTokens)
-    shown: Shown = field(init=False)
-    reviews: Reviews = field(init=False)
-    jobs: Jobs = field(init=False)
+    shown: RunPages = field(init=False)
+    reviews: ServedReviews = field(init=False)
+    jobs: ServeJobs = field(init=False)
 
     def __post_init__(self) -> None:
-        self.shown = Shown(self.workspace, self.runs, self.tokens)
-        self.reviews = Reviews(self.workspace)
-        self.jobs = Jobs(self.at_once, self._report_at)
+        self.shown = RunPages(self.workspace, self.runs, self.tokens)
+        self.reviews = ServedReviews(self.workspace)
+        self.jobs = ServeJobs(self.at_once, self._report_address)
 
     def told_runs(self) -> list[dict[str, Any]]:
-        return [told(key, path) for key, path in self.runs.folders().items()]
+        return [summarize_run(key, path) for key, path in self.runs.folders().items()]
 
-    def _report_at(self, work: Work) -> str | None:
-        key = self.runs.key_of(work.folder) if work.folder else None
-        return report_of(key) if key else None
+    def _report_address(self, command: JobCommand) -> str | None:
+        key = self.runs.key_of(command.folder) if command.folder else None
+        return report_address(key) if key else None
 
 
-def build_application(site: Site) -> Starlette:
+def build_application(site: ServedSite) -> Starlette:
     """Return the application without the checks of `security`; its shutdown ends the jobs."""
 
     @asynccontextmanager
@@ -65,87 +65,89 @@ def build_application(site: Site) -> Starlette:
         await run_in_threadpool(site.jobs.close)
 
     reviews = ReviewApi(site.reviews, site.runs, site.tokens)
-    jobs = JobApi(Desk(site.workspace, site.runs), site.jobs, site.tokens)
+    jobs = JobApi(RequestChecker(site.workspace, site.runs), site.jobs, site.tokens)
     routes = [
-        *_pages(site),
-        Route("/api/library", _quick(lambda _: JSONResponse(offered(site.workspace)))),
-        Route("/api/runs", _quick(lambda _: JSONResponse({"runs": site.told_runs()}))),
-        Route("/api/review/{target}", _quick(reviews.told)),
-        Route("/api/review/{target}", _sent(reviews.decide), methods=["POST"]),
-        Route("/api/review/{target}/{group}/changes", _quick(reviews.changes)),
-        Route("/api/review/{target}/{group}/pictures", _quick(reviews.levels)),
-        Route("/api/review/{target}/{group}/typical", _quick(reviews.typical)),
-        Route("/review/{target}/{group}/picture/{level}-before.jpg", _quick(reviews.before)),
-        Route("/review/{target}/{group}/picture/{level}-after.jpg", _quick(reviews.after)),
-        Route("/api/jobs", _quick(jobs.told)),
-        Route("/api/jobs", _sent(jobs.submit), methods=["POST"]),
-        Route("/api/jobs/{job}/log", _quick(jobs.log)),
-        Route("/api/jobs/{job}/cancel", _sent(jobs.cancel), methods=["POST"]),
+        *_page_routes(site),
+        Route("/api/library", _in_thread(lambda _: JSONResponse(form_choices(site.workspace)))),
+        Route("/api/runs", _in_thread(lambda _: JSONResponse({"runs": site.told_runs()}))),
+        Route("/api/review/{target}", _in_thread(reviews.told)),
+        Route("/api/review/{target}", _json_post(reviews.decide), methods=["POST"]),
+        Route("/api/review/{target}/{group}/changes", _in_thread(reviews.changes)),
+        Route("/api/review/{target}/{group}/pictures", _in_thread(reviews.levels)),
+        Route("/api/review/{target}/{group}/typical", _in_thread(reviews.typical)),
+        Route("/review/{target}/{group}/picture/{level}-before.jpg", _in_thread(reviews.before)),
+        Route("/review/{target}/{group}/picture/{level}-after.jpg", _in_thread(reviews.after)),
+        Route("/api/jobs", _in_thread(jobs.told)),
+        Route("/api/jobs", _json_post(jobs.submit), methods=["POST"]),
+        Route("/api/jobs/{job}/log", _in_thread(jobs.log)),
+        Route("/api/jobs/{job}/cancel", _json_post(jobs.cancel), methods=["POST"]),
     ]
     errors: dict[Any, Any] = dict.fromkeys((MutatorError, ValidationError, HTTPException), on_error)
     return Starlette(routes=routes, exception_handlers=errors, lifespan=lifespan)
 
 
-def _quick(answer: Callable[[Request], Response]) -> Answer:
+def _in_thread(answer: Callable[[Request], Response]) -> AsyncHandler:
     """Compute the response in a thread, so that other requests need not wait."""
 
-    async def answered(request: Request) -> Response:
+    async def handler(request: Request) -> Response:
         return await run_in_threadpool(answer, request)
 
-    return answered
+    return handler
 
 
-def _sent(answer: Callable[[Request, bytes], Response]) -> Answer:
-    async def answered(request: Request) -> Response:
-        kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-        if kind != "application/json":
+def _json_post(answer: Callable[[Request, bytes], Response]) -> AsyncHandler:
+    async def handler(request: Request) -> Response:
+        content_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+        if content_type != "application/json":
             raise HTTPException(415, "the content type is not application/json")
         return await run_in_threadpool(answer, request, await request.body())
 
-    return answered
+    return handler
 
 
-def _pages(site: Site) -> list[Route]:
+def _page_routes(site: ServedSite) -> list[Route]:
     def home(_: Request) -> Response:
-        return HTMLResponse(home_page(site.workspace, site.told_runs(), site.tokens.token(HOME)))
+        return HTMLResponse(home_page(site.workspace, site.told_runs(), site.tokens.token(HOME_PAGE)))
 
-    def run(request: Request) -> Response:
-        return RedirectResponse(report_of(request.path_params["run"]))
+    def redirect_to_report(request: Request) -> Response:
+        return RedirectResponse(report_address(request.path_params["run"]))
 
-    def in_run(request: Request) -> Response:
+    def run_file(request: Request) -> Response:
         return site.shown.file(request.path_params["run"], request.path_params["path"])
 
-    def compared(request: Request) -> Response:
-        given = request.path_params
-        return site.shown.comparison(given["a"], given["b"], given.get("name") or "index.html")
+    def comparison_file(request: Request) -> Response:
+        parameters = request.path_params
+        return site.shown.comparison(parameters["a"], parameters["b"], parameters.get("name") or "index.html")
 
-    def plot(request: Request) -> Response:
-        tried = re.fullmatch(r"[0-9a-f]{16}", request.path_params["name"])
-        if tried is None:
+    def trial_plot(request: Request) -> Response:
+        trial_name = re.fullmatch(r"[0-9a-f]{16}", request.path_params["name"])
+        if trial_name is None:
             raise NotServed("no such plot")
-        return OpenFile(open_file(site.runs.new, f"{TRIES}/{tried[0]}/{_PLOT}"), _PLOT)
+        return OpenFileResponse(
+            open_file(site.runs.new, f"{TRIALS_FOLDER}/{trial_name[0]}/{_PLOT_FILE}"), _PLOT_FILE
+        )
 
-    def review(request: Request) -> Response:
-        chosen = asked(site.reviews, request)
-        own = [run for run in site.told_runs() if run["target"] == chosen.target]
-        runs = [{"key": run["key"], "name": run["key"]} for run in own]
-        token = site.tokens.token(review_page(chosen.target))
-        return HTMLResponse(site.reviews.page(chosen, request.url.query, runs, token))
+    def review_html(request: Request) -> Response:
+        selection = selected_groups(site.reviews, request)
+        runs_of_target = [run for run in site.told_runs() if run["target"] == selection.target]
+        runs = [{"key": run["key"], "name": run["key"]} for run in runs_of_target]
+        token = site.tokens.token(review_page_name(selection.target))
+        return HTMLResponse(site.reviews.page(selection, request.url.query, runs, token))
 
     return [
-        Route("/", _quick(home)),
-        Route("/assets/{name:path}", _quick(_own)),
-        Route("/runs/{run}/", _quick(run)),
-        Route("/runs/{run}/{path:path}", _quick(in_run)),
-        Route("/compare/{a}/{b}/", _quick(compared)),
-        Route("/compare/{a}/{b}/{name}", _quick(compared)),
-        Route(f"/{TRIES}/{{name}}/{_PLOT}", _quick(plot)),
-        Route("/review/{target}", _quick(review)),
+        Route("/", _in_thread(home)),
+        Route("/assets/{name:path}", _in_thread(_asset_response)),
+        Route("/runs/{run}/", _in_thread(redirect_to_report)),
+        Route("/runs/{run}/{path:path}", _in_thread(run_file)),
+        Route("/compare/{a}/{b}/", _in_thread(comparison_file)),
+        Route("/compare/{a}/{b}/{name}", _in_thread(comparison_file)),
+        Route(f"/{TRIALS_FOLDER}/{{name}}/{_PLOT_FILE}", _in_thread(trial_plot)),
+        Route("/review/{target}", _in_thread(review_html)),
     ]
 
 
-def _own(request: Request) -> Response:
+def _asset_response(request: Request) -> Response:
     name = request.path_params["name"]
     if name not in (*asset_names(".js"), *asset_names(".css")):
         raise NotServed("no such file")
-    return Response(asset_text(name), media_type=kind_of(name))
+    return Response(asset_text(name), media_type=media_type_of(name))

@@ -10,29 +10,29 @@ from typing import Any, cast
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-REQUEST_S = 10.0  # time for a whole request to arrive
-_MOST = 100  # connections; a browser opens six
-_SHARE = 4  # connections use at most this fraction of the descriptors
+MOST_REQUEST_S = 10.0  # time for a whole request to arrive
+_MOST_CONNECTIONS = 100  # connections; a browser opens six
+_DESCRIPTORS_PER_CONNECTION = 4  # connections use at most this fraction of the descriptors
 
 
 class Connection(H11Protocol):
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        self._since = self.loop.time()
-        self._limit: asyncio.TimerHandle | None = None
+        self._opened_at = self.loop.time()
+        self._request_timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
         self._expect_request()
-        others = [cast(Connection, one) for one in self.connections if one is not self]
-        others = [one for one in others if not one.transport.is_closing()]
+        others = [cast(Connection, other) for other in self.connections if other is not self]
+        others = [other for other in others if not other.transport.is_closing()]
         if len(others) >= _most_connections():
-            min(others, key=lambda one: (one._is_answering, one._since)).transport.abort()
+            min(others, key=lambda one: (one._is_answering, one._opened_at)).transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
         super().connection_lost(exc)
-        if self._limit:
-            self._limit.cancel()
+        if self._request_timer:
+            self._request_timer.cancel()
 
     def on_response_complete(self) -> None:
         self._expect_request()  # first, because the next request can already be here
@@ -45,9 +45,9 @@ class Connection(H11Protocol):
         return cycle is not None and not cycle.response_complete and not cycle.more_body
 
     def _expect_request(self) -> None:
-        if self._limit:
-            self._limit.cancel()
-        self._limit = self.loop.call_later(REQUEST_S, self._end_if_idle)
+        if self._request_timer:
+            self._request_timer.cancel()
+        self._request_timer = self.loop.call_later(MOST_REQUEST_S, self._end_if_idle)
 
     def _end_if_idle(self) -> None:
         if not self._is_answering:
@@ -55,4 +55,6 @@ class Connection(H11Protocol):
 
 
 def _most_connections() -> int:
-    return min(_MOST, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // _SHARE)
+    return min(
+        _MOST_CONNECTIONS, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // _DESCRIPTORS_PER_CONNECTION
+    )

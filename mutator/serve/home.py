@@ -15,34 +15,34 @@ _MOST_PAIRS = 20  # pairs of runs offered for comparison
 
 def home_page(workspace: Workspace, runs: Sequence[Mapping[str, Any]], token: str) -> str:
     targets = tuple(workspace.targets)
-    return _rendered("home.html", runs=runs, pairs=_pairs(runs), targets=targets, token=token)
+    return _render_page("home.html", runs=runs, pairs=_comparable_pairs(runs), targets=targets, token=token)
 
 
 def error_page(facts: Mapping[str, Any]) -> str:
-    return _rendered("error.html", **facts)
+    return _render_page("error.html", **facts)
 
 
-def offered(workspace: Workspace) -> dict[str, Any]:
+def form_choices(workspace: Workspace) -> dict[str, Any]:
     """Return the choices in the forms. The first entry that cannot be read is reported as `problem`."""
     names = ("targets", "scenarios", "campaigns")
-    found: dict[str, Any] = {name: [*getattr(workspace, name)] for name in names}
-    found |= {"specs": [], "contexts": [], "readings": [], "problem": None}
+    choices: dict[str, Any] = {name: [*getattr(workspace, name)] for name in names}
+    choices |= {"specs": [], "contexts": [], "readings": [], "problem": None}
     try:
-        found["readings"] = [*workspace.readings().names]
-        found["contexts"] = [
+        choices["readings"] = [*workspace.readings().names]
+        choices["contexts"] = [
             {"name": row.id, "condition": row.condition}
             for table in map(workspace.context_table, workspace.context_tables)
             for row in table.rows
         ]
-        found["specs"] = [
+        choices["specs"] = [
             {"name": spec.name, "variants": [variant.name for variant in spec]} for spec in workspace.specs()
         ]
     except MutatorError as err:
-        found["problem"] = err.got
-    return found
+        choices["problem"] = err.got
+    return choices
 
 
-def _pairs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
+def _comparable_pairs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
     """Return pairs of consecutive runs with the same campaign and target."""
     latest: dict[tuple[str, str], str] = {}
     pairs = []
@@ -55,7 +55,7 @@ def _pairs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
     return pairs[-_MOST_PAIRS:]
 
 
-def _rendered(name: str, **content: Any) -> str:
+def _render_page(name: str, **content: Any) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

@@ -11,7 +11,7 @@ _LONGEST_LINE = 16_384  # bytes; longer ones are dropped
 Count = Annotated[int, Field(ge=0)]
 
 
-class Phase(StrictModel):
+class PhaseEvent(StrictModel):
     """What the command is doing; `total` 0: nothing to count."""
 
     event: Literal["phase"]
@@ -21,14 +21,14 @@ class Phase(StrictModel):
     outcomes: dict[str, Count]
 
 
-class Remark(StrictModel):
+class MessageEvent(StrictModel):
     """A sentence. The last `result` of a command counts."""
 
     event: Literal["warning", "result", "error"]
     text: str
 
 
-class Link(StrictModel):
+class FileEvent(StrictModel):
     """A file that the command wrote."""
 
     event: Literal["link"]
@@ -36,8 +36,8 @@ class Link(StrictModel):
     path: str
 
 
-Event = Phase | Remark | Link
-_EVENTS: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="event")])
+JobEvent = PhaseEvent | MessageEvent | FileEvent
+_EVENT_ADAPTER: TypeAdapter[JobEvent] = TypeAdapter(Annotated[JobEvent, Field(discriminator="event")])
 
 
 class EventReader:
@@ -46,12 +46,12 @@ class EventReader:
     def __init__(self) -> None:
         self._rest = b""
 
-    def read(self, data: bytes) -> Iterator[Event]:
+    def read(self, data: bytes) -> Iterator[JobEvent]:
         *lines, self._rest = (self._rest + data).split(b"\n")
         if len(self._rest) > _LONGEST_LINE:
             self._rest = self._rest[:_LONGEST_LINE] + b"\0"  # never a valid line
         for line in lines:
             try:
-                yield _EVENTS.validate_json(line)
+                yield _EVENT_ADAPTER.validate_json(line)
             except ValidationError:
                 continue

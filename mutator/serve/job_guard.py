@@ -15,12 +15,12 @@ PATIENCE_S = 20.0  # a command's time to clean up workers, scratch folders and h
 
 def main() -> int:
     """Run the command; return its exit code, or 128 plus the signal that ended it."""
-    caller = int(sys.argv[1])
-    ended = process_guard.fork_guarded(caller, patience_s=PATIENCE_S)
-    if ended is None:
-        os.close(caller)
+    server_pipe = int(sys.argv[1])
+    child_end = process_guard.fork_guarded(server_pipe, patience_s=PATIENCE_S)
+    if child_end is None:
+        os.close(server_pipe)
         os.execv(sys.executable, [sys.executable, "-P", "-m", "mutator", *sys.argv[2:]])
-    code = int(ended["code"])
+    code = int(child_end["code"])
     return code if code >= 0 else 128 - code
 
 

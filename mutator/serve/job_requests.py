@@ -18,88 +18,88 @@ from mutator.campaigns.filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES
-from mutator.serve.served_runs import Runs, report_of
+from mutator.serve.served_runs import ServedRuns, report_address
 from mutator.store import plan_file
 from mutator.triggers.conditions import canonical_condition
 from mutator.workspace import Workspace
 
 
-def _plain(text: str) -> str:
+def _check_plain_text(text: str) -> str:
     if not text.strip() or text.startswith("-") or not text.isprintable():
         raise ValueError("not plain text: empty, with a leading `-`, or with unprintable characters")
     return text
 
 
-TRIES = "try"  # folder of the results of `try`, next to the runs
-Text = Annotated[str, Field(max_length=500), AfterValidator(_plain)]
+TRIALS_FOLDER = "try"  # folder of the results of `try`, next to the runs
+PlainText = Annotated[str, Field(max_length=500), AfterValidator(_check_plain_text)]
 ExperimentId = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class Rerun(StrictModel):
+class RerunRequest(StrictModel):
     """Rerun an experiment. The kind `plot` also keeps an exact plot and the series."""
 
     kind: Literal["rerun", "plot"]
-    run: Text
+    run: PlainText
     experiment: ExperimentId
 
 
-class Film(StrictModel):
+class FilmRequest(StrictModel):
     kind: Literal["film"]
-    run: Text
+    run: PlainText
     experiment: ExperimentId
 
 
-class Still(StrictModel):
+class StillRequest(StrictModel):
     """Take one frame of the film, at `t` s."""
 
     kind: Literal["still"]
-    run: Text
+    run: PlainText
     experiment: ExperimentId
-    t: Annotated[Finite, Field(ge=0, le=1e6)]
+    t: Annotated[FiniteNumber, Field(ge=0, le=1e6)]
 
 
-class Report(StrictModel):
+class ReportRequest(StrictModel):
     kind: Literal["report"]
-    run: Text
+    run: PlainText
 
 
-class Try(StrictModel):
+class TrialRequest(StrictModel):
     """Inject one fault and run it once."""
 
     kind: Literal["try"]
-    spec: Text
-    scenario: Text
-    trigger: Text = "always"
-    variant: Text | None = None
-    value: Finite | None = None
+    spec: PlainText
+    scenario: PlainText
+    trigger: PlainText = "always"
+    variant: PlainText | None = None
+    value: FiniteNumber | None = None
     seed: Seed | None = None
-    reading: Text | None = None
-    target: Text | None = None
+    reading: PlainText | None = None
+    target: PlainText | None = None
 
 
-class Campaign(StrictModel):
+class CampaignRequest(StrictModel):
     """Run part of a campaign in the new folder `name`."""
 
     kind: Literal["campaign"]
-    campaign: Text
+    campaign: PlainText
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
     limit: Annotated[int, Field(ge=1, le=1000)] = 20
-    only: Text | None = None
+    only: PlainText | None = None
     seed: Seed | None = None
     workers: Annotated[int, Field(ge=1)] | None = None
 
 
-Order = Rerun | Film | Still | Report | Try | Campaign
-_ORDERS: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="kind")])
+JobRequest = RerunRequest | FilmRequest | StillRequest | ReportRequest | TrialRequest | CampaignRequest
+_REQUEST_ADAPTER: TypeAdapter[JobRequest] = TypeAdapter(Annotated[JobRequest, Field(discriminator="kind")])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Work:
+class JobCommand:
     """A checked request, with the arguments of its command line (`words`)."""
 
-    order: Order
+    order: JobRequest
     title: str
     words: tuple[str, ...]
     folder: Path | None = None
@@ -108,103 +108,109 @@ class Work:
 
 
 @dataclass(frozen=True, slots=True)
-class Desk:
+class RequestChecker:
     workspace: Workspace
-    runs: Runs
+    runs: ServedRuns
 
-    def work(self, body: bytes) -> Work:
+    def work(self, body: bytes) -> JobCommand:
         """Check a request in JSON; MutatorError or ValidationError if it is invalid."""
-        order = _ORDERS.validate_json(body)
-        makers: dict[type[Any], Callable[[Any], Work]] = {
-            Rerun: self._rerun,
-            Film: self._film,
-            Still: self._still,
-            Report: self._report,
-            Try: self._try,
-            Campaign: self._campaign,
+        request = _REQUEST_ADAPTER.validate_json(body)
+        builders: dict[type[Any], Callable[[Any], JobCommand]] = {
+            RerunRequest: self._rerun_command,
+            FilmRequest: self._film_command,
+            StillRequest: self._still_command,
+            ReportRequest: self._report_command,
+            TrialRequest: self._trial_command,
+            CampaignRequest: self._campaign_command,
         }
-        return makers[type(order)](order)
+        return builders[type(request)](request)
 
-    def _rerun(self, order: Rerun) -> Work:
-        trace = ["--trace"] if order.kind == "plot" else []
+    def _rerun_command(self, request: RerunRequest) -> JobCommand:
+        trace = ["--trace"] if request.kind == "plot" else []
         what = "exact plot" if trace else "rerun"
-        return self._of_experiment(order, what, "rerun", order.experiment, *trace)
+        return self._experiment_command(request, what, "rerun", request.experiment, *trace)
 
-    def _film(self, order: Film) -> Work:
-        film = self.runs.folder(order.run) / "plots" / f"{order.experiment}.mp4"
-        return self._of_experiment(order, "film", "show", order.experiment, f"--video={film}")
+    def _film_command(self, request: FilmRequest) -> JobCommand:
+        film = self.runs.folder(request.run) / "plots" / f"{request.experiment}.mp4"
+        return self._experiment_command(request, "film", "show", request.experiment, f"--video={film}")
 
-    def _still(self, order: Still) -> Work:
-        what = f"picture at {order.t:.2f} s"
-        return self._of_experiment(order, what, "show", order.experiment, f"--still={order.t:.2f}")
+    def _still_command(self, request: StillRequest) -> JobCommand:
+        what = f"picture at {request.t:.2f} s"
+        return self._experiment_command(request, what, "show", request.experiment, f"--still={request.t:.2f}")
 
-    def _of_experiment(self, order: Rerun | Film | Still, what: str, *words: str) -> Work:
-        folder = self._folder(order.run)
-        if order.experiment not in plan_file.ids(folder):
+    def _experiment_command(
+        self, request: RerunRequest | FilmRequest | StillRequest, what: str, *arguments: str
+    ) -> JobCommand:
+        folder = self._existing_run_folder(request.run)
+        if request.experiment not in plan_file.ids(folder):
             raise MutatorError(
-                f"no experiment '{order.experiment}'",
-                where=order.run,
+                f"no experiment '{request.experiment}'",
+                where=request.run,
                 expected="the id of an experiment in the run",
             )
-        return Work(
-            order=order,
-            title=f"{order.experiment} of {order.run}: {what}",
-            words=(*words, f"--run={folder}", *self._place()),
+        return JobCommand(
+            order=request,
+            title=f"{request.experiment} of {request.run}: {what}",
+            words=(*arguments, f"--run={folder}", *self._workspace_options()),
             folder=folder,
             run=folder,
-            result=f"{report_of(order.run)}#e={order.experiment}",
+            result=f"{report_address(request.run)}#e={request.experiment}",
         )
 
-    def _report(self, order: Report) -> Work:
-        folder = self._folder(order.run)
-        words = ("report", str(folder), *self._place())
-        title, result = f"report of {order.run}", report_of(order.run)
-        return Work(order=order, title=title, words=words, folder=folder, run=folder, result=result)
+    def _report_command(self, request: ReportRequest) -> JobCommand:
+        folder = self._existing_run_folder(request.run)
+        arguments = ("report", str(folder), *self._workspace_options())
+        title, result = f"report of {request.run}", report_address(request.run)
+        return JobCommand(
+            order=request, title=title, words=arguments, folder=folder, run=folder, result=result
+        )
 
-    def _try(self, order: Try) -> Work:
-        spec = next((one for one in self.workspace.specs() if one.name == order.spec), None)
+    def _trial_command(self, request: TrialRequest) -> JobCommand:
+        spec = next((other for other in self.workspace.specs() if other.name == request.spec), None)
         if spec is None:
-            raise _unknown("spec", order.spec, [one.name for one in self.workspace.specs()])
+            raise _unknown_name_error("spec", request.spec, [other.name for other in self.workspace.specs()])
         variants = [variant.name for variant in spec]
-        for what, given, known in (
-            ("scenario", order.scenario, self.workspace.scenarios),
-            ("variant", order.variant, variants),
-            ("reading", order.reading, self.workspace.readings().names),
-            ("target", order.target, self.workspace.targets),
+        for what, requested, accepted in (
+            ("scenario", request.scenario, self.workspace.scenarios),
+            ("variant", request.variant, variants),
+            ("reading", request.reading, self.workspace.readings().names),
+            ("target", request.target, self.workspace.targets),
         ):
-            if given is not None and given not in known:
-                raise _unknown(what, given, known)
-        self._check_trigger(order.trigger, order.target)
-        given_options = {
-            "--scenario": order.scenario,
-            "--trigger": order.trigger,
-            "--variant": order.variant,
-            "--value": order.value,
-            "--seed": order.seed,
-            "--reading": order.reading,
-            "--manifest": order.target,
-            "--out": self._new(TRIES),
+            if requested is not None and requested not in accepted:
+                raise _unknown_name_error(what, requested, accepted)
+        self._check_trigger(request.trigger, request.target)
+        options = {
+            "--scenario": request.scenario,
+            "--trigger": request.trigger,
+            "--variant": request.variant,
+            "--value": request.value,
+            "--seed": request.seed,
+            "--reading": request.reading,
+            "--manifest": request.target,
+            "--out": self._new_folder(TRIALS_FOLDER),
         }
-        words = ("try", order.spec, *_options(given_options), *self._place())
-        return Work(order=order, title=f"{order.spec} in {order.scenario}, {order.trigger}", words=words)
+        arguments = ("try", request.spec, *_joined_options(options), *self._workspace_options())
+        return JobCommand(
+            order=request, title=f"{request.spec} in {request.scenario}, {request.trigger}", words=arguments
+        )
 
-    def _campaign(self, order: Campaign) -> Work:
-        if order.campaign not in self.workspace.campaigns:
-            raise _unknown("campaign", order.campaign, self.workspace.campaigns)
-        if order.only is not None:
-            compile_filter(order.only, PLAN_COLUMN_NAMES)
-        folder = self._new(order.name)
-        given_options = {
+    def _campaign_command(self, request: CampaignRequest) -> JobCommand:
+        if request.campaign not in self.workspace.campaigns:
+            raise _unknown_name_error("campaign", request.campaign, self.workspace.campaigns)
+        if request.only is not None:
+            compile_filter(request.only, PLAN_COLUMN_NAMES)
+        folder = self._new_folder(request.name)
+        options = {
             "--out": folder,
-            "--limit": order.limit,
-            "--only": order.only,
-            "--seed": order.seed,
-            "--workers": min(order.workers or usable_cores(), usable_cores()),
+            "--limit": request.limit,
+            "--only": request.only,
+            "--seed": request.seed,
+            "--workers": min(request.workers or usable_cores(), usable_cores()),
         }
-        return Work(
-            order=order,
-            title=f"{order.campaign} into {order.name}",
-            words=("run", order.campaign, *_options(given_options), *self._place()),
+        return JobCommand(
+            order=request,
+            title=f"{request.campaign} into {request.name}",
+            words=("run", request.campaign, *_joined_options(options), *self._workspace_options()),
             folder=folder,
         )
 
@@ -224,13 +230,13 @@ class Desk:
         if not math.isfinite(time) or time < 0:
             raise MutatorError(f"'{text}'", where="trigger", expected="a finite time of at least 0 s")
 
-    def _folder(self, key: str) -> Path:
+    def _existing_run_folder(self, key: str) -> Path:
         """Return the run folder with this key; MutatorError if it contains links."""
         folder = self.runs.folder(key)
         check_only_plain_files(folder)
         return folder
 
-    def _new(self, name: str) -> Path:
+    def _new_folder(self, name: str) -> Path:
         folder = self.runs.new / name
         if folder.is_symlink():
             raise MutatorError(f"{name} is a link", expected="a new folder", remedy="choose another name")
@@ -238,21 +244,25 @@ class Desk:
             check_only_plain_files(folder)
         return folder.resolve()
 
-    def _place(self) -> list[str]:
-        place = self.workspace
-        options = {"--library": place.library, "--templates": place.templates, "--target": place.target}
-        return [*_options(options), *(["--sandbox"] if place.sandbox else [])]
+    def _workspace_options(self) -> list[str]:
+        workspace = self.workspace
+        options = {
+            "--library": workspace.library,
+            "--templates": workspace.templates,
+            "--target": workspace.target,
+        }
+        return [*_joined_options(options), *(["--sandbox"] if workspace.sandbox else [])]
 
 
-def _options(given: dict[str, Any]) -> list[str]:
+def _joined_options(values_by_option: dict[str, Any]) -> list[str]:
     """Join options and values, so that no value is taken for an option."""
-    return [f"{name}={value}" for name, value in given.items() if value is not None]
+    return [f"{name}={value}" for name, value in values_by_option.items() if value is not None]
 
 
-def _unknown(what: str, name: str, known: Collection[str]) -> MutatorError:
+def _unknown_name_error(what: str, name: str, accepted: Collection[str]) -> MutatorError:
     return MutatorError(
         f"no {what} '{name}'",
         where=what,
-        expected=describe_choices(known),
-        remedy="correct the name" + suggestion(name, list(known)),
+        expected=describe_choices(accepted),
+        remedy="correct the name" + suggestion(name, list(accepted)),
     )

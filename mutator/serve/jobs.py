@@ -18,22 +18,22 @@ from typing import IO, Any
 from mutator._common.progress_events import EVENTS_FD_VARIABLE
 from mutator.errors import JobEnded, MutatorError, NotServed
 from mutator.execution.progress_text import describe_outcomes
-from mutator.serve.job_events import Event, EventReader, Link, Phase
-from mutator.serve.job_requests import TRIES, Work
-from mutator.serve.responses import without_places
+from mutator.serve.job_events import EventReader, FileEvent, JobEvent, PhaseEvent
+from mutator.serve.job_requests import TRIALS_FOLDER, JobCommand
+from mutator.serve.responses import without_folders
 
 _GUARD_MODULE = "mutator.serve.job_guard"
-_COLUMNS = "200"  # line width of a job's output; pages wrap the lines
-_LOG_BYTES = 100_000  # only the last bytes of a job's output are kept
+_OUTPUT_COLUMNS = "200"  # line width of a job's output; pages wrap the lines
+_MOST_LOG_BYTES = 100_000  # only the last bytes of a job's output are kept
 _READ_BYTES = 65_536
-_LONGEST_MESSAGE = 500
-_MOST_JOBS = 200  # ended jobs to keep, the newest
-_MOST_WAITING = 50
-_STYLES = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")  # terminal escape codes
-_END_S = 30.0  # time for jobs to end when the server ends
+_MOST_MESSAGE_CHARACTERS = 500
+_MOST_ENDED_JOBS = 200  # ended jobs to keep, the newest
+_MOST_WAITING_JOBS = 50
+_ESCAPE_CODE_PATTERN = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")  # terminal escape codes
+_MOST_SHUTDOWN_S = 30.0  # time for jobs to end when the server ends
 
 
-class State(StrEnum):
+class JobState(StrEnum):
     QUEUED = "queued"
     RUNNING = "running"
     DONE = "done"
@@ -42,12 +42,12 @@ class State(StrEnum):
 
 
 @dataclass(kw_only=True)
-class Job:
+class ServeJob:
     """A command line, with its progress and result."""
 
     id: str
-    work: Work
-    state: State = State.QUEUED
+    work: JobCommand
+    state: JobState = JobState.QUEUED
     progress: float | None = None  # progress of the current stage, from 0 to 1
     message: str = ""
     result: str | None = None
@@ -65,73 +65,75 @@ class Job:
         facts: dict[str, Any] = {"id": self.id, "kind": order.kind, "title": self.work.title}
         facts |= {name: getattr(order, name, None) for name in ("run", "experiment")}
         facts |= {"state": self.state.value, "progress": self.progress, "message": self.message}
-        facts |= {"result": self.result, "started": _time(self.started), "ended": _time(self.ended)}
+        facts |= {"result": self.result, "started": _utc_text(self.started), "ended": _utc_text(self.ended)}
         return facts
 
     @property
     def text(self) -> str:
         """The output, without control characters and absolute paths."""
-        return _plain(self.log)
+        return _printable_bytes(self.log)
 
     def add_output(self, data: bytes) -> None:
         self.log += data
-        del self.log[:-_LOG_BYTES]
+        del self.log[:-_MOST_LOG_BYTES]
 
     def add_events(self, data: bytes) -> None:
         """Take in what the command sent through the pipe for events."""
         for event in self.events.read(data):
-            self._add(event)
+            self._apply_event(event)
 
-    def _add(self, event: Event) -> None:
-        if isinstance(event, Link):
+    def _apply_event(self, event: JobEvent) -> None:
+        if isinstance(event, FileEvent):
             self.links[event.kind] = event.path
-        elif isinstance(event, Phase):
+        elif isinstance(event, PhaseEvent):
             count = f" {event.done}/{event.total}" if event.total else ""
-            parts = (_line(f"{event.phase}{count}"), describe_outcomes(Counter(event.outcomes)))
+            parts = (_short_text(f"{event.phase}{count}"), describe_outcomes(Counter(event.outcomes)))
             self.message = ", ".join(filter(None, parts))
             self.progress = min(1.0, event.done / event.total) if event.total else None
         elif event.event == "result":
-            self.outcome = _line(event.text)
+            self.outcome = _short_text(event.text)
         elif event.event == "error":
-            self.error = _line(event.text)
+            self.error = _short_text(event.text)
         else:
-            self.message = f"warning: {_line(event.text)}"
+            self.message = f"warning: {_short_text(event.text)}"
 
 
-class Jobs:
+class ServeJobs:
     """The jobs of a server. `report_at` returns the address of a run's report."""
 
-    def __init__(self, at_once: int, report_at: Callable[[Work], str | None]) -> None:
-        self._jobs: dict[str, Job] = {}
+    def __init__(self, at_once: int, report_at: Callable[[JobCommand], str | None]) -> None:
+        self._jobs: dict[str, ServeJob] = {}
         self._count = 0
-        self._waiting: queue.Queue[Job | None] = queue.Queue()
+        self._waiting: queue.Queue[ServeJob | None] = queue.Queue()
         self._lock = threading.Lock()
         self._report_at = report_at
         self._closed = False
-        self._threads = [threading.Thread(target=self._work, daemon=True) for _ in range(at_once)]
+        self._threads = [threading.Thread(target=self._run_jobs, daemon=True) for _ in range(at_once)]
         for thread in self._threads:
             thread.start()
 
-    def submit(self, work: Work) -> Job:
+    def submit(self, command: JobCommand) -> ServeJob:
         """Queue a job; MutatorError if too many are waiting."""
         with self._lock:
-            if sum(job.state is State.QUEUED for job in self._jobs.values()) >= _MOST_WAITING:
+            if sum(job.state is JobState.QUEUED for job in self._jobs.values()) >= _MOST_WAITING_JOBS:
                 raise MutatorError(
-                    f"{_MOST_WAITING} jobs are waiting", remedy="wait for them, or cancel some"
+                    f"{_MOST_WAITING_JOBS} jobs are waiting", remedy="wait for them, or cancel some"
                 )
             self._count += 1
-            job = Job(id=str(self._count), work=work)
+            job = ServeJob(id=str(self._count), work=command)
             self._jobs[job.id] = job
-            for name in [name for name, one in self._jobs.items() if one.ended][:-_MOST_JOBS]:
+            for name in [name for name, job_in_list in self._jobs.items() if job_in_list.ended][
+                :-_MOST_ENDED_JOBS
+            ]:
                 del self._jobs[name]
         self._waiting.put(job)
         return job
 
-    def all(self) -> list[Job]:
+    def all(self) -> list[ServeJob]:
         with self._lock:
             return [*reversed(self._jobs.values())]
 
-    def get(self, name: str) -> Job:
+    def get(self, name: str) -> ServeJob:
         with self._lock:
             if name in self._jobs:
                 return self._jobs[name]
@@ -155,47 +157,47 @@ class Jobs:
         for _ in self._threads:
             self._waiting.put(None)
         for thread in self._threads:
-            thread.join(_END_S)
+            thread.join(_MOST_SHUTDOWN_S)
 
-    def _cancel(self, job: Job) -> None:
-        if job.state is State.QUEUED:
+    def _cancel(self, job: ServeJob) -> None:
+        if job.state is JobState.QUEUED:
             job.ended = datetime.now(UTC)
-        job.state, job.message = State.CANCELLED, "cancelled"
+        job.state, job.message = JobState.CANCELLED, "cancelled"
         if job.hold is not None:
             os.close(job.hold)
             job.hold = None
 
-    def _work(self) -> None:
+    def _run_jobs(self) -> None:
         while (job := self._waiting.get()) is not None:
             try:
-                events, sent = os.pipe()
+                events_in, events_out = os.pipe()
             except OSError as err:
                 with self._lock:
-                    self._fail(job, err)
+                    self._mark_failed(job, err)
                 continue
-            with os.fdopen(events, "rb", buffering=0) as pipe:
+            with os.fdopen(events_in, "rb", buffering=0) as pipe:
                 try:
-                    process = self._started(job, sent)
+                    process = self._start_process(job, events_out)
                 finally:
-                    os.close(sent)
+                    os.close(events_out)
                 if process is not None:
-                    self._follow(job, process, pipe)
+                    self._follow_process(job, process, pipe)
 
-    def _started(self, job: Job, events: int) -> subprocess.Popen[bytes] | None:
+    def _start_process(self, job: ServeJob, events: int) -> subprocess.Popen[bytes] | None:
         """Start the job's command, which sends its events to the pipe `events`; None if it must not start."""
         with self._lock:
-            if job.state is not State.QUEUED or self._closed:
+            if job.state is not JobState.QUEUED or self._closed:
                 return None
             try:
-                watched, job.hold = os.pipe()
+                guard_end, job.hold = os.pipe()
             except OSError as err:
-                self._fail(job, err)
+                self._mark_failed(job, err)
                 return None
             try:
                 process = subprocess.Popen(
-                    [sys.executable, "-P", "-m", _GUARD_MODULE, str(watched), *job.work.words],
-                    pass_fds=[watched, events],
-                    env={**os.environ, "COLUMNS": _COLUMNS, EVENTS_FD_VARIABLE: str(events)},
+                    [sys.executable, "-P", "-m", _GUARD_MODULE, str(guard_end), *job.work.words],
+                    pass_fds=[guard_end, events],
+                    env={**os.environ, "COLUMNS": _OUTPUT_COLUMNS, EVENTS_FD_VARIABLE: str(events)},
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.STDOUT,
@@ -203,34 +205,34 @@ class Jobs:
                 )
             except OSError as err:
                 os.close(job.hold)
-                self._fail(job, err)
+                self._mark_failed(job, err)
                 return None
             finally:
-                os.close(watched)
-            job.state, job.started = State.RUNNING, datetime.now(UTC)
+                os.close(guard_end)
+            job.state, job.started = JobState.RUNNING, datetime.now(UTC)
             return process
 
-    def _fail(self, job: Job, err: OSError) -> None:
-        job.hold, job.state, job.message = None, State.FAILED, f"cannot be started: {err.strerror}"
+    def _mark_failed(self, job: ServeJob, err: OSError) -> None:
+        job.hold, job.state, job.message = None, JobState.FAILED, f"cannot be started: {err.strerror}"
         job.ended = datetime.now(UTC)
 
-    def _follow(self, job: Job, process: subprocess.Popen[bytes], events: IO[bytes]) -> None:
+    def _follow_process(self, job: ServeJob, process: subprocess.Popen[bytes], events: IO[bytes]) -> None:
         assert process.stdout is not None
         with process.stdout as output:
-            self._read(job, {output.fileno(): job.add_output, events.fileno(): job.add_events})
+            self._read_pipes(job, {output.fileno(): job.add_output, events.fileno(): job.add_events})
         code = process.wait()
-        result = self._result(job) if code == 0 else None
+        result = self._result_address(job) if code == 0 else None
         with self._lock:
-            if job.state is State.RUNNING:
-                job.state = State.DONE if code == 0 else State.FAILED
+            if job.state is JobState.RUNNING:
+                job.state = JobState.DONE if code == 0 else JobState.FAILED
                 job.progress, job.result = 1.0 if code == 0 else job.progress, result
-                job.message = _news(job) if code == 0 else _complaint(job)
+                job.message = _success_message(job) if code == 0 else _failure_message(job)
             job.ended = datetime.now(UTC)
             if job.hold is not None:
                 os.close(job.hold)
                 job.hold = None
 
-    def _read(self, job: Job, readers: dict[int, Callable[[bytes], None]]) -> None:
+    def _read_pipes(self, job: ServeJob, readers: dict[int, Callable[[bytes], None]]) -> None:
         """Give what the job's command writes to its readers, until it has closed all pipes."""
         with selectors.DefaultSelector() as pipes:
             for pipe, reader in readers.items():
@@ -241,37 +243,37 @@ class Jobs:
                     if not data:
                         pipes.unregister(ready.fd)
                     with self._lock:
-                        if job.state is State.RUNNING:
+                        if job.state is JobState.RUNNING:
                             ready.data(data)
 
-    def _result(self, job: Job) -> str | None:
+    def _result_address(self, job: ServeJob) -> str | None:
         if job.work.order.kind == "try":
             plot = job.links.get("plot")
-            return f"/{TRIES}/{Path(plot).parent.name}/plot.svg" if plot else None
+            return f"/{TRIALS_FOLDER}/{Path(plot).parent.name}/plot.svg" if plot else None
         return job.work.result or self._report_at(job.work)
 
 
-def _plain(data: bytes | bytearray) -> str:
-    return _printable(data.decode("utf-8", "replace"))
+def _printable_bytes(data: bytes | bytearray) -> str:
+    return _printable_text(data.decode("utf-8", "replace"))
 
 
-def _printable(text: str) -> str:
-    text = without_places(_STYLES.sub("", text))
+def _printable_text(text: str) -> str:
+    text = without_folders(_ESCAPE_CODE_PATTERN.sub("", text))
     return "".join(c for c in text if c.isprintable() or c in "\n\t")
 
 
-def _line(text: str) -> str:
-    return _printable(text)[:_LONGEST_MESSAGE]
+def _short_text(text: str) -> str:
+    return _printable_text(text)[:_MOST_MESSAGE_CHARACTERS]
 
 
-def _news(job: Job) -> str:
+def _success_message(job: ServeJob) -> str:
     film = job.links.get("film")
-    return f"film: {_line(film)}" if film else job.outcome or job.message
+    return f"film: {_short_text(film)}" if film else job.outcome or job.message
 
 
-def _complaint(job: Job) -> str:
+def _failure_message(job: ServeJob) -> str:
     return job.error or job.outcome or job.message or "no output"
 
 
-def _time(moment: datetime | None) -> str | None:
+def _utc_text(moment: datetime | None) -> str | None:
     return moment.strftime("%Y-%m-%dT%H:%M:%SZ") if moment else None

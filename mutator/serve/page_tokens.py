@@ -13,8 +13,8 @@ from pathlib import Path
 
 from mutator.errors import PageRefused
 
-HEADER = "x-mutator-page"
-HOME = "home"
+TOKEN_HEADER = "x-mutator-page"
+HOME_PAGE = "home"
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +35,10 @@ class PageTokens:
             )
 
 
-def run_page(folder: Path) -> str:
+def run_page_name(folder: Path) -> str:
     """Return the name of a run's report for `PageTokens`."""
     return f"run {folder}"
 
 
-def review_page(target: str) -> str:
+def review_page_name(target: str) -> str:
     return f"review {target}"

@@ -13,8 +13,8 @@ from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 
-SCHEMA = "pages/1"
-FILE = "files.json"
+PAGES_SCHEMA = "pages/1"
+DIGESTS_FILE = "files.json"
 _MOST_IN_MEMORY = 2
 
 
@@ -28,33 +28,35 @@ class ReportCache:
         """Return a file of a report, or None if it has no such file. `build` builds a report that is not
         cached.
         """
-        files = self._memory.pop(key, None) or _stored(key)
+        files = self._memory.pop(key, None) or _read_cached(key)
         if files is None:
             files = build()
             with suppress(OSError, MutatorError):  # the cache cannot be written
-                _store(key, files)
+                _write_cached(key, files)
         self._memory[key] = files
         for old in list(self._memory)[:-_MOST_IN_MEMORY]:
             del self._memory[old]
         return files.get(name)
 
 
-def _stored(key: str) -> Mapping[str, bytes] | None:
+def _read_cached(key: str) -> Mapping[str, bytes] | None:
     """Read a report from the cache; None if it is missing or damaged."""
-    place = shared_cache.pages_folder() / key
+    folder = shared_cache.pages_folder() / key
     try:
-        digests = parse_json_object(read_below(place, FILE), place / FILE, SCHEMA)["files"]
-        files = {name: read_below(place, name) for name in digests}
+        digests = parse_json_object(read_below(folder, DIGESTS_FILE), folder / DIGESTS_FILE, PAGES_SCHEMA)["files"]
+        files = {name: read_below(folder, name) for name in digests}
     except (OSError, MutatorError, LookupError, TypeError):
         return None
     return files if {name: digest(data) for name, data in files.items()} == digests else None
 
 
-def _store(key: str, files: Mapping[str, bytes]) -> None:
-    place = shared_cache.pages_folder() / key
-    place.mkdir(parents=True, exist_ok=True)
+def _write_cached(key: str, files: Mapping[str, bytes]) -> None:
+    folder = shared_cache.pages_folder() / key
+    folder.mkdir(parents=True, exist_ok=True)
     for name, data in files.items():
-        write_below(place, name, data)
+        write_below(folder, name, data)
     digests = {name: digest(data) for name, data in files.items()}
-    write_below(place, FILE, json_bytes({"schema": SCHEMA, "files": digests}))  # last: marks it as complete
+    write_below(
+        folder, DIGESTS_FILE, json_bytes({"schema": PAGES_SCHEMA, "files": digests})
+    )  # last: marks it as complete
     shared_cache.prune_pages()

@@ -18,73 +18,77 @@ from mutator.report import report_builder
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.report_digests import inputs_digest
 from mutator.results.table_reader import Results
-from mutator.serve.page_tokens import PageTokens, run_page
+from mutator.serve.page_tokens import PageTokens, run_page_name
 from mutator.serve.report_cache import ReportCache
-from mutator.serve.responses import STORED, OpenFile, kind_of
-from mutator.serve.served_runs import Runs, open_in_run
+from mutator.serve.responses import UNTRUSTED_FILE_HEADERS, OpenFileResponse, media_type_of
+from mutator.serve.served_runs import ServedRuns, open_in_run
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import read_script, script_bytes
 from mutator.web import load_order
 from mutator.workspace import Workspace
 
-_STYLES = [f'<link rel="stylesheet" href="/assets/{name}">' for name in load_order("serve", ".css")]
-_HEAD = "\n".join(['<meta name="mutator-page" content="{}">', *_STYLES, "</head>"])
-_SCRIPTS = "\n".join(
+_STYLE_LINKS = [f'<link rel="stylesheet" href="/assets/{name}">' for name in load_order("serve", ".css")]
+_ADDED_HEAD_END = "\n".join(['<meta name="mutator-page" content="{}">', *_STYLE_LINKS, "</head>"])
+_ADDED_BODY_END = "\n".join(
     [*(f'<script src="/assets/{name}" defer></script>' for name in load_order("serve", ".js")), "</body>"]
 ).encode()
-_MOST_COMPARED = 4  # cached comparisons
+_MOST_CACHED_COMPARISONS = 4  # cached comparisons
 
 
-class Shown:
+class RunPages:
     """Serves files of the runs, and pages made from them. Only one page is made at a time."""
 
-    def __init__(self, workspace: Workspace, runs: Runs, tokens: PageTokens) -> None:
+    def __init__(self, workspace: Workspace, runs: ServedRuns, tokens: PageTokens) -> None:
         self._workspace, self._runs, self._tokens = workspace, runs, tokens
         self._reports = ReportCache()
-        self._making = threading.Lock()
-        self._compared: dict[tuple[str, str], dict[str, bytes]] = {}
+        self._page_lock = threading.Lock()
+        self._comparison_cache: dict[tuple[str, str], dict[str, bytes]] = {}
 
     def file(self, key: str, name: str) -> Response:
         """Open a file of a run, or a part of its report; Absent if it is not served."""
         run = self._runs.folder(key)
         if name.startswith(f"{REPORT_FOLDER}/"):
-            return self._of_report(run, name.removeprefix(f"{REPORT_FOLDER}/"))
+            return self._report_file(run, name.removeprefix(f"{REPORT_FOLDER}/"))
         if name.endswith(".js"):
-            return Response(_series(run, name), media_type=kind_of(name), headers=STORED)
-        return OpenFile(open_in_run(run, name), name)
+            return Response(
+                _read_series_script(run, name), media_type=media_type_of(name), headers=UNTRUSTED_FILE_HEADERS
+            )
+        return OpenFileResponse(open_in_run(run, name), name)
 
     def comparison(self, a: str, b: str, name: str) -> Response:
         """Open a file of a comparison of two runs; MutatorError if they cannot be compared."""
         folders = [self._runs.folder(key) for key in (a, b)]
         for folder in folders:
             check_only_plain_files(folder)  # because outdated tables are written
-        with self._making:
+        with self._page_lock:
             first, second = (digest(Results.up_to_date(folder).parquet()) for folder in folders)
-            made = self._compared.pop((first, second), None) or self._comparison(*folders)
-            self._compared[first, second] = made
-            for old in list(self._compared)[:-_MOST_COMPARED]:
-                del self._compared[old]
-        if name not in made:
-            raise NotServed("no such file", expected=f"one of {', '.join(made)}")
-        return Response(made[name], media_type=kind_of(name))
+            files = self._comparison_cache.pop((first, second), None) or self._build_comparison_files(
+                *folders
+            )
+            self._comparison_cache[first, second] = files
+            for old in list(self._comparison_cache)[:-_MOST_CACHED_COMPARISONS]:
+                del self._comparison_cache[old]
+        if name not in files:
+            raise NotServed("no such file", expected=f"one of {', '.join(files)}")
+        return Response(files[name], media_type=media_type_of(name))
 
-    def _of_report(self, run: Path, name: str) -> Response:
+    def _report_file(self, run: Path, name: str) -> Response:
         """Build the report if it is not cached, whatever report the run folder contains."""
         folder = RunFolder.open(run)
-        with self._making:
+        with self._page_lock:
             key = inputs_digest(folder, self._workspace)
-            data = self._reports.file(key, name, lambda: self._built(folder))
+            data = self._reports.file(key, name, lambda: self._build_report_files(folder))
         if data is None:
             raise NotServed("no such file", expected="a file of the report")
         if not name.endswith(".html"):
-            return Response(data, media_type=kind_of(name), headers=STORED)
+            return Response(data, media_type=media_type_of(name), headers=UNTRUSTED_FILE_HEADERS)
         if name == report_builder.PAGE_FILE:
-            head = _HEAD.format(self._tokens.token(run_page(run))).encode()
+            head = _ADDED_HEAD_END.format(self._tokens.token(run_page_name(run))).encode()
             data = head.join(data.split(b"</head>", 1))
-            data = _SCRIPTS.join(data.rsplit(b"</body>", 1))
+            data = _ADDED_BODY_END.join(data.rsplit(b"</body>", 1))
         return HTMLResponse(data)
 
-    def _built(self, folder: RunFolder) -> Mapping[str, bytes]:
+    def _build_report_files(self, folder: RunFolder) -> Mapping[str, bytes]:
         """Build a report. Raise MutatorError if the tables of a finished run do not follow from its records:
         the report shows them beside the run's seal.
         """
@@ -93,15 +97,15 @@ class Shown:
                 raise problem
         return report_builder.build_report(folder, self._workspace).files
 
-    def _comparison(self, a: Path, b: Path) -> dict[str, bytes]:
-        made = comparing.compare_runs(a, b, None, (self._alerts(a), self._alerts(b)))
+    def _build_comparison_files(self, a: Path, b: Path) -> dict[str, bytes]:
+        comparison = comparing.compare_runs(a, b, None, (self._golden_alerts_note(a), self._golden_alerts_note(b)))
         return {
-            "index.html": comparison_files.render_page(made).encode(),
-            "pairs.csv": comparison_files.pairs_csv(made),
-            "unmatched.csv": comparison_files.unmatched_csv(made),
+            "index.html": comparison_files.render_page(comparison).encode(),
+            "pairs.csv": comparison_files.pairs_csv(comparison),
+            "unmatched.csv": comparison_files.unmatched_csv(comparison),
         }
 
-    def _alerts(self, run: Path) -> str:
+    def _golden_alerts_note(self, run: Path) -> str:
         folder = RunFolder.open(run)
         try:
             return fault_free_alerts_note(
@@ -111,7 +115,7 @@ class Shown:
             return ""
 
 
-def _series(run: Path, name: str) -> bytes:
+def _read_series_script(run: Path, name: str) -> bytes:
     """Read a script of series; Absent unless it equals the output of `write_script` for the same data."""
     path = run / name
     with open_in_run(run, name) as file:

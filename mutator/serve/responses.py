@@ -15,7 +15,7 @@ from starlette.types import Receive, Scope, Send
 from mutator.errors import MutatorError, NotServed, PageRefused
 from mutator.serve.home import error_page
 
-_KINDS = {
+_MEDIA_TYPES = {
     ".css": "text/css; charset=utf-8",
     ".csv": "text/csv; charset=utf-8",
     ".gif": "image/gif",
@@ -29,17 +29,19 @@ _KINDS = {
 }
 # For files that somebody else may have written: as pages of no origin, which run and load nothing. The styles
 # are those of figures.
-STORED = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; sandbox"}
-_FOLDERS = re.compile(r"(?<![\w.~-])/(?!dev/null)(?:[^/\s'\"`]+/)+")
+UNTRUSTED_FILE_HEADERS = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; sandbox"}
+_FOLDERS_PATTERN = re.compile(r"(?<![\w.~-])/(?!dev/null)(?:[^/\s'\"`]+/)+")
 
 
-class OpenFile(FileResponse):
+class OpenFileResponse(FileResponse):
     """Sends an open file, and then closes it."""
 
     def __init__(self, file: BinaryIO, name: str) -> None:
         self._file = file
         place, facts = f"/proc/self/fd/{file.fileno()}", os.fstat(file.fileno())
-        super().__init__(place, media_type=kind_of(name), headers=STORED, stat_result=facts)
+        super().__init__(
+            place, media_type=media_type_of(name), headers=UNTRUSTED_FILE_HEADERS, stat_result=facts
+        )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
@@ -48,22 +50,22 @@ class OpenFile(FileResponse):
             self._file.close()
 
 
-def kind_of(name: str) -> str:
-    return _KINDS[Path(name).suffix]
+def media_type_of(name: str) -> str:
+    return _MEDIA_TYPES[Path(name).suffix]
 
 
-def without_places(text: str) -> str:
+def without_folders(text: str) -> str:
     """Shorten absolute paths in a text."""
     for folder, instead in ((Path.cwd(), ""), (Path.home(), "/_/"), (Path(tempfile.gettempdir()), "/_/")):
         if folder != Path("/"):
             text = text.replace(f"{folder}/", instead)  # names can contain spaces
-    return _FOLDERS.sub("", text)
+    return _FOLDERS_PATTERN.sub("", text)
 
 
 def error_facts(error: MutatorError) -> dict[str, Any]:
     place = error.where or error.argument
     parts = {"got": error.got, "where": place, "expected": error.expected, "remedy": error.remedy}
-    facts: dict[str, Any] = {name: without_places(text) if text else None for name, text in parts.items()}
+    facts: dict[str, Any] = {name: without_folders(text) if text else None for name, text in parts.items()}
     if error.where and error.line is not None:
         facts["where"] += f":{error.line}"
     return {"error": facts}
@@ -71,17 +73,19 @@ def error_facts(error: MutatorError) -> dict[str, Any]:
 
 def on_error(request: Request, error: Exception) -> Response:
     """Return the response to a failed request: JSON for scripts, a page for people."""
-    known = _known(error)
-    status = 404 if isinstance(known, NotServed) else 403 if isinstance(known, PageRefused) else 400
+    mutator_error = _as_mutator_error(error)
+    status = (
+        404 if isinstance(mutator_error, NotServed) else 403 if isinstance(mutator_error, PageRefused) else 400
+    )
     if isinstance(error, HTTPException):
         status = error.status_code
-    facts = error_facts(known)
+    facts = error_facts(mutator_error)
     if request.url.path.startswith("/api/"):
         return JSONResponse(facts, status)
     return Response(error_page(facts["error"]), status, media_type="text/html")
 
 
-def _known(error: Exception) -> MutatorError:
+def _as_mutator_error(error: Exception) -> MutatorError:
     if isinstance(error, MutatorError):
         return error
     if isinstance(error, ValidationError):

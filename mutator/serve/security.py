@@ -20,19 +20,22 @@ from mutator.comparison import comparison_files
 from mutator.web import asset_names, asset_text
 
 HOST = "127.0.0.1"
-MOST_BYTES = 1_000_000  # the longest body of a request
-_METHODS = ("GET", "HEAD", "POST")
-_FRAMES = ("frame", "iframe", "object", "embed", "fencedframe")
-_OWN_SITE = ("same-origin", "none")  # what browsers send for a site's own pages and for typed addresses
+MOST_BODY_BYTES = 1_000_000  # the longest body of a request
+_ALLOWED_METHODS = ("GET", "HEAD", "POST")
+_FRAME_DESTINATIONS = ("frame", "iframe", "object", "embed", "fencedframe")
+_SAME_SITE_VALUES = (
+    "same-origin",
+    "none",
+)  # what browsers send for a site's own pages and for typed addresses
 # what they send with the requests of a page's script
-_OWN_SCRIPT = {
+_SCRIPT_FETCH_VALUES = {
     "sec-fetch-site": ("same-origin",),
     "sec-fetch-dest": ("empty",),
     "sec-fetch-mode": ("cors", "same-origin"),
 }
 
 
-class Guarded:
+class GuardedApplication:
     def __init__(self, app: ASGIApp, *, port: int, token: str) -> None:
         self._app, self._token, self._cookie = app, token, f"mutator-{port}"
         self._hosts = (f"{HOST}:{port}", f"localhost:{port}")
@@ -44,21 +47,21 @@ class Guarded:
         if scope["type"] != "http":
             await send({"type": "websocket.close", "code": 1008})
             return
-        send = _with_policy(send)
-        answer = self._refused(scope) or self._entered(scope)
-        if answer is None and scope["method"] == "POST":
-            body = await _body(Headers(scope=scope), receive)
+        send = _with_security_headers(send)
+        response = self._refusal_of(scope) or self._response_without_cookie(scope)
+        if response is None and scope["method"] == "POST":
+            body = await _read_body(Headers(scope=scope), receive)
             if body is None:
-                answer = _refusal("a body of more than 1 MB", 413)
+                response = _refusal("a body of more than 1 MB", 413)
             else:
-                receive = _replayed(body, receive)
-        await (answer or self._app)(scope, receive, send)
+                receive = _replay_body(body, receive)
+        await (response or self._app)(scope, receive, send)
 
-    def _refused(self, scope: Scope) -> Response | None:
+    def _refusal_of(self, scope: Scope) -> Response | None:
         headers, method = Headers(scope=scope), scope["method"]
         origins = headers.getlist("origin")
-        if method not in _METHODS:
-            return _refusal(f"the method is not one of {', '.join(_METHODS)}", 405)
+        if method not in _ALLOWED_METHODS:
+            return _refusal(f"the method is not one of {', '.join(_ALLOWED_METHODS)}", 405)
         if len(hosts := headers.getlist("host")) != 1 or hosts[0] not in self._hosts:
             return _refusal("the request names another host")
         if len(origins) > 1 or any(origin != f"http://{hosts[0]}" for origin in origins):
@@ -66,36 +69,36 @@ class Guarded:
         if method == "POST" and not origins:
             return _refusal("the request has no origin")
         if method == "POST" and any(
-            headers.get(name, own[0]) not in own for name, own in _OWN_SCRIPT.items()
+            headers.get(name, expected[0]) not in expected for name, expected in _SCRIPT_FETCH_VALUES.items()
         ):
             return _refusal("the request does not come from the script of a page")
-        use = headers.get("sec-fetch-dest", "")
-        if use in _FRAMES:
+        destination = headers.get("sec-fetch-dest", "")
+        if destination in _FRAME_DESTINATIONS:
             return _refusal("pages cannot be shown in other pages")
-        if use == "empty" and not scope["path"].startswith("/api/"):
+        if destination == "empty" and not scope["path"].startswith("/api/"):
             return _refusal("scripts cannot read pages, because pages contain tokens")
-        if headers.get("sec-fetch-site", "none") not in _OWN_SITE:
+        if headers.get("sec-fetch-site", "none") not in _SAME_SITE_VALUES:
             return _refusal("the request comes from another site")
         return None
 
-    def _entered(self, scope: Scope) -> Response | None:
+    def _response_without_cookie(self, scope: Scope) -> Response | None:
         """Return None if the cookie is valid; if the token is in the address, set the cookie and redirect."""
         query = parse_qs(scope["query_string"].decode("latin-1"), keep_blank_values=True)
         if scope["path"] == "/" and scope["method"] == "GET" and "token" in query:
-            if not all(self._is_token(given) for given in query["token"]):
+            if not all(self._is_token(value) for value in query["token"]):
                 return _refusal("wrong token: open the address that the server printed")
-            answer = RedirectResponse("/", 303)
-            answer.set_cookie(self._cookie, self._token, httponly=True, samesite="strict")
-            return answer
-        if any(self._is_token(given) for given in _cookies(Headers(scope=scope), self._cookie)):
+            redirect = RedirectResponse("/", 303)
+            redirect.set_cookie(self._cookie, self._token, httponly=True, samesite="strict")
+            return redirect
+        if any(self._is_token(value) for value in _cookie_values(Headers(scope=scope), self._cookie)):
             return None
         return _refusal("no token: open the address that the server printed")
 
-    def _is_token(self, given: str) -> bool:
-        return hmac.compare_digest(given.encode(), self._token.encode())
+    def _is_token(self, text: str) -> bool:
+        return hmac.compare_digest(text.encode(), self._token.encode())
 
 
-def _cookies(headers: Headers, name: str) -> Iterable[str]:
+def _cookie_values(headers: Headers, name: str) -> Iterable[str]:
     for line in headers.getlist("cookie"):
         for part in line.split(";"):
             key, _, value = part.strip().partition("=")
@@ -107,26 +110,31 @@ def _refusal(why: str, status: int = 403) -> Response:
     return PlainTextResponse(f"refused: {why}\n", status)
 
 
-async def _body(headers: Headers, receive: Receive) -> bytes | None:
+async def _read_body(headers: Headers, receive: Receive) -> bytes | None:
     """Read the body of a request; None if it is too long, whatever its declared length."""
-    told = headers.get("content-length", "0")
-    if not told.isascii() or not told.isdigit() or len(told) > 20 or int(told) > MOST_BYTES:
+    declared_length = headers.get("content-length", "0")
+    if (
+        not declared_length.isascii()
+        or not declared_length.isdigit()
+        or len(declared_length) > 20
+        or int(declared_length) > MOST_BODY_BYTES
+    ):
         return None
     parts: list[bytes] = []
-    size, more = 0, True
-    while more:
+    size, has_more = 0, True
+    while has_more:
         message = await receive()
         if message["type"] == "http.disconnect":
             break
         parts.append(message.get("body", b""))
         size += len(parts[-1])
-        if size > MOST_BYTES:
+        if size > MOST_BODY_BYTES:
             return None
-        more = message.get("more_body", False)
+        has_more = message.get("more_body", False)
     return b"".join(parts)
 
 
-def _replayed(body: bytes, receive: Receive) -> Receive:
+def _replay_body(body: bytes, receive: Receive) -> Receive:
     messages: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
 
     async def replay() -> Message:
@@ -135,11 +143,11 @@ def _replayed(body: bytes, receive: Receive) -> Receive:
     return replay
 
 
-def _with_policy(send: Send) -> Send:
+def _with_security_headers(send: Send) -> Send:
     async def guarded(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
-            headers.setdefault("Content-Security-Policy", policy())
+            headers.setdefault("Content-Security-Policy", content_security_policy())
             headers["X-Content-Type-Options"] = "nosniff"
             headers["Referrer-Policy"] = "no-referrer"
             headers["Cross-Origin-Resource-Policy"] = "same-origin"
@@ -151,11 +159,11 @@ def _with_policy(send: Send) -> Send:
 
 
 @cache
-def policy() -> str:
+def content_security_policy() -> str:
     """Return the policy for pages: they can run only code from `mutator.web`, as files or inline by hash."""
-    scripts = [_hash(f"\n{asset_text(name)}") for name in asset_names(".js")]
-    styles = [_hash(f"\n{asset_text(name)}") for name in asset_names(".css")] + [
-        _hash(f"\n{comparison_files.page_style()}")
+    scripts = [_csp_hash(f"\n{asset_text(name)}") for name in asset_names(".js")]
+    styles = [_csp_hash(f"\n{asset_text(name)}") for name in asset_names(".css")] + [
+        _csp_hash(f"\n{comparison_files.page_style()}")
     ]
     return "; ".join(
         (
@@ -173,5 +181,5 @@ def policy() -> str:
     )
 
 
-def _hash(text: str) -> str:
+def _csp_hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

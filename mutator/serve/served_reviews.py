@@ -22,13 +22,13 @@ from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
-_MOST_KEPT = 8  # selections whose groups are cached
-_SKIPPED = {"reviews", "__pycache__", ".git", "runs"}
-Short = Annotated[str, Field(max_length=2000)]
+_MOST_CACHED_SELECTIONS = 8  # selections whose groups are cached
+_SKIPPED_FOLDERS = {"reviews", "__pycache__", ".git", "runs"}
+ShortText = Annotated[str, Field(max_length=2000)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Selection:
+class GroupSelection:
     """The groups on a page: all of a target, or those of some specs or of a campaign."""
 
     target: str
@@ -42,36 +42,36 @@ class Selection:
         return ["--manifest", self.target, *(word for spec in self.specs for word in ("--spec", spec))]
 
 
-class _ChangeModel(StrictModel):
+class _DecisionModel(StrictModel):
     group: str = Field(pattern=r"^[0-9a-f]{12}$")
     kind: Annotated[ReviewActionKind, Field(strict=False)]
-    text: Short = ""
+    text: ShortText = ""
 
 
-class Decisions(StrictModel):
+class SentDecisions(StrictModel):
     """Changes that a page sends, with the revision and the diff's digest of each group, as the page shows it.
     Approving or rejecting a group requires the digest.
     """
 
-    changes: Annotated[list[_ChangeModel], Field(min_length=1, max_length=5000)]
-    by: Short
-    seen: dict[str, Short]
-    digests: dict[str, Short] = Field(default_factory=dict)
+    changes: Annotated[list[_DecisionModel], Field(min_length=1, max_length=5000)]
+    by: ShortText
+    seen: dict[str, ShortText]
+    digests: dict[str, ShortText] = Field(default_factory=dict)
 
 
-class Reviews:
+class ServedReviews:
     """The reviews of a library. Groups are built on first use, and again when a file changes."""
 
     def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace
-        self._made: dict[Selection, tuple[object, tuple[Group, ...]]] = {}
-        self._making = threading.Lock()
+        self._cached_groups: dict[GroupSelection, tuple[object, tuple[Group, ...]]] = {}
+        self._groups_lock = threading.Lock()
 
     @property
     def reviewer(self) -> str:
         return find_user_name(self.workspace.library) or ""
 
-    def selection(self, target: str, campaign: str | None, specs: Sequence[str]) -> Selection:
+    def selection(self, target: str, campaign: str | None, specs: Sequence[str]) -> GroupSelection:
         if target not in self.workspace.targets:
             raise NotServed(f"no target '{target}'", expected=f"one of {', '.join(self.workspace.targets)}")
         if campaign is not None and campaign not in self.workspace.campaigns:
@@ -85,117 +85,134 @@ class Reviews:
                 raise NotServed(
                     f"no spec '{spec}'", expected="the name of a spec in the library, or a pattern"
                 )
-        return Selection(target=target, campaign=campaign, specs=tuple(specs))
+        return GroupSelection(target=target, campaign=campaign, specs=tuple(specs))
 
-    def groups(self, chosen: Selection) -> tuple[Group, ...]:
-        with self._making:
-            stamp = self._stamp(chosen.target)
-            if (made := self._made.pop(chosen, None)) is None or made[0] != stamp:
-                made = stamp, self._found(chosen)
-            self._made[chosen] = made
-            for old in list(self._made)[:-_MOST_KEPT]:
-                del self._made[old]
-            return made[1]
+    def groups(self, selection: GroupSelection) -> tuple[Group, ...]:
+        with self._groups_lock:
+            stamp = self._input_files(selection.target)
+            if (cached := self._cached_groups.pop(selection, None)) is None or cached[0] != stamp:
+                cached = stamp, self._build_groups(selection)
+            self._cached_groups[selection] = cached
+            for old in list(self._cached_groups)[:-_MOST_CACHED_SELECTIONS]:
+                del self._cached_groups[old]
+            return cached[1]
 
-    def group(self, chosen: Selection, name: str) -> Group:
-        found = next((group for group in self.groups(chosen) if group.id == name), None)
+    def group(self, selection: GroupSelection, name: str) -> Group:
+        matching = next((group for group in self.groups(selection) if group.id == name), None)
         if found is None:
             raise NotServed(f"no group '{name}'", expected="the id of a group on the page")
         return found
 
-    def page(self, chosen: Selection, query: str, runs: Sequence[Mapping[str, Any]], token: str) -> str:
-        review, groups = load_review(self.workspace, chosen.target), self.groups(chosen)
-        served = {
-            "target": chosen.target,
+    def page(
+        self, selection: GroupSelection, query: str, runs: Sequence[Mapping[str, Any]], token: str
+    ) -> str:
+        review, groups = load_review(self.workspace, selection.target), self.groups(selection)
+        page_settings = {
+            "target": selection.target,
             "by": self.reviewer,
-            "api": f"/api/review/{chosen.target}",
+            "api": f"/api/review/{selection.target}",
             "token": token,
             "query": f"?{query}" if query else "",
             "runs": runs,
         }
-        return review_page_html(review, review.in_list_order(groups), chosen.options, served)
+        return review_page_html(review, review.in_list_order(groups), selection.options, page_settings)
 
-    def told(self, chosen: Selection) -> dict[str, Any]:
-        groups = self.groups(chosen)  # first, because this can take seconds, and others can decide meanwhile
-        review = load_review(self.workspace, chosen.target)
-        return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, groups)}
+    def told(self, selection: GroupSelection) -> dict[str, Any]:
+        groups = self.groups(
+            selection
+        )  # first, because this can take seconds, and others can decide meanwhile
+        review = load_review(self.workspace, selection.target)
+        return {"target": selection.target, "by": self.reviewer, "groups": _states(review, groups)}
 
-    def decide(self, chosen: Selection, wanted: Decisions) -> dict[str, Any]:
+    def decide(self, selection: GroupSelection, decisions: SentDecisions) -> dict[str, Any]:
         """Save all changes or none; GroupsChanged if a group or a diff was changed elsewhere."""
-        known = {group.id: group for group in self.groups(chosen)}
-        if strangers := [one.group for one in wanted.changes if one.group not in known]:
-            raise NotServed(f"no group '{strangers[0]}'", expected="the id of a group on the page")
-        if unseen := [one.group for one in wanted.changes if one.group not in wanted.seen]:
-            raise MutatorError(f"no revision of group {unseen[0]}", where="seen")
-        decided = [
-            one.group
-            for one in wanted.changes
-            if one.kind in (ReviewActionKind.APPROVE, ReviewActionKind.REJECT)
+        group_by_id = {group.id: group for group in self.groups(selection)}
+        if unknown_groups := [
+            change.group for change in decisions.changes if change.group not in group_by_id
+        ]:
+            raise NotServed(f"no group '{unknown_groups[0]}'", expected="the id of a group on the page")
+        if without_revision := [
+            change.group for change in decisions.changes if change.group not in decisions.seen
+        ]:
+            raise MutatorError(f"no revision of group {without_revision[0]}", where="seen")
+        decided = [change.group
+            for change in decisions.changes
+            if change.kind in (ReviewActionKind.APPROVE, ReviewActionKind.REJECT)
         ]
-        if blind := [name for name in decided if name not in wanted.digests]:
-            raise MutatorError(f"no digest of the diff of group {blind[0]}", where="digests")
-        touched = [known[name] for name in dict.fromkeys(one.group for one in wanted.changes)]
-        self._refuse_others(chosen, touched, wanted.digests)
+        if without_digest := [name for name in decided if name not in decisions.digests]:
+            raise MutatorError(f"no digest of the diff of group {without_digest[0]}", where="digests")
+        changed_groups = [
+            group_by_id[name] for name in dict.fromkeys(change.group for change in decisions.changes)
+        ]
+        self._check_diffs_unchanged(selection, changed_groups, decisions.digests)
         changes = [
-            ReviewAction(group=known[one.group], kind=one.kind, by=wanted.by, text=one.text)
-            for one in wanted.changes
+            ReviewAction(group=group_by_id[change.group], kind=change.kind, by=decisions.by, text=change.text)
+            for change in decisions.changes
         ]
         try:
-            review = record_actions(self.workspace, chosen.target, changes, wanted.seen)
+            review = record_actions(self.workspace, selection.target, changes, decisions.seen)
         except ReviewConflict as conflict:
-            others = [known[name] for name in conflict.groups]
+            others = [group_by_id[name] for name in conflict.groups]
             raise GroupsChanged(conflict.got, _states(conflict.review, others)) from None
-        return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, touched)}
+        return {"target": selection.target, "by": self.reviewer, "groups": _states(review, changed_groups)}
 
-    def changes(self, chosen: Selection, name: str) -> str:
-        return load_review(self.workspace, chosen.target).diff_since_decision(self.group(chosen, name))
+    def changes(self, selection: GroupSelection, name: str) -> str:
+        return load_review(self.workspace, selection.target).diff_since_decision(self.group(selection, name))
 
-    def picture(self, chosen: Selection, name: str, level: str, *, after: bool) -> bytes:
+    def picture(self, selection: GroupSelection, name: str, level: str, *, after: bool) -> bytes:
         """Return a frame before or after the group's effect, as a JPEG file; Absent if there is none."""
-        manifest = self.workspace.manifest(chosen.target)
-        found = effect_pictures.pictures_at_level(self.workspace, manifest, self.group(chosen, name), level)
-        if found is None:
+        manifest = self.workspace.manifest(selection.target)
+        before_and_after = effect_pictures.pictures_at_level(
+            self.workspace, manifest, self.group(selection, name), level
+        )
+        if before_and_after is None:
             raise NotServed(
                 "no such picture",
                 expected=f"one of the group's levels ({', '.join(effect_pictures.LEVEL_NAMES)})",
             )
-        return found[after]
+        return before_and_after[after]
 
-    def levels(self, chosen: Selection, name: str) -> list[dict[str, str]]:
+    def levels(self, selection: GroupSelection, name: str) -> list[dict[str, str]]:
         """Return the levels that have frames, with their values as text."""
-        manifest, group = self.workspace.manifest(chosen.target), self.group(chosen, name)
-        found = effect_pictures.pictures_of_groups(self.workspace, manifest, [group]).get(name)
-        return [{"name": level.name, "label": level.label} for level in found.levels] if found else []
+        manifest, group = self.workspace.manifest(selection.target), self.group(selection, name)
+        pictures_of_group = effect_pictures.pictures_of_groups(self.workspace, manifest, [group]).get(name)
+        return (
+            [{"name": level.name, "label": level.label} for level in pictures_of_group.levels]
+            if pictures_of_group
+            else []
+        )
 
-    def typical(self, chosen: Selection, name: str, run: Path) -> dict[str, Any] | None:
+    def typical(self, selection: GroupSelection, name: str, run: Path) -> dict[str, Any] | None:
         """Return the group's results in a run; None if the run does not have the group."""
-        folder, group = RunFolder.open(run), self.group(chosen, name)
-        found = group_results.results_of_group(folder, group) if folder.head.target == chosen.target else None
-        return asdict(found) if found else None
+        folder, group = RunFolder.open(run), self.group(selection, name)
+        results = group_results.results_of_group(folder, group) if folder.head.target == selection.target else None
+        return asdict(results) if results else None
 
-    def _refuse_others(self, chosen: Selection, groups: Sequence[Group], digests: Mapping[str, str]) -> None:
-        now = _states(load_review(self.workspace, chosen.target), groups)
-        other = {
+    def _check_diffs_unchanged(
+        self, selection: GroupSelection, groups: Sequence[Group], digests: Mapping[str, str]
+    ) -> None:
+        current_states = _states(load_review(self.workspace, selection.target), groups)
+        changed_states = {
             name: facts
-            for name, facts in now.items()
+            for name, facts in current_states.items()
             if digests.get(name, facts["digest"]) != facts["digest"]
         }
-        if other:
-            names = ", ".join(other)
-            raise GroupsChanged(f"the diff has changed in {names}; reload the page", other)
+        if changed_states:
+            names = ", ".join(changed_states)
+            raise GroupsChanged(f"the diff has changed in {names}; reload the page", changed_states)
 
-    def _found(self, chosen: Selection) -> tuple[Group, ...]:
+    def _build_groups(self, selection: GroupSelection) -> tuple[Group, ...]:
         workspace = self.workspace
-        if chosen.campaign is None:
+        if selection.campaign is None:
             return mutant_groups.groups_of_library(
-                workspace, workspace.manifest(chosen.target), specs=chosen.specs
+                workspace, workspace.manifest(selection.target), specs=selection.specs
             )
-        plan = build_plan(workspace, chosen.campaign, Choices())
-        if plan.campaign.target != chosen.target:
-            raise NotServed(f"campaign '{chosen.campaign}' belongs to target '{plan.campaign.target}'")
+        plan = build_plan(workspace, selection.campaign, Choices())
+        if plan.campaign.target != selection.target:
+            raise NotServed(f"campaign '{selection.campaign}' belongs to target '{plan.campaign.target}'")
         return mutant_groups.groups_of_plan(workspace, plan)
 
-    def _stamp(self, target: str) -> object:
+    def _input_files(self, target: str) -> object:
         manifest = self.workspace.manifest(target)
         places = (self.workspace.library, self.workspace.templates, manifest.root)
         return [_files_in(place) for place in places]
@@ -205,13 +222,13 @@ def _states(review: Review, groups: Iterable[Group]) -> dict[str, Any]:
     return {group.id: review_as_json(review, group) for group in groups}
 
 
-def _files_in(place: Path) -> list[tuple[str, int, int]]:
-    found = []
-    for folder, inner, names in os.walk(place):
-        inner[:] = sorted({*inner} - _SKIPPED)
+def _files_in(root: Path) -> list[tuple[str, int, int]]:
+    files = []
+    for folder, subfolders, names in os.walk(root):
+        subfolders[:] = sorted({*subfolders} - _SKIPPED_FOLDERS)
         for name in names:
             path = os.path.join(folder, name)  # noqa: PTH118 - for speed
             with suppress(OSError):  # the file has been deleted in the meantime
                 facts = os.lstat(path)
-                found.append((path, facts.st_mtime_ns, facts.st_size))
-    return found
+                files.append((path, facts.st_mtime_ns, facts.st_size))
+    return files

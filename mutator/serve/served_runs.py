@@ -15,9 +15,9 @@ from mutator.results.outcome_counting import count_endings
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 
-REPORT = "report/index.html"
+REPORT_PAGE = "report/index.html"
 # folder in a run folder -> served file types
-SERVED: Mapping[str, tuple[str, ...]] = {
+SERVED_SUFFIXES: Mapping[str, tuple[str, ...]] = {
     "": (".csv",),
     "plots": (".svg", ".png", ".jpg", ".mp4", ".gif"),
     "series": (".js",),
@@ -26,19 +26,19 @@ SERVED: Mapping[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Runs:
+class ServedRuns:
     """Run folders below `roots`, by key: the folder's name, with `-2`, `-3` and so on for repeated names."""
 
     roots: tuple[Path, ...]
 
     def folders(self) -> dict[str, Path]:
         """Return the run folders by key, without links to folders elsewhere."""
-        found: dict[str, Path] = {}
+        folder_by_key: dict[str, Path] = {}
         for root in self.roots:
-            for path in _runs_in(root.resolve()):
-                if path not in found.values():
-                    found[_free(path.name, found)] = path
-        return found
+            for path in _run_folders_in(root.resolve()):
+                if path not in folder_by_key.values():
+                    folder_by_key[_unused_key(path.name, folder_by_key)] = path
+        return folder_by_key
 
     def folder(self, key: str) -> Path:
         with suppress(KeyError):
@@ -53,7 +53,7 @@ class Runs:
         return next((root for root in self.roots if not RunFolder.exists(root)), self.roots[0].parent)
 
 
-def _runs_in(root: Path) -> list[Path]:
+def _run_folders_in(root: Path) -> list[Path]:
     if RunFolder.exists(root):
         return [root]
     try:
@@ -64,21 +64,21 @@ def _runs_in(root: Path) -> list[Path]:
     return [path for path in folders if path.resolve() == path and str(path).isprintable()]
 
 
-def report_of(key: str) -> str:
-    return f"/runs/{quote(key, safe='')}/{REPORT}"
+def report_address(key: str) -> str:
+    return f"/runs/{quote(key, safe='')}/{REPORT_PAGE}"
 
 
-def _free(name: str, taken: Iterable[str]) -> str:
-    known, number, key = set(taken), 1, name
-    while key in known:
+def _unused_key(name: str, used_keys: Iterable[str]) -> str:
+    used, number, key = set(used_keys), 1, name
+    while key in used:
         number += 1
         key = f"{name}-{number}"
     return key
 
 
-def told(key: str, path: Path) -> dict[str, Any]:
+def summarize_run(key: str, path: Path) -> dict[str, Any]:
     facts: dict[str, Any] = {"key": key, "campaign": "", "target": "", "planned": 0, "done": 0}
-    facts |= {"report": report_of(key)}
+    facts |= {"report": report_address(key)}
     facts |= {"state": "damaged", "outcomes": {}, "problem": ""}
     try:
         folder = RunFolder.open_unverified(path)
@@ -89,7 +89,7 @@ def told(key: str, path: Path) -> dict[str, Any]:
         }
         with suppress(FileNotFoundError):
             table = Results(path).path.stat()
-            outcomes = _outcomes(path, table.st_mtime_ns, table.st_size)
+            outcomes = _count_outcomes(path, table.st_mtime_ns, table.st_size)
             facts |= {"outcomes": outcomes, "done": sum(outcomes.values())}
     except MutatorError as err:
         facts["problem"] = err.got
@@ -99,7 +99,7 @@ def told(key: str, path: Path) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=1000)
-def _outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
+def _count_outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
     """Count how the experiments ended. `mtime_ns` and `size` of the table are only keys of the cache."""
     return count_endings(Results(run).frame("status", "outcome"))
 
@@ -107,8 +107,8 @@ def _outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
 def open_in_run(run: Path, name: str) -> BinaryIO:
     """Open a file of a run; Absent if it is not served."""
     folder, _, last = name.rpartition("/")
-    if Path(last).suffix not in SERVED.get(folder, ()):
-        raise _absent()
+    if Path(last).suffix not in SERVED_SUFFIXES.get(folder, ()):
+        raise _no_such_file()
     return open_file(run, name)
 
 
@@ -117,8 +117,8 @@ def open_file(root: Path, name: str) -> BinaryIO:
     try:
         return open_below(root, name)
     except (OSError, Outside):
-        raise _absent() from None
+        raise _no_such_file() from None
 
 
-def _absent() -> NotServed:
+def _no_such_file() -> NotServed:
     return NotServed("no such file", expected="a file of a report, not a link")

@@ -7,33 +7,33 @@ from collections.abc import Callable
 import uvicorn
 
 from mutator.errors import MutatorError
-from mutator.serve.application import Site, build_application
+from mutator.serve.application import ServedSite, build_application
 from mutator.serve.connections import Connection
-from mutator.serve.security import HOST, Guarded
+from mutator.serve.security import HOST, GuardedApplication
 
 _BACKLOG = 64  # connections to accept at once
 
 
-def serve(site: Site, *, port: int, ready: Callable[[str], None]) -> None:
+def serve(site: ServedSite, *, port: int, on_ready: Callable[[str], None]) -> None:
     """Serve a site until the process is interrupted, then end all jobs; `ready` is called with the address
     and token.
 
     `port` 0 means any free port. MutatorError for a port in use.
     """
     token = secrets.token_urlsafe(32)
-    with listening(port) as listener:
-        own = listener.getsockname()[1]
-        server = server_of(site, port=own, token=token)
-        ready(f"http://{HOST}:{own}/?token={token}")
+    with open_listener(port) as listener:
+        bound_port = listener.getsockname()[1]
+        server = build_server(site, port=bound_port, token=token)
+        on_ready(f"http://{HOST}:{bound_port}/?token={token}")
         try:
             server.run(sockets=[listener])
         finally:
             site.jobs.close()
 
 
-def server_of(site: Site, *, port: int, token: str) -> uvicorn.Server:
+def build_server(site: ServedSite, *, port: int, token: str) -> uvicorn.Server:
     config = uvicorn.Config(
-        Guarded(build_application(site), port=port, token=token),
+        GuardedApplication(build_application(site), port=port, token=token),
         http=Connection,
         backlog=_BACKLOG,
         access_log=False,  # the log would show the token
@@ -46,7 +46,7 @@ def server_of(site: Site, *, port: int, token: str) -> uvicorn.Server:
     return uvicorn.Server(config)
 
 
-def listening(port: int) -> socket.socket:
+def open_listener(port: int) -> socket.socket:
     """Open a socket that only this machine can reach; MutatorError for a port in use."""
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -167,19 +167,19 @@ Serve = Callable[..., AbstractContextManager[str]]
 @pytest.fixture(scope="session")
 def serve() -> Serve:
     pytest.importorskip("uvicorn", reason="extra `serve` is not installed")
-    from mutator.serve.application import Site
+    from mutator.serve.application import ServedSite
     from mutator.serve.security import HOST
-    from mutator.serve.served_runs import Runs
-    from mutator.serve.server import listening, server_of
+    from mutator.serve.served_runs import ServedRuns
+    from mutator.serve.server import build_server, open_listener
 
     @contextmanager
     def served(
         workspace: Workspace, runs: tuple[Path, ...] = (), *, port: int = 0, token: str = "t"
     ) -> Iterator[str]:
-        site = Site(workspace=workspace, runs=Runs(runs))
-        with listening(port) as listener:
+        site = ServedSite(workspace=workspace, runs=ServedRuns(runs))
+        with open_listener(port) as listener:
             own = listener.getsockname()[1]
-            server = server_of(site, port=own, token=token)
+            server = build_server(site, port=own, token=token)
             thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)
             thread.start()
             while not server.started:

@@ -14,7 +14,7 @@ from mutator.report.report_digests import inputs_digest
 from mutator.review.decisions import load_review
 from mutator.review.mutant_groups import groups_of_library
 from mutator.review.review_page import review_page_html
-from mutator.serve.jobs import Jobs
+from mutator.serve.jobs import ServeJobs
 from mutator.store import file_digests
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -95,7 +95,7 @@ def address(
 ) -> Iterator[str]:
     """The address of a server whose jobs stay in the queue."""
     monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())
-    monkeypatch.setattr(Jobs, "_started", lambda jobs, job: None)
+    monkeypatch.setattr(ServeJobs, "_started", lambda jobs, job: None)
     with serve(workspace, (runs,)) as found:
         yield found
 

@@ -16,8 +16,8 @@ import mutator
 from mutator.errors import MutatorError
 from mutator.execution.cluster.bundle import Bundle, unpack_bundle
 from mutator.execution.session import open_session
-from mutator.serve.application import Site, build_application
-from mutator.serve.served_runs import Runs
+from mutator.serve.application import ServedSite, build_application
+from mutator.serve.served_runs import ServedRuns
 from mutator.store.plan_choices import Choices
 
 from .hostile_libraries import SECRET, TRICKS, World, plant_hooks
@@ -143,7 +143,7 @@ def asked(world: World, address: str) -> tuple[int, str]:
     async def send(message: dict[str, Any]) -> None:
         said.append(message.get("body", b""))
 
-    site = Site(workspace=world.workspace, runs=Runs((world.out,)))
+    site = ServedSite(workspace=world.workspace, runs=ServedRuns((world.out,)))
     try:
         asyncio.run(build_application(site)(scope, receive, send))
     finally:

@@ -9,7 +9,7 @@ import pytest
 
 from mutator._common import progress_events
 from mutator.errors import MutatorError
-from mutator.serve.job_events import EventReader, Link, Phase, Remark
+from mutator.serve.job_events import EventReader, FileEvent, MessageEvent, PhaseEvent
 
 
 @pytest.fixture
@@ -32,11 +32,11 @@ def test_the_reader_understands_every_event(pipe: int) -> None:
     progress_events.report_error("x" * 9_999)
     data = os.read(pipe, 65_536)
     assert [*EventReader().read(data)] == [
-        Phase(event="phase", phase="golden runs", done=1, total=4, outcomes={"sdc": 2}),
-        Remark(event="warning", text="old"),
-        Link(event="link", kind="plot", path=str(Path.cwd() / "plots/a.svg")),
-        Remark(event="result", text="verdict: sdc ?"),
-        Remark(event="error", text="x" * progress_events.MOST_TEXT_LENGTH),
+        PhaseEvent(event="phase", phase="golden runs", done=1, total=4, outcomes={"sdc": 2}),
+        MessageEvent(event="warning", text="old"),
+        FileEvent(event="link", kind="plot", path=str(Path.cwd() / "plots/a.svg")),
+        MessageEvent(event="result", text="verdict: sdc ?"),
+        MessageEvent(event="error", text="x" * progress_events.MOST_TEXT_LENGTH),
     ]
     assert all(len(line) < 4_096 and json.loads(line)["event"] for line in data.splitlines())
 

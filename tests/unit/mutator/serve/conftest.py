@@ -14,11 +14,11 @@ from typing import Any
 import pytest
 
 from mutator.report.panels import figures_panel
-from mutator.serve.application import Site
-from mutator.serve.page_tokens import HEADER, HOME, review_page
+from mutator.serve.application import ServedSite
+from mutator.serve.page_tokens import HOME_PAGE, TOKEN_HEADER, review_page_name
 from mutator.serve.security import HOST
-from mutator.serve.served_runs import Runs
-from mutator.serve.server import listening, server_of
+from mutator.serve.served_runs import ServedRuns
+from mutator.serve.server import build_server, open_listener
 from mutator.workspace import Workspace
 
 from ..report.made_run import make_run
@@ -48,7 +48,7 @@ class Client:
 
     port: int
     place: Path
-    site: Site
+    site: ServedSite
 
     @property
     def origin(self) -> str:
@@ -66,7 +66,11 @@ class Client:
         """Send a request as the server's page does. None in `headers` leaves a header out."""
         own: dict[str, str | None] = {"Host": f"{HOST}:{self.port}", "Cookie": f"mutator-{self.port}={TOKEN}"}
         if method == "POST":
-            own |= {"Origin": self.origin, "Content-Type": "application/json", HEADER: self.token_for(path)}
+            own |= {
+                "Origin": self.origin,
+                "Content-Type": "application/json",
+                TOKEN_HEADER: self.token_for(path),
+            }
         sent = {name: value for name, value in (own | dict(headers or {})).items() if value is not None}
         connection = http.client.HTTPConnection(HOST, self.port, timeout=60)
         try:
@@ -94,7 +98,7 @@ class Client:
     def token_for(self, path: str) -> str:
         """The token of the page that can send any request to `path`."""
         target = path.partition("/api/review/")[2].partition("?")[0]
-        return self.site.tokens.token(review_page(target) if target else HOME)
+        return self.site.tokens.token(review_page_name(target) if target else HOME_PAGE)
 
     def get(self, path: str, **headers: str | None) -> Answer:
         return self.ask("GET", path, {name.replace("_", "-"): value for name, value in headers.items()})
@@ -116,10 +120,10 @@ class Client:
 def served_at(_caches: Path) -> Callable[[Workspace, Path], Any]:
     @contextmanager
     def serve(workspace: Workspace, runs: Path) -> Iterator[Client]:
-        site = Site(workspace=workspace, runs=Runs((runs,)))
-        listener = listening(0)
+        site = ServedSite(workspace=workspace, runs=ServedRuns((runs,)))
+        listener = open_listener(0)
         port = listener.getsockname()[1]
-        server = server_of(site, port=port, token=TOKEN)
+        server = build_server(site, port=port, token=TOKEN)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
         thread.start()
         try:

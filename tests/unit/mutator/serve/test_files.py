@@ -15,9 +15,9 @@ from mutator.report.report_digests import inputs_digest, write_report_files
 from mutator.results import table_building
 from mutator.serve.page_tokens import PageTokens
 from mutator.serve.report_cache import ReportCache
-from mutator.serve.report_pages import Shown
-from mutator.serve.responses import without_places
-from mutator.serve.served_runs import Runs
+from mutator.serve.report_pages import RunPages
+from mutator.serve.responses import without_folders
+from mutator.serve.served_runs import ServedRuns
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import script_bytes
 from mutator.workspace import Workspace
@@ -240,7 +240,7 @@ def test_an_edited_table_is_not_shown_beside_the_seal_of_a_finished_run(
     toycar: Workspace, tmp_path: Path, write_finished: Callable[..., Path]
 ) -> None:
     table = table_building.build_tables(write_finished(toycar, tmp_path / "night"))
-    shown = Shown(toycar, Runs((tmp_path,)), PageTokens(b"secret"))
+    shown = RunPages(toycar, ServedRuns((tmp_path,)), PageTokens(b"secret"))
     assert shown.file("night", "report/index.html").status_code == 200
     table.write_text(table.read_text().replace(",masked,", ",sdc,", 1))
     with pytest.raises(MutatorError, match=r"results\.csv:\d+: 'sdc'; expected 'masked'"):
@@ -298,4 +298,4 @@ def test_text_of_runs_is_escaped(client: Client) -> None:
     ],
 )
 def test_only_the_last_part_of_a_path_is_shown(text: str, told: str) -> None:
-    assert without_places(text) == told
+    assert without_folders(text) == told

@@ -9,8 +9,8 @@ import pytest
 from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
-from mutator.serve.job_requests import Desk, Work
-from mutator.serve.served_runs import Runs
+from mutator.serve.job_requests import JobCommand, RequestChecker
+from mutator.serve.served_runs import ServedRuns
 from mutator.store import plan_file
 from mutator.workspace import Workspace
 
@@ -101,19 +101,19 @@ def test_a_job_request_must_be_json(client: Client, kind: str) -> None:
 
 
 @pytest.fixture
-def desk(toycar: Workspace, tmp_path: Path) -> Desk:
+def desk(toycar: Workspace, tmp_path: Path) -> RequestChecker:
     (tmp_path / "runs").mkdir()
     freeze_plan(build_plan(toycar, "small"), tmp_path / "runs" / "first", toycar)
-    return Desk(toycar, Runs((tmp_path / "runs",)))
+    return RequestChecker(toycar, ServedRuns((tmp_path / "runs",)))
 
 
-def work(desk: Desk, **order: Any) -> Work:
+def work(desk: RequestChecker, **order: Any) -> JobCommand:
     import json
 
     return desk.work(json.dumps(order).encode())
 
 
-def test_requests_become_command_lines(desk: Desk) -> None:
+def test_requests_become_command_lines(desk: RequestChecker) -> None:
     run = desk.runs.folder("first")
     experiment = next(plan_file.ids(run))
     place = (f"--library={desk.workspace.library}", f"--templates={desk.workspace.templates}")
@@ -142,11 +142,11 @@ def test_requests_become_command_lines(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize("trigger", ["always", "10", "1.5", "near", "near_far/near", "t >= 2 and v_ego > 3"])
-def test_a_trigger_becomes_an_option_of_try(desk: Desk, trigger: str) -> None:
+def test_a_trigger_becomes_an_option_of_try(desk: RequestChecker, trigger: str) -> None:
     assert f"--trigger={trigger}" in work(desk, **TRY, trigger=trigger).words
 
 
-def test_a_new_run_cannot_be_a_link(desk: Desk, tmp_path: Path) -> None:
+def test_a_new_run_cannot_be_a_link(desk: RequestChecker, tmp_path: Path) -> None:
     (tmp_path / "runs" / "new").symlink_to(tmp_path)
     with pytest.raises(MutatorError, match="a link"):
         work(desk, **CAMPAIGN)
@@ -155,6 +155,6 @@ def test_a_new_run_cannot_be_a_link(desk: Desk, tmp_path: Path) -> None:
         work(desk, **TRY)
 
 
-def test_an_infinite_number_is_refused(desk: Desk) -> None:
+def test_an_infinite_number_is_refused(desk: RequestChecker) -> None:
     with pytest.raises(ValueError):
         work(desk, **TRY, value=math.inf)

@@ -10,8 +10,8 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.report.panels import figures_panel
-from mutator.serve.job_requests import Rerun, Work
-from mutator.serve.jobs import Job, Jobs, State
+from mutator.serve.job_requests import JobCommand, RerunRequest
+from mutator.serve.jobs import JobState, ServeJob, ServeJobs
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -111,9 +111,9 @@ def test_a_failed_job_gives_the_reason(busy: Client) -> None:
     assert "run.json" in job["message"] or "target" in job["message"]
 
 
-def job(**given: Any) -> Job:
-    order = Rerun(kind="rerun", run="first", experiment="0" * 16)
-    return Job(id="1", work=Work(order=order, title="again", words=()), **given)
+def job(**given: Any) -> ServeJob:
+    order = RerunRequest(kind="rerun", run="first", experiment="0" * 16)
+    return ServeJob(id="1", work=JobCommand(order=order, title="again", words=()), **given)
 
 
 def test_the_output_of_a_job_is_plain_text() -> None:
@@ -166,9 +166,9 @@ def test_events_arrive_in_any_pieces_and_other_lines_are_dropped() -> None:
 
 def test_the_number_of_waiting_jobs_is_limited() -> None:
     """Without a limit, a page could fill the memory."""
-    jobs = Jobs(0, lambda work: None)
+    jobs = ServeJobs(0, lambda work: None)
     for _ in range(50):
-        assert jobs.submit(job().work).state is State.QUEUED
+        assert jobs.submit(job().work).state is JobState.QUEUED
     with pytest.raises(MutatorError, match="50 jobs are waiting"):
         jobs.submit(job().work)
     jobs.close()

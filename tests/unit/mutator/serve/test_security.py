@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.serve.page_tokens import HEADER, HOME, PageTokens, review_page, run_page
-from mutator.serve.security import MOST_BYTES
+from mutator.serve.page_tokens import HOME_PAGE, TOKEN_HEADER, PageTokens, review_page_name, run_page_name
+from mutator.serve.security import MOST_BODY_BYTES
 
 from .conftest import TOKEN, Answer, Client
 
@@ -85,7 +85,7 @@ def test_other_methods_are_refused(client: Client, method: str) -> None:
 
 @pytest.mark.parametrize("chunked", [False, True])
 def test_a_long_body_is_refused_with_and_without_a_length(client: Client, chunked: bool) -> None:
-    body = b'{"kind": "' + b"x" * (MOST_BYTES + 10) + b'"}'
+    body = b'{"kind": "' + b"x" * (MOST_BODY_BYTES + 10) + b'"}'
     assert client.ask("POST", "/api/jobs", body=body, chunked=chunked).status == 413
 
 
@@ -97,7 +97,7 @@ def test_a_long_stated_length_is_refused_before_the_body_arrives(client: Client,
 
 
 def test_a_body_within_the_limit_is_read(client: Client) -> None:
-    body = b'{"kind": "' + b"x" * (MOST_BYTES - 100) + b'"}'
+    body = b'{"kind": "' + b"x" * (MOST_BODY_BYTES - 100) + b'"}'
     for chunked in (False, True):
         assert client.ask("POST", "/api/jobs", body=body, chunked=chunked).status == 400
 
@@ -146,18 +146,18 @@ def test_only_a_script_can_post(client: Client, header: tuple[str, str]) -> None
     assert client.ask("POST", "/api/jobs", usual | {f"Sec-Fetch-{header[0]}": header[1]}, b"{}").status == 403
 
 
-PAGES = (HOME, run_page(Path("/elsewhere")), review_page("toycar"), review_page("other"))
+PAGES = (HOME_PAGE, run_page_name(Path("/elsewhere")), review_page_name("toycar"), review_page_name("other"))
 
 
 def strangers(client: Client, *allowed: str) -> list[str]:
     """The tokens of all other pages, and no token."""
-    night, linked = (run_page(client.place / "runs" / name) for name in ("night", "linked"))
+    night, linked = (run_page_name(client.place / "runs" / name) for name in ("night", "linked"))
     tokens = [client.site.tokens.token(page) for page in {*PAGES, night, linked} - {*allowed}]
     return [*tokens, "", "a", "\xff", PageTokens().token(allowed[0])]
 
 
 def test_only_the_review_page_decides(client: Client) -> None:
-    path, own = "/api/review/toycar", review_page("toycar")
+    path, own = "/api/review/toycar", review_page_name("toycar")
     [group, *_] = groups = client.get(path).json["groups"]
     facts = groups[group]
     body = {
@@ -167,16 +167,16 @@ def test_only_the_review_page_decides(client: Client) -> None:
         "digests": {group: facts["digest"]},
     }
     for token in strangers(client, own):
-        assert client.ask("POST", path, {HEADER: token}, body).status == 403
+        assert client.ask("POST", path, {TOKEN_HEADER: token}, body).status == 403
     assert client.get(path).json["groups"][group]["state"] == "new"
-    assert client.ask("POST", path, {HEADER: client.site.tokens.token(own)}, body).status == 200
+    assert client.ask("POST", path, {TOKEN_HEADER: client.site.tokens.token(own)}, body).status == 200
     assert client.get(path).json["groups"][group]["state"] == "approved"
 
 
 def test_a_run_page_starts_and_cancels_only_jobs_of_its_run(
     client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    night = run_page(client.place / "runs" / "night")
+    night = run_page_name(client.place / "runs" / "night")
     own = client.site.tokens.token(night)
     orders: list[dict[str, object]] = [
         {"kind": "report", "run": "night"},
@@ -184,19 +184,19 @@ def test_a_run_page_starts_and_cancels_only_jobs_of_its_run(
         {"kind": "campaign", "campaign": "small", "name": "night"},
     ]
     for order in orders:
-        for token in [*strangers(client, HOME, night), *([own] if "run" not in order else [])]:
-            assert client.ask("POST", "/api/jobs", {HEADER: token}, order).status in (400, 403)
+        for token in [*strangers(client, HOME_PAGE, night), *([own] if "run" not in order else [])]:
+            assert client.ask("POST", "/api/jobs", {TOKEN_HEADER: token}, order).status in (400, 403)
     assert not client.get("/api/jobs").json["jobs"]
     monkeypatch.setattr(client.site.jobs, "_started", lambda job, events: None)
-    ids = [client.ask("POST", "/api/jobs", {HEADER: own}, orders[0]).json["id"]]
+    ids = [client.ask("POST", "/api/jobs", {TOKEN_HEADER: own}, orders[0]).json["id"]]
     ids += [client.post("/api/jobs", order).json["id"] for order in orders[:1]]
     campaign = client.post("/api/jobs", orders[2] | {"name": "later"}).json["id"]
-    for token in [*strangers(client, HOME, night), own]:
-        assert client.ask("POST", f"/api/jobs/{campaign}/cancel", {HEADER: token}, {}).status == 403
+    for token in [*strangers(client, HOME_PAGE, night), own]:
+        assert client.ask("POST", f"/api/jobs/{campaign}/cancel", {TOKEN_HEADER: token}, {}).status == 403
     states = {job["id"]: job["state"] for job in client.get("/api/jobs").json["jobs"]}
     assert states == dict.fromkeys([*ids, campaign], "queued")
     for job, token in ((ids[0], own), (ids[1], own), (campaign, client.token_for("/api/jobs"))):
-        assert client.ask("POST", f"/api/jobs/{job}/cancel", {HEADER: token}, {}).status == 200
+        assert client.ask("POST", f"/api/jobs/{job}/cancel", {TOKEN_HEADER: token}, {}).status == 200
 
 
 def blocks(page: str, tag: str) -> list[str]:
