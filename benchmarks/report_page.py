@@ -143,13 +143,13 @@ def write(size: int, out: Path) -> dict[str, float]:
     experiments = {e.id: e for e in written_run(workspace, size, out)}
     began = process_time()
     run = ReportedRun.open(RunFolder.open(out), None)
-    more = {RANK_COLUMN: run.seen.places, UNTIMED_PATH_COLUMN: run.seen.path_numbers}
+    more = {RANK_COLUMN: run.experiment_facts.ranks, UNTIMED_PATH_COLUMN: run.experiment_facts.path_numbers}
     table = packed_script_element(
         report_browse.results_table_data(run.results.assign(**more), run.faults, run.paths), "table"
     )
     assert run.paths is not None
     ids = run.results["experiment_id"].tolist()
-    paths = packed_script_element(run.paths.data(ids), "paths")
+    paths = packed_script_element(run.paths.page_data(ids), "paths")
     table_s = process_time() - began
     shown = [experiments[name] for name in ids]
     records = [record(e, n) for n, e in enumerate(shown)]
@@ -162,15 +162,15 @@ def write(size: int, out: Path) -> dict[str, float]:
         scripts=tuple(map(Markup, (table, detail, paths, packed_script_element({}, "media")))),
     )
     content = ReportContent(
-        name=f"{size} experiments",
+        title=f"{size} experiments",
         alarm="",
-        outcomes=count_endings(run.results),
-        planned="",
-        words=glossary_of(run),
-        study="",
+        outcome_counts=count_endings(run.results),
+        plan_text="",
+        glossary=glossary_of(run),
+        study_citation="",
         answers=build_answers_panel(run),
         panels=[panel for panel in (build_fault_paths_panel(run),) if panel],
-        browse=browse,
+        experiment_list=browse,
     )
     page = report_page.report_html(content)
     (out / "report").mkdir()

@@ -30,5 +30,7 @@ def serve_runs(
         # runs/ appears with the first campaign, which can be started in the browser
         if not root.is_dir() and root != RUNS_FOLDER:
             raise MutatorError("no such folder", where=root, expected="a run folder, or a folder of them")
-    site = ServedSite(workspace=open_workspace(workspace), runs=ServedRuns(roots), most_parallel_jobs=most_parallel_jobs)
+    site = ServedSite(
+        workspace=open_workspace(workspace), runs=ServedRuns(roots), most_jobs_at_once=most_parallel_jobs
+    )
     serve(site, port=port, on_ready=on_ready)

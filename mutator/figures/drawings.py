@@ -28,7 +28,7 @@ class Drawing:
     figure: "Figure | None"
     codes: tuple[tuple[str, str], ...] = ()
 
-    def link(self, suffix: str) -> str:
+    def file_name(self, suffix: str) -> str:
         return f"{FIGURES_FOLDER}/{self.name}.{suffix}"
 
 
@@ -50,7 +50,7 @@ def drawing_files(drawings: Sequence[Drawing]) -> dict[str, bytes]:
     files: dict[str, bytes] = {}
     for drawing in drawings:
         if drawing.figure is not None:
-            names = [drawing.link(suffix) for suffix in FIGURE_FORMATS]
+            names = [drawing.file_name(suffix) for suffix in FIGURE_FORMATS]
             files |= dict(zip(names, render_images(drawing.figure, FIGURE_FORMATS), strict=True))
     return files
 

@@ -69,7 +69,7 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
     missing = _missing_fault_types(fault_types, run.frame)
     if len(missing) == len(fault_types):
         return None
-    ends = run.ends() or {}
+    ends = run.latest_golden_ends() or {}
     file_words = re.findall(r"\w+", read_bounded(file, MOST_YAML_BYTES).decode())
     frame = select_common_columns(run.frame, *file_words)  # the queries use only columns that the file names
     frame = frame.assign(t_end=frame["scenario"].map(ends))  # `median_time` needs the ends of the runs
@@ -127,12 +127,12 @@ def _mixture_gaps(run: ReportedRun, missing: list[str]) -> Iterator[str]:
     """Yield how the run differs from the paper's mixture of faults. A shard is always incomplete."""
     if missing:
         yield f"no runs of {counted(len(missing), 'fault type')} of the paper"
-    if run.done < (planned := run.folder.head.experiments):
-        yield f"only {run.done} of {planned} planned experiments were run"
+    if run.ran_count < (planned := run.folder.head.experiments):
+        yield f"only {run.ran_count} of {planned} planned experiments were run"
 
 
 def _describe_coverage(run: ReportedRun, fault_type_count: int, missing: list[str]) -> str:
     text = f"Based on {len(run.frame)} of {run.folder.planned_count} experiments, which cover "
     text += f"{fault_type_count - len(missing)} of the paper's {fault_type_count} fault types."
     text += f" Missing: {', '.join(missing)}." if missing else ""
-    return " ".join(filter(None, (text, fault_free_alerts_note(run.fault_free()))))
+    return " ".join(filter(None, (text, fault_free_alerts_note(run.fault_free_runs()))))

@@ -11,8 +11,8 @@ from mutator.figures.run_plot import (
     GOLDEN_COLOUR,
     MARK_COLOURS,
     MARK_LINE_STYLES,
-    EventMark,
     EventKind,
+    EventMark,
     infinities_as_gaps,
 )
 from mutator.paper.unsafe_actions import ActionFigure, RunPair, StepFlags

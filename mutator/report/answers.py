@@ -43,8 +43,8 @@ def build_answers(run: ReportedRun) -> tuple[ReportAnswer, ...]:
     if has_alerts:
         answers.append(silent_hazards_answer(frame, run.folder.stop_note))
     answers.append(tolerated_faults_answer(frame))
-    if len(run.seen.timings):
-        answers.append(time_spent_answer(frame, run.seen.timings))
+    if len(run.experiment_facts.timings):
+        answers.append(time_spent_answer(frame, run.experiment_facts.timings))
     return tuple(answers)
 
 

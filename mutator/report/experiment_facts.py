@@ -29,10 +29,10 @@ class ExperimentFacts:
     timed experiment; its engine is '' if not recorded.
     """
 
-    places: np.ndarray
+    ranks: np.ndarray
     path_numbers: np.ndarray
     untimed_paths: tuple[UntimedPath, ...]
-    alerts: AlertsByExperiment
+    alerts_by_id: AlertsByExperiment
     timings: "DataFrame"
 
     @classmethod
@@ -59,10 +59,10 @@ class ExperimentFacts:
                     if code == len(untimed_paths):
                         untimed_paths.append(untimed_path)
         return cls(
-            places=ranks_of_rows(results),
+            ranks=ranks_of_rows(results),
             path_numbers=path_numbers,
             untimed_paths=tuple(untimed_paths),
-            alerts=alerts,
+            alerts_by_id=alerts,
             timings=timings_frame(folder),
         )
 

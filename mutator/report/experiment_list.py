@@ -78,7 +78,7 @@ def build_list_data(run: ReportedRun) -> ExperimentListData:
     data: dict[str, Any] = {"table": _list_table_data(run, listed), "details": _list_details_data(run, ids)}
     data["media"] = media_by_experiment(folder, folder.path / REPORT_FOLDER, MOST_EMBEDDED_STILL_BYTES)
     if run.paths:
-        data["paths"] = run.paths.data(ids)
+        data["paths"] = run.paths.page_data(ids)
     facts = {
         **_target_facts(folder, workspace),
         "series": series_facts(folder),
@@ -118,17 +118,17 @@ def _target_facts(folder: RunFolder, workspace: "Workspace | None") -> dict[str,
 
 def _listed_results(run: ReportedRun) -> "DataFrame":
     """Return the results that the page lists, in reading order, with rank and path."""
-    is_listed = run.seen.places < MOST_LISTED_EXPERIMENTS
+    is_listed = run.experiment_facts.ranks < MOST_LISTED_EXPERIMENTS
     extra_columns = {
-        RANK_COLUMN: run.seen.places[is_listed],
-        UNTIMED_PATH_COLUMN: run.seen.path_numbers[is_listed],
+        RANK_COLUMN: run.experiment_facts.ranks[is_listed],
+        UNTIMED_PATH_COLUMN: run.experiment_facts.path_numbers[is_listed],
     }
     return run.results[is_listed].assign(**extra_columns).sort_values(LIST_ORDER)
 
 
 def _list_table_data(run: ReportedRun, listed: "DataFrame") -> dict[str, Any]:
     data = results_table_data(
-        listed, run.faults, run.paths, has_alerts=run.folder.has_alerts, source=run.source
+        listed, run.faults, run.paths, has_alerts=run.folder.has_alerts, source=run.source_lines
     )
     if len(listed) < len(run.results):
         data |= {"of": len(run.results), "map": build_heat_map(run)}
@@ -168,7 +168,7 @@ def results_table_data(
     columns["rank"] = results[RANK_COLUMN] + 1
     columns["t_hazard"] = hazard_times(results).min(axis=1)
     if paths:
-        columns["through"] = paths.through(results[UNTIMED_PATH_COLUMN])
+        columns["through"] = paths.passed_links(results[UNTIMED_PATH_COLUMN])
     if source:
         columns |= _operator_columns(source, results, rows)
     columns_data = [{"name": name, **column_data(name, values)} for name, values in columns.items()]
@@ -188,7 +188,7 @@ def _operator_columns(
 ) -> dict[str, list[str]]:
     """Return the columns that differ for mutants of operators. Their `value` is the change in the source."""
     faults = results["fault_id"].tolist()
-    changes = [source.changes.get(name, "") for name in faults]
+    changes = [source.change_by_fault.get(name, "") for name in faults]
     rows_and_changes = list(zip(rows, changes, strict=True))
     return {
         "value": [

@@ -73,7 +73,7 @@ class RunFaultPaths:
             untimed_paths=untimed_paths,
         )
 
-    def through(self, path_numbers: Iterable[int]) -> list[str]:
+    def passed_links(self, path_numbers: Iterable[int]) -> list[str]:
         """Return the links that each fault got through, joined by `;`. The page filters by them."""
         texts = [
             ";".join(link_name(c.tail, c.tip) for c in path.links if c.state is LinkState.THROUGH)
@@ -81,7 +81,7 @@ class RunFaultPaths:
         ]
         return [texts[number] if number >= 0 else "" for number in path_numbers]
 
-    def data(self, ids: Sequence[str]) -> dict[str, Any]:
+    def page_data(self, ids: Sequence[str]) -> dict[str, Any]:
         """Return the page's data for the experiments `ids`: the shape of each path (-1: none), and for each
         channel a column of first times and a column of largest deviations. `by` lists the components that
         must have changed before their own channels did, with the latest possible time.
@@ -124,7 +124,7 @@ class RunFaultPaths:
     def _latest_times(path: FaultPath | None) -> dict[str, float]:
         return {s.name: round(s.t_by, 4) for s in (path.components if path else ()) if s.t_by is not None}
 
-    def label(self, component: str) -> str:
+    def component_label(self, component: str) -> str:
         """Return the name of a component on pages."""
         return self.components[component]["label"]
 
@@ -163,12 +163,12 @@ class PathCounts:
     """
 
     active: int = 0
-    came: Counter[str] = field(default_factory=Counter)
-    through: Counter[str] = field(default_factory=Counter)
+    reached: Counter[str] = field(default_factory=Counter)
+    passed: Counter[str] = field(default_factory=Counter)
     injected: Counter[str] = field(default_factory=Counter)
     stopped: Counter[str] = field(default_factory=Counter)
     masked: Counter[str] = field(default_factory=Counter)
-    ends: Counter[tuple[str, ...]] = field(default_factory=Counter)
+    masked_by_components: Counter[tuple[str, ...]] = field(default_factory=Counter)
 
     def add(self, path: FaultPath | UntimedPath, count: int = 1) -> None:
         self.active += count
@@ -176,10 +176,10 @@ class PathCounts:
         stopped = {tip for _, tip, state in link_states if state is LinkState.STOPPED}
         for counter, names in (
             (
-                self.came,
+                self.reached,
                 [n for n, _, state in link_states if state in (LinkState.THROUGH, LinkState.STOPPED)],
             ),
-            (self.through, [name for name, _, state in link_states if state is LinkState.THROUGH]),
+            (self.passed, [name for name, _, state in link_states if state is LinkState.THROUGH]),
             (self.injected, path.injected),
             (self.stopped, stopped.union(path.stopped_at)),
             (self.masked, path.stopped_at),
@@ -187,7 +187,7 @@ class PathCounts:
             for name in names:
                 counter[name] += count
         if path.stopped_at:
-            self.ends[path.stopped_at] += count
+            self.masked_by_components[path.stopped_at] += count
 
 
 def path_counts_by_fault_type(

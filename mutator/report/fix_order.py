@@ -166,7 +166,7 @@ def _component_that_passed_most(
     fragment = filtered_list_fragment(
         {"kind": [kind], **list_filter, "through": sorted(links[component])}, "rank"
     )
-    return PageLink(f"{paths.label(component)}: {passed[component]} of {len(hazards)}", fragment)
+    return PageLink(f"{paths.component_label(component)}: {passed[component]} of {len(hazards)}", fragment)
 
 
 def _untimed_paths(frame: pd.DataFrame, paths: RunFaultPaths) -> Iterator[tuple[UntimedPath, int]]:
@@ -184,5 +184,5 @@ def _component_that_stopped_most(kind: str, active: pd.DataFrame, paths: RunFaul
     if not stopped:
         return f"none of {len(active):,}"
     component = min(stopped, key=lambda name: (-stopped[name], name))
-    text = f"{paths.label(component)}: {stopped[component]:,} of {len(active):,}"
+    text = f"{paths.component_label(component)}: {stopped[component]:,} of {len(active):,}"
     return PageLink(text, filtered_list_fragment({"kind": [kind], "stopped_at": [component]}))

@@ -19,29 +19,29 @@ class ReportContent:
     `panels` after it.
     """
 
-    name: str
+    title: str
     alarm: str
-    outcomes: Mapping[str, int]
-    planned: str
-    words: Glossary
-    study: str
+    outcome_counts: Mapping[str, int]
+    plan_text: str
+    glossary: Glossary
+    study_citation: str
     answers: Panel
     panels: Sequence[Panel]
-    browse: ExperimentListData  # the list of experiments, which only the page has
+    experiment_list: ExperimentListData  # the list of experiments, which only the page has
 
 
 def report_markdown(content: ReportContent) -> str:
-    total = sum(content.outcomes.values())
-    endings = ", ".join(f"{n} {name}" for name, n in content.outcomes.items())
-    which = "the worst of them" if content.browse.truncation_note else "them"
+    total = sum(content.outcome_counts.values())
+    endings = ", ".join(f"{n} {name}" for name, n in content.outcome_counts.items())
+    which = "the worst of them" if content.experiment_list.truncation_note else "them"
     parts = [
-        f"# {content.name}",
+        f"# {content.title}",
         f"**{content.alarm}**" if content.alarm else "",
-        f"{counted(total, 'experiment')}: {endings}. {content.planned}",
+        f"{counted(total, 'experiment')}: {endings}. {content.plan_text}",
         content.answers.markdown,
         *(panel.markdown for panel in content.panels),
-        f"Compared with the published numbers: [STUDY.md](STUDY.md) ({content.study})."
-        if content.study
+        f"Compared with the published numbers: [STUDY.md](STUDY.md) ({content.study_citation})."
+        if content.study_citation
         else "",
         f"The table of all experiments is `results.csv`; `index.html` lists {which} with their diffs.",
     ]
@@ -71,8 +71,8 @@ def report_html(content: ReportContent) -> str:
 
 def study_markdown(content: ReportContent, panels: Sequence[Panel]) -> str:
     parts = (
-        f"# {content.name}, compared with its study",
-        f"{content.study}.",
+        f"# {content.title}, compared with its study",
+        f"{content.study_citation}.",
         *(panel.markdown for panel in panels),
     )
     return "\n\n".join(parts) + "\n"

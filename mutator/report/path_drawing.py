@@ -50,7 +50,7 @@ def counts_for_drawing(
     """Return what path_counts.js changes in the drawing to show other counts."""
     return {
         "active": counts.active,
-        "links": {name: _link_look(counts.through[name], counts.came[name]) for name in links},
+        "links": {name: _link_look(counts.passed[name], counts.reached[name]) for name in links},
         "components": {
             name: _box_look(counts.injected[name], counts.stopped[name], counts.masked[name])
             for name in structure.components
@@ -76,7 +76,7 @@ def _idle_link_svg(arrow: LinkArrow, link: LinkModel) -> Iterator[str]:
 
 
 def _link_svg(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
-    kind, width, share = _link_look(counts.through[name], counts.came[name])
+    kind, width, share = _link_look(counts.passed[name], counts.reached[name])
     short = _is_short(arrow)
     first, _, last = share.partition(", ") if short else (share, "", "")
     yield (

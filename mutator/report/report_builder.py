@@ -84,7 +84,7 @@ def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
         lambda: build_list_data(reported), process_count_for(len(reported.results))
     ) as browse:
         study = build_study_panels(reported)
-        content = _build_content(replace(reported, compared=bool(study)), browse)
+        content = _build_content(replace(reported, is_compared=bool(study)), browse)
     panels = (*content.panels, *study)
     files = {name: data for panel in panels for name, data in panel.files.items()}
     files |= {MARKDOWN_FILE: report_markdown(content).encode(), PAGE_FILE: report_html(content).encode()}
@@ -103,15 +103,17 @@ def _written_report(run: Path, rows: int, summaries: tuple[TextTable, ...] = ())
 def _build_content(run: ReportedRun, browse: Callable[[], ExperimentListData]) -> ReportContent:
     panels = [panel for panel_of in PANELS if (panel := panel_of(run)) is not None]
     return ReportContent(
-        name=run.folder.head.campaign,
-        alarm=run.engines.equivalence_text if run.engines and run.engines.has_failed_equivalence else "",
-        outcomes=count_endings(run.results),
-        planned=_describe_plan(run.folder),
-        words=glossary_of(run),
-        study=run.study.about if run.study and run.compared else "",
+        title=run.folder.head.campaign,
+        alarm=run.engine_summary.equivalence_text
+        if run.engine_summary and run.engine_summary.has_failed_equivalence
+        else "",
+        outcome_counts=count_endings(run.results),
+        plan_text=_describe_plan(run.folder),
+        glossary=glossary_of(run),
+        study_citation=run.published_work.about if run.published_work and run.is_compared else "",
         answers=build_answers_panel(run),
         panels=panels,
-        browse=browse(),
+        experiment_list=browse(),
     )
 
 

@@ -41,12 +41,12 @@ class ReportedRun:
     workspace: Workspace | None
     results: "DataFrame"
     frame: "DataFrame"
-    study: "PublishedWork | None"
-    seen: ExperimentFacts
-    engines: EngineSummary | None = None
-    compared: bool = False
+    published_work: "PublishedWork | None"
+    experiment_facts: ExperimentFacts
+    engine_summary: EngineSummary | None = None
+    is_compared: bool = False
     paths: RunFaultPaths | None = None
-    source: SourceLines | None = None
+    source_lines: SourceLines | None = None
     faults: Mapping[str, Fault] = field(default_factory=dict)
     experiments: Mapping[str, Experiment] = field(default_factory=dict)
     records: Mapping[str, Record] = field(default_factory=dict)
@@ -57,22 +57,22 @@ class ReportedRun:
         experiments, records = PlannedExperiments(folder.path), folder.records()
         faults, fault_paths = plan_file.load_faults(folder.path), fault_paths_of(folder)
         results = Results(folder.path).frame()
-        seen = ExperimentFacts.of(folder, results, records, faults, fault_paths)
+        facts = ExperimentFacts.of(folder, results, records, faults, fault_paths)
         return cls(
             folder=folder,
             workspace=workspace,
             results=results,
             frame=prepare_results(
-                results.assign(**{RANK_COLUMN: seen.places, UNTIMED_PATH_COLUMN: seen.path_numbers})
+                results.assign(**{RANK_COLUMN: facts.ranks, UNTIMED_PATH_COLUMN: facts.path_numbers})
             ),
-            engines=summarize_engines(folder, records, seen.timings),
-            study=_find_published_work(folder) if workspace else None,
-            seen=seen,
+            engine_summary=summarize_engines(folder, records, facts.timings),
+            published_work=_find_published_work(folder) if workspace else None,
+            experiment_facts=facts,
             faults=faults,
-            paths=RunFaultPaths.of(folder, fault_paths, experiments, records, seen.untimed_paths)
+            paths=RunFaultPaths.of(folder, fault_paths, experiments, records, facts.untimed_paths)
             if fault_paths
             else None,
-            source=SourceLines.of(folder, workspace, results, faults),
+            source_lines=SourceLines.of(folder, workspace, results, faults),
             experiments=experiments,
             records=records,
         )
@@ -83,11 +83,11 @@ class ReportedRun:
         return tuple(rows_of(self.results, self.faults))
 
     @property
-    def done(self) -> int:
+    def ran_count(self) -> int:
         """The number of planned experiments that ran."""
         return int((self.results["status"] != Status.HARNESS_ERROR.value).sum())
 
-    def fault_free(self) -> tuple[FaultFreeRun, ...]:
+    def fault_free_runs(self) -> tuple[FaultFreeRun, ...]:
         """Return the alerts, hazards and ranges of the golden runs; empty if these cannot be read."""
         if self.workspace is None:
             return ()
@@ -96,7 +96,7 @@ class ReportedRun:
         except (MutatorError, KeyError):
             return ()
 
-    def ends(self) -> dict[str, float] | None:
+    def latest_golden_ends(self) -> dict[str, float] | None:
         """Return the latest end of each scenario's golden runs, in simulated seconds; None if one cannot be
         read.
         """

@@ -37,9 +37,9 @@ _MOST_GAP_LINES = 3  # gaps of up to this many lines are shown, too
 class LineMark:
     """The outcomes of a line's `mutants`: the worst one, and the number of mutants with it."""
 
-    ending: str
+    worst_ending: str
     worst: int
-    mutants: int
+    mutant_count: int
 
 
 MarksByLine = Mapping[int, Mapping[str, LineMark]]  # line (from 1) -> permanent or transient -> mark
@@ -52,13 +52,13 @@ class MarkedFile:
     path: str
     data: bytes
     lines: Sequence[str]
-    shown: tuple[range, ...]
+    shown_lines: tuple[range, ...]
     marks: MarksByLine
 
-    def worst_lines(self) -> dict[str, int]:
+    def line_counts_by_ending(self) -> dict[str, int]:
         """Return the number of lines by the worst outcome or status of their mutants, worst first."""
         worst = [
-            min((m.ending for m in here.values()), key=ENDINGS_WORST_FIRST.index)
+            min((m.worst_ending for m in here.values()), key=ENDINGS_WORST_FIRST.index)
             for here in self.marks.values()
         ]
         return {ending: worst.count(ending) for ending in ENDINGS_WORST_FIRST if ending in worst}
@@ -73,8 +73,8 @@ class SourceLines:
 
     files: tuple[MarkedFile, ...] = ()
     places: Mapping[str, str] = field(default_factory=dict)
-    changes: Mapping[str, str]
-    why: str = ""
+    change_by_fault: Mapping[str, str]
+    reason_without_files: str = ""
 
     @classmethod
     def of(
@@ -96,13 +96,14 @@ class SourceLines:
         except (MutatorError, KeyError):
             manifest = None
         if manifest is None:
-            return cls(changes=changes, why="The target was not found, so its source is not shown.")
+            reason = "The target was not found, so its source is not shown."
+            return cls(change_by_fault=changes, reason_without_files=reason)
         if manifest.tree.digest != folder.head.sources["target"]:
-            return cls(
-                changes=changes,
-                why="The target has changed since this run was planned, so line numbers do not match and its "
-                "source is not shown. Restore the target and rebuild the report (`mutator report`).",
+            reason = (
+                "The target has changed since this run was planned, so line numbers do not match and its "
+                "source is not shown. Restore the target and rebuild the report (`mutator report`)."
             )
+            return cls(change_by_fault=changes, reason_without_files=reason)
         return cls._with_marks(manifest, faults_with_results, results, changes)
 
     @classmethod
@@ -125,7 +126,7 @@ class SourceLines:
         return cls(
             files=tuple(sorted(files, key=_worst_first_key)),
             places={name: f"{path}:{line}" for name, (path, line) in line_by_fault.items()},
-            changes=changes,
+            change_by_fault=changes,
         )
 
 
@@ -155,7 +156,7 @@ def _line_marks(
         yield (
             place,
             lasting,
-            LineMark(ending=ENDINGS_WORST_FIRST[worst], worst=worst_count, mutants=len(ranks)),
+            LineMark(worst_ending=ENDINGS_WORST_FIRST[worst], worst=worst_count, mutant_count=len(ranks)),
         )
 
 
@@ -164,7 +165,7 @@ def _marked_file(file: ParsedFile, marks: MarksByLine) -> MarkedFile:
         path=file.path,
         data=file.data,
         lines=[line.rstrip(b"\r\n").decode(file.encoding) for line in file.lines],
-        shown=_merge_ranges(_lines_around(file, line) for line in marks),
+        shown_lines=_merge_ranges(_lines_around(file, line) for line in marks),
         marks=marks,
     )
 
@@ -189,5 +190,5 @@ def _merge_ranges(parts: Iterable[range]) -> tuple[range, ...]:
 
 
 def _worst_first_key(file: MarkedFile) -> tuple[object, ...]:
-    counts = file.worst_lines()
+    counts = file.line_counts_by_ending()
     return (*(-counts.get(ending, 0) for ending in ENDINGS_WORST_FIRST), file.path)

@@ -37,22 +37,22 @@ class ServedSite:
 
     workspace: Workspace
     runs: ServedRuns
-    at_once: int = 1
+    most_jobs_at_once: int = 1
     tokens: PageTokens = field(default_factory=PageTokens)
-    shown: RunPages = field(init=False)
+    run_pages: RunPages = field(init=False)
     reviews: ServedReviews = field(init=False)
     jobs: ServeJobs = field(init=False)
 
     def __post_init__(self) -> None:
-        self.shown = RunPages(self.workspace, self.runs, self.tokens)
+        self.run_pages = RunPages(self.workspace, self.runs, self.tokens)
         self.reviews = ServedReviews(self.workspace)
-        self.jobs = ServeJobs(self.at_once, self._report_address)
+        self.jobs = ServeJobs(self.most_jobs_at_once, self._report_address)
 
-    def told_runs(self) -> list[dict[str, Any]]:
-        return [summarize_run(key, path) for key, path in self.runs.folders().items()]
+    def summarize_runs(self) -> list[dict[str, Any]]:
+        return [summarize_run(key, path) for key, path in self.runs.folders_by_key().items()]
 
     def _report_address(self, command: JobCommand) -> str | None:
-        key = self.runs.key_of(command.folder) if command.folder else None
+        key = self.runs.key_of(command.run_folder) if command.run_folder else None
         return report_address(key) if key else None
 
 
@@ -69,15 +69,15 @@ def build_application(site: ServedSite) -> Starlette:
     routes = [
         *_page_routes(site),
         Route("/api/library", _in_thread(lambda _: JSONResponse(form_choices(site.workspace)))),
-        Route("/api/runs", _in_thread(lambda _: JSONResponse({"runs": site.told_runs()}))),
-        Route("/api/review/{target}", _in_thread(reviews.told)),
+        Route("/api/runs", _in_thread(lambda _: JSONResponse({"runs": site.summarize_runs()}))),
+        Route("/api/review/{target}", _in_thread(reviews.states)),
         Route("/api/review/{target}", _json_post(reviews.decide), methods=["POST"]),
-        Route("/api/review/{target}/{group}/changes", _in_thread(reviews.changes)),
-        Route("/api/review/{target}/{group}/pictures", _in_thread(reviews.levels)),
-        Route("/api/review/{target}/{group}/typical", _in_thread(reviews.typical)),
-        Route("/review/{target}/{group}/picture/{level}-before.jpg", _in_thread(reviews.before)),
-        Route("/review/{target}/{group}/picture/{level}-after.jpg", _in_thread(reviews.after)),
-        Route("/api/jobs", _in_thread(jobs.told)),
+        Route("/api/review/{target}/{group}/changes", _in_thread(reviews.changes_since_decision)),
+        Route("/api/review/{target}/{group}/pictures", _in_thread(reviews.picture_levels)),
+        Route("/api/review/{target}/{group}/typical", _in_thread(reviews.typical_results)),
+        Route("/review/{target}/{group}/picture/{level}-before.jpg", _in_thread(reviews.picture_before)),
+        Route("/review/{target}/{group}/picture/{level}-after.jpg", _in_thread(reviews.picture_after)),
+        Route("/api/jobs", _in_thread(jobs.list_jobs)),
         Route("/api/jobs", _json_post(jobs.submit), methods=["POST"]),
         Route("/api/jobs/{job}/log", _in_thread(jobs.log)),
         Route("/api/jobs/{job}/cancel", _json_post(jobs.cancel), methods=["POST"]),
@@ -107,32 +107,35 @@ def _json_post(answer: Callable[[Request, bytes], Response]) -> AsyncHandler:
 
 def _page_routes(site: ServedSite) -> list[Route]:
     def home(_: Request) -> Response:
-        return HTMLResponse(home_page(site.workspace, site.told_runs(), site.tokens.token(HOME_PAGE)))
+        return HTMLResponse(home_page(site.workspace, site.summarize_runs(), site.tokens.token_of(HOME_PAGE)))
 
     def redirect_to_report(request: Request) -> Response:
         return RedirectResponse(report_address(request.path_params["run"]))
 
     def run_file(request: Request) -> Response:
-        return site.shown.file(request.path_params["run"], request.path_params["path"])
+        return site.run_pages.run_file(request.path_params["run"], request.path_params["path"])
 
     def comparison_file(request: Request) -> Response:
         parameters = request.path_params
-        return site.shown.comparison(parameters["a"], parameters["b"], parameters.get("name") or "index.html")
+        return site.run_pages.comparison_file(
+            parameters["a"], parameters["b"], parameters.get("name") or "index.html"
+        )
 
     def trial_plot(request: Request) -> Response:
         trial_name = re.fullmatch(r"[0-9a-f]{16}", request.path_params["name"])
         if trial_name is None:
             raise NotServed("no such plot")
         return OpenFileResponse(
-            open_file(site.runs.new, f"{TRIALS_FOLDER}/{trial_name[0]}/{_PLOT_FILE}"), _PLOT_FILE
+            open_file(site.runs.folder_for_new_runs, f"{TRIALS_FOLDER}/{trial_name[0]}/{_PLOT_FILE}"),
+            _PLOT_FILE,
         )
 
     def review_html(request: Request) -> Response:
         selection = selected_groups(site.reviews, request)
-        runs_of_target = [run for run in site.told_runs() if run["target"] == selection.target]
+        runs_of_target = [run for run in site.summarize_runs() if run["target"] == selection.target]
         runs = [{"key": run["key"], "name": run["key"]} for run in runs_of_target]
-        token = site.tokens.token(review_page_name(selection.target))
-        return HTMLResponse(site.reviews.page(selection, request.url.query, runs, token))
+        token = site.tokens.token_of(review_page_name(selection.target))
+        return HTMLResponse(site.reviews.render_page(selection, request.url.query, runs, token))
 
     return [
         Route("/", _in_thread(home)),

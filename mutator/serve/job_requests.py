@@ -102,9 +102,9 @@ class JobCommand:
     order: JobRequest
     title: str
     words: tuple[str, ...]
-    folder: Path | None = None
-    run: Path | None = None  # the run whose report can request it
-    result: str | None = None  # the page with the result
+    run_folder: Path | None = None
+    requesting_run: Path | None = None  # the run whose report can request it
+    result_address: str | None = None  # the page with the result
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ class RequestChecker:
     workspace: Workspace
     runs: ServedRuns
 
-    def work(self, body: bytes) -> JobCommand:
+    def build_command(self, body: bytes) -> JobCommand:
         """Check a request in JSON; MutatorError or ValidationError if it is invalid."""
         request = _REQUEST_ADAPTER.validate_json(body)
         builders: dict[type[Any], Callable[[Any], JobCommand]] = {
@@ -152,9 +152,9 @@ class RequestChecker:
             order=request,
             title=f"{request.experiment} of {request.run}: {what}",
             words=(*arguments, f"--run={folder}", *self._workspace_options()),
-            folder=folder,
-            run=folder,
-            result=f"{report_address(request.run)}#e={request.experiment}",
+            run_folder=folder,
+            requesting_run=folder,
+            result_address=f"{report_address(request.run)}#e={request.experiment}",
         )
 
     def _report_command(self, request: ReportRequest) -> JobCommand:
@@ -162,7 +162,12 @@ class RequestChecker:
         arguments = ("report", str(folder), *self._workspace_options())
         title, result = f"report of {request.run}", report_address(request.run)
         return JobCommand(
-            order=request, title=title, words=arguments, folder=folder, run=folder, result=result
+            order=request,
+            title=title,
+            words=arguments,
+            run_folder=folder,
+            requesting_run=folder,
+            result_address=result,
         )
 
     def _trial_command(self, request: TrialRequest) -> JobCommand:
@@ -211,7 +216,7 @@ class RequestChecker:
             order=request,
             title=f"{request.campaign} into {request.name}",
             words=("run", request.campaign, *_joined_options(options), *self._workspace_options()),
-            folder=folder,
+            run_folder=folder,
         )
 
     def _check_trigger(self, text: str, target: str | None) -> None:
@@ -237,7 +242,7 @@ class RequestChecker:
         return folder
 
     def _new_folder(self, name: str) -> Path:
-        folder = self.runs.new / name
+        folder = self.runs.folder_for_new_runs / name
         if folder.is_symlink():
             raise MutatorError(f"{name} is a link", expected="a new folder", remedy="choose another name")
         if folder.is_dir():

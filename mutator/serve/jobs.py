@@ -50,26 +50,30 @@ class ServeJob:
     state: JobState = JobState.QUEUED
     progress: float | None = None  # progress of the current stage, from 0 to 1
     message: str = ""
-    result: str | None = None
+    result_address: str | None = None
     started: datetime | None = None
     ended: datetime | None = None
     log: bytearray = field(default_factory=bytearray)
-    outcome: str = ""  # what came out of the command, in one sentence
-    error: str = ""
-    links: dict[str, str] = field(default_factory=dict)  # kind of file -> path
-    events: EventReader = field(default_factory=EventReader)
-    hold: int | None = None  # the writing end of the pipe to the job's guard
+    result_text: str = ""  # what came out of the command, in one sentence
+    error_text: str = ""
+    path_by_kind: dict[str, str] = field(default_factory=dict)  # kind of file -> path
+    event_reader: EventReader = field(default_factory=EventReader)
+    guard_pipe: int | None = None  # the writing end of the pipe to the job's guard
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         order = self.work.order
         facts: dict[str, Any] = {"id": self.id, "kind": order.kind, "title": self.work.title}
         facts |= {name: getattr(order, name, None) for name in ("run", "experiment")}
         facts |= {"state": self.state.value, "progress": self.progress, "message": self.message}
-        facts |= {"result": self.result, "started": _utc_text(self.started), "ended": _utc_text(self.ended)}
+        facts |= {
+            "result": self.result_address,
+            "started": _utc_text(self.started),
+            "ended": _utc_text(self.ended),
+        }
         return facts
 
     @property
-    def text(self) -> str:
+    def log_text(self) -> str:
         """The output, without control characters and absolute paths."""
         return _printable_bytes(self.log)
 
@@ -79,21 +83,21 @@ class ServeJob:
 
     def add_events(self, data: bytes) -> None:
         """Take in what the command sent through the pipe for events."""
-        for event in self.events.read(data):
+        for event in self.event_reader.read(data):
             self._apply_event(event)
 
     def _apply_event(self, event: JobEvent) -> None:
         if isinstance(event, FileEvent):
-            self.links[event.kind] = event.path
+            self.path_by_kind[event.kind] = event.path
         elif isinstance(event, PhaseEvent):
             count = f" {event.done}/{event.total}" if event.total else ""
             parts = (_short_text(f"{event.phase}{count}"), describe_outcomes(Counter(event.outcomes)))
             self.message = ", ".join(filter(None, parts))
             self.progress = min(1.0, event.done / event.total) if event.total else None
         elif event.event == "result":
-            self.outcome = _short_text(event.text)
+            self.result_text = _short_text(event.text)
         elif event.event == "error":
-            self.error = _short_text(event.text)
+            self.error_text = _short_text(event.text)
         else:
             self.message = f"warning: {_short_text(event.text)}"
 
@@ -163,9 +167,9 @@ class ServeJobs:
         if job.state is JobState.QUEUED:
             job.ended = datetime.now(UTC)
         job.state, job.message = JobState.CANCELLED, "cancelled"
-        if job.hold is not None:
-            os.close(job.hold)
-            job.hold = None
+        if job.guard_pipe is not None:
+            os.close(job.guard_pipe)
+            job.guard_pipe = None
 
     def _run_jobs(self) -> None:
         while (job := self._waiting.get()) is not None:
@@ -189,7 +193,7 @@ class ServeJobs:
             if job.state is not JobState.QUEUED or self._closed:
                 return None
             try:
-                guard_end, job.hold = os.pipe()
+                guard_end, job.guard_pipe = os.pipe()
             except OSError as err:
                 self._mark_failed(job, err)
                 return None
@@ -204,7 +208,7 @@ class ServeJobs:
                     start_new_session=True,  # only the server handles Ctrl-C
                 )
             except OSError as err:
-                os.close(job.hold)
+                os.close(job.guard_pipe)
                 self._mark_failed(job, err)
                 return None
             finally:
@@ -213,7 +217,7 @@ class ServeJobs:
             return process
 
     def _mark_failed(self, job: ServeJob, err: OSError) -> None:
-        job.hold, job.state, job.message = None, JobState.FAILED, f"cannot be started: {err.strerror}"
+        job.guard_pipe, job.state, job.message = None, JobState.FAILED, f"cannot be started: {err.strerror}"
         job.ended = datetime.now(UTC)
 
     def _follow_process(self, job: ServeJob, process: subprocess.Popen[bytes], events: IO[bytes]) -> None:
@@ -225,12 +229,12 @@ class ServeJobs:
         with self._lock:
             if job.state is JobState.RUNNING:
                 job.state = JobState.DONE if code == 0 else JobState.FAILED
-                job.progress, job.result = 1.0 if code == 0 else job.progress, result
+                job.progress, job.result_address = 1.0 if code == 0 else job.progress, result
                 job.message = _success_message(job) if code == 0 else _failure_message(job)
             job.ended = datetime.now(UTC)
-            if job.hold is not None:
-                os.close(job.hold)
-                job.hold = None
+            if job.guard_pipe is not None:
+                os.close(job.guard_pipe)
+                job.guard_pipe = None
 
     def _read_pipes(self, job: ServeJob, readers: dict[int, Callable[[bytes], None]]) -> None:
         """Give what the job's command writes to its readers, until it has closed all pipes."""
@@ -248,9 +252,9 @@ class ServeJobs:
 
     def _result_address(self, job: ServeJob) -> str | None:
         if job.work.order.kind == "try":
-            plot = job.links.get("plot")
+            plot = job.path_by_kind.get("plot")
             return f"/{TRIALS_FOLDER}/{Path(plot).parent.name}/plot.svg" if plot else None
-        return job.work.result or self._report_at(job.work)
+        return job.work.result_address or self._report_at(job.work)
 
 
 def _printable_bytes(data: bytes | bytearray) -> str:
@@ -267,12 +271,12 @@ def _short_text(text: str) -> str:
 
 
 def _success_message(job: ServeJob) -> str:
-    film = job.links.get("film")
-    return f"film: {_short_text(film)}" if film else job.outcome or job.message
+    film = job.path_by_kind.get("film")
+    return f"film: {_short_text(film)}" if film else job.result_text or job.message
 
 
 def _failure_message(job: ServeJob) -> str:
-    return job.error or job.outcome or job.message or "no output"
+    return job.error_text or job.result_text or job.message or "no output"
 
 
 def _utc_text(moment: datetime | None) -> str | None:

@@ -20,8 +20,8 @@ class ReviewApi:
     def __init__(self, reviews: ServedReviews, runs: ServedRuns, tokens: PageTokens) -> None:
         self._reviews, self._runs, self._tokens = reviews, runs, tokens
 
-    def told(self, request: Request) -> Response:
-        return JSONResponse(self._reviews.told(selected_groups(self._reviews, request)))
+    def states(self, request: Request) -> Response:
+        return JSONResponse(self._reviews.states(selected_groups(self._reviews, request)))
 
     def decide(self, request: Request, body: bytes) -> Response:
         """Save decisions, remarks and flags: all or none. Only the target's review page can send them."""
@@ -35,24 +35,26 @@ class ReviewApi:
         except GroupsChanged as conflict:
             return JSONResponse({"conflict": conflict.got, "groups": conflict.groups}, 409)
 
-    def changes(self, request: Request) -> Response:
-        diff = self._reviews.changes(selected_groups(self._reviews, request), request.path_params["group"])
+    def changes_since_decision(self, request: Request) -> Response:
+        diff = self._reviews.diff_since_decision(
+            selected_groups(self._reviews, request), request.path_params["group"]
+        )
         return JSONResponse({"changes": diff})
 
-    def typical(self, request: Request) -> Response:
+    def typical_results(self, request: Request) -> Response:
         """Return a group's results in a run; null if the run does not have the group."""
         run = self._runs.folder(request.query_params.get("run", ""))
         selection = selected_groups(self._reviews, request)
         return JSONResponse(self._reviews.typical(selection, request.path_params["group"], run))
 
-    def levels(self, request: Request) -> Response:
+    def picture_levels(self, request: Request) -> Response:
         selection = selected_groups(self._reviews, request)
         return JSONResponse({"levels": self._reviews.levels(selection, request.path_params["group"])})
 
-    def before(self, request: Request) -> Response:
+    def picture_before(self, request: Request) -> Response:
         return self._picture(request, after=False)
 
-    def after(self, request: Request) -> Response:
+    def picture_after(self, request: Request) -> Response:
         return self._picture(request, after=True)
 
     def _picture(self, request: Request, *, after: bool) -> Response:
@@ -69,16 +71,16 @@ class JobApi:
     def __init__(self, request_checker: RequestChecker, jobs: ServeJobs, tokens: PageTokens) -> None:
         self._request_checker, self._jobs, self._tokens = request_checker, jobs, tokens
 
-    def told(self, _: Request) -> Response:
-        return JSONResponse({"jobs": [job.told() for job in self._jobs.all()]})
+    def list_jobs(self, _: Request) -> Response:
+        return JSONResponse({"jobs": [job.as_json() for job in self._jobs.all()]})
 
     def submit(self, request: Request, body: bytes) -> Response:
-        command = self._request_checker.work(body)
+        command = self._request_checker.build_command(body)
         self._check_token(request, command)
         return JSONResponse({"id": self._jobs.submit(command).id}, 201)
 
     def log(self, request: Request) -> Response:
-        return JSONResponse({"log": self._jobs.get(request.path_params["job"]).text})
+        return JSONResponse({"log": self._jobs.get(request.path_params["job"]).log_text})
 
     def cancel(self, request: Request, _: bytes) -> Response:
         job = self._jobs.get(request.path_params["job"])
@@ -90,7 +92,7 @@ class JobApi:
         return JSONResponse({"id": job.id})
 
     def _check_token(self, request: Request, command: JobCommand) -> None:
-        pages = [run_page_name(command.run)] if command.run else []
+        pages = [run_page_name(command.requesting_run)] if command.requesting_run else []
         self._tokens.check(_token_of(request), HOME_PAGE, *pages)
 
 
@@ -113,4 +115,4 @@ def selected_groups(reviews: ServedReviews, request: Request) -> GroupSelection:
     specs = [value for name, value in parameters if name == "spec"]
     if len(campaigns) > 1:
         raise MutatorError("several campaigns in the address", expected="one campaign")
-    return reviews.selection(request.path_params["target"], campaigns[0] if campaigns else None, specs)
+    return reviews.select(request.path_params["target"], campaigns[0] if campaigns else None, specs)

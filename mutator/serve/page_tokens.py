@@ -23,12 +23,12 @@ class PageTokens:
 
     _key: bytes = field(default_factory=lambda: secrets.token_bytes(32))
 
-    def token(self, page: str) -> str:
+    def token_of(self, page: str) -> str:
         return hmac.new(self._key, page.encode("utf-8", "surrogateescape"), hashlib.sha256).hexdigest()
 
     def check(self, token: str, *pages: str) -> None:
         """Raise UnknownPage unless the token is that of one of these pages."""
-        if not any(hmac.compare_digest(self.token(page).encode(), token.encode()) for page in pages):
+        if not any(hmac.compare_digest(self.token_of(page).encode(), token.encode()) for page in pages):
             raise PageRefused(
                 "the request does not come from the page that may send it",
                 remedy="reload the page; start other jobs on the first page",

@@ -24,7 +24,7 @@ class ReportCache:
     def __init__(self) -> None:
         self._memory: dict[str, Mapping[str, bytes]] = {}
 
-    def file(self, key: str, name: str, build: Callable[[], Mapping[str, bytes]]) -> bytes | None:
+    def report_file(self, key: str, name: str, build: Callable[[], Mapping[str, bytes]]) -> bytes | None:
         """Return a file of a report, or None if it has no such file. `build` builds a report that is not
         cached.
         """
@@ -43,7 +43,8 @@ def _read_cached(key: str) -> Mapping[str, bytes] | None:
     """Read a report from the cache; None if it is missing or damaged."""
     folder = shared_cache.pages_folder() / key
     try:
-        digests = parse_json_object(read_below(folder, DIGESTS_FILE), folder / DIGESTS_FILE, PAGES_SCHEMA)["files"]
+        stored = parse_json_object(read_below(folder, DIGESTS_FILE), folder / DIGESTS_FILE, PAGES_SCHEMA)
+        digests = stored["files"]
         files = {name: read_below(folder, name) for name in digests}
     except (OSError, MutatorError, LookupError, TypeError):
         return None

@@ -44,7 +44,7 @@ class RunPages:
         self._page_lock = threading.Lock()
         self._comparison_cache: dict[tuple[str, str], dict[str, bytes]] = {}
 
-    def file(self, key: str, name: str) -> Response:
+    def run_file(self, key: str, name: str) -> Response:
         """Open a file of a run, or a part of its report; Absent if it is not served."""
         run = self._runs.folder(key)
         if name.startswith(f"{REPORT_FOLDER}/"):
@@ -55,7 +55,7 @@ class RunPages:
             )
         return OpenFileResponse(open_in_run(run, name), name)
 
-    def comparison(self, a: str, b: str, name: str) -> Response:
+    def comparison_file(self, a: str, b: str, name: str) -> Response:
         """Open a file of a comparison of two runs; MutatorError if they cannot be compared."""
         folders = [self._runs.folder(key) for key in (a, b)]
         for folder in folders:
@@ -77,13 +77,13 @@ class RunPages:
         folder = RunFolder.open(run)
         with self._page_lock:
             key = inputs_digest(folder, self._workspace)
-            data = self._reports.file(key, name, lambda: self._build_report_files(folder))
+            data = self._reports.report_file(key, name, lambda: self._build_report_files(folder))
         if data is None:
             raise NotServed("no such file", expected="a file of the report")
         if not name.endswith(".html"):
             return Response(data, media_type=media_type_of(name), headers=UNTRUSTED_FILE_HEADERS)
         if name == report_builder.PAGE_FILE:
-            head = _ADDED_HEAD_END.format(self._tokens.token(run_page_name(run))).encode()
+            head = _ADDED_HEAD_END.format(self._tokens.token_of(run_page_name(run))).encode()
             data = head.join(data.split(b"</head>", 1))
             data = _ADDED_BODY_END.join(data.rsplit(b"</body>", 1))
         return HTMLResponse(data)
@@ -98,7 +98,8 @@ class RunPages:
         return report_builder.build_report(folder, self._workspace).files
 
     def _build_comparison_files(self, a: Path, b: Path) -> dict[str, bytes]:
-        comparison = comparing.compare_runs(a, b, None, (self._golden_alerts_note(a), self._golden_alerts_note(b)))
+        notes = (self._golden_alerts_note(a), self._golden_alerts_note(b))
+        comparison = comparing.compare_runs(a, b, None, notes)
         return {
             "index.html": comparison_files.render_page(comparison).encode(),
             "pairs.csv": comparison_files.pairs_csv(comparison),

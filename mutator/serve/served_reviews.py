@@ -36,7 +36,7 @@ class GroupSelection:
     specs: tuple[str, ...] = ()
 
     @property
-    def options(self) -> list[str]:
+    def cli_options(self) -> list[str]:
         if self.campaign:
             return ["--campaign", self.campaign]
         return ["--manifest", self.target, *(word for spec in self.specs for word in ("--spec", spec))]
@@ -71,7 +71,7 @@ class ServedReviews:
     def reviewer(self) -> str:
         return find_user_name(self.workspace.library) or ""
 
-    def selection(self, target: str, campaign: str | None, specs: Sequence[str]) -> GroupSelection:
+    def select(self, target: str, campaign: str | None, specs: Sequence[str]) -> GroupSelection:
         if target not in self.workspace.targets:
             raise NotServed(f"no target '{target}'", expected=f"one of {', '.join(self.workspace.targets)}")
         if campaign is not None and campaign not in self.workspace.campaigns:
@@ -99,11 +99,11 @@ class ServedReviews:
 
     def group(self, selection: GroupSelection, name: str) -> Group:
         matching = next((group for group in self.groups(selection) if group.id == name), None)
-        if found is None:
+        if matching is None:
             raise NotServed(f"no group '{name}'", expected="the id of a group on the page")
-        return found
+        return matching
 
-    def page(
+    def render_page(
         self, selection: GroupSelection, query: str, runs: Sequence[Mapping[str, Any]], token: str
     ) -> str:
         review, groups = load_review(self.workspace, selection.target), self.groups(selection)
@@ -115,9 +115,9 @@ class ServedReviews:
             "query": f"?{query}" if query else "",
             "runs": runs,
         }
-        return review_page_html(review, review.in_list_order(groups), selection.options, page_settings)
+        return review_page_html(review, review.in_list_order(groups), selection.cli_options, page_settings)
 
-    def told(self, selection: GroupSelection) -> dict[str, Any]:
+    def states(self, selection: GroupSelection) -> dict[str, Any]:
         groups = self.groups(
             selection
         )  # first, because this can take seconds, and others can decide meanwhile
@@ -135,7 +135,8 @@ class ServedReviews:
             change.group for change in decisions.changes if change.group not in decisions.seen
         ]:
             raise MutatorError(f"no revision of group {without_revision[0]}", where="seen")
-        decided = [change.group
+        decided = [
+            change.group
             for change in decisions.changes
             if change.kind in (ReviewActionKind.APPROVE, ReviewActionKind.REJECT)
         ]
@@ -156,7 +157,7 @@ class ServedReviews:
             raise GroupsChanged(conflict.got, _states(conflict.review, others)) from None
         return {"target": selection.target, "by": self.reviewer, "groups": _states(review, changed_groups)}
 
-    def changes(self, selection: GroupSelection, name: str) -> str:
+    def diff_since_decision(self, selection: GroupSelection, name: str) -> str:
         return load_review(self.workspace, selection.target).diff_since_decision(self.group(selection, name))
 
     def picture(self, selection: GroupSelection, name: str, level: str, *, after: bool) -> bytes:
@@ -185,7 +186,9 @@ class ServedReviews:
     def typical(self, selection: GroupSelection, name: str, run: Path) -> dict[str, Any] | None:
         """Return the group's results in a run; None if the run does not have the group."""
         folder, group = RunFolder.open(run), self.group(selection, name)
-        results = group_results.results_of_group(folder, group) if folder.head.target == selection.target else None
+        if folder.head.target != selection.target:
+            return None
+        results = group_results.results_of_group(folder, group)
         return asdict(results) if results else None
 
     def _check_diffs_unchanged(

@@ -31,7 +31,7 @@ class ServedRuns:
 
     roots: tuple[Path, ...]
 
-    def folders(self) -> dict[str, Path]:
+    def folders_by_key(self) -> dict[str, Path]:
         """Return the run folders by key, without links to folders elsewhere."""
         folder_by_key: dict[str, Path] = {}
         for root in self.roots:
@@ -42,14 +42,14 @@ class ServedRuns:
 
     def folder(self, key: str) -> Path:
         with suppress(KeyError):
-            return self.folders()[key]
+            return self.folders_by_key()[key]
         raise NotServed(f"no run '{key}'", expected="one of the served runs", remedy="see the first page")
 
     def key_of(self, folder: Path) -> str | None:
-        return next((key for key, path in self.folders().items() if path == folder.resolve()), None)
+        return next((key for key, path in self.folders_by_key().items() if path == folder.resolve()), None)
 
     @property
-    def new(self) -> Path:
+    def folder_for_new_runs(self) -> Path:
         return next((root for root in self.roots if not RunFolder.exists(root)), self.roots[0].parent)
 
 

@@ -56,7 +56,7 @@ def _write_experiments(request: ExportRequest) -> None:
     folder, out = request.folder, request.out
     builder = ExperimentFileBuilder(folder, request.workspace)
     selected_ids = _selected_ids(folder, request.parts.only)
-    ids_with_data = [name for name in selected_ids if builder.has(name)]
+    ids_with_data = [name for name in selected_ids if builder.has_data(name)]
     remedy = f"rerun one: `mutator rerun {(selected_ids or ['ID'])[0]} --run {folder.path} --trace`"
     if not ids_with_data:
         raise MutatorError(
@@ -77,7 +77,7 @@ def _write_experiments(request: ExportRequest) -> None:
         )
     make_folder(out)
     for name in ids_with_data:
-        write_atomic(path_below(out, f"{name}.mcap"), builder.of(name))
+        write_atomic(path_below(out, f"{name}.mcap"), builder.file_bytes(name))
 
 
 class ExperimentFileBuilder:
@@ -93,10 +93,10 @@ class ExperimentFileBuilder:
     def _experiments(self) -> Mapping[str, Experiment]:
         return {experiment.id: experiment for experiment in plan_file.load_experiments(self._folder.path)}
 
-    def has(self, experiment_id: str) -> bool:
+    def has_data(self, experiment_id: str) -> bool:
         return self._series.has_series(experiment_id) or self._kept_traces(experiment_id) is not None
 
-    def of(self, experiment_id: str) -> bytes:
+    def file_bytes(self, experiment_id: str) -> bytes:
         """Return an experiment's file, from its exact traces if kept, else from its series."""
         experiment, record = self._experiments[experiment_id], self._records[experiment_id]
         if (traces := self._kept_traces(experiment_id)) is not None:
@@ -106,11 +106,11 @@ class ExperimentFileBuilder:
         else:
             golden, faulty = self._series_topics(record)
         writer = _McapWriter()
-        writer.metadata("experiment", self._experiment_facts(experiment, record))
+        writer.add_metadata("experiment", self._experiment_facts(experiment, record))
         for run, topics in (("golden", golden), ("faulty", faulty)):
             for topic in topics:
-                writer.channel(run, topic)
-        writer.events(_record_events(record))
+                writer.add_topic(run, topic)
+        writer.add_events(_record_events(record))
         return writer.finish()
 
     def _kept_traces(self, experiment_id: str) -> tuple[Trace, Trace] | None:
@@ -187,10 +187,10 @@ class _McapWriter:
         self._writer.start(profile="", library="mutator")
         self._messages: list[tuple[int, int, dict[str, Any]]] = []
 
-    def metadata(self, name: str, facts: dict[str, str]) -> None:
+    def add_metadata(self, name: str, facts: dict[str, str]) -> None:
         self._writer.add_metadata(name, facts)
 
-    def channel(self, run: str, topic: Topic) -> None:
+    def add_topic(self, run: str, topic: Topic) -> None:
         unit = topic.about["unit"]
         text = f"{topic.about['about'] or topic.name} [{unit}]"
         schema = self._register_schema(
@@ -205,7 +205,7 @@ class _McapWriter:
         for t, value in topic.values:
             self._add_message(number, t, {"value": value if math.isfinite(value) else None})
 
-    def events(self, events: Iterable[tuple[float, str, str]]) -> None:
+    def add_events(self, events: Iterable[tuple[float, str, str]]) -> None:
         fields = {"kind": {"enum": list(EVENT_KINDS)}, "name": {"type": "string"}, "t": {"type": "number"}}
         schema = self._register_schema("event", fields)
         number = self._writer.register_channel(topic=EVENTS_TOPIC, message_encoding="json", schema_id=schema)
@@ -215,7 +215,7 @@ class _McapWriter:
     def finish(self) -> bytes:
         first = min((time for time, *_ in self._messages), default=0)
         if first < 0:
-            self.metadata("times", {"first_s": f"{first / 1e9:.9g}"})
+            self.add_metadata("times", {"first_s": f"{first / 1e9:.9g}"})
         zero = min(0, first)
         for sequence, (time, channel, message) in enumerate(sorted(self._messages, key=lambda m: m[:2])):
             data = json.dumps(message).encode()

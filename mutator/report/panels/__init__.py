@@ -34,10 +34,10 @@ def build_study_panels(run: ReportedRun) -> tuple[Panel, ...]:
     """Return the panels of the study's page: those of the study, then the run's tables and figures next to
     the published ones. Empty if the run has too few experiments or none of the study's faults.
     """
-    if not run.study:
+    if not run.published_work:
         return ()
     with STUDIES.blaming_package(run.folder.head.study or ""):
-        panels = [panel for panel_of in run.study.panels if (panel := panel_of(run))]
+        panels = [panel for panel_of in run.published_work.panels if (panel := panel_of(run))]
         general_panels = (
             (tables_panel.build_published_panel(run), figures_panel.build_study_figures_panel(run))
             if panels

@@ -48,7 +48,7 @@ aria-label="Control structure">{{ figure }}</div>
 {% for name, (tail, tip, carries) in links.items() %}
 <tr data-link="{{ name }}"><td>{{ label(tail) }}</td><td>{{ label(tip) }}</td>
 <td>{{ carries }}</td>
-<td class="number">{{ share(counts[all].through[name], counts[all].came[name]) }}</td></tr>
+<td class="number">{{ share(counts[all].passed[name], counts[all].reached[name]) }}</td></tr>
 {% endfor %}
 </tbody></table></div></details>
 <h3>Where masked faults were stopped</h3>
@@ -66,7 +66,9 @@ def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the counts of links and components; None if no path is known."""
     paths = run.paths
     counts = (
-        path_counts_by_fault_type(fault_types_of(run.results), run.seen.path_numbers, paths) if paths else {}
+        path_counts_by_fault_type(fault_types_of(run.results), run.experiment_facts.path_numbers, paths)
+        if paths
+        else {}
     )
     if paths is None or not counts:
         return None
@@ -93,7 +95,7 @@ def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
         counts=counts,
         data=data and _markup(data),
         links=links,
-        label=paths.label,
+        label=paths.component_label,
         share=lambda through, came: describe_passed_share(through, came) or "none reached it",
         stops=stops,
         none_stopped=_NONE_STOPPED,
@@ -125,9 +127,14 @@ def _links_in_order(paths: RunFaultPaths) -> Links:
 
 def _links_table(links: Links, counts: PathCounts, paths: RunFaultPaths) -> TextTable:
     rows = [
-        (paths.label(tail), paths.label(tip), carries, describe_passed_share(counts.through[name], came))
+        (
+            paths.component_label(tail),
+            paths.component_label(tip),
+            carries,
+            describe_passed_share(counts.passed[name], came),
+        )
         for name, (tail, tip, carries) in links.items()
-        if (came := counts.came[name])
+        if (came := counts.reached[name])
     ]
     return TextTable(
         heads=("from", "to", "what it carries", "got through, of those that reached it"), rows=rows
@@ -138,16 +145,24 @@ def _masked_faults_table(counts: Mapping[str, PathCounts], paths: RunFaultPaths)
     """Return the table of masked faults by fault type, with a column for each set of components that stopped
     them. None if no fault was masked.
     """
-    ends = sorted(counts[ALL_FAULT_TYPES].ends, key=lambda names: (len(names), list(map(paths.label, names))))
+    ends = sorted(
+        counts[ALL_FAULT_TYPES].masked_by_components,
+        key=lambda names: (len(names), list(map(paths.component_label, names))),
+    )
     if not ends:
         return None
-    heads = ["fault type", "active", "masked", *(" and ".join(map(paths.label, names)) for names in ends)]
+    heads = [
+        "fault type",
+        "active",
+        "masked",
+        *(" and ".join(map(paths.component_label, names)) for names in ends),
+    ]
     order = [*(kind for kind in counts if kind != ALL_FAULT_TYPES), ALL_FAULT_TYPES]
     rows: list[Sequence[str]] = [
         (
             kind,
-            *map(str, (counts[kind].active, counts[kind].ends.total())),
-            *(str(counts[kind].ends[names]) for names in ends),
+            *map(str, (counts[kind].active, counts[kind].masked_by_components.total())),
+            *(str(counts[kind].masked_by_components[names]) for names in ends),
         )
         for kind in order
     ]

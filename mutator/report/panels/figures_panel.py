@@ -29,7 +29,7 @@ def build_figures_panel(run: ReportedRun) -> Panel | None:
 
 def build_study_figures_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of figures that the run's study adds; None if there are none."""
-    return _build_panel(run.study.drawings(run)) if run.study else None
+    return _build_panel(run.published_work.drawings(run)) if run.published_work else None
 
 
 def _build_panel(drawings: tuple[Drawing, ...]) -> Panel | None:
@@ -41,9 +41,9 @@ def _build_panel(drawings: tuple[Drawing, ...]) -> Panel | None:
         parts += [f"### {drawing.title}", drawing.note]
         parts += [f"{what}: `{code}`" for what, code in drawing.codes]
         if drawing.figure is not None:
-            parts.append(f"![{drawing.title}]({drawing.link('svg')})")
+            parts.append(f"![{drawing.title}]({drawing.file_name('svg')})")
     html = rendered(
-        _HTML_TEMPLATE, drawings=drawings, picture=lambda drawing: _data_uri(files[drawing.link("svg")])
+        _HTML_TEMPLATE, drawings=drawings, picture=lambda drawing: _data_uri(files[drawing.file_name("svg")])
     )
     return Panel(anchor="figures", link="Figures", markdown="\n\n".join(parts), html=html, files=files)
 

@@ -28,7 +28,7 @@ def build_mutation_score_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the shares in total and by operator."""
     if not (run.results["module"] == OPERATORS_MODULE).any():
         return None
-    runs = run.fault_free()
+    runs = run.fault_free_runs()
     score = mutation_score_sheet(
         run.frame,
         plan_file.load_faults(run.folder.path),

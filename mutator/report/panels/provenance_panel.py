@@ -31,7 +31,7 @@ _HTML_TEMPLATE = """\
 
 def build_provenance_panel(run: ReportedRun) -> Panel:
     """Return the panel with engines, equivalence check, plan, choices, sources and versions."""
-    engines, facts = run.engines, _provenance_facts(run)
+    engines, facts = run.engine_summary, _provenance_facts(run)
     unsealed = list(unsealed_facts(run.folder).items())
     parts = []
     if engines:
@@ -61,7 +61,7 @@ def _provenance_facts(run: ReportedRun) -> list[tuple[str, str]]:
     chosen = without_keys(head.as_json(), UNSEALED_KEYS[HEAD])["choices"]
     facts = {
         "experiments": f"{len(run.results)} of {folder.planned_count} planned",
-        **({"proof": run.engines.equivalence_state} if run.engines else {}),
+        **({"proof": run.engine_summary.equivalence_state} if run.engine_summary else {}),
         **({"reviewed": reviewed} if reviewed else {}),
         **digests_or_why_no_seal(folder),
         "campaign": head.campaign,
@@ -85,12 +85,12 @@ def _study_fact(run: ReportedRun) -> dict[str, str]:
     name = run.folder.head.study
     if not name:
         return {}
-    if run.study and run.workspace:
-        problems = study_problems(name, run.study, run.workspace)
-        not_compared = "" if run.compared else "; these results cannot be compared with it"
+    if run.published_work and run.workspace:
+        problems = study_problems(name, run.published_work, run.workspace)
+        not_compared = "" if run.is_compared else "; these results cannot be compared with it"
         why = (
             f"; problem with its data (see `mutator check`): {problems[0].got}" if problems else not_compared
         )
-        return {"study": f"{name} ({run.study.about}){why}"}
+        return {"study": f"{name} ({run.published_work.about}){why}"}
     why = "cannot be loaded here" if run.workspace else "needs a fault library, but none was found"
     return {"study": f"{name}, which {why}"}

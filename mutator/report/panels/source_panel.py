@@ -64,14 +64,18 @@ _CSS_CLASS_BY_TOKEN = {tokenize.COMMENT: "comment", tokenize.NUMBER: "number", t
 
 def build_source_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with each file that has faults. Only the worst file is unfolded."""
-    source = run.source
+    source = run.source_lines
     if source is None:
         return None
     worst = _worst_lines_table(source.files)
-    parts = ["## Source", source.why or _INTRODUCTION, *([worst.as_markdown()] if worst.rows else ())]
+    parts = [
+        "## Source",
+        source.reason_without_files or _INTRODUCTION,
+        *([worst.as_markdown()] if worst.rows else ()),
+    ]
     html = rendered(
         _HTML_TEMPLATE,
-        why=source.why,
+        why=source.reason_without_files,
         about=_INTRODUCTION,
         signs=_ENDING_SIGNS,
         meanings=_ENDING_MEANINGS,
@@ -86,13 +90,15 @@ def build_source_panel(run: ReportedRun) -> Panel | None:
 
 
 def _describe_file(file: MarkedFile) -> str:
-    endings = [f"{_ENDING_MEANINGS[name].partition(':')[0]} {n}" for name, n in file.worst_lines().items()]
+    endings = [
+        f"{_ENDING_MEANINGS[name].partition(':')[0]} {n}" for name, n in file.line_counts_by_ending().items()
+    ]
     return f"{counted(len(file.marks), 'line')} with mutants, by worst outcome: {', '.join(endings)}"
 
 
 def _worst_lines_table(files: Sequence[MarkedFile]) -> TextTable:
     ranked_lines = [
-        (min(ENDINGS_WORST_FIRST.index(mark.ending) for mark in marks.values()), number, line, marks)
+        (min(ENDINGS_WORST_FIRST.index(mark.worst_ending) for mark in marks.values()), number, line, marks)
         for number, file in enumerate(files)
         for line, marks in file.marks.items()
     ]
@@ -108,12 +114,12 @@ def _worst_lines_table(files: Sequence[MarkedFile]) -> TextTable:
 
 
 def _describe_mark(mark: LineMark) -> str:
-    return f"{_ENDING_MEANINGS[mark.ending].partition(':')[0]} {mark.worst}/{mark.mutants}"
+    return f"{_ENDING_MEANINGS[mark.worst_ending].partition(':')[0]} {mark.worst}/{mark.mutant_count}"
 
 
 def _rows_html(file: MarkedFile) -> Markup:
     texts, rows, last = _coloured_lines(file), list[Markup](), 0
-    for part in file.shown:
+    for part in file.shown_lines:
         if gap := part.start - last - 1:
             rows.append(_GAP_HTML.format(f"{counted(gap, 'line')} without faults"))
         for line in part:
@@ -135,11 +141,13 @@ def _row_html(file: MarkedFile, line: int, text: Markup) -> Markup:
 
 
 def _mark_html(mark: LineMark, line: int, place: str, lasting: str) -> Markup:
-    share = f"{mark.worst}/{mark.mutants}"
-    words = f"line {line}, {lasting}: {_ENDING_MEANINGS[mark.ending]} for {mark.worst} of "
-    words += counted(mark.mutants, "mutant")
+    share = f"{mark.worst}/{mark.mutant_count}"
+    words = f"line {line}, {lasting}: {_ENDING_MEANINGS[mark.worst_ending]} for {mark.worst} of "
+    words += counted(mark.mutant_count, "mutant")
     query = _search_fragment(place, f"lasting={lasting}")
-    return _MARK_HTML.format(mark.ending, query, words, words, f"{_ENDING_SIGNS[mark.ending]} {share}")
+    return _MARK_HTML.format(
+        mark.worst_ending, query, words, words, f"{_ENDING_SIGNS[mark.worst_ending]} {share}"
+    )
 
 
 def _search_fragment(place: str, *more: str) -> str:

@@ -65,9 +65,9 @@ def build_tables_panel(run: ReportedRun) -> Panel:
     """Return the panel of counts, then statistics. Tables with published counterparts are on the study's
     page.
     """
-    runs = run.fault_free()
+    runs = run.fault_free_runs()
     golden_alerts_note = fault_free_alerts_note(runs)
-    statistic_sheets = () if run.compared else _statistic_sheets(run, None)
+    statistic_sheets = () if run.is_compared else _statistic_sheets(run, None)
     counts, sheets = (
         _count_tables(run),
         [
@@ -104,8 +104,8 @@ def build_published_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of the run's statistics next to the published ones of its study; None if there are
     none.
     """
-    golden_alerts_note = fault_free_alerts_note(run.fault_free())
-    published = run.study.published(run) if run.study else None
+    golden_alerts_note = fault_free_alerts_note(run.fault_free_runs())
+    published = run.published_work.published(run) if run.published_work else None
     sheets = [_with_alerts_note(sheet, golden_alerts_note) for sheet in _statistic_sheets(run, published)]
     if not sheets:
         return None
@@ -126,8 +126,8 @@ def _count_tables(run: ReportedRun) -> list[tuple[str, TextTable]]:
 
 
 def _statistic_sheets(run: ReportedRun, published: PublishedCounts | None) -> tuple[Sheet, ...]:
-    alerts = run.seen.alerts if run.folder.has_alerts else None
-    return run_sheets(run.frame, published, alerts, run.ends())
+    alerts = run.experiment_facts.alerts_by_id if run.folder.has_alerts else None
+    return run_sheets(run.frame, published, alerts, run.latest_golden_ends())
 
 
 def _distribution_sheets(run: ReportedRun) -> tuple[Sheet, ...]:

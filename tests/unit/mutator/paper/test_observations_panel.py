@@ -50,7 +50,12 @@ def test_claims_about_all_faults_need_the_whole_plan(
     for done in (folder.planned_count - 1, folder.planned_count):
         done_results = pd.DataFrame({"status": ["ok"] * done})
         run = ReportedRun(
-            folder=folder, workspace=toycar, results=done_results, frame=frame, study=None, seen=SEEN
+            folder=folder,
+            workspace=toycar,
+            results=done_results,
+            frame=frame,
+            published_work=None,
+            experiment_facts=SEEN,
         )
         panel = build_observations_panel(run)
         assert panel is not None
@@ -66,5 +71,12 @@ def test_a_report_without_activated_faults_of_the_paper_has_no_observations(
     freeze_plan(build_plan(toycar, "small"), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")
     frame = results({"module": "radar", "fault_type": "chaff"})
-    run = ReportedRun(folder=folder, workspace=toycar, results=frame, frame=frame, study=None, seen=SEEN)
+    run = ReportedRun(
+        folder=folder,
+        workspace=toycar,
+        results=frame,
+        frame=frame,
+        published_work=None,
+        experiment_facts=SEEN,
+    )
     assert build_observations_panel(run) is None

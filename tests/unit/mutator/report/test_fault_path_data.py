@@ -58,7 +58,7 @@ def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Recor
     found = RunFaultPaths(
         fault_paths=FaultPaths(CHANNELS, None), channels=CHANNELS, by_id=by_id, records=records
     )
-    data = found.data(["a", "b", "c", "d"])
+    data = found.page_data(["a", "b", "c", "d"])
     assert data["shape"] == [0, -1, 1, 0]
     assert data["shapes"][0] == [["eyes", "reached", 0], ["pedals", "reached", 1], ["car", "reached", 2]]
     assert data["first"] == [[1.2346, None, 1.0, None], [None] * 4, [2.0, None, None, None]]
@@ -83,7 +83,7 @@ def test_the_page_filters_by_the_links_that_a_fault_got_through() -> None:
         records={},
         untimed_paths=untimed_paths,
     )
-    assert found.through([1, -1, 0]) == ["eyes→pedals;pedals→car", "", ""]
+    assert found.passed_links([1, -1, 0]) == ["eyes→pedals;pedals→car", "", ""]
 
 
 def test_faults_are_counted_by_link_and_component() -> None:
@@ -101,11 +101,11 @@ def test_faults_are_counted_by_link_and_component() -> None:
     counts.add(path(ComponentState.INJECTED, ComponentState.UNRECORDED, ComponentState.REACHED))
     counts.add(path(ComponentState.INJECTED, ComponentState.REACHED, ComponentState.UNCHANGED))
     assert counts.active == 4
-    assert counts.through == {"eyes-pedals": 2, "pedals-car": 2}
-    assert counts.came == {"eyes-pedals": 3, "pedals-car": 4}
+    assert counts.passed == {"eyes-pedals": 2, "pedals-car": 2}
+    assert counts.reached == {"eyes-pedals": 3, "pedals-car": 4}
     assert (counts.injected, counts.stopped) == ({"eyes": 4}, {"car": 2, "pedals": 1})
     assert counts.masked == {"pedals": 1}
-    assert counts.ends == {("pedals",): 1}
+    assert counts.masked_by_components == {("pedals",): 1}
 
 
 def test_the_drawing_of_other_counts_is_the_one_that_the_page_changes_to(clone: Workspace) -> None:
@@ -113,8 +113,8 @@ def test_the_drawing_of_other_counts_is_the_one_that_the_page_changes_to(clone: 
     structure = load_hazard_analysis(clone.library / "stpa").structure
     links, name = list(structure.links), next(iter(structure.components))
     counts = PathCounts(active=8)
-    counts.came.update({links[0]: 8, links[1]: 3})
-    counts.through.update({links[0]: 1})
+    counts.reached.update({links[0]: 8, links[1]: 3})
+    counts.passed.update({links[0]: 1})
     counts.injected.update({name: 8})
     counts.masked.update({name: 2})
     drawn = counts_for_drawing(structure, counts, links)

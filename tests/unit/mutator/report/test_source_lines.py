@@ -54,15 +54,15 @@ def run(
 
 def test_lines_have_the_worst_outcome_of_their_mutants(toycar: Workspace, run: Path) -> None:
     """A harness error is not an outcome."""
-    source = ReportedRun.open(RunFolder.open(run), toycar).source
+    source = ReportedRun.open(RunFolder.open(run), toycar).source_lines
     assert source is not None
     (file,) = source.files
     wanted = file.marks[at("wanted =")]
-    assert wanted["permanent"] == LineMark(ending="hazard", worst=5, mutants=6)
-    assert wanted["transient"] == LineMark(ending="masked", worst=6, mutants=6)
+    assert wanted["permanent"] == LineMark(worst_ending="hazard", worst=5, mutant_count=6)
+    assert wanted["transient"] == LineMark(worst_ending="masked", worst=6, mutant_count=6)
     assert at("gas =") not in file.marks and at("brake =") not in file.marks
-    assert file.worst_lines() == {"hazard": 2}
-    assert file.shown == (range(at("def drive"), len(file.lines) + 1),)
+    assert file.line_counts_by_ending() == {"hazard": 2}
+    assert file.shown_lines == (range(at("def drive"), len(file.lines) + 1),)
 
 
 def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:

@@ -98,7 +98,7 @@ class Client:
     def token_for(self, path: str) -> str:
         """The token of the page that can send any request to `path`."""
         target = path.partition("/api/review/")[2].partition("?")[0]
-        return self.site.tokens.token(review_page_name(target) if target else HOME_PAGE)
+        return self.site.tokens.token_of(review_page_name(target) if target else HOME_PAGE)
 
     def get(self, path: str, **headers: str | None) -> Answer:
         return self.ask("GET", path, {name.replace("_", "-"): value for name, value in headers.items()})

@@ -108,8 +108,8 @@ def test_a_request_that_never_arrives_is_given_up(
 def test_a_long_response_is_not_given_up(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     """A first report can take longer than a request may take to arrive."""
     monkeypatch.setattr(connections, "MOST_REQUEST_S", 0.1)
-    told = client.site.told_runs
-    monkeypatch.setattr(client.site, "told_runs", lambda: (time.sleep(0.4), told())[1])
+    summarize = client.site.summarize_runs
+    monkeypatch.setattr(client.site, "summarize_runs", lambda: (time.sleep(0.4), summarize())[1])
     assert client.get("/api/runs").status == 200
 
 

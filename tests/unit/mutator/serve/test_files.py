@@ -214,19 +214,19 @@ def test_no_stored_report_is_served(client: Client, linked: Path, name: str) -> 
 
 def test_a_report_is_built_once(client: Client, linked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second server reads the cache. A damaged file in the cache is not used."""
-    monkeypatch.setattr(client.site.shown, "_reports", ReportCache())
+    monkeypatch.setattr(client.site.run_pages, "_reports", ReportCache())
     first = client.get("/runs/linked/report/index.html").data
     assert not (linked / "report").exists()
     before = [path.name for path in shared_cache.pages_folder().iterdir()]
     with monkeypatch.context() as patch:
         patch.setattr(report_builder, "build_report", None)
         assert client.get("/runs/linked/report/index.html").data == first
-        monkeypatch.setattr(client.site.shown, "_reports", ReportCache())
+        monkeypatch.setattr(client.site.run_pages, "_reports", ReportCache())
         assert client.get("/runs/linked/report/index.html").data == first
     for name in before:
         page = shared_cache.pages_folder() / name / "index.html"
         page.write_bytes(page.read_bytes().replace(b"</main>", b"</main><b>forged</b>"))
-    monkeypatch.setattr(client.site.shown, "_reports", ReportCache())
+    monkeypatch.setattr(client.site.run_pages, "_reports", ReportCache())
     assert client.get("/runs/linked/report/index.html").data == first
 
 
@@ -241,10 +241,10 @@ def test_an_edited_table_is_not_shown_beside_the_seal_of_a_finished_run(
 ) -> None:
     table = table_building.build_tables(write_finished(toycar, tmp_path / "night"))
     shown = RunPages(toycar, ServedRuns((tmp_path,)), PageTokens(b"secret"))
-    assert shown.file("night", "report/index.html").status_code == 200
+    assert shown.run_file("night", "report/index.html").status_code == 200
     table.write_text(table.read_text().replace(",masked,", ",sdc,", 1))
     with pytest.raises(MutatorError, match=r"results\.csv:\d+: 'sdc'; expected 'masked'"):
-        shown.file("night", "report/index.html")
+        shown.run_file("night", "report/index.html")
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,7 @@ def desk(toycar: Workspace, tmp_path: Path) -> RequestChecker:
 def work(desk: RequestChecker, **order: Any) -> JobCommand:
     import json
 
-    return desk.work(json.dumps(order).encode())
+    return desk.build_command(json.dumps(order).encode())
 
 
 def test_requests_become_command_lines(desk: RequestChecker) -> None:
@@ -125,7 +125,7 @@ def test_requests_become_command_lines(desk: RequestChecker) -> None:
     assert work(desk, kind="film", **about).words == ("show", experiment, film, *of_run)
     still = work(desk, kind="still", t=3, **about)
     assert still.words == ("show", experiment, "--still=3.00", *of_run)
-    assert still.result == f"/runs/first/report/index.html#e={experiment}"
+    assert still.result_address == f"/runs/first/report/index.html#e={experiment}"
     assert work(desk, kind="report", run="first").words == ("report", str(run), *place)
     given = {"value": -2.5, "seed": 3, "variant": "shifted", "trigger": "v_ego > 3"}
     options = ("--scenario=A", "--trigger=v_ego > 3", "--variant=shifted", "--value=-2.5", "--seed=3")

@@ -121,9 +121,9 @@ def test_the_output_of_a_job_is_plain_text() -> None:
     hostile = f"\x1b[31m/srv/data/{HOSTILE}\x07\u202e"
     made.add_output(f"{hostile}\n".encode())
     made.add_output(b"\xff\xfe\n")
-    assert made.text == f"{HOSTILE}\n\ufffd\ufffd\n"
+    assert made.log_text == f"{HOSTILE}\n\ufffd\ufffd\n"
     made.add_output(b"x" * 300_000)
-    assert len(made.text) == 100_000
+    assert len(made.log_text) == 100_000
     made.add_events(event("warning", text=hostile))
     assert made.message == f"warning: {HOSTILE}"
     made.add_events(event("phase", phase="x" * 9_999, done=0, total=0, outcomes={}))
@@ -146,7 +146,13 @@ def test_the_state_of_a_job_does_not_depend_on_its_output() -> None:
     """A fault's name, or what a target prints, can look like any sentence."""
     made = job()
     made.add_output(b"error: none\nexperiments 3/4\nverdict: hazard\nplot: /tmp/plot.svg\n")
-    assert (made.progress, made.message, made.outcome, made.error, made.links) == (None, "", "", "", {})
+    assert (made.progress, made.message, made.result_text, made.error_text, made.path_by_kind) == (
+        None,
+        "",
+        "",
+        "",
+        {},
+    )
 
 
 def test_events_arrive_in_any_pieces_and_other_lines_are_dropped() -> None:
@@ -161,7 +167,7 @@ def test_events_arrive_in_any_pieces_and_other_lines_are_dropped() -> None:
         made.add_events(line)
     for byte in event("result", text="verdict: sdc"):
         made.add_events(bytes([byte]))
-    assert (made.outcome, made.message) == ("verdict: sdc", "")
+    assert (made.result_text, made.message) == ("verdict: sdc", "")
 
 
 def test_the_number_of_waiting_jobs_is_limited() -> None:

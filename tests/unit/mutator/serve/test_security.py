@@ -152,8 +152,8 @@ PAGES = (HOME_PAGE, run_page_name(Path("/elsewhere")), review_page_name("toycar"
 def strangers(client: Client, *allowed: str) -> list[str]:
     """The tokens of all other pages, and no token."""
     night, linked = (run_page_name(client.place / "runs" / name) for name in ("night", "linked"))
-    tokens = [client.site.tokens.token(page) for page in {*PAGES, night, linked} - {*allowed}]
-    return [*tokens, "", "a", "\xff", PageTokens().token(allowed[0])]
+    tokens = [client.site.tokens.token_of(page) for page in {*PAGES, night, linked} - {*allowed}]
+    return [*tokens, "", "a", "\xff", PageTokens().token_of(allowed[0])]
 
 
 def test_only_the_review_page_decides(client: Client) -> None:
@@ -169,7 +169,7 @@ def test_only_the_review_page_decides(client: Client) -> None:
     for token in strangers(client, own):
         assert client.ask("POST", path, {TOKEN_HEADER: token}, body).status == 403
     assert client.get(path).json["groups"][group]["state"] == "new"
-    assert client.ask("POST", path, {TOKEN_HEADER: client.site.tokens.token(own)}, body).status == 200
+    assert client.ask("POST", path, {TOKEN_HEADER: client.site.tokens.token_of(own)}, body).status == 200
     assert client.get(path).json["groups"][group]["state"] == "approved"
 
 
@@ -177,7 +177,7 @@ def test_a_run_page_starts_and_cancels_only_jobs_of_its_run(
     client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     night = run_page_name(client.place / "runs" / "night")
-    own = client.site.tokens.token(night)
+    own = client.site.tokens.token_of(night)
     orders: list[dict[str, object]] = [
         {"kind": "report", "run": "night"},
         {"kind": "try", "spec": "sensor/distance", "scenario": "near"},
@@ -187,7 +187,7 @@ def test_a_run_page_starts_and_cancels_only_jobs_of_its_run(
         for token in [*strangers(client, HOME_PAGE, night), *([own] if "run" not in order else [])]:
             assert client.ask("POST", "/api/jobs", {TOKEN_HEADER: token}, order).status in (400, 403)
     assert not client.get("/api/jobs").json["jobs"]
-    monkeypatch.setattr(client.site.jobs, "_started", lambda job, events: None)
+    monkeypatch.setattr(client.site.jobs, "_start_process", lambda job, events: None)
     ids = [client.ask("POST", "/api/jobs", {TOKEN_HEADER: own}, orders[0]).json["id"]]
     ids += [client.post("/api/jobs", order).json["id"] for order in orders[:1]]
     campaign = client.post("/api/jobs", orders[2] | {"name": "later"}).json["id"]
