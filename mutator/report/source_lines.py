@@ -89,7 +89,9 @@ class SourceLines:
             return None
         faults_with_results = {name: faults[name] for name in results["fault_id"].unique() if name in faults}
         changes = {
-            name: str(fault.value) for name, fault in faults_with_results.items() if fault.module == OPERATORS_MODULE
+            name: str(fault.value)
+            for name, fault in faults_with_results.items()
+            if fault.module == OPERATORS_MODULE
         }
         try:
             manifest = workspace.manifest(folder.head.target) if workspace else None

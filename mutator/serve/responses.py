@@ -73,13 +73,11 @@ def error_facts(error: MutatorError) -> dict[str, Any]:
 
 def on_error(request: Request, error: Exception) -> Response:
     """Return the response to a failed request: JSON for scripts, a page for people."""
-    mutator_error = _as_mutator_error(error)
-    status = (
-        404 if isinstance(mutator_error, NotServed) else 403 if isinstance(mutator_error, PageRefused) else 400
-    )
+    failure = _as_mutator_error(error)
+    status = 404 if isinstance(failure, NotServed) else 403 if isinstance(failure, PageRefused) else 400
     if isinstance(error, HTTPException):
         status = error.status_code
-    facts = error_facts(mutator_error)
+    facts = error_facts(failure)
     if request.url.path.startswith("/api/"):
         return JSONResponse(facts, status)
     return Response(error_page(facts["error"]), status, media_type="text/html")
