@@ -97,7 +97,7 @@ def _draw_hazard_shares(
 ) -> None:
     for m, method in enumerate(methods):
         colour, marker = style.colour_and_marker(method)
-        height = 0.18 * (2 * m - len(methods) + 1)
+        height = 0.18 * (2 * m - len(methods) + 1)  # methods side by side, centred on the row
         tally_by_row = [
             (i, tallies[method, kind]) for i, kind in enumerate(kinds) if (method, kind) in tallies
         ]

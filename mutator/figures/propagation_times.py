@@ -21,7 +21,7 @@ def draw(frame: pd.DataFrame) -> "Figure":
     figure, axes = style.blank_figure(6.2, 2, 2)
     for axis, step in zip(axes, steps, strict=True):
         for m, method in enumerate(methods):
-            offset = 0.36 * (m - (len(methods) - 1) / 2)
+            offset = 0.36 * (m - (len(methods) - 1) / 2)  # side by side, centred on the scenario
             spread_by_x = [(i + offset, spreads.get((method, s))) for i, s in enumerate(scenarios)]
             _draw_method(axis, [(x, spread[step]) for x, spread in spread_by_x if spread], str(method))
         axis.set_title(step, fontsize=style.TEXT_POINTS, loc="left")

@@ -18,7 +18,7 @@ SILENT_HAZARD_WARNINGS = (NO_ALERT, ALERT_AFTER_HAZARD)  # silent hazards: no al
 
 @dataclass(frozen=True, slots=True)
 class PageLink:
-    """A text that links to a place on the page. `to` is the URL fragment, without #."""
+    """A text that links to a place on the page. `fragment` is that of the URL, without #."""
 
     text: str
     fragment: str
@@ -26,7 +26,7 @@ class PageLink:
 
 @dataclass(frozen=True, slots=True)
 class ShareBar:
-    """A bar that shows `part` as a share of `of`."""
+    """A bar that shows `part` as a share of `whole`."""
 
     part: float
     whole: float
@@ -35,7 +35,7 @@ class ShareBar:
 
 @dataclass(frozen=True, slots=True)
 class ExplainedCodes:
-    """Codes of hazards or of a severity class, whose meanings the page explains. `word` precedes them."""
+    """Codes of hazards or of a severity class, whose meanings the page explains. `prefix` precedes them."""
 
     codes: tuple[str, ...]
     prefix: str = ""
@@ -58,12 +58,12 @@ class AnswerTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportAnswer:
-    """The answer to a question. `wide`: its tables have many columns."""
+    """The answer to a question. `is_wide`: its tables have many columns."""
 
     name: str
     title: str
     paragraph: str
-    tables: tuple[AnswerTable, ...] = ()  # listings without lines are not shown
+    tables: tuple[AnswerTable, ...] = ()  # tables without rows are not shown
     links: tuple[PageLink, ...] = ()
     is_wide: bool = False
 
@@ -85,7 +85,7 @@ def was_or_were(count: int) -> str:
 
 
 def fault_type_counts(part: pd.DataFrame, whole: pd.DataFrame) -> list[tuple[str, int, int]]:
-    """Each fault type with its number of rows in `part` and in `of`, largest first."""
+    """Each fault type with its number of rows in `part` and in `whole`, largest first."""
     parts = part["kind"].value_counts()
     counts = [(str(k), int(parts.get(k, 0)), int(n)) for k, n in whole["kind"].value_counts().items()]
     return sorted(counts, key=lambda c: (-c[1], -c[2], c[0]))

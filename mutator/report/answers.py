@@ -79,7 +79,7 @@ def _describe_first_alert(row: ResultRow) -> str:
 
 
 def silent_hazards_answer(frame: pd.DataFrame, alerts_caveat: str = "") -> ReportAnswer:
-    """Say which hazards were silent. `note` is a caveat about alerts that were not observed."""
+    """Say which hazards were silent. `alerts_caveat` is about alerts that were not observed."""
     hazards = frame[frame["outcome"] == "hazard"]
     silent = hazards[hazards["warning"] != ALERT_BEFORE_HAZARD]
     never, late = (int((silent["warning"] == name).sum()) for name in (NO_ALERT, ALERT_AFTER_HAZARD))

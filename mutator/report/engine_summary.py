@@ -40,7 +40,7 @@ class EngineSummary:
 def summarize_engines(
     folder: RunFolder, records: Mapping[str, Record], timings: "DataFrame"
 ) -> EngineSummary | None:
-    """Summarize a run's `timings` (as in `Seen`) and `proof/`. None without timings and without `proof/`."""
+    """Summarize a run's `timings` (as in `ExperimentFacts`) and `proof/`; None if it has neither."""
     counts_by_mode = _count_modes(timings)
     if not counts_by_mode and not (folder.path / PROOF_FOLDER).is_dir():
         return None

@@ -16,7 +16,9 @@ from mutator.store.run_folder import RunFolder
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-_EXPERIMENTS_IN_BATCH = 5_000  # number of experiments in a batch
+_EXPERIMENTS_IN_BATCH = (
+    5_000  # enough to outweigh sending the results to another process, few enough for all cores
+)
 # extra columns of a frame of results; no metric has such a name
 RANK_COLUMN, UNTIMED_PATH_COLUMN = "#place", "#untimed_path"
 _TimedAlerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
@@ -24,9 +26,9 @@ _TimedAlerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
 
 @dataclass(frozen=True, kw_only=True)
 class ExperimentFacts:
-    """`places` (the rank, from 0) and `path_numbers` (an index into `untimed_paths`, -1: none) have a number
-    for each row of the results. `alerts` are those of experiments with a hazard. `timings` has a row for each
-    timed experiment; its engine is '' if not recorded.
+    """`ranks` (from 0, the worst) and `path_numbers` (an index into `untimed_paths`, -1: none) have a number
+    for each row of the results. `alerts_by_id` has only experiments with a hazard. `timings` has a row for
+    each timed experiment; its engine is '' if not recorded.
     """
 
     ranks: np.ndarray

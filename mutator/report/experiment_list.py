@@ -53,7 +53,7 @@ LIST_ORDER = ["module", "fault_type", "scenario", "method", "trigger", "experime
 DETAILS_SCHEMA = "report-details/1"
 _ALERT_COLUMNS = ("alerts", "t_alert", "reaction_time")  # columns that need a target with alerts
 MOST_EMBEDDED_STILL_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
-_TRACE_DIGEST_DIGITS = 16  # hex digits of the digest of a trace
+_TRACE_DIGEST_DIGITS = 16  # enough to notice another trace; whole digests would be four times as long
 MOST_LISTED_EXPERIMENTS = (
     50_000  # maximum number of experiments that the page lists, so that it opens quickly
 )
@@ -61,7 +61,7 @@ MOST_LISTED_EXPERIMENTS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExperimentListData:
-    """Data for the page's scripts: `facts` as JSON, the rest as script elements. `listed` says which
+    """Data for the page's scripts: facts as JSON, the rest as script elements. `truncation_note` says which
     experiments the page lists; '' if all.
     """
 
@@ -225,6 +225,7 @@ def _json_number(value: float) -> float | int | str | None:
         return None
     if math.isinf(value):
         return "Infinity" if value > 0 else "-Infinity"
+    # JSON as numbers of JavaScript: whole numbers are exact up to 2**53
     return int(value) if abs(value) < 2**53 and value == int(value) else float(value)
 
 
@@ -306,12 +307,12 @@ def _readable_patches(run: ReportedRun, ids: Iterable[str]) -> Iterator[tuple[st
 def media_by_experiment(
     folder: RunFolder, page_folder: Path, most_embedded_bytes: int
 ) -> dict[str, dict[str, Any]]:
-    """Return the stills, films and exact plots in plots/, by experiment. Stills are embedded up to `budget`
-    bytes in total; the rest become links relative to `seen_from`.
+    """Return the stills, films and exact plots in plots/, by experiment. Stills are embedded up to
+    `most_embedded_bytes` in total; the rest become links relative to `page_folder`.
     """
     files_by_experiment: dict[str, dict[str, Any]] = {}
-    files = filter(Path.is_file, (folder.path / "plots").glob("*"))
-    for path in sorted(files, key=lambda p: (len(p.name), p.name)):
+    plot_files = filter(Path.is_file, (folder.path / "plots").glob("*"))
+    for path in sorted(plot_files, key=lambda p: (len(p.name), p.name)):
         name, _, time = path.stem.partition("-")
         link = Path(os.path.relpath(path, page_folder)).as_posix()
         media_of_experiment = files_by_experiment.setdefault(name, {"stills": [], "films": []})
@@ -326,7 +327,7 @@ def media_by_experiment(
                 kind = "jpeg" if path.suffix == ".jpg" else "png"
                 link = f"data:image/{kind};base64,{base64.b64encode(read_bounded(path)).decode()}"
             media_of_experiment["stills"].append([time.removesuffix("s"), link])
-    return {name: kept for name, kept in files_by_experiment.items() if any(kept.values())}
+    return {name: files for name, files in files_by_experiment.items() if any(files.values())}
 
 
 def scene_facts(manifest: TargetManifest) -> dict[str, Any] | None:

@@ -157,9 +157,9 @@ def _components_with_columns(path: FaultPath) -> Iterator[tuple[Any, int]]:
 
 @dataclass(slots=True, kw_only=True)
 class PathCounts:
-    """Counts over the paths of some faults. By link: how many `came` to its start and got `through`, if its
-    end is recorded. By component: how many were `injected`, `stopped`, and `masked` there. `ends` counts
-    masked faults by the set of components that stopped them.
+    """Counts over the paths of some faults. By link: how many `reached` its start and `passed`, if its
+    end is recorded. By component: how many were `injected`, `stopped`, and `masked` there.
+    `masked_by_components` counts masked faults by the set of components that stopped them.
     """
 
     active: int = 0
@@ -193,7 +193,7 @@ class PathCounts:
 def path_counts_by_fault_type(
     kinds: "pd.Series[str]", path_numbers: "np.ndarray", paths: RunFaultPaths
 ) -> Mapping[str, PathCounts]:
-    """Return the counts of all faults, then those by fault type. `codes` has each row's path (-1: none)."""
+    """Return the counts of all faults, then those by fault type. `path_numbers`: each row's path (-1: none)."""
     import pandas as pd
 
     counts: dict[str, PathCounts] = defaultdict(PathCounts)

@@ -65,7 +65,7 @@ class Filming:
         golden: Path | None = None,
     ) -> bool:
         """Rerun an experiment's faulty run, and the golden run unless it is given, and write `shots`.
-        Return whether the new record equals `known`; true if `known` is None. Raise MutatorError if the
+        Return whether the new record equals `stored_record`; true without one. Raise MutatorError if the
         faulty run left no film or the target's command fails.
         """
         with ScratchFolder("mutator-film-") as scratch:
@@ -141,6 +141,7 @@ def _write_shot(manifest: TargetManifest, folder: Path, film_paths: Mapping[str,
     for place in (out, scratch_file):
         make_folder(place.parent)
     arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
+    # -P and -s: neither the current folder nor the user's packages can replace a module of the target
     command = [sys.executable, "-P", "-s", "-m", film.module, *fill_placeholders(arguments, placeholders)]
     films = (Path(film_paths["golden"]), Path(film_paths["faulty"]))
     if sandbox := Sandbox.of_target(manifest, folder, [*films, tree]):

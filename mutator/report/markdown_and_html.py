@@ -14,9 +14,8 @@ from mutator.web import asset_text, json_script_element, load_order
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportContent:
-    """The content of both forms of a report. `alarm` is shown first. `outcomes` counts outcomes and
-    statuses. `study` cites the study that has its own page. `answers` come before the list of experiments,
-    `panels` after it.
+    """The content of both forms of a report. `alarm` is shown first. `study_citation` cites the
+    study that has its own page. `answers` come before the list of experiments, `panels` after it.
     """
 
     title: str

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 class ReportedRun:
     """The data that a report is made from. `results` are all experiments with a record, `frame` the usable
     ones. `faults` are those of the plan; `experiments` (the plan) and `records` are read on access. Without a
-    workspace, no experiment can be rerun, and there is no study. `compared`: the study has its own page on
+    workspace, no experiment can be rerun, and there is no study. `is_compared`: the study has its own page on
     these results.
     """
 

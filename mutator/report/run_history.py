@@ -36,7 +36,7 @@ _COLUMN_HEADS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PastRun:
-    """One run. `date` is the time of its last record, `commit` the commit of its target."""
+    """One run. `date` is the time of its last record."""
 
     folder: RunFolder
     date: datetime
@@ -99,6 +99,7 @@ def _past_run(path: Path) -> PastRun:
     folder = RunFolder.open_unverified(path)
     rows = {row.experiment_id: row for row in Results(path).rows()}
     files = [*(path / "records").glob("*.jsonl"), Results(path).path]
+    # the records of equal runs are equal, so they have no date; the files do
     last = max(file.stat().st_mtime for file in files if file.exists())
     git = folder.stretches[-1].git or {}
     state = git.get("target")

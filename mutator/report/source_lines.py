@@ -30,12 +30,12 @@ ENDINGS_WORST_FIRST = (
 )
 LASTING_VALUES = (PERMANENT, TRANSIENT)
 _CONTEXT_LINES = 2  # lines shown before and after a marked line outside functions
-_MOST_GAP_LINES = 3  # gaps of up to this many lines are shown, too
+_MOST_GAP_LINES = 3  # smaller gaps are shown: the note on what is left out takes a line, too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineMark:
-    """The outcomes of a line's `mutants`: the worst one, and the number of mutants with it."""
+    """The worst ending of a line's mutants, the number of mutants with it, and the number of all."""
 
     worst_ending: str
     worst: int
@@ -47,7 +47,7 @@ MarksByLine = Mapping[int, Mapping[str, LineMark]]  # line (from 1) -> permanent
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MarkedFile:
-    """A file with faults. `shown` has the ranges of lines to show, numbered from 1."""
+    """A file with faults. `shown_lines` has ranges, numbered from 1."""
 
     path: str
     data: bytes
@@ -66,9 +66,9 @@ class MarkedFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceLines:
-    """The files of a run, worst first. `places` maps each fault to its line, such as `pkg/plan.py:42`;
-    `changes` maps each fault of an operator to its change, such as `a + b -> a - b`. `why` is the reason if
-    there are no files.
+    """The files of a run, worst first. `line_by_fault` has lines such as `pkg/plan.py:42`;
+    `change_by_fault` maps each fault of an operator to its change, such as `a + b -> a - b`.
+    `reason_without_files` is empty if there are files.
     """
 
     files: tuple[MarkedFile, ...] = ()

@@ -18,10 +18,8 @@ from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_progress import Progress, StagePace
 from mutator.workspace import Workspace
 
-MOST_EXPERIMENTS, PLANNED_PER_EXPERIMENT = (
-    10,
-    20,
-)  # at most 10 experiments, and at most one in 20 of the planned ones
+MOST_EXPERIMENTS = 10
+PLANNED_PER_EXPERIMENT = 20  # small campaigns should not spend most of their time on stills
 BUDGET_S = 120.0  # no further experiment starts after this time
 
 OnProgress = Callable[[Progress], None]

@@ -12,7 +12,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 MOST_REQUEST_S = 10.0  # time for a whole request to arrive
 _MOST_CONNECTIONS = 100  # connections; a browser opens six
-_DESCRIPTORS_PER_CONNECTION = 4  # connections use at most this fraction of the descriptors
+_DESCRIPTORS_PER_CONNECTION = 4  # the others are for files of runs, pipes of jobs and caches
 
 
 class Connection(H11Protocol):
@@ -27,7 +27,7 @@ class Connection(H11Protocol):
         others = [cast(Connection, other) for other in self.connections if other is not self]
         others = [other for other in others if not other.transport.is_closing()]
         if len(others) >= _most_connections():
-            min(others, key=lambda one: (one._is_answering, one._opened_at)).transport.abort()
+            min(others, key=lambda other: (other._is_answering, other._opened_at)).transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
         super().connection_lost(exc)

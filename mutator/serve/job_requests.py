@@ -97,7 +97,7 @@ _REQUEST_ADAPTER: TypeAdapter[JobRequest] = TypeAdapter(Annotated[JobRequest, Fi
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobCommand:
-    """A checked request, with the arguments of its command line (`words`)."""
+    """A checked request, with the arguments of its command line."""
 
     order: JobRequest
     title: str

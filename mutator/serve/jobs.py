@@ -25,12 +25,12 @@ from mutator.serve.responses import without_folders
 _GUARD_MODULE = "mutator.serve.job_guard"
 _OUTPUT_COLUMNS = "200"  # line width of a job's output; pages wrap the lines
 _MOST_LOG_BYTES = 100_000  # only the last bytes of a job's output are kept
-_READ_BYTES = 65_536
+_READ_BYTES = 65_536  # what a pipe holds in Linux
 _MOST_MESSAGE_CHARACTERS = 500
 _MOST_ENDED_JOBS = 200  # ended jobs to keep, the newest
 _MOST_WAITING_JOBS = 50
 _ESCAPE_CODE_PATTERN = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")  # terminal escape codes
-_MOST_SHUTDOWN_S = 30.0  # time for jobs to end when the server ends
+_MOST_SHUTDOWN_S = 30.0  # for jobs to end with the server; longer than `job_guard.PATIENCE_S`
 
 
 class JobState(StrEnum):

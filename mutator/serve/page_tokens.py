@@ -24,6 +24,7 @@ class PageTokens:
     _key: bytes = field(default_factory=lambda: secrets.token_bytes(32))
 
     def token_of(self, page: str) -> str:
+        # names of folders need not be valid UTF-8
         return hmac.new(self._key, page.encode("utf-8", "surrogateescape"), hashlib.sha256).hexdigest()
 
     def check(self, token: str, *pages: str) -> None:

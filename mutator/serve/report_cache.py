@@ -15,7 +15,7 @@ from mutator.errors import MutatorError
 
 PAGES_SCHEMA = "pages/1"
 DIGESTS_FILE = "files.json"
-_MOST_IN_MEMORY = 2
+_MOST_IN_MEMORY = 2  # a report can have 15 MB
 
 
 class ReportCache:

@@ -45,7 +45,7 @@ class GuardedApplication:
             await self._app(scope, receive, send)
             return
         if scope["type"] != "http":
-            await send({"type": "websocket.close", "code": 1008})
+            await send({"type": "websocket.close", "code": 1008})  # policy violation
             return
         send = _with_security_headers(send)
         response = self._refusal_of(scope) or self._response_without_cookie(scope)
@@ -116,7 +116,7 @@ async def _read_body(headers: Headers, receive: Receive) -> bytes | None:
     if (
         not declared_length.isascii()
         or not declared_length.isdigit()
-        or len(declared_length) > 20
+        or len(declared_length) > 20  # so that int() cannot take long
         or int(declared_length) > MOST_BODY_BYTES
     ):
         return None

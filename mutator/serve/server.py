@@ -15,7 +15,7 @@ _BACKLOG = 64  # connections to accept at once
 
 
 def serve(site: ServedSite, *, port: int, on_ready: Callable[[str], None]) -> None:
-    """Serve a site until the process is interrupted, then end all jobs; `ready` is called with the address
+    """Serve a site until the process is interrupted, then end all jobs; `on_ready` is called with the address
     and token.
 
     `port` 0 means any free port. MutatorError for a port in use.
@@ -41,7 +41,7 @@ def build_server(site: ServedSite, *, port: int, token: str) -> uvicorn.Server:
         ws="none",
         server_header=False,
         proxy_headers=False,
-        timeout_graceful_shutdown=2,
+        timeout_graceful_shutdown=2,  # s; an open page must not delay Ctrl-C
     )
     return uvicorn.Server(config)
 

@@ -39,9 +39,9 @@ def build_answers_panel(run: ReportedRun) -> Panel:
     answers = build_answers(run)
     parts = []
     for answer in answers:
-        tables = [_plain_table(one).as_markdown() for one in answer.tables if one.rows]
+        tables = [_plain_table(table).as_markdown() for table in answer.tables if table.rows]
         parts += [f"## {answer.title}", answer.paragraph, *tables]
-    columns = [[one for one in answers if one.is_wide], [one for one in answers if not one.is_wide]]
+    columns = [[a for a in answers if a.is_wide], [a for a in answers if not a.is_wide]]
     meanings = code_meanings(run)
     html = rendered(_HTML_TEMPLATE, columns=columns, table=lambda listing: _table_html(listing, meanings))
     return Panel(anchor="answers", link="Answers", markdown="\n\n".join(parts), html=html)
