@@ -193,7 +193,7 @@ class PathCounts:
 def path_counts_by_fault_type(
     kinds: "pd.Series[str]", path_numbers: "np.ndarray", paths: RunFaultPaths
 ) -> Mapping[str, PathCounts]:
-    """Return the counts of all faults, then those by fault type. `path_numbers`: each row's path (-1: none)."""
+    """Return counts of all faults, then by fault type. `path_numbers`: the path of each row or -1."""
     import pandas as pd
 
     counts: dict[str, PathCounts] = defaultdict(PathCounts)
