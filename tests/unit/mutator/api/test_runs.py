@@ -175,7 +175,9 @@ def test_only_a_rerun_that_equals_the_record_is_kept(driven: Run) -> None:
     kept = SeriesFolder(driven.path).kept_path(experiment.id)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            run_experiments, "rerun", lambda *where, **more: (rerun_experiment(*where, **more)[0], False)
+            run_experiments,
+            "rerun_experiment",
+            lambda *where, **more: (rerun_experiment(*where, **more)[0], False),
         )
         assert experiment.rerun(keep=True).same_as_record is False
     assert not kept.exists()
