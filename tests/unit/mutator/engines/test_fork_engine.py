@@ -118,10 +118,10 @@ from pathlib import Path
 from mutator.workspace import Workspace
 sys.path.insert(0, sys.argv[4])
 from fork_on_toy import Fork
-from mutator.triggers.trigger_kinds import at_time
+from mutator.triggers.trigger_kinds import trigger_at_time
 toy = Workspace(library=Path(sys.argv[1]), templates=Path(sys.argv[2]))
 fork = Fork(toy, Path(sys.argv[3]))
-print(fork.run(fork.job(at_time(2.0))).mode, flush=True)
+print(fork.run(fork.job(trigger_at_time(2.0))).mode, flush=True)
 time.sleep(60)
 """
 
