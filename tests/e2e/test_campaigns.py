@@ -188,7 +188,7 @@ def test_experiments_with_harness_errors_are_rerun(
         done = execute(self, job, folder)
         if job.mutant_id and len(job.name) == 16 and len(hit) < 2:
             hit.append(job.name)
-            fields = {name: getattr(done, name) for name in ("out", "probe", "cpu_s", "wall_s")}
+            fields = {name: getattr(done, name) for name in ("out", "probe_report", "cpu_s", "wall_s")}
             return JobResult(status=Status.HARNESS_ERROR, detail="killed from outside by SIGKILL", **fields)
         return done
 

@@ -121,7 +121,7 @@ def test_collecting_50000_experiments_is_fast(toy: Workspace, tmp_path: Path) ->
         golden_digests={},
         secret=b"",
         written=WrittenFiles(),
-        worker_name=lambda name: name,
+        new_worker_name=lambda name: name,
         problem="",
         interrupted=False,
     )

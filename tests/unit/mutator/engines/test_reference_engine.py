@@ -138,10 +138,10 @@ def test_a_run_with_too_many_steps_times_out(run: Run) -> None:
     )
     body = "from toycar import _fi\nfor n in range(1000): _fi.observe(n)"
     files = {"toycar/_fi.py": probe, **entry(body)}
-    execution = run(files, replace(LIMITS, steps=100), mutant="m")
+    execution = run(files, replace(LIMITS, steps=100), mutant_id="m")
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "limit of 100 simulation steps")
-    assert run(files, replace(LIMITS, steps=2000), mutant="m").status is Status.OK
-    other = run(files, replace(LIMITS, steps=2000), mutant="another")
+    assert run(files, replace(LIMITS, steps=2000), mutant_id="m").status is Status.OK
+    other = run(files, replace(LIMITS, steps=2000), mutant_id="another")
     assert other.status is Status.HARNESS_ERROR
     assert "not the one of this mutant" in other.detail
 
