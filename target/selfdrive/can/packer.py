@@ -6,6 +6,7 @@ from selfdrive.can.dbc import MessageLayout, SignalLayout
 from selfdrive.messages import CanFrame
 
 new_frame = tuple.__new__  # CanFrame's own constructor takes three times as long
+# by byte; looking sums up is faster than shifting each byte
 _HALF_BYTE_SUMS = bytes((value >> 4) + (value & 0xF) for value in range(256))
 
 

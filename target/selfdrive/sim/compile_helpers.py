@@ -53,6 +53,7 @@ def compile_helpers(folder: Path) -> Iterator[Path]:
     with writing(folder, expected="a folder for compiled helpers", remedy="choose another --out"):
         folder.mkdir(parents=True, exist_ok=True)
         sources = {compiled.file_name(source): source for source in sorted(PACKAGE_FOLDER.rglob("*.c"))}
+        # A library is named by its sources' digest, so an older one would never be used again.
         for old in folder.glob(f"*{compiled.SUFFIX}"):
             if old.name not in sources:
                 old.unlink()
@@ -62,6 +63,7 @@ def compile_helpers(folder: Path) -> Iterator[Path]:
                 _compile(source, library, scratch)
                 data = library.read_bytes()
                 library.write_bytes(data + sha256(data).digest())
+                # Renaming is atomic: runs in other processes never load half a library.
                 yield library.replace(folder / name)
 
 

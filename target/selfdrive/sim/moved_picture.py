@@ -19,7 +19,7 @@ from selfdrive.sim.road_renderer import car_to_road, first_road_row, pan_pixels,
 OFFSET_STEP = 0.004  # m
 HEADING_STEP = 0.00025  # rad
 SHIFT_DISTANCE = 10.0  # m ahead, where shifting the whole frame is exact
-CODED_METRES_PER_PIXEL = 0.03895
+CODED_METRES_PER_PIXEL = 0.03895  # from the code of the paper's authors
 MOST_CODED_SHIFT = 1.0  # m; largest shift of the picture
 
 

@@ -8,14 +8,14 @@ from selfdrive.sim.lateral import LateralDynamics, LateralMotion
 from selfdrive.sim.truth import GroundTruth
 
 LONGITUDINAL_MASS = 1700.0  # kg, for the longitudinal motion
-GRAVITY = 9.81
-ROLLING_RESISTANCE = 0.01
+GRAVITY = 9.81  # m/s^2
+ROLLING_RESISTANCE = 0.01  # force as a share of the weight
 DRAG = 0.5 * 1.225 * 0.3  # N s^2/m^2
-PEAK_FORCE = 3.0 * LONGITUDINAL_MASS
+PEAK_FORCE = 3.0 * LONGITUDINAL_MASS  # N
 PEAK_POWER = 100_000.0  # W
-GAS_SLOPE = 3.33
-BRAKE_FORCE = 10.0 * LONGITUDINAL_MASS
-BRAKE_SLOPE = 0.3
+GAS_SLOPE = 3.33  # a pedal of 0.3 already gives the peak force
+BRAKE_FORCE = 10.0 * LONGITUDINAL_MASS  # N
+BRAKE_SLOPE = 0.3  # full brake decelerates by 3 m/s^2
 BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s; above this, power, not force, limits acceleration
 CREEP_BP = (0.0, 1.5)  # m/s
 CREEP_V = (1.0, 0.0)  # m/s^2 from an idling automatic gearbox

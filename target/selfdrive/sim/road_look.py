@@ -29,7 +29,7 @@ class LinePaint:
     fade: float = 0.0  # 0 fresh .. 1 invisible
 
 
-YELLOW_PAINT = LinePaint(tone=182.0, yellow=True)
+YELLOW_PAINT = LinePaint(tone=182.0, yellow=True)  # darker than white in a grey picture
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

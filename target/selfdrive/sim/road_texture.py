@@ -14,7 +14,7 @@ from selfdrive.common.ordered import total
 from selfdrive.sim.road_look import DASH_PERIOD, LinePaint, RoadLook
 
 STRIP_HALF_WIDTH = 12.0  # m from the lane centre to the strip's edge
-ROWS_PER_PERIOD, COLUMNS = 400, 2400
+ROWS_PER_PERIOD, COLUMNS = 400, 2400  # texels of 3 cm along the road and 1 cm across
 ROW_LENGTH, COLUMN_WIDTH = DASH_PERIOD / ROWS_PER_PERIOD, 2.0 * STRIP_HALF_WIDTH / COLUMNS  # m
 TILE_PERIODS = 3  # after which the finest texture, which cameras cannot resolve, repeats
 TRACK_OFFSET, TRACK_WIDTH = 0.8, 0.35  # m: wheel tracks in a lane

@@ -102,6 +102,7 @@ def write_run(result: SimulationResult, folder: Path) -> None:
     with writing(folder, expected="a writable folder", remedy="choose another --out"):
         folder.mkdir(parents=True, exist_ok=True)
         part, final = folder / "record.json.part", folder / "record.json"
+        # First, so that an old record never stands beside a new trace.
         final.unlink(missing_ok=True)
         with (folder / "trace.npz").open("wb") as file:
             file.writelines(trace)

@@ -11,11 +11,11 @@ from zlib import crc32
 import numpy as np
 
 _ZIP_VERSION = 45  # of the format, with ZIP64
-_CREATED_ON_UNIX = 3
+_CREATED_ON_UNIX = 3  # the host system that makes readers use the mode
 _ZIP_DATE = 0x21  # 1980-01-01; the time is 0
-_FILE_MODE = 0o600 << 16
+_FILE_MODE = 0o600 << 16  # in the upper half of the external attributes
 _NPY_MAGIC = b"\x93NUMPY\x01\x00"
-_ROW_COUNT_DIGITS = 21
+_ROW_COUNT_DIGITS = 21  # NumPy's reserve for appending rows without moving data
 _SIZE_IN_EXTRA_FIELD = 0xFFFFFFFF  # the size is in the ZIP64 field
 
 

@@ -9,7 +9,7 @@ import numpy as np
 # columns: width of a mark (up to 0.2 m), and distance from its middle to that of each side
 SINGLE_MARK = (3, 5)
 DOUBLE_MARK = (9, 8)  # the same for a double line, 0.3 m wide in total
-EDGE_COLUMNS = DOUBLE_MARK[1]
+EDGE_COLUMNS = DOUBLE_MARK[1]  # nearer to the border, a double line has no road beside it
 SIDE_COLUMNS = 5  # columns of road on each side for comparison
 AVERAGED_ROWS = 3  # rows averaged
 SPECK_KERNEL = np.ones((5, 1), np.uint8)  # anything bright in fewer rows is a flake or a drop

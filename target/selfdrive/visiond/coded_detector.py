@@ -35,7 +35,7 @@ MIN_CLUSTER_POINTS = 30  # of a cluster
 MIDDLE_COLUMN = 320  # column that separates left and right lines
 READ_ROW = 278  # where lines are read
 INWARD_PIXELS = 3  # px by which a line is read closer to the middle
-METRES_PER_PIXEL = 0.024856
+METRES_PER_PIXEL = 0.024856  # in READ_ROW, from the code of the paper's authors
 MISSING_LINE_COLUMN = 0  # column of a line without a cluster
 
 

@@ -20,7 +20,7 @@ from selfdrive.visiond.road_region import RoadRegion
 
 C_SOURCE = Path(__file__).with_name("mark_lines.c")
 EXACT_BELOW = 2**24  # smaller integers, and sums of them, are exact in single precision
-NO_NUMBER = 2**31 - 1
+NO_NUMBER = 2**31 - 1  # larger than any, so that the minimum over neighbours ignores it
 
 
 class _PointsStructure(ctypes.Structure):

@@ -8,9 +8,9 @@ components of a mask of such squares.
 import cv2
 import numpy as np
 
-NOISE = -1
+NOISE = -1  # as in scikit-learn
 
-_NO_CLUSTER = 65535
+_NO_CLUSTER = 65535  # larger than any cluster, so that the minimum over neighbours ignores it
 
 
 def dbscan(points: np.ndarray, shape: tuple[int, int], eps: int, min_samples: int) -> np.ndarray:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 CELL_PIXELS = 4  # pixels
-ORIENTATION_BINS = 9
+ORIENTATION_BINS = 9  # of 20 degrees
 WINDOW_PIXELS = 32  # pixels
 WINDOW_STRIDE = 16  # pixels between windows
 WINDOW_BLOCKS = WINDOW_PIXELS // CELL_PIXELS - 1  # blocks of 2 x 2 cells in a window, each way

@@ -8,7 +8,7 @@ import numpy as np
 from selfdrive.common.array_math import each
 
 WEIGHTS_PATH = Path(__file__).with_name("lane_net.npz")
-HIDDEN_NODES = 10
+HIDDEN_NODES = 10  # as in the paper
 FEATURE_STEPS, WEIGHT_STEPS = 2**12, 2**20  # per unit of features and weights
 WINDOWS_AT_ONCE = 32  # windows; for more, allocating memory takes longer than the sums
 

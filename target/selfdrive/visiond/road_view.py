@@ -15,7 +15,7 @@ SIDE_REACH = 5.2  # m, to the left and to the right
 MIN_RESOLUTION = 1.3 / 0.12  # px/m; with fewer, a mark of 0.12 m looks like texture
 FARTHEST_ROAD = 35.0  # m
 MIN_DROP = 13.0  # px below the horizon, more than a camera's pitch can be off
-MIN_ROWS = 8
+MIN_ROWS = 8  # fewer would not show a line's direction
 LEVEL_COUNT = 3  # full, half and quarter size
 HALVING_RESOLUTION = 40.0  # px/m above which the next smaller picture is used
 

@@ -18,7 +18,7 @@ from selfdrive.visiond import coded_detector as coded
 from selfdrive.visiond.hog import WINDOW_FEATURES, WINDOW_PIXELS, WINDOW_STRIDE, Hog, detection_windows
 from selfdrive.visiond.lane_net import LaneNet
 
-MOST_MISTAKEN_SHARE = 0.003
+MOST_MISTAKEN_SHARE = 0.003  # of the windows inside the lane
 MOST_LINE_ERROR = 0.3  # m
 TRIED_THRESHOLDS = [0.25 * k for k in range(33)]  # log odds
 SEED, PICTURE_COUNT = 0, 200

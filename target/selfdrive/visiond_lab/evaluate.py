@@ -31,7 +31,7 @@ COMPARED_ROW = 278  # where lines are compared
 SPACING_TOLERANCE = 0.3 / 3.7  # of the lines' true spacing
 IMAGE_SUFFIXES = (".jpg", ".png", ".jpeg")
 ROBUST, PAPER, BOTH = "robust", "paper", "both"
-DETECTED_COLOUR, TRUE_COLOUR = (0, 255, 0), (0, 0, 255)
+DETECTED_COLOUR, TRUE_COLOUR = (0, 255, 0), (0, 0, 255)  # BGR
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +51,7 @@ def _canonical_model(focal: float, height: float) -> CameraModel:
 
 UDACITY_MODEL = _canonical_model(focal=579.0, height=1.21)  # lines 3.7 m apart diverge by 3.05 px per row
 TUSIMPLE_MODEL = _canonical_model(focal=500.0, height=1.68)  # 2.2 px per row
+# By the first word of a key, the cameras of public data sets.
 SOURCE_BY_KEY = {
     "p1": CameraSource(vanishing_row=318, rows=540, model=UDACITY_MODEL),
     "vid": CameraSource(vanishing_row=318, rows=540, model=UDACITY_MODEL),

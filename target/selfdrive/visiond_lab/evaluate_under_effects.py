@@ -33,8 +33,8 @@ from selfdrive.visiond_lab.evaluate import (
     load_labelled_frames,
 )
 
-SEED_COUNT = 20
-EFFECT_MOMENT = Moment(2.0, 50.0, 26.82)
+SEED_COUNT = 20  # drawings of each effect and level
+EFFECT_MOMENT = Moment(2.0, 50.0, 26.82)  # any time and place, at 60 mph
 DETECTORS = PAPER, ROBUST
 PANELS_PER_ROW = 5  # panels of a strip
 CSV_HEADER = "effect", "level", "amount", "unit", "pictures", *(f"missed_{name}" for name in DETECTORS)

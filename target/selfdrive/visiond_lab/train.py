@@ -20,7 +20,7 @@ from selfdrive.visiond.lane_net import HIDDEN_NODES, WEIGHTS_PATH, LaneNet
 from selfdrive.visiond_lab.training_windows import draw_labelled_windows
 
 FULL_ROADS, SMALL_ROADS = (600, 60), (12, 4)  # roads for training and testing
-EPOCHS = 25
+EPOCHS = 25  # without early stopping, so that training always takes the same steps
 WEIGHT_DECAY = 3e-3  # penalty on large weights
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-LOWEST, LOW, MID, HIGH = range(4)
+LOWEST, LOW, MID, HIGH = range(4)  # priorities; the highest is shown
 
 
 class Alert(NamedTuple):

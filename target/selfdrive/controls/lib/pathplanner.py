@@ -11,7 +11,7 @@ CERTAINTY_RATE = 0.05
 USUAL_WIDTH = ((0.0, 31.0), (3.0, 3.8))  # m over m/s: roads for higher speeds are wider
 WIDTH_DOUBT = ((0.3, 1.0), (1.0, 0.0))  # trust in the right line over the error of the width in m
 PATH_PROB = 1.0  # the model does not report the probability of its path
-MIN_LANE_PROB = 0.01
+MIN_LANE_PROB = 0.01  # of both lines together; below it, only the model's path counts
 
 
 class ModelFit:

@@ -7,7 +7,7 @@ from selfdrive.common.interp import clip
 from selfdrive.controls.lib.polynomial import Poly, slope, value
 
 REACH = 140.0  # m; no path is known further ahead
-NEAREST_STEPS = 3
+NEAREST_STEPS = 3  # few, because paths bend little
 
 Curve = Callable[[float], tuple[float, float]]  # x in m to y and dy/dx
 

@@ -19,13 +19,13 @@ LAT_FILTER = 2.0 * pi * 0.2 * DT_MDL / (1.0 + 2.0 * pi * 0.2 * DT_MDL)  # low pa
 A_REL_FILTER = 2.0 * pi * 0.5 * DT_MDL / (1.0 + 2.0 * pi * 0.5 * DT_MDL)  # low pass of 0.5 Hz
 A_REL_MAX = 10.0  # m/s^2
 
-CLUSTER_DISTANCE = 2.5
+CLUSTER_DISTANCE = 2.5  # between centroids, in the space of `cluster_tracks`
 LANE_HALF = 1.5  # m from the path; nearer objects are ahead of the car
 CUT_IN_MAX = 1.0  # m of correction for lateral speed
 SECOND_GAP = 8.0  # m; closer and as fast as the first lead: the same vehicle
 SECOND_SPEED = 1.0  # m/s
 
-FUSIONS_FOR_MOVING = 3
+FUSIONS_FOR_MOVING = 3  # cycles, 0.15 s
 FUSIONS_FOR_FCW = 20
 
 

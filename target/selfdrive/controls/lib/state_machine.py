@@ -20,7 +20,7 @@ PRE_ENABLED = "pre_enabled"
 ENABLED = "enabled"
 SOFT_DISABLING = "soft_disabling"
 
-SOFT_DISABLE_CYCLES = 300
+SOFT_DISABLE_CYCLES = 300  # 3 s, in which the driver can take over
 
 
 class StateMachine:

@@ -9,7 +9,7 @@ from selfdrive.controls.lib.polynomial import Poly, value
 from selfdrive.controls.lib.radar_helpers import Track
 from selfdrive.messages import LeadVision
 
-MIN_PROB = 0.7
+MIN_PROB = 0.7  # less probable leads confirm nothing
 RATE_VARIANCE = 1e2  # (m/s)^2, about that of a lead of 70 % probability
 Q_DISTANCE = 0.5  # m^2, each cycle
 Q_RATE = 1.0  # (m/s)^2, each cycle

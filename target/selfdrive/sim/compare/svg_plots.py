@@ -11,7 +11,7 @@ import numpy as np
 _WIDTH, _HEIGHT = 3600, 2000
 _LEFT, _RIGHT, _TOP, _BOTTOM = 380, 3540, 150, 1750
 _SIMPLIFICATION_SLACK = 2.5  # largest distance of a line from its points
-_TICK_COUNT = 4
+_TICK_COUNT = 4  # roughly, because steps are 1, 2 or 5 times a power of ten
 
 
 class PlotLine(NamedTuple):
@@ -65,6 +65,7 @@ def simplify_line(points: np.ndarray, slack: float) -> np.ndarray:
         (x0, y0), (x1, y1) = points[first], points[last]
         inner = points[first + 1 : last]
         distances = np.abs(inner[:, 1] - y0 - (inner[:, 0] - x0) * (y1 - y0) / (x1 - x0))
+        # A span is split at its farthest point until all points are close (Douglas and Peucker, 1973).
         farthest = int(np.argmax(distances))
         if distances[farthest] > slack:
             middle = first + 1 + farthest
@@ -79,6 +80,7 @@ def _path_data(x: np.ndarray, y: np.ndarray) -> str:
     parts = []
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         points = np.column_stack((x[begin:end], y[begin:end]))
+        # Relative moves in whole tenths of a pixel take the fewest characters.
         whole = np.round(simplify_line(points, _SIMPLIFICATION_SLACK)).astype(int)
         parts.append(
             f"M{whole[0][0]} {whole[0][1]}l" + " ".join(f"{a} {b}" for a, b in np.diff(whole, axis=0))

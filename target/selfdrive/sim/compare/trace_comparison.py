@@ -116,6 +116,7 @@ def compare_trace(
 
 def _check_same_duration(reference: ReferenceTrace, steps: int) -> None:
     last, period = int(reference.steps[-1]), int(reference.steps[-1] - reference.steps[-2])
+    # The run continues after the last row of the reference, but not for a whole period.
     if not last < steps <= last + period:
         end, run_end = last / STEPS_PER_SECOND, (steps - 1) / STEPS_PER_SECOND
         raise ConfigError(
@@ -169,6 +170,7 @@ def _compare_channel(
     if column.channel.startswith("lead_") and column.channel != "lead_status":
         valid &= _rows_where_both_have_a_lead(reference, run_channels)
     steps, reference_values = reference.steps[valid], reference_values[valid]
+    # A message can become visible one step later than in the reference, so the better match counts.
     delays = (0, 1) if column.published else (0,)
     differences = min(
         (_differences_at_steps(column, reference_values, run_values, steps - delay) for delay in delays),
@@ -251,6 +253,7 @@ def time_lag_s(steps: np.ndarray, reference: np.ndarray, run_channel: np.ndarray
             dissimilarity_by_shift[shift] = 1.0 - correlation
     if not dissimilarity_by_shift:
         return None
+    # A tenth more dissimilarity than the best is treated as equal; 1e-9 allows for rounding near zero.
     similarly_good = 1.1 * min(dissimilarity_by_shift.values()) + 1e-9
     return (
         next(

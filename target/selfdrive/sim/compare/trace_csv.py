@@ -16,7 +16,7 @@ from selfdrive.common.conversions import KPH_TO_MS
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.recorder import COUNTED_ALERTS, LONG_STATES, PLAN_SOURCES
 
-STEPS_PER_SECOND = 100
+STEPS_PER_SECOND = 100  # of recorded traces
 STEPS_PER_ROW = 5  # steps between written rows
 
 _FCW_BIT = 1 << COUNTED_ALERTS.index("fcw")

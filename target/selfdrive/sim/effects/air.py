@@ -15,7 +15,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.effect import Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
-VISIBILITY_CONTRAST = 0.05
+VISIBILITY_CONTRAST = 0.05  # share that remains at the visibility distance (WMO No. 8)
 LAYER_HEIGHT = 100.0  # m; above this height, the sky is clear
 
 

@@ -26,8 +26,8 @@ from selfdrive.sim.effects.windscreen import REDUCTION, shrink_picture
 from selfdrive.sim.picture import Region, whole
 
 C_SOURCE = Path(__file__).with_name("precipitation.c")
-DISC_AREA = 0.25 * np.pi
-PROBE_CAMERA = CameraModel(width=88, rows=64)
+DISC_AREA = 0.25 * np.pi  # of a disc of diameter 1
+PROBE_CAMERA = CameraModel(width=88, rows=64)  # small, because every process checks with it
 WHOLE_PROBE = whole((PROBE_CAMERA.rows, PROBE_CAMERA.width))
 PROBE_AIRLIGHTS = 93.75, 126.25, 11.9, 21.25  # air levels at which fused sums give different bits
 

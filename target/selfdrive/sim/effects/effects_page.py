@@ -25,7 +25,7 @@ from selfdrive.visiond.detector import LaneDetector, LaneLines
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
 
-SEEDS = 1, 2, 3, 4, 5
+SEEDS = 1, 2, 3, 4, 5  # several, because one drawing of an effect can be mild by chance
 PICTURES_PER_SEED = 6  # per seed
 PICTURE_STEP, CAR_SPEED = 0.05, 26.82  # s, m/s
 DETECTOR_STYLES: dict[str, tuple[type, tuple[int, int, int], int]] = {  # with colour (BGR) and width (px)

@@ -13,16 +13,16 @@ from selfdrive.sim.picture import Picture, Region
 WHITE_REFLECTANCE = 0.32  # reflectance shown as white in daylight; asphalt of 0.12 has level 95
 SUN_HEIGHT = radians(6.0), radians(12.0)  # drawn from this range
 SUN_SIDE = radians(8.0)  # at most, to either side
-SUN_RADIUS = radians(0.27)
+SUN_RADIUS = radians(0.27)  # as seen from the earth
 ASPHALT_SLOPES = 0.25  # rms slope of surface facets
 NORMAL_REFLECTANCE = 0.04  # reflectance at normal incidence, for a refractive index of 1.5
 MIRRORING_SHARE = 0.004  # share of a dry road's surface that mirrors; similar to the CIE's road table R3
 
 ELECTRONS_PER_LUX = 14.0  # freed in a pixel by white light of 1 lux in the longest exposure (10 ms)
-FULL_WELL_ELECTRONS = 10000.0
+FULL_WELL_ELECTRONS = 10000.0  # the most that a pixel holds, white in good light
 MOST_GAIN = 64.0  # 36 dB
 READ_NOISE = 5.0  # electrons
-QUANTILE_COUNT = 256
+QUANTILE_COUNT = 256  # of a pixel's noise, as many as grey levels
 
 
 class SunGlare(Effect):

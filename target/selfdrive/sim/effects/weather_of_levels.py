@@ -20,7 +20,7 @@ from selfdrive.sim.effects.precipitation import Rain, Snow
 REMAINING_CONTRAST = 0.05  # share of the contrast that remains at the meteorological range
 MIN_STREAK_DROP = 1.0  # mm; smaller drops make no streak
 MIN_BLOCK_SIZE = 2.0  # px; smaller flakes make no block
-SIZE_CLASSES, BISECTIONS = 200, 40
+SIZE_CLASSES, BISECTIONS = 200, 40  # of flakes; of the rate, which leave 1e-12 of its range
 
 
 class Weather(NamedTuple):

@@ -5,6 +5,7 @@ import numpy as np
 
 Colour = tuple[int, int, int]
 
+# The background is dark, as road pictures mostly are, so that lines and labels stand out.
 PAPER = (28, 24, 21)
 PANEL = (40, 35, 31)
 RULE = (74, 66, 60)

@@ -11,10 +11,10 @@ from PIL import Image
 from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.film import drawing
 
-PICTURES_PER_S = 20
+PICTURES_PER_S = 20  # as many as the camera takes, so a film has the speed of the run
 PICTURES_PER_GIF_FRAME = 4  # a GIF has only every fourth picture, to limit its size
-GIF_WIDTH = 800
-GIF_COLOURS = 128
+GIF_WIDTH = 800  # pixels, also to limit its size
+GIF_COLOURS = 128  # half of what the format allows; compresses better
 H264_OPTIONS = {"crf": "25", "preset": "veryfast"}
 STILL_SUFFIXES = ".png", ".jpg"
 

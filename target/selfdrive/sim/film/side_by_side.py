@@ -12,8 +12,9 @@ from selfdrive.sim.film.recorded_film import FilmFrame, RecordedFilm
 from selfdrive.sim.film.timeline import Timeline
 from selfdrive.sim.recorder import COUNTED_ALERTS
 
-WIDTH, HEIGHT = 1280, 720
+WIDTH, HEIGHT = 1280, 720  # pixels, a size that every player supports
 MARGIN = 8
+# Heading, panes, captions and strips leave the rest of HEIGHT to the timeline.
 HEADING_HEIGHT = 42
 PANE_SIZE = 628, 404
 CAPTION_HEIGHT = 26

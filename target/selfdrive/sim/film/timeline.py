@@ -21,7 +21,7 @@ LABELS_WIDTH = 86  # pixels left of the plots, for their names
 FOOT_HEIGHT, HEAD_HEIGHT = 18, 18  # pixels below the plots (seconds) and above them (marks)
 GAP = 6  # pixels between plots and between labels
 TICK_STEPS = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)  # s
-MOST_TICKS = 16
+MOST_TICKS = 16  # labels of more would touch
 MIN_OFFSET_SPAN, MOST_OFFSET_SPAN = 0.3, 4.0  # m; limits of the plot's range
 # m; the plot reaches at least the first, and not below the second
 MIN_DISTANCE_SPAN, MIN_DISTANCE_SHOWN = 10.0, -10.0
@@ -126,6 +126,7 @@ class Timeline:
             cv2.line(self._canvas, (x, HEAD_HEIGHT - 4), (x, self._size[1] - FOOT_HEIGHT), colour, 1)
             label = f"{mark.label} {mark.t:.2f}"
             columns = drawing.text_width(label, drawing.SMALL_TEXT)
+            # A label moves right rather than overlap the one before; if it does not fit, only its line stays.
             label_left = max(labels_end, min(x - 2, self._size[0] - columns - 4))
             if label_left + columns <= self._size[0]:
                 drawing.write_text(
