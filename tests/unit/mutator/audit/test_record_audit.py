@@ -17,7 +17,7 @@ from tests.made_head import HEAD as MADE_UP
 CHANNELS = tuple(ChannelFacts(name, "-", Role.INTERNAL, "", "") for name in ("gas", "brake", "seen"))
 HEAD = replace(MADE_UP, hazards=("H1", "H3"), compared=("gas", "brake"), channels=CHANNELS)
 MANIFEST: Any = SimpleNamespace(
-    compared=[Channel(name="gas", unit="-"), Channel(name="brake", unit="-", tolerance=0.5)]
+    compared_channels=[Channel(name="gas", unit="-"), Channel(name="brake", unit="-", tolerance=0.5)]
 )
 MakeRecord = Callable[..., Record]
 FINE = {"max_dev": (("gas", 0.0), ("brake", 0.25)), "trace_digest": "f" * 64}
