@@ -85,7 +85,7 @@ def run_job(job: dict[str, Any]) -> None:
         load_neighbour("nondeterminism_watch").NondeterminismWatcher(job["tree"]) if job["watch"] else None
     )
     line_recorder = (
-        load_neighbour("executed_lines").LineRecorder(job["tree"], *job["lines"]) if job["lines"] else None
+        load_neighbour("line_recorder").LineRecorder(job["tree"], *job["lines"]) if job["lines"] else None
     )
     observations: list[Any] = []
     try:
