@@ -16,7 +16,13 @@ function constants(folder) {
   return Object.fromEntries(names.map((name) => [name, "readonly"]));
 }
 
+/** Names that say what happened to a value instead of what it is. `left` is missing, because it is also a direction. */
+const EMPTY_NAMES = ("found known told made seen own wanted given kept held said asked shown taken put gone meant heard done one thing things " +
+  "stuff theirs ours they it says").split(" ");
+const nameRules = { "id-denylist": ["error", ...EMPTY_NAMES] };
+
 const rules = {
+  ...nameRules,
   eqeqeq: "error",
   "no-redeclare": ["error", { builtinGlobals: false }], // each script declares one of those constants
   "no-shadow": "off",
@@ -36,5 +42,5 @@ export default [
     rules,
   })),
   { files: ["docs/_static/*.js"], languageOptions: { sourceType: "script", globals: { ...globals.browser, DOCUMENTATION_OPTIONS: "readonly" } }, rules },
-  { files: ["**/*.mjs"], languageOptions: { globals: globals.node } },
+  { files: ["**/*.mjs"], languageOptions: { globals: globals.node }, rules: nameRules },
 ];

@@ -7,7 +7,7 @@
   if (!place) return;
   const limit = Number(place.dataset.limit);
   const words = document.getElementById("words");
-  const shown = document.getElementById("shown");
+  const countElement = document.getElementById("shown");
   const buttons = [...document.querySelectorAll("button[data-change]")];
   const rows = [...place.querySelectorAll("tbody tr")].map((row) => ({
     row, text: row.textContent.toLowerCase(), changes: [...row.querySelectorAll(".change")].map((e) => e.textContent),
@@ -24,7 +24,7 @@
       row.hidden = !fits || count > limit;
     }
     const more = count > limit ? `, the first ${limit} are shown` : "";
-    shown.textContent = `${count} of ${rows.length}${more}`;
+    countElement.textContent = `${count} of ${rows.length}${more}`;
     return new URLSearchParams({ ...(chosen.length && { c: chosen.join(",") }), ...(parts.length && { q: parts.join(" ") }) });
   }
 

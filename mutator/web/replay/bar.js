@@ -10,11 +10,11 @@ class ReplayBar {
     this.clock = clock;
     this.describe = describe;
     this.handle = el("span.handle");
-    this.done = el("span.done");
+    this.progress = el("span.done");
     this.window = el("span.window", { hidden: true });
     this.element = el("div.timebar", { role: "slider", tabindex: 0, "aria-label": "Time of the replay", "aria-valuemin": series.start.toFixed(2),
       "aria-valuemax": series.end.toFixed(2), onpointerdown: (event) => this.#drag(event) },
-      el("span.track"), this.done, ...this.#parts(), this.window, this.handle);
+      el("span.track"), this.progress, ...this.#parts(), this.window, this.handle);
     this.jumps = el("div.jumps", { role: "group", "aria-label": "Go to" }, series.marks.map((mark) => this.#jump(mark)));
   }
 
@@ -22,10 +22,10 @@ class ReplayBar {
   #at = (t) => `${(100 * (t - this.series.start)) / (this.series.end - this.series.start || 1)}%`;
 
   #span(name, from, to, title) {
-    const { el } = Dom, made = el(`span.${name}`, { title });
-    made.style.left = this.#at(from);
-    made.style.width = `calc(${this.#at(to)} - ${this.#at(from)})`;
-    return made;
+    const { el } = Dom, span = el(`span.${name}`, { title });
+    span.style.left = this.#at(from);
+    span.style.width = `calc(${this.#at(to)} - ${this.#at(from)})`;
+    return span;
   }
 
   #parts() {
@@ -52,10 +52,10 @@ class ReplayBar {
     event.preventDefault();
     this.element.focus({ preventScroll: true });
     this.element.setPointerCapture(event.pointerId);
-    const { left, width } = this.element.getBoundingClientRect(), { start, end } = this.series;
+    const { left: barLeft, width } = this.element.getBoundingClientRect(), { start, end } = this.series;
     const move = ({ clientX }) => {
       this.clock.pause();
-      this.clock.seek(start + ((clientX - left) / width) * (end - start));
+      this.clock.seek(start + ((clientX - barLeft) / width) * (end - start));
     };
     const over = new AbortController(), { signal } = over;
     move(event);
@@ -67,7 +67,7 @@ class ReplayBar {
   show() {
     const { t, isPlaying } = this.clock, { start, end } = this.series, share = (t - start) / (end - start || 1);
     this.handle.style.left = `${100 * share}%`;
-    this.done.style.transform = `scaleX(${share})`;
+    this.progress.style.transform = `scaleX(${share})`;
     if (isPlaying) return;
     this.element.setAttribute("aria-valuenow", t.toFixed(2));
     this.element.setAttribute("aria-valuetext", this.describe(t));

@@ -18,7 +18,7 @@ const ReplayData = (() => {
   }
 
   /** The value of a channel in a run (`golden` or `faulty`) at a time: the last sample; NaN if there is none. */
-  const held = (channel, run, t) => (channel.t.length && t >= channel.t[0] - TINY ? channel[run][index(channel.t, t)] : NaN);
+  const valueAt = (channel, run, t) => (channel.t.length && t >= channel.t[0] - TINY ? channel[run][index(channel.t, t)] : NaN);
 
   const same = (a, b) => a === b || (Number.isNaN(a) && Number.isNaN(b));
 
@@ -30,13 +30,13 @@ const ReplayData = (() => {
 
   /** The largest difference between golden and faulty up to the end of the drive: {by, t}; `by` is 0 if they are equal. */
   function largest(channel, end) {
-    const found = { by: 0, t: NaN };
+    const difference = { by: 0, t: NaN };
     for (let i = 0; i < channel.t.length && channel.t[i] <= end + TINY; i++) {
       const by = Math.abs(channel.faulty[i] - channel.golden[i]);
-      if (by > found.by) Object.assign(found, { by, t: channel.t[i] });
-      else if (!found.by && !same(channel.faulty[i], channel.golden[i])) Object.assign(found, { by: NaN, t: channel.t[i] });
+      if (by > difference.by) Object.assign(difference, { by, t: channel.t[i] });
+      else if (!difference.by && !same(channel.faulty[i], channel.golden[i])) Object.assign(difference, { by: NaN, t: channel.t[i] });
     }
-    return found;
+    return difference;
   }
 
   /** The root mean square difference between golden and faulty, from activation to the end of the drive, as a share of the axis.
@@ -72,9 +72,9 @@ const ReplayData = (() => {
   /** About `count` round numbers that label an axis from `low` to `high`. */
   function ticks(low, high, count) {
     const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
-    const step = power * ([1, 2, 5, 10].find((m) => m * power >= rough) || 10), made = [];
-    for (let k = Math.ceil(low / step - TINY); k * step <= high + step * TINY; k++) made.push(Number((k * step).toPrecision(12)));
-    return made;
+    const step = power * ([1, 2, 5, 10].find((m) => m * power >= rough) || 10), numbers = [];
+    for (let k = Math.ceil(low / step - TINY); k * step <= high + step * TINY; k++) numbers.push(Number((k * step).toPrecision(12)));
+    return numbers;
   }
 
   /** The number of decimals for a channel with this axis. */
@@ -88,11 +88,11 @@ const ReplayData = (() => {
   function text(value, places) {
     if (Number.isNaN(value)) return "–";
     if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
-    const made = Math.abs(value) >= 1e6 ? value.toExponential(1) : value.toFixed(places);
-    return (Number(made) === 0 ? made.replace("-", "") : made).replace("-", "−");
+    const formatted = Math.abs(value) >= 1e6 ? value.toExponential(1) : value.toFixed(places);
+    return (Number(formatted) === 0 ? formatted.replace("-", "") : formatted).replace("-", "−");
   }
 
   const unit = (channel) => (channel.unit && channel.unit !== "-" ? channel.unit.replace("^2", "²").replace("^3", "³") : "");
 
-  return { TINY, index, held, same, steps, until, largest, apart, range, ticks, digits, text, unit };
+  return { TINY, index, valueAt, same, steps, until, largest, apart, range, ticks, digits, text, unit };
 })();

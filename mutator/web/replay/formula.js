@@ -24,15 +24,15 @@ const Formula = (() => {
     const [operator, ...parts] = tree, of = parts.map((part) => evaluate(part, values));
     if (operator === "ever") return ever(of[0]);
     if (operator === "rate") return rate(of[0], values.t);
-    const one = OF_NUMBERS[operator], made = new Array(count);
-    for (let i = 0; i < count; i++) made[i] = one(...of.map((array) => array[i]));
-    return made;
+    const operation = OF_NUMBERS[operator], results = new Array(count);
+    for (let i = 0; i < count; i++) results[i] = operation(...of.map((array) => array[i]));
+    return results;
   }
 
   /** For each step, whether the condition has held so far. */
   function ever(holds) {
-    let found = false;
-    return holds.map((now) => (found = found || now));
+    let wasTrue = false;
+    return holds.map((now) => (wasTrue = wasTrue || now));
   }
 
   /** The rate of change per second since the previous step; NaN in the first step. */

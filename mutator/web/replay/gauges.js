@@ -38,7 +38,7 @@ class ReplayGauges {
   }
 
   #show({ channel, share, places, button, faulty, golden, fill, needle }, t, isWritten) {
-    const now = ReplayData.held(channel, "faulty", t), before = ReplayData.held(channel, "golden", t);
+    const now = ReplayData.valueAt(channel, "faulty", t), before = ReplayData.valueAt(channel, "golden", t);
     const zero = share(0), to = Number.isNaN(now) ? zero : share(now);
     fill.style.transform = `translateX(${100 * Math.min(zero, to)}%) scaleX(${Math.abs(to - zero)})`;
     needle.style.transform = `translateX(${100 * share(before)}%)`;

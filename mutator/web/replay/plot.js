@@ -155,7 +155,7 @@ class ReplayPlot {
     this.cursor.hidden = t < view.from - ReplayData.TINY || t > view.to + ReplayData.TINY;
     this.cursor.style.transform = `translateX(${this.x(t, view)}px)`;
     if (!isWritten) return;
-    const golden = ReplayData.held(this.channel, "golden", t), faulty = ReplayData.held(this.channel, "faulty", t), by = faulty - golden;
+    const golden = ReplayData.valueAt(this.channel, "golden", t), faulty = ReplayData.valueAt(this.channel, "faulty", t), by = faulty - golden;
     this.golden.textContent = this.#text(golden);
     this.faulty.textContent = this.#text(faulty);
     this.by.textContent = ReplayData.same(golden, faulty) ? "" : this.#difference(by);

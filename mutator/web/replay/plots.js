@@ -5,7 +5,7 @@
 class ReplayPlots {
   static NARROWEST = 0.2; // duration (s) of the narrowest view
   static CHOSEN = { actuator: 2, truth: 3, internal: 1 }; // maximum number of initial plots by role
-  static SEEN = 0.002; // the smallest visible difference, as a share of the axis
+  static SMALLEST_VISIBLE = 0.002; // the smallest visible difference, as a share of the axis
   static FACTOR = 1.6; // ratio of a zoom step
 
   constructor(channels, axes, series, clock, zoomed) {
@@ -22,7 +22,7 @@ class ReplayPlots {
     this.list = el("div.list", { onpointerdown: (event) => this.#press(event), onpointermove: (event) => this.#hover(event),
       onpointerleave: () => this.#look(null) });
     this.list.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
-    this.told = el("span.told");
+    this.timeLabel = el("span.told");
     this.element = el("div.plots", {}, this.#tools(), this.list);
     this.chosen = new Set(this.#interesting().map(({ name }) => name));
     this.#fill();
@@ -32,9 +32,9 @@ class ReplayPlots {
   #interesting() {
     const begin = this.series.active?.[0] ?? this.series.start, end = ReplayData.until(this.series);
     const ranked = this.plots.map(({ channel, axis }) => ({ channel, apart: ReplayData.apart(channel, axis, begin, end) }))
-      .filter(({ apart }) => apart > ReplayPlots.SEEN).sort((a, b) => b.apart - a.apart).map(({ channel }) => channel);
-    const found = Object.entries(ReplayPlots.CHOSEN).flatMap(([role, most]) => ranked.filter((channel) => channel.role === role).slice(0, most));
-    return found.length ? found : this.plots.slice(0, 3).map(({ channel }) => channel);
+      .filter(({ apart }) => apart > ReplayPlots.SMALLEST_VISIBLE).sort((a, b) => b.apart - a.apart).map(({ channel }) => channel);
+    const differing = Object.entries(ReplayPlots.CHOSEN).flatMap(([role, most]) => ranked.filter((channel) => channel.role === role).slice(0, most));
+    return differing.length ? differing : this.plots.slice(0, 3).map(({ channel }) => channel);
   }
 
   #tools() {
@@ -43,7 +43,7 @@ class ReplayPlots {
     return el("div.tools", {},
       el("p.legend", {}, el("span.key.golden"), "golden", el("span.key.faulty"), "faulty", this.series.active ? [el("span.key.active"), "fault active"] : null,
         this.series.tEnd === null ? null : [el("span.key.after"), "after the end of the drive"]),
-      this.told,
+      this.timeLabel,
       el("div.buttons", { role: "group", "aria-label": "Time range shown" },
         button("−", "Zoom out (−)", () => this.zoom(-1)), button("+", "Zoom in (+)", () => this.zoom(1)),
         button("◀", "Earlier", () => this.pan(-0.4)), button("▶", "Later", () => this.pan(0.4)),
@@ -51,9 +51,9 @@ class ReplayPlots {
   }
 
   #fill() {
-    const shown = this.plots.filter(({ channel }) => this.chosen.has(channel.name));
-    this.list.replaceChildren(...shown.map(({ element }) => element), shown.length ? this.axis : Dom.el("p.quiet", {}, "No channel is chosen. Press one above."));
-    this.shown = shown;
+    const shownPlots = this.plots.filter(({ channel }) => this.chosen.has(channel.name));
+    this.list.replaceChildren(...shownPlots.map(({ element }) => element), shownPlots.length ? this.axis : Dom.el("p.quiet", {}, "No channel is chosen. Press one above."));
+    this.shownPlots = shownPlots;
     this.width = 0; // so that the new plots are drawn
   }
 
@@ -71,13 +71,13 @@ class ReplayPlots {
     if (!width || (width === this.width && colours === this.colours)) return;
     this.width = width;
     this.colours = colours;
-    for (const plot of this.shown) plot.draw(width, this.view, colours);
+    for (const plot of this.shownPlots) plot.draw(width, this.view, colours);
     this.#times(width, colours);
     this.written = -Infinity;
   }
 
   #times(width, colours) {
-    const context = ReplayColours.fitted(this.axis, width, 20), { from, to } = this.view, [plot] = this.shown;
+    const context = ReplayColours.fitted(this.axis, width, 20), { from, to } = this.view, [plot] = this.shownPlots;
     if (!plot) return;
     context.font = "11px system-ui, sans-serif";
     context.fillStyle = colours.quiet;
@@ -89,9 +89,9 @@ class ReplayPlots {
   show(now, isPlaying) {
     if (isPlaying) this.#keepInView(this.clock.t);
     const t = this.hovered ?? this.clock.t, isWritten = !isPlaying || now - this.written > ReplayGauges.TEXTS;
-    this.told.textContent = `${t.toFixed(2)} s`;
+    this.timeLabel.textContent = `${t.toFixed(2)} s`;
     if (isWritten) this.written = now;
-    for (const plot of this.shown) if (plot.width) plot.look(t, this.view, isWritten);
+    for (const plot of this.shownPlots) if (plot.width) plot.look(t, this.view, isWritten);
   }
 
   #keepInView(t) {
@@ -107,7 +107,7 @@ class ReplayPlots {
   }
 
   #timeAt(event) {
-    const [plot] = this.shown;
+    const [plot] = this.shownPlots;
     if (!plot?.width) return null;
     const t = plot.time(event.clientX - plot.canvas.getBoundingClientRect().left, this.view);
     return t < this.view.from || t > this.view.to ? null : t;
@@ -154,8 +154,8 @@ class ReplayPlots {
   zoom(steps, around = this.clock.t) {
     const { from, to } = this.view, { start, end } = this.series;
     const span = Math.min(end - start, Math.max(ReplayPlots.NARROWEST, (to - from) / ReplayPlots.FACTOR ** steps));
-    const at = Math.min(to, Math.max(from, around)), left = at - ((at - from) / (to - from)) * span;
-    this.#set(left, left + span);
+    const at = Math.min(to, Math.max(from, around)), viewStart = at - ((at - from) / (to - from)) * span;
+    this.#set(viewStart, viewStart + span);
   }
 
   /** Move by a share of the view. */
@@ -191,10 +191,10 @@ class ReplayPlots {
 
   #set(from, to) {
     const { start, end } = this.series, span = Math.min(to - from, end - start);
-    const left = Math.min(end - span, Math.max(start, from));
-    this.view = { from: left, to: left + span };
+    const viewStart = Math.min(end - span, Math.max(start, from));
+    this.view = { from: viewStart, to: viewStart + span };
     this.width = 0;
-    this.zoomed(left, left + span);
+    this.zoomed(viewStart, viewStart + span);
     this.clock.redraw();
   }
 }

@@ -109,9 +109,9 @@ const Replay = (() => {
     /** The state at a time, as text. */
     describe(t) {
       const words = [`${t.toFixed(2)} s`, ...this.#stateAt(t).map(([, text]) => text)];
-      const differ = this.channels.filter((c) => !ReplayData.same(ReplayData.held(c, "faulty", t), ReplayData.held(c, "golden", t)));
+      const differ = this.channels.filter((c) => !ReplayData.same(ReplayData.valueAt(c, "faulty", t), ReplayData.valueAt(c, "golden", t)));
       for (const channel of (differ.length ? differ : this.channels).slice(0, SPOKEN)) {
-        const places = ReplayData.digits(this.axes[this.channels.indexOf(channel)]), of = (run) => ReplayData.text(ReplayData.held(channel, run, t), places);
+        const places = ReplayData.digits(this.axes[this.channels.indexOf(channel)]), of = (run) => ReplayData.text(ReplayData.valueAt(channel, run, t), places);
         words.push([channel.name, of("faulty"), ReplayData.unit(channel), differ.length ? `(golden ${of("golden")})` : ""].filter(Boolean).join(" "));
       }
       return `${words.join(", ")}${differ.length ? "" : ", same as golden"}`;
@@ -172,11 +172,11 @@ const Replay = (() => {
         if (isPlaying && this.stated !== undefined) this.live.textContent = key.replaceAll("|", ", ");
         this.stated = key;
       }
-      const told = isPlaying ? "Pause" : "Play";
-      if (this.playing.dataset.told !== told) {
-        this.playing.replaceChildren(symbol(isPlaying ? "pause" : "play"), ` ${told}`);
-        this.playing.title = `${told} (space)`;
-        this.playing.dataset.told = told;
+      const action = isPlaying ? "Pause" : "Play";
+      if (this.playing.dataset.told !== action) {
+        this.playing.replaceChildren(symbol(isPlaying ? "pause" : "play"), ` ${action}`);
+        this.playing.title = `${action} (space)`;
+        this.playing.dataset.told = action; // eslint-disable-line id-denylist -- an attribute of the page
       }
       clearTimeout(this.speaking);
       if (!isPlaying) this.speaking = setTimeout(() => document.activeElement !== this.bar.element && this.#say(t), SILENCE);

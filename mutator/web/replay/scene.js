@@ -50,10 +50,10 @@ class ReplayScene {
 
   /** A view that follows an actor and reaches far enough ahead to show the other actors. */
   #following() {
-    const own = this.tracks.followed("faulty", this.t), [least, most] = ReplayScene.ZOOM;
+    const followed = this.tracks.followed("faulty", this.t), [least, most] = ReplayScene.ZOOM;
     const scale = Math.min(most, Math.max(least, ((1 - ReplayScene.AT) * this.width) / (this.tracks.reachAt(this.t) + 9)));
-    const room = Math.max(0, this.height / 2 / scale - 3), beyond = Math.max(0, Math.abs(own.y) - room);
-    return { scale, x: own.x - (ReplayScene.AT * this.width) / scale, y: Math.sign(own.y) * beyond };
+    const room = Math.max(0, this.height / 2 / scale - 3), beyond = Math.max(0, Math.abs(followed.y) - room);
+    return { scale, x: followed.x - (ReplayScene.AT * this.width) / scale, y: Math.sign(followed.y) * beyond };
   }
 
   #x = (x) => (x - this.view.x) * this.view.scale;
@@ -186,17 +186,17 @@ class ReplayScene {
       if (pose.actor.believed) this.#believed(pose, name, above + pose.actor.width * view.scale + 16, faulty.find(this.#isOwn));
       else this.#label(name, this.#x(pose.x), above - 7, colours.ink, "center");
     }
-    const own = golden.find(({ actor }) => actor.name === this.tracks.scene.follow), here = faulty.find(({ actor }) => actor === own?.actor);
-    if (!own || !here) return;
-    const x = this.#x(own.x), by = Math.abs(own.x - here.x).toFixed(0), y = this.#y(own.y) + 46; // below the actors and their names
+    const goldenPose = golden.find(({ actor }) => actor.name === this.tracks.scene.follow), here = faulty.find(({ actor }) => actor === goldenPose?.actor);
+    if (!goldenPose || !here) return;
+    const x = this.#x(goldenPose.x), by = Math.abs(goldenPose.x - here.x).toFixed(0), y = this.#y(goldenPose.y) + 46; // below the actors and their names
     if (x > width) this.#label(`golden ${by} m ahead ▶`, width - 8, y, colours.goldenText, "right");
     else if (x < 0) this.#label(`◀ golden ${by} m behind`, 8, y, colours.goldenText);
   }
 
   /** The name of what the controller believes; if it is out of view ahead, with its distance. */
-  #believed(pose, name, y, own) {
-    const { colours, width } = this, by = own ? (pose.x - own.x - (pose.actor.length + own.actor.length) / 2).toFixed(0) : null;
-    if (own && this.#x(pose.x - pose.actor.length / 2) > width) this.#label(`${name} ${by} m ahead ▶`, width - 8, y, colours.belief, "right");
+  #believed(pose, name, y, followedPose) {
+    const { colours, width } = this, by = followedPose ? (pose.x - followedPose.x - (pose.actor.length + followedPose.actor.length) / 2).toFixed(0) : null;
+    if (followedPose && this.#x(pose.x - pose.actor.length / 2) > width) this.#label(`${name} ${by} m ahead ▶`, width - 8, y, colours.belief, "right");
     else this.#label(name, this.#x(pose.x), y, colours.belief, "center");
   }
 

@@ -22,7 +22,7 @@ const SeriesFile = (() => {
       const script = document.createElement("script");
       script.charset = "x-user-defined"; // one character per byte
       script.src = `${FOLDER}${path}.js`;
-      const done = (what, value) => {
+      const finish = (what, value) => {
         waiting.delete(name);
         script.remove();
         what(value);
@@ -30,10 +30,10 @@ const SeriesFile = (() => {
       waiting.set(name, (text) => {
         const bytes = new Uint8Array(text.length);
         for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
-        done(resolve, bytes);
+        finish(resolve, bytes);
       });
-      script.addEventListener("error", () => done(resolve, null));
-      script.addEventListener("load", () => waiting.has(name) && done(reject, damaged(`series/${path}.js`)));
+      script.addEventListener("error", () => finish(resolve, null));
+      script.addEventListener("load", () => waiting.has(name) && finish(reject, damaged(`series/${path}.js`)));
       document.head.append(script);
     });
   }
@@ -68,11 +68,11 @@ const SeriesFile = (() => {
   }
 
   async function bytesOf({ name, at, size }) {
-    const known = chunks.get(name) || read(name, name);
+    const promise = chunks.get(name) || read(name, name);
     chunks.delete(name);
-    chunks.set(name, known);
+    chunks.set(name, promise);
     if (chunks.size > CHUNKS) chunks.delete(chunks.keys().next().value);
-    const bytes = await known;
+    const bytes = await promise;
     if (!bytes) throw new Error(`series/${name}.js is missing`);
     return bytes.subarray(at, at + size);
   }
@@ -84,14 +84,14 @@ const SeriesFile = (() => {
   async function decoded(bytes, golden) {
     const raw = await inflated(bytes), view = new DataView(raw);
     const text = 4 + view.getUint32(0, true), about = JSON.parse(new TextDecoder().decode(new Uint8Array(raw, 4, text - 4)));
-    const { known, more, changed, points } = about, own = new Float64Array(raw.slice(text, text + 8 * (more + points.length)));
-    const t = new Float64Array(known + more), every = golden ? golden.every : about.every;
-    if (golden) t.set(golden.t.subarray(0, known));
-    t.set(own.subarray(0, more), known);
-    const words = unplaned(new Uint8Array(raw, text + own.byteLength));
+    const { known: commonCount, more, changed, points } = about, doubles = new Float64Array(raw.slice(text, text + 8 * (more + points.length)));
+    const t = new Float64Array(commonCount + more), every = golden ? golden.every : about.every;
+    if (golden) t.set(golden.t.subarray(0, commonCount));
+    t.set(doubles.subarray(0, more), commonCount);
+    const words = unplaned(new Uint8Array(raw, text + doubles.byteLength));
     const rows = every.map((step, channel) => {
       const values = new Float32Array(new Int32Array(Math.ceil(t.length / step)).fill(NONE).buffer);
-      if (golden) values.set(golden.rows[channel].subarray(0, Math.ceil(known / step)));
+      if (golden) values.set(golden.rows[channel].subarray(0, Math.ceil(commonCount / step)));
       return values;
     });
     let at = 0;
@@ -101,7 +101,7 @@ const SeriesFile = (() => {
     }
     if (words.length !== at + 2 * points.length) throw new Error("the number of values does not match");
     const exact = new Float32Array(words.buffer, 4 * at);
-    return { about, t, every, rows, points: points.map((channel, i) => ({ channel, t: own[more + i], golden: exact[i], faulty: exact[points.length + i] })) };
+    return { about, t, every, rows, points: points.map((channel, i) => ({ channel, t: doubles[more + i], golden: exact[i], faulty: exact[points.length + i] })) };
   }
 
   /** Words stored by byte: all first bytes, then all second ones, and so on. */
@@ -124,27 +124,27 @@ const SeriesFile = (() => {
   function together(golden, run, channel) {
     const longer = run.t.length > golden.t.length ? run : golden, t = longer.t.filter((_, i) => i % golden.every[channel] === 0);
     const between = run.points.filter((p) => p.channel === channel), length = t.length + between.length;
-    const made = { t: new Float64Array(length), golden: new Float32Array(length), faulty: new Float32Array(length) };
-    const put = (k, time, one, other) => {
-      made.t[k] = time;
-      made.golden[k] = one;
-      made.faulty[k] = other;
+    const joined = { t: new Float64Array(length), golden: new Float32Array(length), faulty: new Float32Array(length) };
+    const setStep = (k, time, goldenValue, faultyValue) => {
+      joined.t[k] = time;
+      joined.golden[k] = goldenValue;
+      joined.faulty[k] = faultyValue;
     };
-    const one = golden.rows[channel], other = run.rows[channel];
+    const goldenRow = golden.rows[channel], faultyRow = run.rows[channel];
     let k = 0, next = 0;
     for (let i = 0; i < t.length; i++) {
-      for (; next < between.length && between[next].t < t[i]; next++) put(k++, between[next].t, between[next].golden, between[next].faulty);
-      put(k++, t[i], i < one.length ? one[i] : NaN, i < other.length ? other[i] : NaN);
+      for (; next < between.length && between[next].t < t[i]; next++) setStep(k++, between[next].t, between[next].golden, between[next].faulty);
+      setStep(k++, t[i], i < goldenRow.length ? goldenRow[i] : NaN, i < faultyRow.length ? faultyRow[i] : NaN);
     }
-    for (; next < between.length; next++) put(k++, between[next].t, between[next].golden, between[next].faulty);
-    return made;
+    for (; next < between.length; next++) setStep(k++, between[next].t, between[next].golden, between[next].faulty);
+    return joined;
   }
 
   function marks({ active, manifest, alerts, hazards }) {
-    const made = [...alerts.map(([name, t]) => ["alert", t, name]), ...hazards.map(([name, t]) => ["hazard", t, name])];
-    if (active) made.push(["activation", active[0], "activated"]);
-    if (manifest !== null) made.push(["manifest", manifest, "manifested"]);
-    return made.sort((a, b) => a[1] - b[1]);
+    const eventMarks = [...alerts.map(([name, t]) => ["alert", t, name]), ...hazards.map(([name, t]) => ["hazard", t, name])];
+    if (active) eventMarks.push(["activation", active[0], "activated"]);
+    if (manifest !== null) eventMarks.push(["manifest", manifest, "manifested"]);
+    return eventMarks.sort((a, b) => a[1] - b[1]);
   }
 
   const ROUNDING = 2 ** -19, SMALLEST = 1e-37, LARGEST = 3e38; // as in store/series_check.py
@@ -153,26 +153,26 @@ const SeriesFile = (() => {
   function deviates(golden, run, channel, largest) {
     if (largest > LARGEST && largest < Infinity) return true; // too large for single precision
     let low = 0, high = golden.about.channels[channel].own_times ? Infinity : 0;
-    const add = (one, other) => {
-      const same = one === other || (Number.isNaN(one) && Number.isNaN(other)), gap = same ? 0 : Math.abs(one - other);
-      const by = Number.isNaN(gap) ? Infinity : gap, size = ROUNDING * (Math.abs(one) + Math.abs(other)) + SMALLEST;
+    const add = (goldenValue, faultyValue) => {
+      const same = goldenValue === faultyValue || (Number.isNaN(goldenValue) && Number.isNaN(faultyValue)), gap = same ? 0 : Math.abs(goldenValue - faultyValue);
+      const by = Number.isNaN(gap) ? Infinity : gap, size = ROUNDING * (Math.abs(goldenValue) + Math.abs(faultyValue)) + SMALLEST;
       const rounding = Number.isFinite(size) ? size : 0;
       low = Math.max(low, by - rounding);
       high = Math.max(high, by + rounding);
     };
-    const one = golden.rows[channel], other = run.rows[channel];
-    for (let i = 0; i < Math.min(one.length, other.length); i++) add(one[i], other[i]);
+    const goldenRow = golden.rows[channel], faultyRow = run.rows[channel];
+    for (let i = 0; i < Math.min(goldenRow.length, faultyRow.length); i++) add(goldenRow[i], faultyRow[i]);
     for (const p of run.points) if (p.channel === channel) add(p.golden, p.faulty);
     return low <= largest && largest <= high;
   }
 
-  /** The data of a replay. `known` has what the record says: the start of the digest of its `trace`, and the `largest` deviation
+  /** The data of a replay. `expected` has what the record says: the start of the digest of its `trace`, and the `largest` deviation
    *  of each compared channel. A series that does not match is an error. */
-  function shown(id, known, golden, run) {
+  function buildSeries(id, expected, golden, run) {
     const { about } = run, { channels } = golden.about, names = channels.map(({ name }) => name);
-    const matches = known.trace && about.trace?.startsWith(known.trace)
+    const matches = expected.trace && about.trace?.startsWith(expected.trace)
       && run.t.every((t, i) => i >= golden.t.length || t === golden.t[i])
-      && Object.entries(known.largest).every(([name, by]) => names.includes(name) && deviates(golden, run, names.indexOf(name), by));
+      && Object.entries(expected.largest).every(([name, by]) => names.includes(name) && deviates(golden, run, names.indexOf(name), by));
     if (!matches) throw new Error("it belongs to another run than the record");
     return {
       id, start: golden.about.start, end: about.end, tEnd: about.t_end, active: about.active, marks: marks(about),
@@ -181,18 +181,18 @@ const SeriesFile = (() => {
   }
 
   /** The two runs in the file of one rerun experiment. */
-  async function readKept(id, known) {
+  async function readKept(id, expected) {
     const bytes = await read(`kept/${id}`, id);
     if (!bytes) return null;
     const length = new DataView(bytes.buffer).getUint32(0, true), golden = await decoded(bytes.subarray(4, 4 + length), null);
-    return shown(id, known, golden, await decoded(bytes.subarray(4 + length), golden));
+    return buildSeries(id, expected, golden, await decoded(bytes.subarray(4 + length), golden));
   }
 
-  async function found(id, known, isNew) {
+  async function findSeries(id, expected, isNew) {
     const there = JSON.parse(document.getElementById("facts").textContent).series; // so that no missing files are requested
     if (isNew || there.kept.includes(id)) { // from a rerun, perhaps because the packed series is damaged
-      const own = await readKept(id, known);
-      if (own) return own;
+      const series = await readKept(id, expected);
+      if (series) return series;
     }
     if (there.packed) index ??= readIndex();
     const place = (await index)?.of.get(id);
@@ -200,14 +200,14 @@ const SeriesFile = (() => {
     const { places } = await index, [entry, reference] = place;
     if (!goldens.has(reference)) goldens.set(reference, bytesOf(places[reference]).then((bytes) => decoded(bytes, null)));
     const golden = await goldens.get(reference);
-    return shown(id, known, golden, await decoded(await bytesOf(places[entry]), golden));
+    return buildSeries(id, expected, golden, await decoded(await bytesOf(places[entry]), golden));
   }
 
-  /** The series of an experiment; null if there is none. Rejects with a message if it is damaged or does not match what is
-   *  `known` from the record, {trace, largest}. `isNew`: the series can be newer than this page. */
-  async function load(id, known, { isNew = false } = {}) {
+  /** The series of an experiment; null if there is none. Rejects with a message if it is damaged or does not match
+   *  what the record says: `expected`, {trace, largest}. `isNew`: the series can be newer than this page. */
+  async function load(id, expected, { isNew = false } = {}) {
     try {
-      return await found(id, known, isNew);
+      return await findSeries(id, expected, isNew);
     } catch (error) {
       throw new Error(`The series of ${id} cannot be read: ${error.message}`, { cause: error });
     }

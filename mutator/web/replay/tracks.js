@@ -51,15 +51,15 @@ class ReplayTracks {
 
   /** How far the view must reach ahead of the followed actor, smoothed so that zooming is not noticeable. */
   #reach() {
-    const { least, most, spread } = ReplayTracks.REACH, { actors } = this.runs.faulty, own = actors[this.follow];
-    const wanted = Array.from(this.t, (_, i) => this.#farthest(actors, own, i, least, most));
+    const { least, most, spread } = ReplayTracks.REACH, { actors } = this.runs.faulty, followed = actors[this.follow];
+    const distances = Array.from(this.t, (_, i) => this.#farthest(actors, followed, i, least, most));
     const half = Math.max(1, Math.round(spread / ((this.t[this.t.length - 1] - this.t[0]) / (this.t.length - 1) || 1)));
     const over = (values, of) => Array.from(values, (_, i) => of(values.slice(Math.max(0, i - half), i + half + 1)));
-    return over(over(wanted, (near) => Math.max(...near)), (near) => near.reduce((a, b) => a + b, 0) / near.length);
+    return over(over(distances, (near) => Math.max(...near)), (near) => near.reduce((a, b) => a + b, 0) / near.length);
   }
 
-  #farthest(actors, own, i, least, most) {
-    const ahead = actors.map(({ x, visible }, k) => (visible[i] && !this.scene.actors[k].believed ? x[i] - own.x[i] : 0));
+  #farthest(actors, followed, i, least, most) {
+    const ahead = actors.map(({ x, visible }, k) => (visible[i] && !this.scene.actors[k].believed ? x[i] - followed.x[i] : 0));
     return Math.max(least, ...ahead.filter((x) => x <= most));
   }
 
@@ -120,12 +120,12 @@ class ReplayTracks {
 
   /** Where the followed actor touches or is nearest to another at a time; its own position if it is alone. */
   contact(t) {
-    const there = this.at("faulty", t), own = there.find(({ actor }) => actor.name === this.scene.follow) ?? there[0];
-    if (!own || this.follow < 0) return own ?? null;
-    const gap = (other) => Math.abs(other.x - own.x) - (other.actor.length + own.actor.length) / 2;
-    const [nearest] = there.filter((other) => other !== own && !other.actor.believed).sort((a, b) => gap(a) - gap(b));
-    if (!nearest || gap(nearest) > 1) return { x: own.x, y: own.y };
-    const side = Math.sign(nearest.x - own.x) || 1;
-    return { x: own.x + (side * own.actor.length) / 2, y: (own.y + nearest.y) / 2 };
+    const there = this.at("faulty", t), followed = there.find(({ actor }) => actor.name === this.scene.follow) ?? there[0];
+    if (!followed || this.follow < 0) return followed ?? null;
+    const gap = (other) => Math.abs(other.x - followed.x) - (other.actor.length + followed.actor.length) / 2;
+    const [nearest] = there.filter((other) => other !== followed && !other.actor.believed).sort((a, b) => gap(a) - gap(b));
+    if (!nearest || gap(nearest) > 1) return { x: followed.x, y: followed.y };
+    const side = Math.sign(nearest.x - followed.x) || 1;
+    return { x: followed.x + (side * followed.actor.length) / 2, y: (followed.y + nearest.y) / 2 };
   }
 }

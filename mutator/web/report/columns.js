@@ -25,8 +25,8 @@ class Columns {
   }
 
   show() {
-    const shown = new Set(this.grid.columns.map((column) => column.name));
-    for (const { box } of this.boxes) box.checked = shown.has(box.value);
+    const names = new Set(this.grid.columns.map((column) => column.name));
+    for (const { box } of this.boxes) box.checked = names.has(box.value);
     this.element.classList.toggle("in-use", this.state.columns.length > 0);
   }
 }

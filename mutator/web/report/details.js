@@ -3,19 +3,19 @@
 // Diff, spec and trigger of each experiment, assembled from shared parts (report/browse.py: details).
 
 class Details {
-  static #made = null;
+  static #promise = null;
 
   /** The details that the page contains. They are unpacked only once. */
   static read() {
-    Details.#made ??= Packed.read("details").then((data) => new Details(data));
-    return Details.#made;
+    Details.#promise ??= Packed.read("details").then((data) => new Details(data));
+    return Details.#promise;
   }
 
   constructor(data) {
     this.data = data;
     // the members of a shape are in row order
-    const seen = new Uint32Array(data.shapes.length);
-    this.member = data.shape.map((shape) => (shape < 0 ? -1 : seen[shape]++));
+    const memberCounts = new Uint32Array(data.shapes.length);
+    this.member = data.shape.map((shape) => (shape < 0 ? -1 : memberCounts[shape]++));
   }
 
   /** The diff of a row: its shape with the row's values in the holes; null: no diff. */

@@ -152,16 +152,16 @@ class Experiment {
   async #fillLate(row) {
     const id = this.text("experiment_id");
     this.#path();
-    const details = await Details.read(), known = { trace: details.trace(row), largest: this.#largest() };
-    const [media, series] = await Promise.all([Packed.read("media"), SeriesFile.load(id, known).catch((error) => error)]);
+    const details = await Details.read(), expected = { trace: details.trace(row), largest: this.#largest() };
+    const [media, series] = await Promise.all([Packed.read("media"), SeriesFile.load(id, expected).catch((error) => error)]);
     if (this.row !== row) return; // another experiment was opened in the meantime
     this.#change(details.patch(row));
     const spec = details.spec(row);
     this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "The plan of this run folder does not contain this experiment."));
-    this.#pictures(id, [media?.[id]].find((kept) => kept?.stills.length || kept?.films.length));
+    this.#pictures(id, [media?.[id]].find((pictures) => pictures?.stills.length || pictures?.films.length));
     const place = this.#content("replay");
     if (series && !(series instanceof Error)) Replay.show(place, series, this.facts);
-    else this.#noSeries(id, known, series);
+    else this.#noSeries(id, expected, series);
   }
 
   /** The largest deviation of each compared channel in the whole run, if the run ended normally. */
@@ -186,16 +186,16 @@ class Experiment {
       snippet.parentElement.remove();
       return;
     }
-    const shown = el("div");
+    const diff = el("div");
     const button = (mode, title) => el("button", { type: "button", "aria-pressed": String(this.mode === mode), onclick: () => {
       this.mode = mode;
       this.#change(patch);
       this.#content("change").querySelector('[aria-pressed="true"]').focus();
     } }, title);
     place.replaceChildren(el("div.buttons", { role: "group", "aria-label": "Diff layout" },
-      button("unified", "Unified"), button("split", "Side by side"), Dom.copyButton(() => patch, "Copy diff")), shown,
+      button("unified", "Unified"), button("split", "Side by side"), Dom.copyButton(() => patch, "Copy diff")), diff,
       el("p.quiet", {}, "Not shown: the probe, the module that evaluates the mutant's trigger."));
-    renderDiff(shown, patch, { mode: this.mode });
+    renderDiff(diff, patch, { mode: this.mode });
     const lines = Diff.injected(patch);
     snippet.replaceChildren(...lines.map(({ path, lines: code }) => el("div", {}, el("p.quiet", {}, path),
       el("pre", { tabindex: 0 }, el("code", {}, dedented(code).map((line) => [...Diff.coloured(line), "\n"]))))));
@@ -209,10 +209,10 @@ class Experiment {
       el("table", {}, el("tbody", {}, rows.map(([name, value]) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, value))))));
   }
 
-  #pictures(id, kept) {
+  #pictures(id, pictures) {
     const { el } = Dom;
     const place = this.#content("pictures");
-    if (!kept && !(this.facts.filmed && this.#endedWell)) {
+    if (!pictures && !(this.facts.filmed && this.#endedWell)) {
       place.parentElement.remove(); // the target cannot be filmed, or the run has no channels
       return;
     }
@@ -220,10 +220,10 @@ class Experiment {
     const t = Number.isNaN(hazard) ? (Number.isNaN(begin) ? 10 : begin + 2) : hazard;
     const run = this.facts.run(), separator = run.includes("\\") ? "\\" : "/";
     place.replaceChildren(
-      ...(kept ? kept.stills : []).map(([time, link]) => el("figure", {}, el("img", { src: link, alt: `Golden and faulty runs at ${time} s`, loading: "lazy" }), el("figcaption", {}, this.#moment(time)))),
-      ...(kept ? kept.films : []).map((link) => link.endsWith(".gif") ? el("img", { src: link, alt: "Golden and faulty runs", loading: "lazy" })
+      ...(pictures ? pictures.stills : []).map(([time, link]) => el("figure", {}, el("img", { src: link, alt: `Golden and faulty runs at ${time} s`, loading: "lazy" }), el("figcaption", {}, this.#moment(time)))),
+      ...(pictures ? pictures.films : []).map((link) => link.endsWith(".gif") ? el("img", { src: link, alt: "Golden and faulty runs", loading: "lazy" })
         : el("video", { src: link, controls: true, preload: "none", "aria-label": "Golden and faulty runs" })),
-      el("p", {}, kept ? "More stills, or a film:" : "There are no pictures of this experiment yet. This command makes a still and a film:"),
+      el("p", {}, pictures ? "More stills, or a film:" : "There are no pictures of this experiment yet. This command makes a still and a film:"),
       this.command(`mutator show ${id} --run ${run} --still ${t.toFixed(2)} --video ${run}${separator}plots${separator}${id}.mp4`),
       el("p", {}, "Then rebuild the report to see them here:"), this.command(`mutator report ${run}`));
   }
@@ -236,24 +236,24 @@ class Experiment {
   }
 
   /** The reason why there is no replay, and how to get one. `error` says why an existing series cannot be read. */
-  #noSeries(id, known, error) {
+  #noSeries(id, expected, error) {
     const { el } = Dom;
     const place = this.#content("replay");
     if (!this.#endedWell) {
       place.replaceChildren(el("p", {}, "The run did not finish normally, so it has no channels."));
       return;
     }
-    const said = el("p", { role: "status" });
+    const status = el("p", { role: "status" });
     const load = async () => {
-      const series = await SeriesFile.load(id, known, { isNew: true }).catch((error) => error);
+      const series = await SeriesFile.load(id, expected, { isNew: true }).catch((error) => error);
       if (this.text("experiment_id") !== id) return;
-      if (!series || series instanceof Error) said.textContent = series ? series.message : "The series does not exist yet.";
+      if (!series || series instanceof Error) status.textContent = series ? series.message : "The series does not exist yet.";
       else Replay.show(place, series, this.facts);
     };
     const why = "The run folder does not have this experiment's channels: there was no room for them, or an older version of mutator ran the experiment.";
     place.replaceChildren(error ? el("p", { role: "alert" }, error.message) : el("p", {}, why), el("p", {}, "This command reruns it:"),
       this.command(`mutator rerun ${id} --trace --run ${this.facts.run()}`),
-      el("p", {}, el("button", { type: "button", onclick: load }, "Show them"), " after the rerun."), said);
+      el("p", {}, el("button", { type: "button", onclick: load }, "Show them"), " after the rerun."), status);
   }
 }
 

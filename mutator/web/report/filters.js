@@ -29,7 +29,7 @@ class Filters {
     const { table } = this, options = facet.values.map((value) => {
       const box = el("input", { type: "checkbox", onchange: () => this.state.toggle(facet.name, value) });
       const count = el("span.count");
-      return { value, box, count, element: el("label.option", { title: table.meaning(facet.name, value) }, box, el("span", {}, Filters.shown(facet, table.called(facet.name, value))), count) };
+      return { value, box, count, element: el("label.option", { title: table.meaning(facet.name, value) }, box, el("span", {}, Filters.valueText(facet, table.called(facet.name, value))), count) };
     });
     const badge = el("b.badge");
     const element = el("details.facet", { "data-facet": facet.name },
@@ -39,7 +39,7 @@ class Filters {
   }
 
   /** The text that shows a value. */
-  static shown(facet, value) {
+  static valueText(facet, value) {
     return facet.show ? facet.show(value) : value;
   }
 
@@ -64,15 +64,15 @@ class Filters {
     const chip = (title, value, drop) =>
       el("button.chip", { type: "button", onclick: drop, "aria-label": `Remove filter ${title}: ${value}` },
         el("span.quiet", {}, `${title}: `), value, el("span", { "aria-hidden": "true" }, " ✕"));
-    const made = [];
-    if (this.state.query) made.push(chip("text", this.state.query, () => this.state.set({ query: "" })));
+    const chips = [];
+    if (this.state.query) chips.push(chip("text", this.state.query, () => this.state.set({ query: "" })));
     for (const facet of Rows.FACETS) {
       const { name, title } = facet;
       for (const value of this.state.chosen.get(name) || []) {
-        made.push(chip(title.toLowerCase(), this.table.called(name, value), () => this.state.toggle(name, value)));
+        chips.push(chip(title.toLowerCase(), this.table.called(name, value), () => this.state.toggle(name, value)));
       }
     }
-    if (made.length > 1) made.push(el("button.clear", { type: "button", onclick: () => this.state.clear() }, "Clear all"));
-    this.chips.replaceChildren(...made);
+    if (chips.length > 1) chips.push(el("button.clear", { type: "button", onclick: () => this.state.clear() }, "Clear all"));
+    this.chips.replaceChildren(...chips);
   }
 }

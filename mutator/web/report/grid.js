@@ -60,11 +60,11 @@ class Grid {
 
   /** The columns that are hidden by default. Metrics have a unit and a meaning. */
   static #more(table, metrics) {
-    const known = new Map(metrics.map(([name, unit, about]) => [name, { unit, about }]));
+    const metricsByName = new Map(metrics.map(([name, unit, about]) => [name, { unit, about }]));
     const names = [...table.columns.keys()].filter((name) => !Grid.COLUMNS.some((column) => column.name === name));
-    names.sort((a, b) => Number(known.has(b)) - Number(known.has(a)));
+    names.sort((a, b) => Number(metricsByName.has(b)) - Number(metricsByName.has(a)));
     return names.map((name) => {
-      const { unit, about } = known.get(name) || {};
+      const { unit, about } = metricsByName.get(name) || {};
       const title = name.replaceAll("_", " ") + (unit && unit !== "-" ? ` [${unit}]` : "");
       const isNumber = Boolean(table.columns.get(name).numbers);
       return { name, title, about, isNumber, px: Math.max(70, 24 + 7.5 * title.length) };
@@ -73,11 +73,11 @@ class Grid {
 
   /** Show the columns that the state names, or the defaults. */
   #choose() {
-    const wanted = this.state.columns;
-    this.chosen = wanted.join();
+    const names = this.state.columns;
+    this.chosen = names.join();
     const all = [...this.usual, ...this.more];
-    const found = wanted.length ? all.filter((column) => wanted.includes(column.name)) : this.usual;
-    this.columns = found.length ? found : this.usual;
+    const columns = names.length ? all.filter((column) => names.includes(column.name)) : this.usual;
+    this.columns = columns.length ? columns : this.usual;
   }
 
   #build() {
@@ -155,9 +155,9 @@ class Grid {
   /** The rows to render: the visible ones and a margin; on paper, the first ones. */
   #span() {
     if (this.isOnPaper) return [0, Math.min(this.rows.length, Grid.PRINTED)];
-    const seen = Math.ceil(this.place.clientHeight / Grid.ROW_PX);
+    const visibleCount = Math.ceil(this.place.clientHeight / Grid.ROW_PX);
     const first = Math.max(0, Math.floor(this.place.scrollTop / Grid.ROW_PX) - Grid.SPARE);
-    return [first, Math.min(this.rows.length, first + seen + 2 * Grid.SPARE)];
+    return [first, Math.min(this.rows.length, first + visibleCount + 2 * Grid.SPARE)];
   }
 
   /** Render the rows of the span. */
@@ -167,9 +167,9 @@ class Grid {
     const hadFocus = this.body.contains(document.activeElement);
     const space = (count) =>
       count > 0 ? el("tr.space", { "aria-hidden": "true", style: `height: ${count * Grid.ROW_PX}px` }, el("td")) : null;
-    const shown = [];
-    for (let at = first; at < last; at++) shown.push(this.#row(at));
-    this.body.replaceChildren(...[space(first), ...shown, this.isOnPaper ? null : space(more)].filter(Boolean));
+    const rowElements = [];
+    for (let at = first; at < last; at++) rowElements.push(this.#row(at));
+    this.body.replaceChildren(...[space(first), ...rowElements, this.isOnPaper ? null : space(more)].filter(Boolean));
     if (this.isOnPaper && more > 0) this.body.append(el("tr", {}, el("td.quiet", { colspan: this.columns.length }, `and ${more.toLocaleString("en")} more (not printed)`)));
     if (!this.rows.length) this.body.append(el("tr", {}, el("td.quiet", { colspan: 3 }, this.table.count ? "No experiment matches these filters." : "No experiment has run yet.")));
     if (hadFocus) this.#element(this.current)?.focus({ preventScroll: true });

@@ -23,9 +23,9 @@ class Happened {
   /** Scenario, trigger and alerts in words. */
   #setting() {
     const { el } = Dom;
-    const known = (name) => [this.text(name), this.table.meaning(name, this.text(name))].filter(Boolean).join(": ");
-    const condition = this.text("condition"), trigger = known("trigger");
-    const rows = [["scenario", known("scenario")], ["trigger", trigger.includes(condition) ? trigger : `${condition} (${trigger})`]];
+    const withMeaning = (name) => [this.text(name), this.table.meaning(name, this.text(name))].filter(Boolean).join(": ");
+    const condition = this.text("condition"), trigger = withMeaning("trigger");
+    const rows = [["scenario", withMeaning("scenario")], ["trigger", trigger.includes(condition) ? trigger : `${condition} (${trigger})`]];
     if (this.text("status") === "ok" && this.table.columns.has("alerts")) rows.push(["alert", this.#alert()]);
     return el("table.plain.setting", {}, el("tbody", {}, rows.filter(([, about]) => about).map(([name, about]) =>
       el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, about)))));
@@ -82,10 +82,10 @@ class Happened {
   /** The metrics of this run and their meanings. */
   #metrics() {
     const { el } = Dom;
-    const known = (this.facts.metrics || []).filter(([name]) => this.text(name) !== "");
-    if (!known.length) return "";
-    return el("details", {}, el("summary", {}, `Metrics (${known.length})`), el("div.scroll", { tabindex: 0 }, el("table.plain", {}, el("tbody", {},
-      known.map(([name, unit, about]) => el("tr", {}, el("th", { scope: "row" }, name.replaceAll("_", " ")),
+    const metrics = (this.facts.metrics || []).filter(([name]) => this.text(name) !== "");
+    if (!metrics.length) return "";
+    return el("details", {}, el("summary", {}, `Metrics (${metrics.length})`), el("div.scroll", { tabindex: 0 }, el("table.plain", {}, el("tbody", {},
+      metrics.map(([name, unit, about]) => el("tr", {}, el("th", { scope: "row" }, name.replaceAll("_", " ")),
         el("td.number", {}, Grid.number(this.table.number(this.row, name))), el("td", {}, unit), el("td", {}, about)))))));
   }
 }

@@ -26,8 +26,8 @@ class HeatMap {
 
   /** For each severity class, the share of activated faults with a contact of at least that class. */
   static severities(table) {
-    const found = table.facets.find((f) => f.name === "severity");
-    const classes = found ? found.values.filter((value) => value !== found.none).sort() : [];
+    const facet = table.facets.find((f) => f.name === "severity");
+    const classes = facet ? facet.values.filter((value) => value !== facet.none).sort() : [];
     return classes.map((name) => ({
       name: `severity-${name}`, title: `severity ${name} or worse / activated`,
       part: (row) => table.text(row, "severity") >= name, of: (row) => table.text(row, "t_activation") !== "",
@@ -47,22 +47,22 @@ class HeatMap {
   static shares(table) {
     const has = (name) => (row) => table.text(row, name) !== "";
     const isActive = has("t_activation"), isHazard = has("hazards"), isAlert = has("alerts"), all = () => true;
-    const made = [
+    const measures = [
       { name: "hazards", title: "hazards / activated", part: isHazard, of: isActive },
       { name: "hazards-injected", title: "hazards / injected", part: isHazard, of: all },
       { name: "activated", title: "activated / injected", part: isActive, of: all },
       { name: "manifested", title: "manifested / activated", part: has("t_manifest"), of: isActive },
     ];
-    if (table.columns.has("alerts")) made.push(
+    if (table.columns.has("alerts")) measures.push(
       { name: "alerts", title: "alerts / activated", part: isAlert, of: isActive },
       { name: "silent", title: "silent hazards (no alert before) / hazards", part: (row) => table.text(row, "reaction_time") === "", of: isHazard },
       { name: "no-alert", title: "hazards with no alert at all / hazards", part: (row) => !isAlert(row), of: isHazard },
     );
-    if (table.checked.length < 2) return made;
+    if (table.checked.length < 2) return measures;
     const each = table.checked.map((hazard) => ({
       name: hazard, title: `${hazard} / activated`, of: isActive, part: has(`t_${hazard.toLowerCase()}`),
     }));
-    return [...made, ...each];
+    return [...measures, ...each];
   }
 
   /** Count `rows` and show them. */
@@ -72,25 +72,25 @@ class HeatMap {
     if (!this.rows || !this.columns) return;
     const width = this.columns.values.length + 1, height = this.rows.values.length + 1;
     if (this.table.map) {
-      const told = this.table.map.cells[measure.name];
-      this.#draw(measure, measure.value ? HeatMap.#coloured(measure, told) : told.map(([n, all]) => HeatMap.#shareOf(n, all)), width);
+      const cells = this.table.map.cells[measure.name];
+      this.#draw(measure, measure.value ? HeatMap.#coloured(measure, cells) : cells.map(([n, all]) => HeatMap.#shareOf(n, all)), width);
       return;
     }
     const cells = Array.from({ length: width * height }, () => []);
     for (const row of rows) {
       if (!this.table.usable(row) || !measure.of(row)) continue;
-      const told = measure.value ? measure.value(row) : measure.part(row);
-      if (Number.isNaN(told)) continue; // this run has no value
+      const value = measure.value ? measure.value(row) : measure.part(row);
+      if (Number.isNaN(value)) continue; // this run has no value
       const [y] = this.rows.members[this.rows.codes[row]], [x] = this.columns.members[this.columns.codes[row]];
       // last row and column: totals
-      for (const at of [y * width + x, y * width + width - 1, (height - 1) * width + x, height * width - 1]) cells[at].push(told);
+      for (const at of [y * width + x, y * width + width - 1, (height - 1) * width + x, height * width - 1]) cells[at].push(value);
     }
     this.#draw(measure, measure.value ? HeatMap.#summaries(measure, cells) : cells.map(HeatMap.#share), width);
   }
 
   /** The text, description and colour (0 to 1) of each cell of a share. */
-  static #share(told) {
-    return HeatMap.#shareOf(told.filter(Boolean).length, told.length);
+  static #share(values) {
+    return HeatMap.#shareOf(values.filter(Boolean).length, values.length);
   }
 
   static #shareOf(n, all) {
@@ -99,19 +99,19 @@ class HeatMap {
 
   /** The text, description and colour of each cell of a metric. The worst cell has full colour. */
   static #summaries({ which, turn }, cells) {
-    return HeatMap.#coloured({ turn }, cells.map((told) => {
-      const sorted = told.sort((a, b) => turn * (a - b)), middle = (sorted.length - 1) / 2;
+    return HeatMap.#coloured({ turn }, cells.map((values) => {
+      const sorted = values.sort((a, b) => turn * (a - b)), middle = (sorted.length - 1) / 2;
       if (!sorted.length) return [NaN, 0];
       return [which === "worst" ? sorted.at(-1) : (sorted[Math.floor(middle)] + sorted[Math.ceil(middle)]) / 2, sorted.length];
     }));
   }
 
   /** The text, description and colour of values (null: no value), each given with its number of runs. */
-  static #coloured({ turn }, told) {
-    const values = told.map(([value]) => value ?? NaN);
-    const known = values.filter(Number.isFinite), low = Math.min(...known), high = Math.max(...known);
+  static #coloured({ turn }, valuesWithCounts) {
+    const values = valuesWithCounts.map(([value]) => value ?? NaN);
+    const finite = values.filter(Number.isFinite), low = Math.min(...finite), high = Math.max(...finite);
     const rate = (value) => (high > low && Number.isFinite(value) ? (turn > 0 ? value - low : high - value) / (high - low) : 0);
-    return values.map((value, at) => ({ all: told[at][1], text: Grid.number(value), what: `${Grid.number(value)}, over ${told[at][1]}`, rate: rate(value) }));
+    return values.map((value, at) => ({ all: valuesWithCounts[at][1], text: Grid.number(value), what: `${Grid.number(value)}, over ${valuesWithCounts[at][1]}`, rate: rate(value) }));
   }
 
   #draw(measure, cells, width) {
@@ -120,12 +120,12 @@ class HeatMap {
     const focused = this.place.contains(document.activeElement) ? document.activeElement.dataset.at : null;
     const cell = (y, x) => {
       const { all, text, what, rate } = cells[y * width + x];
-      const where = `${kinds[y] || "all fault types"} in ${scenarios[x] || "all scenarios"}`, said = all ? what : "none to count";
+      const where = `${kinds[y] || "all fault types"} in ${scenarios[x] || "all scenarios"}`, description = all ? what : "none to count";
       const isChosen = this.#isChosen(HeatMap.ROW, kinds[y]) && this.#isChosen(HeatMap.COLUMN, scenarios[x]);
       return el("td", {}, el("button.cell", {
         type: "button", "data-at": `${y},${x}`, "aria-pressed": String(isChosen && this.#isAny), style: `--rate: ${rate.toFixed(3)}`,
         class: `cell${all ? "" : " nothing"}${rate > 0.55 ? " strong" : ""}`,
-        title: `${where}\n${measure.title}: ${said}`, "aria-label": `${where}: ${measure.title} ${said}`,
+        title: `${where}\n${measure.title}: ${description}`, "aria-label": `${where}: ${measure.title} ${description}`,
         onclick: () => this.#choose(kinds[y], scenarios[x], isChosen && this.#isAny),
       }, all ? text : "·"));
     };

@@ -9,21 +9,21 @@ const Path = (() => {
     reached: { sign: "●", word: "reached", about: "it differs from the golden run" },
     passed: { sign: "○", word: "passed on", about: "none of its recorded channels changed, but a component that only it feeds did" },
     feedback: { sign: "↺", word: "by feedback", about: "it differs from the golden run, but only after the controlled process did" },
-    held: { sign: "■", word: "held", about: "it stayed equal to the golden run" },
+    held: { sign: "■", word: "held", about: "it stayed equal to the golden run" }, // eslint-disable-line id-denylist -- a state of stored paths
     unseen: { sign: "?", word: "not recorded", about: "it has no recorded channels" },
   };
-  let shown = null; // the strip in which a replay highlights boxes: {boxes: [[element, time]]}
+  let currentStrip = null; // the strip in which a replay highlights boxes: {boxes: [[element, time]]}
 
   /** An experiment's channels that left the golden run, by component, with first times and largest deviations. */
   function departures(paths, row) {
-    const found = new Map();
+    const channelsByComponent = new Map();
     paths.channels.forEach(([name, unit, component, about], i) => {
       const t = paths.first[i][row];
       if (t === null) return;
-      if (!found.has(component)) found.set(component, []);
-      found.get(component).push({ name, unit, about, t, largest: Number(paths.largest[i][row]) });
+      if (!channelsByComponent.has(component)) channelsByComponent.set(component, []);
+      channelsByComponent.get(component).push({ name, unit, about, t, largest: Number(paths.largest[i][row]) });
     });
-    return found;
+    return channelsByComponent;
   }
 
   const seconds = (t) => `${t.toFixed(2)} s`;
@@ -33,7 +33,7 @@ const Path = (() => {
 
   /** Show the path of an experiment in `place`; `results` has its row and reads cells with `text` and `number`. */
   async function strip(place, results) {
-    shown = null;
+    currentStrip = null;
     const paths = await Packed.read("paths");
     if (!place.isConnected) return; // another experiment was opened in the meantime
     const shape = paths ? paths.shapes[paths.shape[results.row]] : null;
@@ -41,11 +41,11 @@ const Path = (() => {
       place.replaceChildren(Dom.el("p.quiet", {}, paths ? none(results) : "This run has no paths: no channel of the manifest names a component."));
       return;
     }
-    const left = departures(paths, results.row), begin = results.number("t_activation");
-    const components = shape.map(([name, state, column]) => pathComponent(name, state, column, left.get(name) || [], paths.by[results.row]?.[name], begin));
+    const channelsByComponent = departures(paths, results.row), begin = results.number("t_activation");
+    const components = shape.map(([name, state, column]) => pathComponent(name, state, column, channelsByComponent.get(name) || [], paths.by[results.row]?.[name], begin));
     const boxes = [];
-    place.replaceChildren(said(results, paths), drawn(components, paths, boxes), late(components, paths), table(paths, left, begin));
-    shown = { boxes };
+    place.replaceChildren(summary(results, paths), drawn(components, paths, boxes), late(components, paths), table(paths, channelsByComponent, begin));
+    currentStrip = { boxes };
     listen(place);
   }
 
@@ -56,7 +56,7 @@ const Path = (() => {
   }
 
   /** A sentence that says how far the fault got. */
-  function said(results, paths) {
+  function summary(results, paths) {
     const label = (name) => paths.components[name]?.label || name;
     const all = (names) => names.split(";").map(label).join(" and ");
     const reached = results.text("reached"), stopped = results.text("stopped_at");
@@ -66,47 +66,47 @@ const Path = (() => {
 
   /** A component of the path. `t` is when it changed or, with `by`, the latest possible time, inferred from components that only it feeds. */
   function pathComponent(name, state, column, channels, by, begin) {
-    const own = first(channels), t = state === "injected" ? begin : by ?? own;
-    return { name, state, column, channels, own, t: Number.isNaN(t) ? Infinity : t, by: state !== "injected" && by !== undefined, begin };
+    const ownTime = first(channels), t = state === "injected" ? begin : by ?? ownTime;
+    return { name, state, column, channels, ownTime, t: Number.isNaN(t) ? Infinity : t, by: state !== "injected" && by !== undefined, begin };
   }
 
   /** The boxes. Components at the same distance along the path share a column. */
   function drawn(components, paths, boxes) {
     const { el } = Dom;
     const columns = [];
-    for (const one of components) (columns[one.column] ??= []).push(one);
+    for (const component of components) (columns[component.column] ??= []).push(component);
     return el("div.scroll", { tabindex: 0, role: "group", "aria-label": "Path of the fault" }, el("ol.path-strip", {}, columns.map((together) =>
-      el("li", {}, together.map((one) => {
-        const made = box(one, paths);
-        boxes.push([made, one.t]);
-        return made;
+      el("li", {}, together.map((component) => {
+        const element = box(component, paths);
+        boxes.push([element, component.t]);
+        return element;
       })))));
   }
 
-  function box(one, paths) {
+  function box(component, paths) {
     const { el } = Dom;
-    const { sign, word, about } = STATES[one.state];
-    const { label, about: what } = paths.components[one.name] || { label: one.name, about: "" };
-    const changed = one.channels.map((c) => `${c.name}: first at ${seconds(c.t)}, largest difference ${amount(c.largest, c.unit)}`);
-    const why = one.by ? [`components that only it feeds had changed by ${seconds(one.t)}${one.own < Infinity ? `; its own channels show it from ${seconds(one.own)}` : ""}`] : [];
-    return el(`div.path-box.is-${one.state}`, { "data-component": one.name, title: [`${label}. ${what}`, about, ...why, ...changed].join("\n") },
+    const { sign, word, about } = STATES[component.state];
+    const { label, about: what } = paths.components[component.name] || { label: component.name, about: "" };
+    const changed = component.channels.map((c) => `${c.name}: first at ${seconds(c.t)}, largest difference ${amount(c.largest, c.unit)}`);
+    const why = component.by ? [`components that only it feeds had changed by ${seconds(component.t)}${component.ownTime < Infinity ? `; its own channels show it from ${seconds(component.ownTime)}` : ""}`] : [];
+    return el(`div.path-box.is-${component.state}`, { "data-component": component.name, title: [`${label}. ${what}`, about, ...why, ...changed].join("\n") },
       el("strong", {}, label),
       el("span.state", {}, el("span", { "aria-hidden": "true" }, `${sign} `), word),
-      one.t === Infinity ? "" : el("span.time", {}, one.by ? "by " : "", seconds(one.t), one.state === "injected" ? "" : el("span.quiet", {}, ` ${since(one.t, one.begin)}`)));
+      component.t === Infinity ? "" : el("span.time", {}, component.by ? "by " : "", seconds(component.t), component.state === "injected" ? "" : el("span.quiet", {}, ` ${since(component.t, component.begin)}`)));
   }
 
   /** The reason why a component can change after one further along the path. */
   function late(components, paths) {
     const { el } = Dom;
-    const all = components.filter((one) => one.state === "reached" && components.some((other) => other.state === "reached" && other.column > one.column && other.t < one.t));
-    const names = all.map((one) => paths.components[one.name]?.label || one.name).join(" and ");
+    const all = components.filter((component) => component.state === "reached" && components.some((other) => other.state === "reached" && other.column > component.column && other.t < component.t));
+    const names = all.map((component) => paths.components[component.name]?.label || component.name).join(" and ");
     return names ? el("p.quiet", {}, `Recorded channels of ${names} changed only after those of a component further along the path. The fault reached that component by another path.`) : "";
   }
 
   /** All channels that left the golden run, including those of components off the path. */
-  function table(paths, left, begin) {
+  function table(paths, channelsByComponent, begin) {
     const { el } = Dom;
-    const rows = [...left].flatMap(([component, channels]) => channels.map((c) => ({ ...c, component }))).sort((a, b) => a.t - b.t);
+    const rows = [...channelsByComponent].flatMap(([component, channels]) => channels.map((c) => ({ ...c, component }))).sort((a, b) => a.t - b.t);
     if (!rows.length) return "";
     const heads = ["channel", "component", "first at", "from activation", "largest difference", "meaning"];
     return el("details", {}, el("summary", {}, `Channels that differ from the golden run (${rows.length} of ${paths.channels.length})`),
@@ -125,7 +125,7 @@ const Path = (() => {
 
   /** Highlight the components that the fault has reached by time t. */
   function at(t) {
-    for (const [element, time] of shown?.boxes || []) {
+    for (const [element, time] of currentStrip?.boxes || []) {
       element.classList.toggle("is-lit", time <= t);
       element.classList.toggle("is-ahead", time > t && time < Infinity);
     }

@@ -9,22 +9,22 @@ const Report = (() => {
   /** The run folder as commands name it; the page's location if it was opened from disk. */
   function runFolder() {
     const path = decodeURIComponent(location.pathname);
-    const found = location.protocol === "file:" && /^(.*)\/report\/[^/]*$/.exec(path);
-    if (!found) return "DIR";
-    return /^[\w./-]+$/.test(found[1]) ? found[1] : `'${found[1].replaceAll("'", "'\\''")}'`;
+    const match = location.protocol === "file:" && /^(.*)\/report\/[^/]*$/.exec(path);
+    if (!match) return "DIR";
+    return /^[\w./-]+$/.test(match[1]) ? match[1] : `'${match[1].replaceAll("'", "'\\''")}'`;
   }
 
   /** Create the page's components and tie them to its state. */
   async function start() {
     const data = await Packed.read("table");
-    const given = JSON.parse(find("facts").textContent);
-    const table = new Rows.Table(data, given.meanings), state = new State(() => view.update()), search = find("search");
-    const heat = new HeatMap(find("heat"), find("measure"), table, state, given.metrics);
+    const facts = JSON.parse(find("facts").textContent);
+    const table = new Rows.Table(data, facts.meanings), state = new State(() => view.update()), search = find("search");
+    const heat = new HeatMap(find("heat"), find("measure"), table, state, facts.metrics);
     const filters = new Filters(find("facets"), find("chips"), table, state);
-    const grid = new Grid(find("grid"), table, state, given.metrics);
+    const grid = new Grid(find("grid"), table, state, facts.metrics);
     const columns = new Columns(search.parentElement, grid, state);
     const actions = { move: (by) => grid.move(by), close: () => view.close(), place: () => grid.placeOf(state.experiment) };
-    const experiment = new Experiment(find("experiment"), table, state, { ...given, run: runFolder }, actions);
+    const experiment = new Experiment(find("experiment"), table, state, { ...facts, run: runFolder }, actions);
     const view = viewOf({ table, state, search, heat, filters, grid, columns, experiment });
     searching(search, state);
     keyboard({ grid, experiment, search, close: view.close });
@@ -48,9 +48,9 @@ const Report = (() => {
   /** A text with the number of experiments that match a state, and with the names in the state that do not exist. */
   function foundText(table, state, count) {
     const all = table.count.toLocaleString("en");
-    const noun = `experiment${table.count === 1 ? "" : "s"}`, found = state.isFiltered ? `${count.toLocaleString("en")} of ${all} ${noun}` : `${all} ${noun}`;
+    const noun = `experiment${table.count === 1 ? "" : "s"}`, countText = state.isFiltered ? `${count.toLocaleString("en")} of ${all} ${noun}` : `${all} ${noun}`;
     const listed = table.of > table.count ? ` listed, the worst of ${table.of.toLocaleString("en")}` : "";
-    return [found + listed, ...missing(table, state), ...table.unknown(state)].join(". ");
+    return [countText + listed, ...missing(table, state), ...table.unknown(state)].join(". ");
   }
 
   /** The message for an open experiment that is not listed. */

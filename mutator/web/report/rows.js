@@ -40,12 +40,12 @@ const Rows = (() => {
 
   /** A facet's values, and which of them each word of its column has. */
   function facet(of, columns) {
-    const found = columns.get(of.name);
-    if (!found || !found.words) return null;
-    const split = found.words.map((word) => (word ? (of.between ? word.split(of.between) : [word]) : [of.none || ""]));
+    const column = columns.get(of.name);
+    if (!column || !column.words) return null;
+    const split = column.words.map((word) => (word ? (of.between ? word.split(of.between) : [word]) : [of.none || ""]));
     const values = [...new Set(split.flat())].sort((a, b) => a.localeCompare(b, "en", { numeric: true }));
     const at = new Map(values.map((value, i) => [value, i]));
-    return { ...of, codes: found.codes, values, at, members: split.map((s) => [...new Set(s)].map((v) => at.get(v))) };
+    return { ...of, codes: column.codes, values, at, members: split.map((s) => [...new Set(s)].map((v) => at.get(v))) };
   }
 
   class Table {
@@ -66,8 +66,8 @@ const Rows = (() => {
     }
 
     text(row, name) {
-      const found = this.columns.get(name);
-      return found ? found.text(row) : "";
+      const column = this.columns.get(name);
+      return column ? column.text(row) : "";
     }
 
     /** The text that shows a value of a column. Components have labels. */
@@ -77,13 +77,13 @@ const Rows = (() => {
 
     /** What a code in a column means, such as `S3` in `scenario`; null if the page knows none. Codes are separated by `;`. */
     meaning(name, code) {
-      const known = this.meanings[name] ?? {};
-      return String(code).split(";").map((one) => known[one]).filter(Boolean).join("; ") || null;
+      const meanings = this.meanings[name] ?? {};
+      return String(code).split(";").map((part) => meanings[part]).filter(Boolean).join("; ") || null;
     }
 
     number(row, name) {
-      const found = this.columns.get(name);
-      return found ? found.number(row) : NaN;
+      const column = this.columns.get(name);
+      return column ? column.number(row) : NaN;
     }
 
     /** The row of an experiment, by its id or a unique prefix; -1 if there is none. */
@@ -97,24 +97,24 @@ const Rows = (() => {
 
     /** A function of the row: whether a searched column contains `token`. */
     #has(name, token) {
-      const found = this.columns.get(name);
-      if (!found) return null;
-      if (found.words) {
-        const hit = found.words.map((word) => word.toLowerCase().includes(token));
-        return hit.includes(true) ? (row) => hit[found.codes[row]] : null;
+      const column = this.columns.get(name);
+      if (!column) return null;
+      if (column.words) {
+        const hit = column.words.map((word) => word.toLowerCase().includes(token));
+        return hit.includes(true) ? (row) => hit[column.codes[row]] : null;
       }
       if (name === "experiment_id" && !/^[0-9a-f]+$/.test(token)) return null;
-      return (row) => found.text(row).toLowerCase().includes(token);
+      return (row) => column.text(row).toLowerCase().includes(token);
     }
 
     /** `smallest_ttc<1` as a function of the row; null: not a comparison with a column. An empty cell matches only `=none`. */
     #comparison(token) {
-      const [, name, sign, wanted] = COMPARISON.exec(token) || [];
-      const found = this.columns.get(name), compare = COMPARED[sign];
-      if (!found) return null;
-      if (sign === "=" && wanted === "none") return (row) => found.text(row) === "" || found.text(row) === "none";
-      if (found.numbers) return Number.isNaN(Number(wanted)) ? null : (row) => compare(found.number(row), Number(wanted));
-      return (row) => found.text(row) !== "" && compare(found.text(row).toLowerCase(), wanted);
+      const [, name, sign, operand] = COMPARISON.exec(token) || [];
+      const column = this.columns.get(name), compare = COMPARED[sign];
+      if (!column) return null;
+      if (sign === "=" && operand === "none") return (row) => column.text(row) === "" || column.text(row) === "none";
+      if (column.numbers) return Number.isNaN(Number(operand)) ? null : (row) => compare(column.number(row), Number(operand));
+      return (row) => column.text(row) !== "" && compare(column.text(row).toLowerCase(), operand);
     }
 
     /** The rows that have all words of `query` in any column and satisfy its comparisons; null: no query. */
@@ -125,11 +125,11 @@ const Rows = (() => {
         const fits = this.#comparison(token);
         return fits ? [fits] : SEARCHED.map((name) => this.#has(name, token)).filter(Boolean);
       });
-      const found = new Uint8Array(this.count);
+      const matches = new Uint8Array(this.count);
       for (let row = 0; row < this.count; row++) {
-        found[row] = tests.every((any) => any.some((has) => has(row))) ? 1 : 0;
+        matches[row] = tests.every((any) => any.some((has) => has(row))) ? 1 : 0;
       }
-      return found;
+      return matches;
     }
 
     /**
@@ -138,17 +138,17 @@ const Rows = (() => {
      * `apart` has the rows that match all facets except perhaps those in `free`. A map over these facets counts them.
      */
     filter(query, chosen, free = []) {
-      const found = this.#searched(query);
+      const matches = this.#searched(query);
       const tests = this.facets.map((f) => {
-        const wanted = chosen.get(f.name);
-        if (!wanted || !wanted.size) return null;
-        return Uint8Array.from(f.members, (has) => (has.some((value) => wanted.has(f.values[value])) ? 1 : 0));
+        const chosenValues = chosen.get(f.name);
+        if (!chosenValues || !chosenValues.size) return null;
+        return Uint8Array.from(f.members, (has) => (has.some((value) => chosenValues.has(f.values[value])) ? 1 : 0));
       });
       const counts = this.facets.map((f) => new Uint32Array(f.values.length));
       const isFree = this.facets.map((f) => free.includes(f.name));
       const rows = [], apart = [];
       for (let row = 0; row < this.count; row++) {
-        if (found && !found[row]) continue;
+        if (matches && !matches[row]) continue;
         let failed = 0, where = -1, failedFixed = 0;
         for (let i = 0; i < tests.length; i++) {
           if (tests[i] && !tests[i][this.facets[i].codes[row]]) {
@@ -170,32 +170,32 @@ const Rows = (() => {
 
     /** Sentences about a state's unknown columns and filters, and about filters for values that these results lack. */
     unknown({ query, chosen, unknown }) {
-      const made = unknown.map((name) => `This page has no filter "${name}"`);
+      const sentences = unknown.map((name) => `This page has no filter "${name}"`);
       for (const token of query.toLowerCase().split(/\s+/)) {
         const [, name] = COMPARISON.exec(token) || [];
-        if (name && !this.columns.has(name)) made.push(`There is no column "${name}" to search`);
+        if (name && !this.columns.has(name)) sentences.push(`There is no column "${name}" to search`);
       }
       for (const [name, values] of chosen) {
         const facet = this.facets.find((f) => f.name === name);
         if (facet && [...values].some((value) => facet.at.has(value))) continue;
-        made.push(`No experiment has ${name} ${[...values].map((value) => `"${value}"`).join(" or ")}`);
+        sentences.push(`No experiment has ${name} ${[...values].map((value) => `"${value}"`).join(" or ")}`);
       }
-      return made;
+      return sentences;
     }
 
     /** `rows` sorted by a column: text alphabetically, numbers by size, empty cells last; the sort is stable. */
     sort(rows, name, descending) {
-      const found = this.columns.get(name);
-      if (!found) return rows;
+      const column = this.columns.get(name);
+      if (!column) return rows;
       const turn = descending ? -1 : 1;
       const key = new Float64Array(this.count);
-      if (found.numbers) for (let row = 0; row < this.count; row++) key[row] = found.number(row);
+      if (column.numbers) for (let row = 0; row < this.count; row++) key[row] = column.number(row);
       else {
-        const texts = found.words || found.texts;
+        const texts = column.words || column.texts;
         const order = texts.map((_, i) => i).sort((a, b) => texts[a].localeCompare(texts[b], "en", { numeric: true }));
         const rank = new Float64Array(texts.length);
         order.forEach((at, i) => (rank[at] = texts[at] === "" ? NaN : i));
-        for (let row = 0; row < this.count; row++) key[row] = rank[found.words ? found.codes[row] : row];
+        for (let row = 0; row < this.count; row++) key[row] = rank[column.words ? column.codes[row] : row];
       }
       const empty = (row) => Number.isNaN(key[row]);
       return [...rows].sort((a, b) => Number(empty(a)) - Number(empty(b)) || (empty(a) ? a - b : turn * (key[a] - key[b]) || a - b));

@@ -24,27 +24,27 @@ class State {
 
   #read() {
     const fragment = location.hash.slice(1);
-    const given = new Map();
+    const valuesByName = new Map();
     for (const part of State.isOurs(fragment) ? fragment.split("&") : []) {
       const [name, value = ""] = part.split("=");
       try {
-        given.set(name, value.split(",").map(decodeURIComponent));
+        valuesByName.set(name, value.split(",").map(decodeURIComponent));
       } catch {
         // the link was cut, so use the readable part
       }
     }
-    const one = (name, otherwise) => (given.get(name) || [otherwise])[0];
-    this.experiment = one("e", "");
-    this.query = one("q", "");
-    this.sort = one("sort", "");
-    this.heat = one("heat", "");
-    this.columns = (given.get("cols") || []).filter(Boolean); // columns of the list; empty: the defaults
+    const firstValue = (name, otherwise) => (valuesByName.get(name) || [otherwise])[0];
+    this.experiment = firstValue("e", "");
+    this.query = firstValue("q", "");
+    this.sort = firstValue("sort", "");
+    this.heat = firstValue("heat", "");
+    this.columns = (valuesByName.get("cols") || []).filter(Boolean); // columns of the list; empty: the defaults
     this.chosen = new Map();
     for (const { name, none } of Rows.FACETS) {
-      if (given.has(name)) this.chosen.set(name, new Set(given.get(name).map((value) => (value === "none" && none) || value)));
+      if (valuesByName.has(name)) this.chosen.set(name, new Set(valuesByName.get(name).map((value) => (value === "none" && none) || value)));
     }
-    const known = ["e", "q", "sort", "heat", "cols", ...Rows.FACETS.map(({ name }) => name)];
-    this.unknown = [...given.keys()].filter((name) => name && !known.includes(name)); // filters that this page does not have
+    const names = ["e", "q", "sort", "heat", "cols", ...Rows.FACETS.map(({ name }) => name)];
+    this.unknown = [...valuesByName.keys()].filter((name) => name && !names.includes(name)); // filters that this page does not have
   }
 
   /** The fragment of this state; with `experiment`, that experiment is open. */

@@ -32,15 +32,15 @@ const Beside = (() => {
     const figure = (name, title, about) => {
       const image = el("img", { src: address(name), alt: `Image ${title} ${about}`.trim() });
       const whole = el("a", { href: address(name), target: "_blank", rel: "noopener", title: "Full size" }, image);
-      const shown = el("figure", {}, whole, el("figcaption", {}, title, about ? el("span", {}, ` ${about}`) : ""));
+      const element = el("figure", {}, whole, el("figcaption", {}, title, about ? el("span", {}, ` ${about}`) : ""));
       image.addEventListener("error", () => whole.replaceWith(el("p.quiet.none", {}, "no image")));
-      return shown;
+      return element;
     };
-    const found = await get(`${served.api}/${id}/pictures${served.query}`).catch((error) => error);
-    if (found instanceof Error) place.replaceChildren(el("p.quiet", {}, `No images: ${found.message}.`));
-    else if (!found?.levels.length) place.hidden = true;
+    const answer = await get(`${served.api}/${id}/pictures${served.query}`).catch((error) => error);
+    if (answer instanceof Error) place.replaceChildren(el("p.quiet", {}, `No images: ${answer.message}.`));
+    else if (!answer?.levels.length) place.hidden = true;
     else place.replaceChildren(figure("most-before", "before", ""),
-      ...found.levels.map(({ name, label }) => figure(`${name}-after`, `after, ${LEVELS[name] || name}:`, label)));
+      ...answer.levels.map(({ name, label }) => figure(`${name}-after`, `after, ${LEVELS[name] || name}:`, label)));
   }
 
   /** The results of a group's experiments in a run, with links to a typical experiment and the worst one. */
@@ -50,28 +50,28 @@ const Beside = (() => {
     place.hidden = !run;
     if (!run) return;
     place.replaceChildren(el("span.quiet", {}, "…"));
-    const found = await get(`${served.api}/${id}/typical${query(served, { run })}`).catch((error) => error);
+    const answer = await get(`${served.api}/${id}/typical${query(served, { run })}`).catch((error) => error);
     if (place.dataset.run !== run) return; // another run was chosen in the meantime
-    if (found instanceof Error) place.replaceChildren(el("span.quiet", {}, `No typical experiment: ${found.message}`));
-    else place.replaceChildren(...told(found, run));
+    if (answer instanceof Error) place.replaceChildren(el("span.quiet", {}, `No typical experiment: ${answer.message}`));
+    else place.replaceChildren(...resultElements(answer, run));
   }
 
-  function told(found, run) {
-    if (!found) return [el("span.quiet", {}, "This run has no experiment of this group.")];
-    const counts = Object.entries(found.outcomes).map(([name, n]) => [el(`span.ending.${name}`, {}, `${n} ${name.replaceAll("_", " ")}`), " "]);
-    const one = (title, experiment) => experiment && el("p", {}, el("b", {}, `${title}: `), `${experiment.label}: ${experiment.verdict} `,
+  function resultElements(results, run) {
+    if (!results) return [el("span.quiet", {}, "This run has no experiment of this group.")];
+    const counts = Object.entries(results.outcomes).map(([name, n]) => [el(`span.ending.${name}`, {}, `${n} ${name.replaceAll("_", " ")}`), " "]);
+    const paragraph = (title, experiment) => experiment && el("p", {}, el("b", {}, `${title}: `), `${experiment.label}: ${experiment.verdict} `,
       el("a", { href: `/runs/${encodeURIComponent(run)}/report/index.html#e=${experiment.id}`, target: "_blank", rel: "noopener", "aria-label": `Replay of experiment ${experiment.id}` }, "Replay"));
-    const isOther = found.worst && found.worst.id !== found.typical?.id;
-    return [el("p", {}, `${Card.plural(found.experiments, "experiment")} in this run: `, counts), one("Typical", found.typical), isOther ? one("Worst", found.worst) : null].filter(Boolean);
+    const isOther = results.worst && results.worst.id !== results.typical?.id;
+    return [el("p", {}, `${Card.plural(results.experiments, "experiment")} in this run: `, counts), paragraph("Typical", results.typical), isOther ? paragraph("Worst", results.worst) : null].filter(Boolean);
   }
 
-  /** Call `seen` once for each of `elements`, when it comes near the visible area. */
-  function nearby(seen, elements) {
+  /** Call `onNear` once for each of `elements`, when it comes near the visible area. */
+  function nearby(onNear, elements) {
     const observer = new IntersectionObserver((entries) => {
       for (const { isIntersecting, target } of entries) {
         if (!isIntersecting) continue;
         observer.unobserve(target);
-        seen(target);
+        onNear(target);
       }
     }, { rootMargin: "300px" });
     for (const element of elements) observer.observe(element);
@@ -80,9 +80,9 @@ const Beside = (() => {
 
   async function changes(place, id, served) {
     place.replaceChildren(el("p.quiet", {}, "…"));
-    const found = await get(`${served.api}/${id}/changes${served.query}`).catch((error) => error);
-    if (found instanceof Error) place.replaceChildren(el("p", { role: "alert" }, `The changes cannot be shown: ${found.message}.`));
-    else Changes.render(place, found?.changes || "");
+    const answer = await get(`${served.api}/${id}/changes${served.query}`).catch((error) => error);
+    if (answer instanceof Error) place.replaceChildren(el("p", { role: "alert" }, `The changes cannot be shown: ${answer.message}.`));
+    else Changes.render(place, answer?.changes || "");
   }
 
   return { pictures, typical, nearby, changes, words };

@@ -11,7 +11,7 @@ class Card {
     this.group = group;
     this.data = data;
     this.actions = actions;
-    this.element = this.#made();
+    this.element = this.#build();
   }
 
   #part(name) {
@@ -22,7 +22,7 @@ class Card {
     return Boolean(this.data.served);
   }
 
-  #made() {
+  #build() {
     const { el } = Dom;
     const { group } = this, { id } = group;
     const linked = (event) => {
@@ -69,7 +69,7 @@ class Card {
     const { el } = Dom;
     const { id } = this.group;
     const field = el("input", { "aria-label": `Remark about ${id}`, placeholder: "Remark", maxlength: 2000, autocomplete: "off" });
-    const kept = (event) => {
+    const save = (event) => {
       event.preventDefault();
       const text = field.value.trim();
       if (text && this.actions.mark([id], "remark", text)) {
@@ -77,7 +77,7 @@ class Card {
         this.element.focus({ preventScroll: true });
       }
     };
-    return el("form.remark", { onsubmit: kept }, field, el("button", {}, "Save remark"));
+    return el("form.remark", { onsubmit: save }, field, el("button", {}, "Save remark"));
   }
 
   /** Show the current state of the group. `pending` has the kinds of marks that are being sent. */
@@ -90,7 +90,7 @@ class Card {
     if (group.flag) header.querySelector(".flagged").title = `by ${group.flag.by}, ${Card.moment(group.flag.at)}`;
     for (const button of header.querySelectorAll("[data-mark]")) button.setAttribute("aria-pressed", String(this.isMarked(button.dataset.mark, pending)));
     const decision = this.#part("decision");
-    decision.textContent = Card.told(group.decision);
+    decision.textContent = Card.describeDecision(group.decision);
     decision.hidden = !group.decision;
     this.#since();
     this.#remarks();
@@ -106,9 +106,9 @@ class Card {
 
   /** Show the state of the last mark, such as `saving`. */
   say(text, isBad = false) {
-    const kept = this.#part("head").querySelector(".kept");
-    kept.textContent = text;
-    kept.classList.toggle("bad", isBad);
+    const status = this.#part("head").querySelector(".kept");
+    status.textContent = text;
+    status.classList.toggle("bad", isBad);
   }
 
   /** Show another reviewer's change (empty: none). `mine` is the kind of the mark that was not saved. */
@@ -129,7 +129,7 @@ class Card {
   }
 
   /** A decision in one line: who, when, for which commit, and changes since. */
-  static told(decision) {
+  static describeDecision(decision) {
     if (!decision) return "";
     const { verdict, by, at, text, commit, tool, changed } = decision;
     const source = [commit && `commit ${commit.slice(0, 10)}`, tool && `mutator ${tool}`].filter(Boolean).join(", ");
@@ -173,7 +173,7 @@ class Card {
   /** The text in which the search looks for words. */
   get words() {
     const g = this.group;
-    return [g.id, g.state, Card.told(g.decision), ...g.injections, ...g.specs, g.trigger, g.hold, ...g.remarks.map((r) => `${r.by} ${r.text}`)]
+    return [g.id, g.state, Card.describeDecision(g.decision), ...g.injections, ...g.specs, g.trigger, g.hold, ...g.remarks.map((r) => `${r.by} ${r.text}`)]
       .join(" ").toLowerCase();
   }
 
@@ -189,13 +189,13 @@ class Card {
 
   /** The range of each numeric hole, without seeds, such as `: by - 245.0 to - 12.0`. */
   static #spans(g) {
-    const told = g.heads.slice(2).flatMap((head, i) => {
+    const spans = g.heads.slice(2).flatMap((head, i) => {
       const cells = g.rows.map((row) => [Number(row[i + 2].replaceAll(" ", "") || NaN), row[i + 2]]);
       if (head.endsWith("seed") || cells.some(([n]) => Number.isNaN(n))) return [];
       cells.sort(([a], [b]) => a - b);
       return [`${head} ${cells[0][1]} to ${cells.at(-1)[1]}`];
     });
-    return told.length ? `: ${told.join(", ")}` : "";
+    return spans.length ? `: ${spans.join(", ")}` : "";
   }
 
   #values() {

@@ -6,8 +6,8 @@
 const Guard = (() => {
   const CALM_MS = 500;
   const INPUT = ["click", "keydown", "submit"];
-  let shown = performance.now();
-  const left = () => shown + CALM_MS - performance.now();
+  let shownAtMs = performance.now();
+  const remainingMs = () => shownAtMs + CALM_MS - performance.now();
 
   /** Whether a key that is held down would decide again. It may move between groups, scroll and edit text. */
   function isHeld({ repeat, key, target }) {
@@ -15,7 +15,7 @@ const Guard = (() => {
   }
 
   function check(event) {
-    if (event.isTrusted && left() <= 0 && !isHeld(event)) return;
+    if (event.isTrusted && remainingMs() <= 0 && !isHeld(event)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
   }
@@ -25,9 +25,9 @@ const Guard = (() => {
     if (!isOn) return;
     for (const kind of INPUT) addEventListener(kind, check, { capture: true });
     document.addEventListener("visibilitychange", (event) => {
-      if (event.isTrusted && !document.hidden) shown = performance.now();
+      if (event.isTrusted && !document.hidden) shownAtMs = performance.now();
     });
-    await new Promise((done) => setTimeout(done, Math.max(0, left()) + 1));
+    await new Promise((resolve) => setTimeout(resolve, Math.max(0, remainingMs()) + 1));
   }
 
   return { start };

@@ -8,7 +8,7 @@ class Outbox {
   static MOST = 200; // changes per request
   static OTHER = "the diff of this group has changed, so reload this page";
 
-  /** `events`: changed(ids), kept(ids), refused(id, words), conflict(id, words, item), offline(words or ""). */
+  /** `events`: changed(ids), saved(ids), refused(id, words), conflict(id, words, item), offline(words or ""). */
   constructor(served, groups, events) {
     this.served = served;
     this.groups = groups;
@@ -26,8 +26,8 @@ class Outbox {
 
   static #stored(key) {
     try {
-      const found = JSON.parse(sessionStorage.getItem(key) || "[]");
-      return Array.isArray(found) ? found : [];
+      const items = JSON.parse(sessionStorage.getItem(key) || "[]");
+      return Array.isArray(items) ? items : [];
     } catch {
       return [];
     }
@@ -42,7 +42,7 @@ class Outbox {
     for (const change of changes) {
       const waiting = this.queue.find((item) => item.group === change.group);
       const { revision, digest } = this.groups.get(change.group);
-      this.queue.push({ ...change, by, digest, seen: waiting ? waiting.seen : revision });
+      this.queue.push({ ...change, by, digest, seen: waiting ? waiting.seen : revision }); // eslint-disable-line id-denylist -- a key of stored marks
     }
     this.#keep();
     this.events.changed(changes.map((change) => change.group));
@@ -65,7 +65,7 @@ class Outbox {
     const { sends } = this;
     const answer = await this.#ask(this.address);
     if (!answer.data?.groups) {
-      this.events.offline(this.#gone(answer));
+      this.events.offline(this.#offlineText(answer));
       return;
     }
     this.events.offline("");
@@ -73,7 +73,7 @@ class Outbox {
     this.#flush();
   }
 
-  #gone({ status }) {
+  #offlineText({ status }) {
     const waiting = this.queue.length ? ` ${this.queue.length === 1 ? "1 mark waits" : `${this.queue.length} marks wait`} in this tab and will be sent.` : "";
     if (status === 403) return `The server no longer knows this page. In another tab, open the address that the server printed, and keep this tab open.${waiting}`;
     return `${status ? `Unexpected answer from the server (${status})` : "The server does not answer"}.${waiting}`;
@@ -103,11 +103,11 @@ class Outbox {
       const by = this.queue[0].by;
       const batch = this.queue.filter((item) => item.by === by).slice(0, this.isSingle ? 1 : Outbox.MOST);
       const changes = batch.map(({ group, kind, text }) => ({ group, kind, text }));
-      const seen = Object.fromEntries(batch.map((item) => [item.group, item.seen]).reverse()); // of the group's first mark in the batch
+      const revisions = Object.fromEntries(batch.map((item) => [item.group, item.seen]).reverse()); // of the group's first mark in the batch
       const digests = Object.fromEntries(batch.map((item) => [item.group, item.digest]).reverse()); // of the shown diffs
-      const answer = await this.#ask(this.address, { changes, by, seen, digests });
+      const answer = await this.#ask(this.address, { changes, by, seen: revisions, digests }); // eslint-disable-line id-denylist -- a key of the request
       if (!this.#answered(answer, batch)) {
-        this.events.offline(this.#gone(answer));
+        this.events.offline(this.#offlineText(answer));
         return;
       }
     }
@@ -132,24 +132,24 @@ class Outbox {
 
   #saved(batch, groups) {
     this.#drop(batch);
-    for (const item of this.queue) if (groups[item.group] && batch.some((one) => one.group === item.group)) item.seen = groups[item.group].revision;
+    for (const item of this.queue) if (groups[item.group] && batch.some((sent) => sent.group === item.group)) item.seen = groups[item.group].revision; // eslint-disable-line id-denylist -- a key of stored marks
     this.#keep();
     this.#receive(groups, batch.map((item) => item.group));
-    this.events.kept([...new Set(batch.map((item) => item.group))]);
+    this.events.saved([...new Set(batch.map((item) => item.group))]);
   }
 
   /** Tell the reviewer which marks were not saved because somebody else changed the group, and resend the rest. */
   #conflicted(batch, { conflict, groups }) {
     const isOther = (item) => groups[item.group] && groups[item.group].digest !== item.digest;
     const stale = batch.filter((item) => groups[item.group] && (isOther(item) || groups[item.group].revision !== item.seen));
-    const others = stale.filter(isOther), told = stale.length ? stale.filter((item) => !isOther(item)) : batch;
-    const kept = told.filter((item) => groups[item.group] && Outbox.#isThere(item, groups[item.group]));
-    const again = told.filter((item) => !kept.includes(item) && item.kind === "remark" && groups[item.group]); // a remark overwrites nothing
-    for (const item of again) item.seen = groups[item.group].revision;
-    const lost = told.filter((item) => !kept.includes(item) && !again.includes(item));
-    this.#drop([...kept, ...lost, ...others]);
+    const others = stale.filter(isOther), conflicting = stale.length ? stale.filter((item) => !isOther(item)) : batch;
+    const saved = conflicting.filter((item) => groups[item.group] && Outbox.#isThere(item, groups[item.group]));
+    const again = conflicting.filter((item) => !saved.includes(item) && item.kind === "remark" && groups[item.group]); // a remark overwrites nothing
+    for (const item of again) item.seen = groups[item.group].revision; // eslint-disable-line id-denylist -- a key of stored marks
+    const lost = conflicting.filter((item) => !saved.includes(item) && !again.includes(item));
+    this.#drop([...saved, ...lost, ...others]);
     this.#receive(groups, batch.map((item) => item.group));
-    this.events.kept(kept.map((item) => item.group));
+    this.events.saved(saved.map((item) => item.group));
     for (const item of others) this.events.refused(item.group, Outbox.OTHER);
     for (const item of lost) this.events.conflict(item.group, conflict, item);
   }

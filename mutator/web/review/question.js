@@ -5,8 +5,8 @@
 const Question = (() => {
   const find = (id) => document.getElementById(id);
 
-  /** Ask a question. `yes` is the label of the button, and `done()` is called when the user presses it. */
-  function ask(title, about, yes, done) {
+  /** Ask a question. `yes` is the label of the button, and `onYes()` is called when the user presses it. */
+  function ask(title, about, yes, onYes) {
     const dialog = find("ask");
     find("ask-title").textContent = title;
     find("ask-about").textContent = about;
@@ -14,7 +14,7 @@ const Question = (() => {
     dialog.returnValue = "";
     dialog.showModal();
     find("ask-yes").focus();
-    dialog.addEventListener("close", () => dialog.returnValue === "yes" && done(), { once: true });
+    dialog.addEventListener("close", () => dialog.returnValue === "yes" && onYes(), { once: true });
   }
 
   return { ask };

@@ -12,7 +12,7 @@ const Review = (() => {
     constructor(data) {
       this.data = data;
       this.groups = new Map(data.groups.map((g) => [g.id, g]));
-      this.said = new Map(); // group id -> timer of its card's message
+      this.messageTimers = new Map(); // group id -> timer of its card's message
       const actions = {
         mark: (ids, kind, text) => this.mark(ids, kind, text), show: (id) => this.#show(id), unfold: (id) => this.#unfold(id),
         resolve: (id, isMine) => this.#resolve(id, isMine),
@@ -38,7 +38,7 @@ const Review = (() => {
     #outbox() {
       return new Outbox(this.data.served, this.groups, {
         changed: (ids) => this.#changed(ids),
-        kept: (ids) => ids.forEach((id) => this.#say(id, "saved")),
+        saved: (ids) => ids.forEach((id) => this.#say(id, "saved")),
         refused: (id, words) => {
           this.#changed([id]);
           this.#say(id, `not saved: ${words}`, true);
@@ -53,12 +53,12 @@ const Review = (() => {
     }
 
     #read() {
-      const given = new URLSearchParams(location.hash.slice(1));
-      this.query = given.get("q") || "";
-      this.states = new Set((given.get("state") || "").split(",").filter((s) => this.data.states.includes(s)));
-      this.isFlagged = given.get("flag") === "1";
-      this.current = this.groups.has(given.get("g")) ? given.get("g") : "";
-      this.mode = given.get("diff") === "split" ? "split" : "unified";
+      const parameters = new URLSearchParams(location.hash.slice(1));
+      this.query = parameters.get("q") || "";
+      this.states = new Set((parameters.get("state") || "").split(",").filter((s) => this.data.states.includes(s)));
+      this.isFlagged = parameters.get("flag") === "1";
+      this.current = this.groups.has(parameters.get("g")) ? parameters.get("g") : "";
+      this.mode = parameters.get("diff") === "split" ? "split" : "unified";
     }
 
     #write() {
@@ -87,7 +87,7 @@ const Review = (() => {
       });
       find("bar").addEventListener("submit", (event) => event.preventDefault());
       for (const mode of ["unified", "split"]) find(mode).addEventListener("click", () => this.#layout(mode));
-      for (const kind of DECISIONS) find(`${kind}-shown`).addEventListener("click", () => this.#ask(this.shown, kind));
+      for (const kind of DECISIONS) find(`${kind}-shown`).addEventListener("click", () => this.#ask(this.listedIds, kind));
       find("keys").addEventListener("click", () => find("help").showModal());
       if (this.data.served) this.#servedControls(this.data.served);
     }
@@ -141,25 +141,25 @@ const Review = (() => {
         return false;
       }
       const [id] = ids, isDown = ids.length === 1 && this.cards.get(id).isMarked(kind, marks.pending(id));
-      const done = isDown ? (kind === "flag" ? "unflag" : "clear") : kind;
-      for (const one of ids) {
-        this.#settle(one);
-        this.#say(one, "saving");
+      const changeKind = isDown ? (kind === "flag" ? "unflag" : "clear") : kind;
+      for (const groupId of ids) {
+        this.#settle(groupId);
+        this.#say(groupId, "saving");
       }
-      marks.add(ids.map((group) => ({ group, kind: done, text })), by);
+      marks.add(ids.map((group) => ({ group, kind: changeKind, text })), by);
       return true;
     }
 
     #say(id, text, isBad = false) {
-      clearTimeout(this.said.get(id));
+      clearTimeout(this.messageTimers.get(id));
       this.cards.get(id).say(text, isBad);
-      if (text === "saved") this.said.set(id, setTimeout(() => this.cards.get(id).say(""), 4000));
+      if (text === "saved") this.messageTimers.set(id, setTimeout(() => this.cards.get(id).say(""), 4000));
     }
 
     #conflict(id, words, item) {
       this.conflicts.set(id, item);
       const { decision, flag } = this.groups.get(id);
-      const other = decision ? `In the meantime: ${Card.told(decision)}.` : flag ? `In the meantime, ${flag.by} flagged this group.` : "In the meantime, the decision was withdrawn.";
+      const other = decision ? `In the meantime: ${Card.describeDecision(decision)}.` : flag ? `In the meantime, ${flag.by} flagged this group.` : "In the meantime, the decision was withdrawn.";
       this.cards.get(id).conflict(`${other} Your mark was not saved: ${Card.name(item.kind).toLowerCase()}.`, item.kind);
       this.#say(id, "not saved", true);
       find("said").textContent = `${id}: ${words || other}`;
@@ -190,14 +190,14 @@ const Review = (() => {
 
     /** Hide groups that do not match. With `isKept`, shown groups stay even if they no longer match. */
     #apply({ isKept = false } = {}) {
-      const wanted = this.query.toLowerCase().split(/\s+/).filter(Boolean);
+      const words = this.query.toLowerCase().split(/\s+/).filter(Boolean);
       const fits = (g) => (!this.states.size || this.states.has(g.state)) && (!this.isFlagged || g.flag)
-        && wanted.every((w) => this.cards.get(g.id).words.includes(w));
-      const before = new Set(isKept ? this.shown : []);
-      this.shown = this.data.groups.filter((g) => fits(g) || before.has(g.id)).map((g) => g.id);
-      const seen = this.stacks.fold(this.shown);
-      for (const [id, { element }] of this.cards) element.hidden = !seen.has(id);
-      find("nothing").hidden = this.shown.length > 0;
+        && words.every((w) => this.cards.get(g.id).words.includes(w));
+      const before = new Set(isKept ? this.listedIds : []);
+      this.listedIds = this.data.groups.filter((g) => fits(g) || before.has(g.id)).map((g) => g.id);
+      const visible = this.stacks.fold(this.listedIds);
+      for (const [id, { element }] of this.cards) element.hidden = !visible.has(id);
+      find("nothing").hidden = this.listedIds.length > 0;
       this.#counts();
       if (find("find").value.trim() !== this.query) find("find").value = this.query;
       for (const mode of ["unified", "split"]) find(mode).setAttribute("aria-pressed", String(mode === this.mode));
@@ -206,16 +206,16 @@ const Review = (() => {
 
     #counts() {
       const { groups, states } = this.data, all = plural(groups.length, "group");
-      find("found").textContent = this.shown.length === groups.length ? all : `${this.shown.length} of ${all}`;
+      find("found").textContent = this.listedIds.length === groups.length ? all : `${this.listedIds.length} of ${all}`;
       for (const button of find("states").children) {
         const name = button.dataset.state, isFlag = name === "flagged";
         const count = groups.filter((g) => (isFlag ? g.flag : g.state === name)).length;
         button.textContent = `${name} ${count}`;
         button.setAttribute("aria-pressed", String(isFlag ? this.isFlagged : this.states.has(name)));
       }
-      const isFiltered = this.shown.length < groups.length, none = this.shown.length === 0;
+      const isFiltered = this.listedIds.length < groups.length, none = this.listedIds.length === 0;
       for (const kind of DECISIONS) {
-        find(`${kind}-shown`).textContent = `${Card.VERBS[kind][0]} ${!isFiltered ? `all ${groups.length}` : this.shown.length === 1 ? "this one" : `these ${this.shown.length}`}`;
+        find(`${kind}-shown`).textContent = `${Card.VERBS[kind][0]} ${!isFiltered ? `all ${groups.length}` : this.listedIds.length === 1 ? "this one" : `these ${this.listedIds.length}`}`;
         find(`${kind}-shown`).disabled = none || !states.length;
       }
     }
@@ -231,7 +231,7 @@ const Review = (() => {
     #show(id) {
       this.current = id;
       const { element } = this.cards.get(id);
-      if (element.hidden && this.shown.includes(id)) this.#unfold(id);
+      if (element.hidden && this.listedIds.includes(id)) this.#unfold(id);
       for (const card of this.cards.values()) card.element.removeAttribute("aria-current");
       element.setAttribute("aria-current", "true");
       element.focus({ preventScroll: true });
@@ -240,10 +240,10 @@ const Review = (() => {
     }
 
     #move(by) {
-      const seen = this.shown.filter((id) => !this.cards.get(id).element.hidden);
-      if (!seen.length) return;
-      const at = seen.indexOf(this.current);
-      this.#show(seen[at < 0 ? 0 : Math.min(Math.max(at + by, 0), seen.length - 1)]);
+      const visible = this.listedIds.filter((id) => !this.cards.get(id).element.hidden);
+      if (!visible.length) return;
+      const at = visible.indexOf(this.current);
+      this.#show(visible[at < 0 ? 0 : Math.min(Math.max(at + by, 0), visible.length - 1)]);
     }
 
     #key(event) {
@@ -255,10 +255,10 @@ const Review = (() => {
         }
         return;
       }
-      const done = this.#keys()[event.key];
-      if (!done) return;
+      const action = this.#keys()[event.key];
+      if (!action) return;
       event.preventDefault();
-      done();
+      action();
     }
 
     /** Leave a field and return to the current group. */
@@ -284,7 +284,7 @@ const Review = (() => {
         j: () => this.#move(1), k: () => this.#move(-1),
         a: on(() => this.mark([id], "approve")), r: on(() => this.mark([id], "reject")),
         o: on(() => this.stacks.of(id).length > 1 && this.#unfold(id)), s: on(() => this.#ask(this.stacks.of(id), "approve")),
-        A: () => this.#ask(this.shown, "approve"), R: () => this.#ask(this.shown, "reject"),
+        A: () => this.#ask(this.listedIds, "approve"), R: () => this.#ask(this.listedIds, "reject"),
         v: open("values"), t: open("triggers"), d: open("since"),
         m: () => this.#layout(this.mode === "split" ? "unified" : "split"),
         "/": () => find("find").focus(), "?": () => find("help").showModal(),

@@ -14,20 +14,20 @@ class Stacks {
   }
 
   /** Stack the shown groups (ids, in order) under the first of their kind. Returns the groups that stay visible. */
-  fold(shown) {
+  fold(ids) {
     this.members.clear();
     let first = null;
-    for (const id of shown) {
+    for (const id of ids) {
       if (first && this.cards.get(first).group.like === this.cards.get(id).group.like) this.members.get(first).push(id);
       else this.members.set((first = id), []);
     }
-    const seen = new Set();
+    const visible = new Set();
     for (const [id, others] of this.members) {
-      seen.add(id);
-      if (this.isOpen(id)) others.forEach((other) => seen.add(other));
+      visible.add(id);
+      if (this.isOpen(id)) others.forEach((other) => visible.add(other));
     }
     for (const [id, card] of this.cards) this.#show(card, this.members.get(id) || []);
-    return seen;
+    return visible;
   }
 
   isOpen(id) {
@@ -61,7 +61,7 @@ class Stacks {
 
   #lines(id, others) {
     const { el } = Dom;
-    const texts = Stacks.differences([id, ...others].map((one) => this.cards.get(one).group.injections.join("; "))).slice(1);
+    const texts = Stacks.differences([id, ...others].map((member) => this.cards.get(member).group.injections.join("; "))).slice(1);
     const lines = others.slice(0, Stacks.LISTED).map((other, i) => {
       const { state } = this.cards.get(other).group;
       return el("li", {}, el("span.quiet", {}, other), " ", el(`span.state.${state}`, {}, state), ` ${texts[i]}`);

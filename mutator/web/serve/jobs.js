@@ -5,7 +5,7 @@
 
 const Jobs = (() => {
   const { el } = Dom;
-  const SOON_MS = 1000, LATER_MS = 5000, SHOWN = 20;
+  const SOON_MS = 1000, LATER_MS = 5000, MOST_SHOWN = 20;
   const ACTIVE = ["queued", "running"];
   const token = document.querySelector('meta[name="mutator-page"]').content; // says which page sends a request
   const [, kind, run] = location.pathname.split("/");
@@ -13,7 +13,7 @@ const Jobs = (() => {
   const isActive = (job) => ACTIVE.includes(job.state);
   const rows = new Map(); // job id -> row
   const watchers = [];
-  let place = null, timer = null, known = [];
+  let place = null, timer = null, latestJobs = [];
 
   /** A server error as text. */
   const words = ({ got, where, expected, remedy }) =>
@@ -40,28 +40,28 @@ const Jobs = (() => {
     return id;
   }
 
-  /** Call `seen(jobs)` with the jobs, newest first, after each request for the list. */
-  function watch(seen) {
-    watchers.push(seen);
-    seen(known);
+  /** Call `onJobs(jobs)` with the jobs, newest first, after each request for the list. */
+  function watch(onJobs) {
+    watchers.push(onJobs);
+    onJobs(latestJobs);
   }
 
   async function poll() {
     clearTimeout(timer);
     try {
-      known = (await ask("/api/jobs")).jobs;
-      show(known);
-      for (const seen of watchers) seen(known);
+      latestJobs = (await ask("/api/jobs")).jobs;
+      show(latestJobs);
+      for (const watcher of watchers) watcher(latestJobs);
       tell("");
     } catch (error) {
       tell(`The jobs cannot be shown: ${error.message}.`);
     }
-    timer = setTimeout(poll, known.some(isActive) ? SOON_MS : LATER_MS);
+    timer = setTimeout(poll, latestJobs.some(isActive) ? SOON_MS : LATER_MS);
   }
 
   function tell(text) {
-    const said = place.querySelector(".jobs-said");
-    if (said.textContent !== text) said.textContent = text;
+    const message = place.querySelector(".jobs-said");
+    if (message.textContent !== text) message.textContent = text;
     if (text) place.hidden = false;
   }
 
@@ -71,13 +71,13 @@ const Jobs = (() => {
     const waiting = active ? `${active} unfinished` : "none unfinished";
     place.querySelector(".jobs-count").textContent = `${jobs.length} in total, ${waiting}${failed ? `, ${failed} failed` : ""}`;
     place.querySelector(".jobs-none").hidden = jobs.length > 0;
-    const list = place.querySelector("ul"), shown = jobs.slice(0, SHOWN);
+    const list = place.querySelector("ul"), newest = jobs.slice(0, MOST_SHOWN);
     for (const [id, row] of rows) {
-      if (shown.some((job) => job.id === id)) continue;
+      if (newest.some((job) => job.id === id)) continue;
       row.element.remove();
       rows.delete(id);
     }
-    shown.forEach((job, at) => {
+    newest.forEach((job, at) => {
       if (!rows.has(job.id)) rows.set(job.id, rowOf(job.id));
       const row = rows.get(job.id);
       row.update(job);
@@ -129,8 +129,8 @@ const Jobs = (() => {
       const isAtEnd = text.scrollTop + text.clientHeight >= text.scrollHeight - 4;
       if (text.textContent !== answer.log) text.textContent = answer.log || "Nothing has been printed yet.";
       if (isAtEnd) text.scrollTop = text.scrollHeight;
-      const job = known.find((one) => one.id === id);
-      await new Promise((done) => setTimeout(done, SOON_MS));
+      const job = latestJobs.find((listed) => listed.id === id);
+      await new Promise((resolve) => setTimeout(resolve, SOON_MS));
       if (!dialog.open || !job || !isActive(job)) return;
     }
   }

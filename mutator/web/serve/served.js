@@ -9,36 +9,36 @@
   if (!place || kind !== "runs") return;
   const run = decodeURIComponent(key);
   const facts = JSON.parse(document.getElementById("facts").textContent);
-  let shown = null; // id of the experiment with buttons
+  let shownId = null; // id of the experiment with buttons
 
   /** The default time of a still: that of an event. */
   function momentOf(experiment) {
     const at = (name) => experiment.table.number(experiment.row, name);
-    const found = ["t_hazard", "t_manifest", "t_activation"].map(at).find((t) => !Number.isNaN(t));
-    return (found ?? 10).toFixed(2);
+    const time = ["t_hazard", "t_manifest", "t_activation"].map(at).find((t) => !Number.isNaN(t));
+    return (time ?? 10).toFixed(2);
   }
 
   function buttons(id, experiment) {
-    const said = el("p.said", { role: "status" }), jobs = el("ul.own-jobs");
+    const status = el("p.said", { role: "status" }), jobs = el("ul.own-jobs");
     const order = async (order) => {
-      said.textContent = "…";
+      status.textContent = "…";
       try {
         await Jobs.start({ ...order, run, experiment: id });
-        said.textContent = "";
+        status.textContent = "";
       } catch (error) {
-        said.textContent = `Not started: ${error.message}.`;
+        status.textContent = `Not started: ${error.message}.`;
       }
     };
     const button = (text, title, ask) => el("button", { type: "button", title, onclick: () => order(ask()) }, text);
     const time = el("input", { type: "number", min: 0, step: "0.05", value: momentOf(experiment), "aria-label": "Time of the still, in seconds" });
     const pictures = facts.filmed ? [button("Film", "Golden and faulty runs, the whole drive", () => ({ kind: "film" })),
       el("span.still", {}, button("Still", "One image of the golden and faulty runs", () => ({ kind: "still", t: Number(time.value) })), " at ", time, " s")] : [];
-    const made = el("section.do", { "data-id": id }, el("h3", {}, "Run it here"),
+    const section = el("section.do", { "data-id": id }, el("h3", {}, "Run it here"),
       el("div.row", {}, button("Rerun", "Check that the result is the same", () => ({ kind: "rerun" })),
         button("Exact plot", "Rerun and record every step of the channels", () => ({ kind: "plot" })), pictures),
-      said, jobs);
-    plot(id, made);
-    return made;
+      status, jobs);
+    plot(id, section);
+    return section;
   }
 
   /** The exact plot, if it exists. */
@@ -51,16 +51,16 @@
 
   function fill({ id, experiment }) {
     if (place.querySelector(`section.do[data-id="${id}"]`)) return;
-    shown = id;
+    shownId = id;
     place.querySelector("section.again").before(buttons(id, experiment));
-    Jobs.watch(own);
+    Jobs.watch(showJobs);
   }
 
   /** The jobs of the open experiment. */
-  function own(jobs) {
+  function showJobs(jobs) {
     const list = place.querySelector(".own-jobs");
     if (!list) return;
-    const mine = jobs.filter((job) => job.run === run && job.experiment === shown).slice(0, 3);
+    const mine = jobs.filter((job) => job.run === run && job.experiment === shownId).slice(0, 3);
     const text = JSON.stringify(mine.map((job) => [job.id, job.state, job.message]));
     if (list.dataset.text === text) return;
     list.dataset.text = text;

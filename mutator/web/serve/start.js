@@ -13,23 +13,23 @@
 
   /** A form that starts a job; `order(fields)` returns the request. */
   function form(title, about, fields, verb, order) {
-    const said = el("p", { role: "status" }), button = el("button.main", {}, verb);
-    const made = el("form.order", { "aria-label": title, onsubmit: sent }, el("h3", {}, title), el("p.quiet", {}, about), el("div.fields", {}, fields), el("p", {}, button), said);
+    const status = el("p", { role: "status" }), button = el("button.main", {}, verb);
+    const element = el("form.order", { "aria-label": title, onsubmit: sent }, el("h3", {}, title), el("p.quiet", {}, about), el("div.fields", {}, fields), el("p", {}, button), status);
     async function sent(event) {
       event.preventDefault();
       button.disabled = true;
-      said.className = "";
-      said.textContent = "…";
+      status.className = "";
+      status.textContent = "…";
       try {
-        await Jobs.start(order(Object.fromEntries(new FormData(made))));
-        said.textContent = "Added to the jobs.";
+        await Jobs.start(order(Object.fromEntries(new FormData(element))));
+        status.textContent = "Added to the jobs.";
       } catch (error) {
-        said.className = "bad";
-        said.textContent = `Not started: ${error.message}.`;
+        status.className = "bad";
+        status.textContent = `Not started: ${error.message}.`;
       }
       button.disabled = false;
     }
-    return made;
+    return element;
   }
 
   const orNull = (text) => (text?.trim() ? text.trim() : null);
@@ -38,8 +38,8 @@
   function tryForm({ specs, scenarios, contexts, readings, targets }) {
     const variants = select("variant", []);
     const fill = () => {
-      const found = specs.find((spec) => spec.name === name.value);
-      variants.replaceChildren(option("", "all"), ...(found ? found.variants.map((variant) => option(variant)) : []));
+      const chosenSpec = specs.find((spec) => spec.name === name.value);
+      variants.replaceChildren(option("", "all"), ...(chosenSpec ? chosenSpec.variants.map((variant) => option(variant)) : []));
     };
     const name = el("input", { name: "spec", list: "specs", required: true, autocomplete: "off", spellcheck: "false", placeholder: specs[0]?.name || "", oninput: fill });
     const time = el("input", { name: "time", type: "number", min: 0, step: "0.01", value: 10, "aria-label": "Time in seconds", hidden: true });
@@ -54,9 +54,9 @@
       labelled("Seed", el("input", { name: "seed", type: "number", min: 0, step: 1 }), "empty: 0"),
       readings.length > 1 ? labelled("Reading", select("reading", readings.map((r) => option(r)))) : null,
       targets.length > 1 ? labelled("Target", select("target", targets.map((t) => option(t)))) : null,
-    ], "Try it", (given) => ({
-      kind: "try", spec: given.spec.trim(), scenario: given.scenario, trigger: given.trigger === "time" ? given.time : given.trigger,
-      variant: orNull(given.variant), value: numberOrNull(given.value), seed: numberOrNull(given.seed), reading: orNull(given.reading), target: orNull(given.target),
+    ], "Try it", (values) => ({
+      kind: "try", spec: values.spec.trim(), scenario: values.scenario, trigger: values.trigger === "time" ? values.time : values.trigger,
+      variant: orNull(values.variant), value: numberOrNull(values.value), seed: numberOrNull(values.seed), reading: orNull(values.reading), target: orNull(values.target),
     }));
   }
 
@@ -74,8 +74,8 @@
       labelled("Run folder", name, "next to the other runs"),
       labelled("Only", el("input", { name: "only", placeholder: "scenario == \"S1\"", autocomplete: "off", spellcheck: "false" }), "a filter; empty: all"),
       labelled("Seed", el("input", { name: "seed", type: "number", min: 0, step: 1 }), "empty: the campaign's"),
-    ], "Run it", (given) => ({
-      kind: "campaign", campaign: given.campaign, name: given.name.trim(), limit: Number(given.limit), only: orNull(given.only), seed: numberOrNull(given.seed),
+    ], "Run it", (values) => ({
+      kind: "campaign", campaign: values.campaign, name: values.name.trim(), limit: Number(values.limit), only: orNull(values.only), seed: numberOrNull(values.seed),
     }));
   }
 

@@ -65,13 +65,13 @@ const Diff = (() => {
   function coloured(text) {
     const parts = [];
     let end = 0;
-    for (const found of text.matchAll(TOKENS)) {
-      const kind = CLASSES[found.slice(1).findIndex((g) => g !== undefined) + 1];
-      const name = kind === "word" ? word(found[0]) : kind;
+    for (const match of text.matchAll(TOKENS)) {
+      const kind = CLASSES[match.slice(1).findIndex((g) => g !== undefined) + 1];
+      const name = kind === "word" ? word(match[0]) : kind;
       if (!name) continue;
-      if (found.index > end) parts.push(text.slice(end, found.index));
-      parts.push(el(name === "hole" ? "mark.hole" : `span.py-${name}`, {}, found[0]));
-      end = found.index + found[0].length;
+      if (match.index > end) parts.push(text.slice(end, match.index));
+      parts.push(el(name === "hole" ? "mark.hole" : `span.py-${name}`, {}, match[0]));
+      end = match.index + match[0].length;
     }
     if (end < text.length) parts.push(text.slice(end));
     return parts;
@@ -92,18 +92,18 @@ const Diff = (() => {
 
   /** The lines of a hunk side by side, with removed lines next to the added lines that follow them. */
   function pairs(lines) {
-    const made = [];
+    const rows = [];
     for (let i = 0; i < lines.length; ) {
       if (lines[i].sign === " ") {
-        made.push([lines[i], lines[i++]]);
+        rows.push([lines[i], lines[i++]]);
         continue;
       }
-      const gone = [], come = [];
-      while (i < lines.length && lines[i].sign === "-") gone.push(lines[i++]);
-      while (i < lines.length && lines[i].sign === "+") come.push(lines[i++]);
-      for (let k = 0; k < Math.max(gone.length, come.length); k++) made.push([gone[k] || null, come[k] || null]);
+      const removed = [], added = [];
+      while (i < lines.length && lines[i].sign === "-") removed.push(lines[i++]);
+      while (i < lines.length && lines[i].sign === "+") added.push(lines[i++]);
+      for (let k = 0; k < Math.max(removed.length, added.length); k++) rows.push([removed[k] || null, added[k] || null]);
     }
-    return made;
+    return rows;
   }
 
   function table(hunks, path, mode) {
@@ -121,8 +121,8 @@ const Diff = (() => {
   const changes = (hunk) => hunk.lines.filter((line) => line.sign !== " ");
   const isProbe = (hunk) => changes(hunk).every((line) => PROBE.test(line.text));
 
-  function sections(files, mode, wanted) {
-    return files.map((file) => ({ ...file, hunks: file.hunks.filter(wanted) })).filter((file) => file.hunks.length).map((file) =>
+  function sections(files, mode, isIncluded) {
+    return files.map((file) => ({ ...file, hunks: file.hunks.filter(isIncluded) })).filter((file) => file.hunks.length).map((file) =>
       el("section.file", {}, el("h4.path", {}, file.path, file.isNew ? " (new file)" : ""),
         el("div.scroll", { tabindex: 0, role: "region", "aria-label": file.path }, table(file.hunks, file.path, mode))));
   }
@@ -130,8 +130,8 @@ const Diff = (() => {
   /** Replace the content of `element` with `patch`. */
   function render(element, patch, { mode = "unified" } = {}) {
     const files = parse(patch);
-    const shown = sections(files, mode, (hunk) => !isProbe(hunk)), folded = files.flatMap((f) => f.hunks).filter(isProbe).length;
-    element.replaceChildren(...shown);
+    const visible = sections(files, mode, (hunk) => !isProbe(hunk)), folded = files.flatMap((f) => f.hunks).filter(isProbe).length;
+    element.replaceChildren(...visible);
     if (!files.length) element.append(el("p.quiet", {}, "The source is unchanged."));
     if (!folded) return;
     const fold = el("details", {}, el("summary.quiet", {}, `and ${folded} ${folded > 1 ? "calls" : "call"} of the probe`));

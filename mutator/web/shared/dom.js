@@ -6,24 +6,24 @@ const Dom = (() => {
   /** An element: `el("a.link", {href, onclick}, "text", child, [more])`. Null attributes and children are left out. */
   function el(what, attributes = {}, ...children) {
     const [tag, ...classes] = what.split(".");
-    const made = document.createElement(tag);
-    if (classes.length) made.className = classes.join(" ");
+    const element = document.createElement(tag);
+    if (classes.length) element.className = classes.join(" ");
     for (const [name, value] of Object.entries(attributes)) {
       if (value === null || value === undefined || value === false) continue;
-      if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
-      else if (name === "style") made.style.cssText = value; // a content security policy forbids the attribute
-      else made.setAttribute(name, value === true ? "" : value);
+      if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+      else if (name === "style") element.style.cssText = value; // a content security policy forbids the attribute
+      else element.setAttribute(name, value === true ? "" : value);
     }
-    made.append(...children.flat(Infinity).filter((c) => c !== null && c !== undefined && c !== false));
-    return made;
+    element.append(...children.flat(Infinity).filter((c) => c !== null && c !== undefined && c !== false));
+    return element;
   }
 
   /** An SVG element. */
   function svg(tag, attributes = {}, ...children) {
-    const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
-    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-    made.append(...children.flat(Infinity));
-    return made;
+    const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+    element.append(...children.flat(Infinity));
+    return element;
   }
 
   /** A button that copies the result of `text()` and confirms it. */

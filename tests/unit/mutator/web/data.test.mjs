@@ -7,13 +7,13 @@ const { ReplayData } = load("replay/data.js");
 const channel = (golden, faulty = golden) => ({ t: golden.map((_, i) => i), golden, faulty });
 
 test("the sample at a time is the last one that is not later", () => {
-  const found = [-1, 0, 0.9, 1, 2.5, 99].map((t) => ReplayData.index([0, 1, 2], t));
-  assert.deepEqual(found, [0, 0, 0, 1, 2, 2]);
+  const indices = [-1, 0, 0.9, 1, 2.5, 99].map((t) => ReplayData.index([0, 1, 2], t));
+  assert.deepEqual(indices, [0, 0, 0, 1, 2, 2]);
 });
 
 test("a channel has no value before its first sample", () => {
   const late = { t: [1, 2], golden: [5, 6], faulty: [5, 7] };
-  assert.deepEqual([0.5, 1, 3].map((t) => ReplayData.held(late, "faulty", t)), [NaN, 5, 7]);
+  assert.deepEqual([0.5, 1, 3].map((t) => ReplayData.valueAt(late, "faulty", t)), [NaN, 5, 7]);
 });
 
 test("the largest difference ignores what follows the end of the drive", () => {
@@ -54,8 +54,8 @@ test("decimals follow the size of the axis", () => {
 });
 
 test("values have a true minus sign, but never a negative zero", () => {
-  const found = [-1.25, -0.001, NaN, Infinity, -Infinity, 12_345_678].map((value) => ReplayData.text(value, 1));
-  assert.deepEqual(found, ["−1.3", "0.0", "–", "∞", "−∞", "1.2e+7"]);
+  const texts = [-1.25, -0.001, NaN, Infinity, -Infinity, 12_345_678].map((value) => ReplayData.text(value, 1));
+  assert.deepEqual(texts, ["−1.3", "0.0", "–", "∞", "−∞", "1.2e+7"]);
 });
 
 test("units have exponents, and none is shown for a plain number", () => {

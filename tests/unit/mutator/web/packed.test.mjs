@@ -17,9 +17,9 @@ test("damaged data are an error", async () => {
 });
 
 test("an element is unpacked once, and an absent one is null", async () => {
-  const asked = [];
-  globalThis.document = { getElementById: (id) => (asked.push(id), id === "here" ? { textContent: packed([1]) } : null) };
+  const ids = [];
+  globalThis.document = { getElementById: (id) => (ids.push(id), id === "here" ? { textContent: packed([1]) } : null) };
   assert.equal(Packed.read("here"), Packed.read("here"));
   assert.deepEqual([await Packed.read("here"), await Packed.read("absent")], [[1], null]);
-  assert.deepEqual(asked, ["here", "absent"]);
+  assert.deepEqual(ids, ["here", "absent"]);
 });
