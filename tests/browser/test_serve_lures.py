@@ -95,7 +95,7 @@ def address(
 ) -> Iterator[str]:
     """The address of a server whose jobs stay in the queue."""
     monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())
-    monkeypatch.setattr(ServeJobs, "_start_process", lambda jobs, job: None)
+    monkeypatch.setattr(ServeJobs, "_start_process", lambda jobs, job, events: None)
     with serve(workspace, (runs,)) as found:
         yield found
 
