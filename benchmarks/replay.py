@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mutator.report.experiment_list import scene_facts
+from mutator.report.experiment_list import scene_as_json
 from mutator.targets.manifest import TargetManifest
 from mutator.web import asset_text, load_order
 from mutator.workspace import Workspace
@@ -86,7 +86,7 @@ def main() -> int:
     if path is None:
         parser.error("no browser here")
     manifest = Workspace.find().manifest("openpilot")
-    data = {"series": made_series(manifest), "facts": {"scene": scene_facts(manifest), "hazards": []}}
+    data = {"series": made_series(manifest), "facts": {"scene": scene_as_json(manifest), "hazards": []}}
     replay = [name for name in load_order("report", ".js") if name.startswith(("shared/dom", "replay/"))]
     text = PAGE.format(
         styles="".join(f"<style>{asset_text(name)}</style>" for name in load_order("report", ".css")),

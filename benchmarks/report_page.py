@@ -143,7 +143,10 @@ def write(size: int, out: Path) -> dict[str, float]:
     experiments = {e.id: e for e in written_run(workspace, size, out)}
     began = process_time()
     run = ReportedRun.open(RunFolder.open(out), None)
-    more = {RANK_COLUMN: run.experiment_facts.ranks, UNTIMED_PATH_COLUMN: run.experiment_facts.path_numbers}
+    more = {
+        RANK_COLUMN: run.experiment_facts.worst_first_ranks,
+        UNTIMED_PATH_COLUMN: run.experiment_facts.untimed_path_indices,
+    }
     table = packed_script_element(
         report_browse.results_table_data(run.results.assign(**more), run.faults, run.paths), "table"
     )

@@ -41,7 +41,7 @@ FaultWithTrigger = tuple[Fault, Trigger]
 
 def pairs_of_specs(
     selected_target: SelectedTarget,
-    specs: Iterable[str],
+    specs_globs_or_files: Iterable[str],
     triggers: Sequence[str] = (),
     *,
     seed: int | None = None,
@@ -59,7 +59,7 @@ def pairs_of_specs(
         ]
         selected_triggers = selected_triggers or [always_trigger(armed_after_s=armed_after_s)]
     pairs: list[FaultWithTrigger] = []
-    for name in _spec_names(selected_target.workspace, specs):
+    for name in _spec_names(selected_target.workspace, specs_globs_or_files):
         faults = selected_target.faults(FaultChoice(spec=name, seed=seed, reading=reading))
         pairs += [(fault, trigger) for fault in faults for trigger in selected_triggers]
     if not pairs:
@@ -186,8 +186,8 @@ def write_mutants(
     return rows
 
 
-def _spec_names(workspace: Workspace, names_and_globs: Iterable[str]) -> Iterator[str]:
-    for name_or_glob in names_and_globs:
+def _spec_names(workspace: Workspace, specs_globs_or_files: Iterable[str]) -> Iterator[str]:
+    for name_or_glob in specs_globs_or_files:
         if not any(c in name_or_glob for c in "*?["):
             yield name_or_glob
             continue

@@ -13,7 +13,7 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun_experiment
 from mutator.outcomes.golden_comparison import Trace, load_trace
 from mutator.outcomes.series_sampling import write_sampled_series
-from mutator.report.film import Filming, Shot
+from mutator.report.film import ExperimentFilmer, Shot
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -79,7 +79,9 @@ class RunExperiment(StoredExperiment):
 
         MutatorError for a target that cannot be filmed, and for a faulty run that left no film.
         """
-        return Filming.of(self.run.workspace, self.run.folder).take_shots(self.experiment, self.record, shots)
+        return ExperimentFilmer.of(self.run.workspace, self.run.folder).rerun_and_write_shots(
+            self.experiment, self.record, shots
+        )
 
     def _load_traces(self) -> tuple[Trace, Trace]:
         if self.record is None:

@@ -117,7 +117,7 @@ class SelectedTarget:
         if not isinstance(trigger_like, str):
             check_number("trigger", trigger_like, least=0)
         arming_time_s = self.manifest.armed_after_s if armed_after_s is None else armed_after_s
-        return find_trigger(
+        return context_or_parsed_trigger(
             self.workspace, str(trigger_like), arming_time_s, self.manifest.observation.variables
         )
 
@@ -134,7 +134,7 @@ def context_tables(workspace: Workspace) -> tuple[ContextTable, ...]:
     return tuple(map(workspace.context_table, workspace.context_tables))
 
 
-def find_trigger(
+def context_or_parsed_trigger(
     workspace: Workspace, trigger_text: str, armed_after_s: float, variables: Collection[str]
 ) -> Trigger:
     tables = context_tables(workspace)

@@ -36,7 +36,7 @@ from mutator.cli import (
     run_folders,
     serving,
 )
-from mutator.cli.console import Terminal, discard_output, ignoring_output_errors, show_error
+from mutator.cli.console import Terminal, discard_output, ignoring_stderr_errors, show_error
 from mutator.cli.options import Library, Root, Sandbox, Target, Templates, WorkspaceOptions
 from mutator.errors import (
     EXIT_CHECK_FAILED,
@@ -283,7 +283,7 @@ def _report_defect() -> int:
 
 def _print_error(text: str) -> None:
     progress_events.report_error(text)
-    with ignoring_output_errors():
+    with ignoring_stderr_errors():
         print(text, file=sys.stderr)
 
 

@@ -84,7 +84,7 @@ def verify(
         facts = {"run": str(run), "passed": audit.passed, **asdict(audit.seals), "facts": audit.facts}
         facts |= {"signer": audit.signer, "not_sealed": audit.not_sealed}
         terminal.print_json(facts | {"checks": checks, "repaired": audit.repaired})
-    terminal.say(str(audit))
+    terminal.print_text(str(audit))
     if not audit.passed:
         raise typer.Exit(EXIT_CHECK_FAILED)
 
@@ -106,8 +106,8 @@ def seal(
     if as_json:
         terminal.print_json({"run": str(run), "signed": sign is not None, **asdict(seals)})
     for name, value in seals.digest_by_name().items():
-        terminal.say(f"{name}: {value}")
+        terminal.print_text(f"{name}: {value}")
     if sign:
-        terminal.say(f"signed: {short_path(run / 'seal.json.sig')}")
+        terminal.print_text(f"signed: {short_path(run / 'seal.json.sig')}")
     elif not seals.seal:
-        terminal.say("seal: none: the run is not finished")
+        terminal.print_text("seal: none: the run is not finished")

@@ -68,13 +68,13 @@ def cache(
         )
         return
     if deleted is not None:
-        terminal.say(f"deleted {counted(len(deleted), 'entry', 'entries')}, {_describe_size(deleted)}")
+        terminal.print_text(f"deleted {counted(len(deleted), 'entry', 'entries')}, {_describe_size(deleted)}")
     rows = [
         (kind, len(of_kind), _describe_size(of_kind)) for kind, of_kind in _entries_by_kind(entries).items()
     ]
     rows.append(("total", len(entries), _describe_size(entries)))
     terminal.print_table(("what", "entries", "size"), rows, right_aligned=(1, 2), last_is_total=True)
-    terminal.say(f"in {short_path(mutator.cache_folder())}")
+    terminal.print_text(f"in {short_path(mutator.cache_folder())}")
 
 
 def parse_size(text: str) -> int:

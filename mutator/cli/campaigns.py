@@ -31,7 +31,7 @@ from mutator.cli.options import (
     WorkspaceOptions,
     with_workspace_options,
 )
-from mutator.cli.run_folders import print_counts
+from mutator.cli.run_folders import print_outcome_counts
 from mutator.errors import MutatorError
 from mutator.execution.progress_text import describe_duration
 
@@ -102,9 +102,9 @@ def plan(
         _print_plan_as_json(terminal, folder, new_plan, cost, reason_by_variant)
     _print_plan(terminal, new_plan, cost, reason_by_variant)
     # enough to compare by eye; run.json has all digits
-    terminal.say(f"plan: {short_path(folder / 'plan.csv')} (digest {new_plan.digest[:16]})")
+    terminal.print_text(f"plan: {short_path(folder / 'plan.csv')} (digest {new_plan.digest[:16]})")
     command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
-    terminal.say(f"run it: {shlex.join(command)}", whole=True)
+    terminal.print_text(f"run it: {shlex.join(command)}", without_folding=True)
 
 
 def _print_plan_as_json(
@@ -141,18 +141,18 @@ def _print_plan(
         last_is_total=True,
     )
     for text in new_plan.operator_notes:
-        terminal.say(text)
+        terminal.print_text(text)
     if len(new_plan.seeds) > 1:
-        terminal.say(
+        terminal.print_text(
             f"{describe_seeds(new_plan.seeds)}: {len(new_plan.goldens())} golden runs (each seed has its own)"
         )
     if sharing := len(new_plan.experiments) - new_plan.runs:
-        terminal.say(
+        terminal.print_text(
             f"runs: {new_plan.runs}; experiments that reuse another scenario's identical run: {sharing}"
         )
     for reason, variants in _variants_by_reason(reason_by_variant).items():
-        terminal.say(f"only the reference engine can run {', '.join(variants)}: {reason}")
-    terminal.say(f"expected: {_describe_cost(cost)}")
+        terminal.print_text(f"only the reference engine can run {', '.join(variants)}: {reason}")
+    terminal.print_text(f"expected: {_describe_cost(cost)}")
 
 
 def _variants_by_reason(reason_by_variant: dict[str, str]) -> dict[str, list[str]]:
@@ -293,27 +293,27 @@ def _print_summary(
             counts | paths | outcomes | asdict(summary.seals) | {"not_forked": summary.not_forked}
         )
     if report:
-        print_counts(terminal, run)
-    terminal.say(
+        print_outcome_counts(terminal, run)
+    terminal.print_text(
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now; "
         f"checks, experiments and proof took {describe_duration(summary.elapsed_s)}"
     )
     if summary.proof_note:
-        terminal.say(f"proof: {summary.proof_note}")
+        terminal.print_text(f"proof: {summary.proof_note}")
     if report:
-        terminal.say(f"report: {report_paths[0]} and {report_paths[1]}")
+        terminal.print_text(f"report: {report_paths[0]} and {report_paths[1]}")
     for name, value in summary.seals.digest_by_name().items():
-        terminal.say(f"{name}: {value}")
+        terminal.print_text(f"{name}: {value}")
     if summary.harness_errors:
-        terminal.say(
+        terminal.print_text(
             f"harness errors: {len(summary.harness_errors)} (not in rates; the same command retries them)"
         )
         for name, detail in summary.harness_errors[:5]:  # often the same error; --json has all
-            terminal.say(f"  {name}: {detail}", style="red")
+            terminal.print_text(f"  {name}: {detail}", style="red")
     if summary.problem:
         terminal.print_error(summary.problem)
     if summary.interrupted or summary.done < summary.planned:
-        terminal.say(f"resume: {resume_command()}", style="bold", whole=True)
+        terminal.print_text(f"resume: {resume_command()}", style="bold", without_folding=True)
 
 
 def resume_command() -> str:

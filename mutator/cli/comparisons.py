@@ -86,7 +86,7 @@ def compare(
         )
     else:
         _print_comparison(terminal, run_comparison)
-        terminal.say(f"comparison: {short_path(files.markdown)} and {short_path(files.page)}")
+        terminal.print_text(f"comparison: {short_path(files.markdown)} and {short_path(files.page)}")
     _fail_on_findings(terminal, comparison, gates, failing)
 
 
@@ -101,26 +101,26 @@ def _parse_gates(texts: list[str]) -> "list[mutator.Gate]":
 def _print_comparison(terminal: Terminal, run_comparison: "mutator.RunComparison") -> None:
     comparison = run_comparison.comparison
     if comparison.parts_remark:
-        terminal.say(comparison.parts_remark, style="bold")
-        terminal.say()
+        terminal.print_text(comparison.parts_remark, style="bold")
+        terminal.print_text()
     differing = [(f.name, f.a, f.b) for f in comparison.facts if f.is_different]
     if differing:
         terminal.print_table(["what differs", comparison.names.a, comparison.names.b], differing)
-        terminal.say(run_comparison.files_text)
-        terminal.say()
+        terminal.print_text(run_comparison.files_text)
+        terminal.print_text()
     for sheet in comparison.sheets:
         if sheet.name.endswith("_by_fault_type"):  # too long for a terminal
             continue
-        terminal.say(sheet.title, style="bold")
+        terminal.print_text(sheet.title, style="bold")
         heads, lines = list(sheet.heads), sheet.table().rows
         terminal.print_table(
             heads, lines, right_aligned=range(1, len(heads)), last_is_total=sheet.name == "changes"
         )
-        terminal.say()
-    terminal.say(run_comparison.summary)
+        terminal.print_text()
+    terminal.print_text(run_comparison.summary)
     for remark in comparison.remarks:
         if remark != comparison.parts_remark:
-            terminal.say(remark)
+            terminal.print_text(remark)
 
 
 def _comparison_as_json(

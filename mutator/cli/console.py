@@ -58,30 +58,30 @@ class Terminal:
     def err(self) -> "Console":
         return _build_console(stderr=True)
 
-    def say(self, text: str = "", style: str | None = None, *, whole: bool = False) -> None:
+    def print_text(self, text: str = "", style: str | None = None, *, without_folding: bool = False) -> None:
         """Print text; fold it unless `whole` is set, as for a command to copy."""
         if not self.as_json:
-            _print_text(self.out, text, style, whole=whole)
+            _print_text(self.out, text, style, without_folding=without_folding)
 
     def print_result(self, text: str, style: str | None = None) -> None:
         """Print the sentence that says what came out of the command."""
         progress_events.report_result(text)
-        self.say(text, style)
+        self.print_text(text, style)
 
     def print_link(self, kind: str, path: Path, text: str | None = None) -> None:
         """Print where a file was written: `kind: path`, or `text`."""
         progress_events.report_link(kind, path)
-        self.say(text or f"{kind}: {short_path(path)}")
+        self.print_text(text or f"{kind}: {short_path(path)}")
 
     def print_note(self, text: str) -> None:
         """Print a remark to standard error, so that a pipe gets only the result."""
-        with ignoring_output_errors():
+        with ignoring_stderr_errors():
             _print_text(self.err, text, "dim")
 
     def print_error(self, text: str) -> None:
         """Print an error to standard error."""
         progress_events.report_error(text)
-        with ignoring_output_errors():
+        with ignoring_stderr_errors():
             _print_text(self.err, f"error: {text}", "bold red")
 
     def print_json(self, data: Any) -> None:
@@ -105,7 +105,10 @@ class Terminal:
         if self.out.is_terminal:
             self.out.print(_build_rich_table(heads, cells, right_aligned, last_is_total))
         else:
-            self.say(TextTable(heads=heads, rows=cells, right_aligned=right_aligned).as_text(), whole=True)
+            self.print_text(
+                TextTable(heads=heads, rows=cells, right_aligned=right_aligned).as_text(),
+                without_folding=True,
+            )
 
     def print_diff(self, patch: str) -> None:
         """Print a unified diff: coloured in a terminal, elsewhere unchanged, as `patch` needs it."""
@@ -169,11 +172,11 @@ _OPTION_BY_ARGUMENT = {
 }
 
 
-def option_of(argument: str) -> str:
+def option_of_argument(argument: str) -> str:
     return _OPTION_BY_ARGUMENT.get(argument) or "--" + argument.replace("_", "-")
 
 
-def with_options(
+def with_option_names(
     error: MutatorError, command_options: Mapping[str, str] = MappingProxyType({})
 ) -> MutatorError:
     """Return the error with options instead of API arguments; `own` has options of a single command."""
@@ -181,7 +184,7 @@ def with_options(
         return error
 
     def option_name(argument: str) -> str:
-        return command_options.get(argument) or option_of(argument)
+        return command_options.get(argument) or option_of_argument(argument)
 
     remedy = error.remedy and re.sub(r"`([a-z_]+)`", lambda match: option_name(match[1]), error.remedy)
     place = error.where or option_name(error.argument)
@@ -189,7 +192,7 @@ def with_options(
 
 
 def show_error(error: MutatorError) -> None:
-    terminal, error = Terminal(), with_options(error)
+    terminal, error = Terminal(), with_option_names(error)
     place = short_path(error.where) + (f":{error.line}" if error.line is not None else "")
     terminal.print_error(f"{place}: {error.got}" if place else error.got)
     if error.expected:
@@ -199,7 +202,7 @@ def show_error(error: MutatorError) -> None:
 
 
 def error_text(error: MutatorError) -> str:
-    error = with_options(error)
+    error = with_option_names(error)
     where = short_path(error.where) or None
     return str(
         MutatorError(error.got, where=where, line=error.line, expected=error.expected, remedy=error.remedy)
@@ -237,7 +240,7 @@ def short_path(location: str | Path | None) -> str:
 
 
 @contextmanager
-def ignoring_output_errors() -> Iterator[None]:
+def ignoring_stderr_errors() -> Iterator[None]:
     """Ignore failures to write to standard error: they must not stop a command."""
     try:
         yield
@@ -264,9 +267,9 @@ def _build_console(*, stderr: bool) -> "Console":
     return Piped(stderr=stderr, highlight=False, emoji=False)  # keep `:x:` as text
 
 
-def _print_text(console: "Console", text: str, style: str | None, *, whole: bool = False) -> None:
+def _print_text(console: "Console", text: str, style: str | None, *, without_folding: bool = False) -> None:
     text = _escape_controls(text)
-    if not whole:
+    if not without_folding:
         width = console.width if console.is_terminal else _pipe_line_width()
         text = wrap_text(text, width).replace(NO_BREAK_SPACE, " ")
     # Rich must not fold again

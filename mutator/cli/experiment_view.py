@@ -41,7 +41,7 @@ def find_run_experiment(workspace: "Workspace", run: Path | None, id_start: str)
     )
 
 
-def print_worst(
+def print_worst_experiments(
     terminal: Terminal, workspace: "Workspace", run: Path | None, only: str | None, limit: int
 ) -> None:
     folder = run or find_newest_run(workspace.library.parent)
@@ -52,7 +52,9 @@ def print_worst(
         return
     heads = tuple(rows[0]) if rows else ()
     terminal.print_table(heads, [tuple(row.values()) for row in rows], right_aligned=(3, 5))
-    terminal.say(f"{len(rows)} of {counted(count, 'experiment')} in {short_path(folder)}, the worst first")
+    terminal.print_text(
+        f"{len(rows)} of {counted(count, 'experiment')} in {short_path(folder)}, the worst first"
+    )
 
 
 def _row_facts(row: "ResultRow") -> dict[str, object]:
@@ -78,12 +80,12 @@ def print_experiment(
         del facts["method"]
     width = max(len(name) for name in facts)
     for name, value in facts.items():
-        terminal.say(f"{name.ljust(width)}  {value}", style="bold" if name == "fault" else None)
-    terminal.say()
+        terminal.print_text(f"{name.ljust(width)}  {value}", style="bold" if name == "fault" else None)
+    terminal.print_text()
     diff, note = readable_patch(patch)
     terminal.print_diff(diff)
-    terminal.say(note, style="dim")
-    terminal.say()
+    terminal.print_text(note, style="dim")
+    terminal.print_text()
 
 
 def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
@@ -96,7 +98,7 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     ending = record.outcome.value if record.outcome else record.status.value
     terminal.print_result(f"verdict: {ending}", style=STYLE_BY_ENDING.get(ending))
     if record.detail:
-        terminal.say(record.detail)
+        terminal.print_text(record.detail)
     activation_s = record.activation.first if record.activation else None
     events = _list_events(record, manifest)
     if events:
@@ -108,19 +110,21 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
         terminal.print_table(["time [s]", "from activation [s]", "what"], rows, right_aligned=(0, 1))
     verdict = result.verdict
     if manifest and (note := _missing_alert_note(record, manifest, verdict["reaction_time_s"])):
-        terminal.say(note)
+        terminal.print_text(note)
     if verdict["severity"]:
-        terminal.say(f"severity: {verdict['severity']}, delta-v {verdict['metrics']['delta_v']:.2f} m/s")
+        terminal.print_text(
+            f"severity: {verdict['severity']}, delta-v {verdict['metrics']['delta_v']:.2f} m/s"
+        )
     for name, what in _TIME_LABELS.items():
         if verdict[name] is not None:
-            terminal.say(f"{what}: {verdict[name]:.2f} s")
+            terminal.print_text(f"{what}: {verdict[name]:.2f} s")
     units = _unit_by_name(manifest) if manifest else {}
     deviations = _describe_values(verdict["difference_in_drive"].items(), units)
     if deviations:
         until = "" if record.t_end is None else " up to the end of the drive"
-        terminal.say(f"largest difference from the golden run{until}: {deviations}")
+        terminal.print_text(f"largest difference from the golden run{until}: {deviations}")
     if record.metrics:
-        terminal.say(f"metrics: {_describe_values(record.metrics, units)}")
+        terminal.print_text(f"metrics: {_describe_values(record.metrics, units)}")
 
 
 def _manifest_if_any(result: "ExperimentResult") -> "TargetManifest | None":
@@ -154,11 +158,11 @@ def _missing_alert_note(record: "Record", manifest: "TargetManifest", reaction_s
 def print_fault_path(terminal: Terminal, experiment: StoredExperiment) -> None:
     if (path := experiment.fault_path) is None:
         return
-    terminal.say("path of the fault:")
+    terminal.print_text("path of the fault:")
     for component in path.components:
-        terminal.say(f"  {_describe_component(component)}")
+        terminal.print_text(f"  {_describe_component(component)}")
     stopped = f", stopped at {' and '.join(path.stopped_at)}" if path.stopped_at else ""
-    terminal.say(f"reached: {path.reached or 'no recorded component'}{stopped}")
+    terminal.print_text(f"reached: {path.reached or 'no recorded component'}{stopped}")
 
 
 def _describe_component(component: "PathComponent") -> str:
@@ -206,11 +210,13 @@ def print_trial(terminal: Terminal, trial: "Trial") -> None:
     print_verdict(terminal, trial)
     if trial.golden_hazards:
         reached = ", ".join(f"{name} at {t:.2f} s" for name, t in trial.golden_hazards)
-        terminal.say(f"the fault-free run also reaches {reached}: the fault is not necessarily the cause")
+        terminal.print_text(
+            f"the fault-free run also reaches {reached}: the fault is not necessarily the cause"
+        )
     if trial.log.strip() and trial.record.detail:
-        terminal.say("last lines of the run:")
-        terminal.say(trial.log.strip(), whole=True)
+        terminal.print_text("last lines of the run:")
+        terminal.print_text(trial.log.strip(), without_folding=True)
     if plot_path:
         terminal.print_link("plot", plot_path, f"plot: {plot_path}")
     else:
-        terminal.say("no plot: the run left no trace")
+        terminal.print_text("no plot: the run left no trace")

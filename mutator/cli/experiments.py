@@ -92,7 +92,7 @@ def show(
 
     terminal = Terminal(as_json)
     if experiment is None:
-        experiment_view.print_worst(terminal, workspace_options.workspace(), run, only, limit)
+        experiment_view.print_worst_experiments(terminal, workspace_options.workspace(), run, only, limit)
         return
     workspace = workspace_options.workspace()
     stored = experiment_view.find_stored_experiment(workspace, run, experiment)
@@ -114,7 +114,9 @@ def show(
     for path in film_paths:
         terminal.print_link("film", path)
     if stored.record and not plot_path and not film_paths:
-        terminal.say(f"no plot is stored; to rerun and plot it: {_plot_command(stored)}", whole=True)
+        terminal.print_text(
+            f"no plot is stored; to rerun and plot it: {_plot_command(stored)}", without_folding=True
+        )
 
 
 def _plot_command(experiment: "StoredExperiment") -> str:
@@ -137,12 +139,12 @@ def _print_stored(terminal: Terminal, experiment: "StoredExperiment", patch: str
 
     experiment_view.print_experiment(terminal, experiment.experiment, patch)
     if experiment.record is None:
-        terminal.say(str(experiment.not_run_error()))
+        terminal.print_text(str(experiment.not_run_error()))
     else:
         experiment_view.print_verdict(terminal, experiment)
         experiment_view.print_fault_path(terminal, experiment)
     if experiment.stretch:
-        terminal.say(f"recorded on: {experiment.stretch}")
+        terminal.print_text(f"recorded on: {experiment.stretch}")
 
 
 def _rerun_and_plot(terminal: Terminal, experiment: "RunExperiment", *, anew: bool) -> Path | None:
@@ -221,8 +223,8 @@ def rerun(
     experiment_view.print_verdict(terminal, trial)
     terminal.print_result(_describe_comparison(is_same), style="bold red" if is_same is False else None)
     if trace:
-        terminal.say(f"trace: {short_path(traces)}")
-        terminal.say(f"plot: {short_path(plot)}" if plot else "no plot: the run left no trace")
+        terminal.print_text(f"trace: {short_path(traces)}")
+        terminal.print_text(f"plot: {short_path(plot)}" if plot else "no plot: the run left no trace")
     if is_same is False:
         raise typer.Exit(EXIT_CHECK_FAILED)
 

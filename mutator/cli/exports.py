@@ -82,4 +82,4 @@ def export(
         )
     if as_json:
         terminal.print_json({"format": format, "file": str(out_path)})
-    terminal.say(f"{format}: {short_path(out_path)}")
+    terminal.print_text(f"{format}: {short_path(out_path)}")

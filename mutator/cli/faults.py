@@ -192,7 +192,7 @@ def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole
         terminal.print_json([{"fault": fault, "id": name, "patch": patch} for fault, name, patch in diffs])
     for fault, _, patch in diffs:
         # `patch` skips text before a diff, so piped output can include the heading.
-        terminal.say(f"# {fault}", style="bold", whole=True)
+        terminal.print_text(f"# {fault}", style="bold", without_folding=True)
         text, note = (patch, "") if whole_patch else readable_patch(patch)
         terminal.print_diff(text)
         if note:
@@ -298,11 +298,13 @@ def generate(
         index = mutants.write(out, trees=trees, step=step)
     if as_json:
         terminal.print_json(index)
-    terminal.say(f"{counted(len(index), 'mutant')} in {out}, listed in {out / 'index.csv'}")
+    terminal.print_text(f"{counted(len(index), 'mutant')} in {out}, listed in {out / 'index.csv'}")
     first_patch = out / index[0]["patch"]
     root = mutants.selected_target.manifest.root
     if mutants.selected_target.manifest.overlay is None:  # otherwise a patch spans two folders
-        terminal.say(f"apply one: patch -p1 -d {short_path(root)} < {first_patch}", whole=True)
+        terminal.print_text(
+            f"apply one: patch -p1 -d {short_path(root)} < {first_patch}", without_folding=True
+        )
 
 
 def _parse_operator_choice(

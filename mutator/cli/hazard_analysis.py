@@ -54,14 +54,14 @@ def stpa(
         terminal.print_json(_analysis_as_json(analysis) | {"problems": problem_facts})
     _print_analysis(terminal, analysis)
     if svg:
-        terminal.say(f"control structure: {short_path(svg)}")
+        terminal.print_text(f"control structure: {short_path(svg)}")
     for problem in problems:
-        terminal.say(error_text(problem), style="red", whole=not terminal.out.is_terminal)
+        terminal.print_text(error_text(problem), style="red", without_folding=not terminal.out.is_terminal)
     if problems:
-        terminal.say(counted(len(problems), "problem"), style="bold red")
+        terminal.print_text(counted(len(problems), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
     faults = {fault for factor in analysis.factors_by_id.values() for fault in factor.faults}
-    terminal.say(
+    terminal.print_text(
         f"all well: {counted(len(analysis.factors_by_id), 'causal factor')}, "
         f"{counted(len(faults), 'fault spec')}, no gap, no contradiction",
         style="green",
@@ -164,11 +164,11 @@ def _print_section(
     terminal: Terminal, title: str, heads: list[str], rows: Iterable[tuple[str, ...]], closing_text: str = ""
 ) -> None:
     cells = [tuple(" ".join(cell.split()) for cell in row) for row in rows]
-    terminal.say(f"{title} ({len(cells)})", style="bold")
+    terminal.print_text(f"{title} ({len(cells)})", style="bold")
     terminal.print_table(heads, cells)
     if closing_text:
-        terminal.say(closing_text)
-    terminal.say()
+        terminal.print_text(closing_text)
+    terminal.print_text()
 
 
 def _analysis_as_json(analysis: "HazardAnalysis") -> dict[str, Any]:

@@ -11,7 +11,7 @@ import typer
 import mutator
 from mutator._common.message_text import counted
 from mutator.cli import completion
-from mutator.cli.console import Terminal, error_text, short_path, with_options
+from mutator.cli.console import Terminal, error_text, short_path, with_option_names
 from mutator.cli.options import Json, Manifest, WorkspaceOptions, with_workspace_options
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
@@ -63,15 +63,15 @@ def list_library(
         terminal.print_json({name: rows for name, (_, rows) in tables.items()})
     for name, (columns, rows) in tables.items():
         numbers = [i for i, c in enumerate(columns) if all(isinstance(r[c], int) for r in rows)]
-        terminal.say(f"{name} ({len(rows)})", style="bold")
+        terminal.print_text(f"{name} ({len(rows)})", style="bold")
         if rows:
             terminal.print_table(columns, [[r[c] for c in columns] for r in rows], right_aligned=numbers)
-        terminal.say()
+        terminal.print_text()
 
 
 def _list_specs(workspace: "Workspace") -> ColumnsAndRows:
     rows = [
-        {"name": s.name, "faults": s.fault_count, "about": _join_lines(s.about)} for s in workspace.specs()
+        {"name": s.name, "faults": s.fault_count, "about": _as_one_line(s.about)} for s in workspace.specs()
     ]
     return ["name", "faults", "about"], rows
 
@@ -91,7 +91,7 @@ def _list_files(files: Mapping[str, Path], about_key: str) -> ColumnsAndRows:
     for name, path in files.items():
         data = load_yaml(path).data
         about = data.get(about_key, "") if isinstance(data, dict) else ""
-        rows.append({"name": name, "file": short_path(path), "about": _join_lines(str(about))})
+        rows.append({"name": name, "file": short_path(path), "about": _as_one_line(str(about))})
     return ["name", "file", "about"], rows
 
 
@@ -101,7 +101,7 @@ def _list_fault_models(workspace: "Workspace") -> ColumnsAndRows:
             "name": m.name,
             "kind": m.kind.value,
             "parameters": ", ".join(p.name + ("?" if p.optional else "") for p in m.params),
-            "about": _join_lines(m.about),
+            "about": _as_one_line(m.about),
         }
         for m in workspace.fault_models()
     ]
@@ -110,7 +110,7 @@ def _list_fault_models(workspace: "Workspace") -> ColumnsAndRows:
 
 def _list_triggers(workspace: "Workspace") -> ColumnsAndRows:
     rows = [
-        {"table": table.name, "name": row.id, "condition": row.condition, "about": _join_lines(row.about)}
+        {"table": table.name, "name": row.id, "condition": row.condition, "about": _as_one_line(row.about)}
         for table in map(workspace.context_table, workspace.context_tables)
         for row in table.rows
     ]
@@ -185,14 +185,14 @@ def check(
         problem_facts = [{"file": p.where, "line": p.line, "problem": str(p)} for p in problems]
         terminal.print_json({"problems": problem_facts, "findings": findings})
     for problem in problems:
-        terminal.say(error_text(problem), style="red", whole=not terminal.out.is_terminal)
+        terminal.print_text(error_text(problem), style="red", without_folding=not terminal.out.is_terminal)
     for finding in findings:
         # without --drive, passed checks are not news
         if drive or finding.level != "ok":
             _print_finding(terminal, finding)
     failed = [finding for finding in findings if finding.level == "failed"]
     if problems or failed:
-        terminal.say(counted(len(problems) + len(failed), "problem"), style="bold red")
+        terminal.print_text(counted(len(problems) + len(failed), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
     faults = sum(spec.fault_count for spec in workspace.specs())
     readings_note = {1: "", 2: ", in both readings"}.get(
@@ -201,23 +201,23 @@ def check(
     warning_count = sum(finding.level == "warning" for finding in findings)
     verdict = f"no problem, {counted(warning_count, 'warning')}" if warning_count else "all well"
     specs = counted(len(workspace.spec_files()), "spec")
-    terminal.say(f"{verdict}: {specs}, {counted(faults, 'fault')}{readings_note}", style="green")
+    terminal.print_text(f"{verdict}: {specs}, {counted(faults, 'fault')}{readings_note}", style="green")
 
 
 def _print_finding(terminal: Terminal, finding: "Finding") -> None:
-    terminal.say(f"{finding.name}: {finding.found}", style=STYLE_BY_LEVEL[finding.level])
+    terminal.print_text(f"{finding.name}: {finding.found}", style=STYLE_BY_LEVEL[finding.level])
     for finding_place in finding.places:
         file = (
             short_path(Path(finding_place.file))
             if Path(finding_place.file).is_absolute()
             else finding_place.file
         )
-        terminal.say(f"  {replace(finding_place, file=str(file))}")
+        terminal.print_text(f"  {replace(finding_place, file=str(file))}")
     if finding.remedy:
-        terminal.say(f"  to do: {finding.remedy}")
+        terminal.print_text(f"  to do: {finding.remedy}")
 
 
-def _join_lines(text: str) -> str:
+def _as_one_line(text: str) -> str:
     return " ".join(text.split())
 
 
@@ -233,7 +233,7 @@ def doctor(as_json: Json = False, *, workspace_options: WorkspaceOptions) -> Non
         try:
             findings = mutator.doctor(workspace_options.workspace())
         except MutatorError as e:
-            findings = mutator.doctor(with_options(e))
+            findings = mutator.doctor(with_option_names(e))
     if as_json:
         terminal.print_json(findings)
     terminal.print_table(
@@ -241,6 +241,6 @@ def doctor(as_json: Json = False, *, workspace_options: WorkspaceOptions) -> Non
     )
     failed = [f.name for f in findings if f.level == "failed"]
     if failed:
-        terminal.say(f"not ready: {', '.join(failed)}", style="bold red")
+        terminal.print_text(f"not ready: {', '.join(failed)}", style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
-    terminal.say("ready", style="green")
+    terminal.print_text("ready", style="green")

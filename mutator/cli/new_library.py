@@ -7,7 +7,7 @@ import typer
 
 import mutator
 from mutator._common.message_text import counted
-from mutator.cli.console import Terminal, short_path, with_options
+from mutator.cli.console import Terminal, short_path, with_option_names
 from mutator.cli.options import Json
 from mutator.errors import MutatorError
 
@@ -43,7 +43,7 @@ def init(
     try:
         mutator.init_library(folder, target=tree)
     except MutatorError as error:
-        raise with_options(error, {"target": "--target"}) from None  # elsewhere, `target` is --manifest
+        raise with_option_names(error, {"target": "--target"}) from None  # elsewhere, `target` is --manifest
     facts: dict[str, Any] = {"folder": str(folder)}
     content = "fault_library/, templates/"
     if tree is not None:
@@ -52,4 +52,4 @@ def init(
         content = f"fault_library/ with {counted(len(places), 'place')} to fill in,"
     if as_json:
         terminal.print_json(facts)
-    terminal.say(f"{short_path(folder)}: {content} and a README.md with the next steps")
+    terminal.print_text(f"{short_path(folder)}: {content} and a README.md with the next steps")

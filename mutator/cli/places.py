@@ -58,11 +58,11 @@ def _print_places(terminal: Terminal, places: Sequence["ListedPlace"]) -> None:
         letter = letters.setdefault(place.models, _letters_of(len(letters)))
         rows.append([place.line, _anchor_as_yaml(place.at), letter])
     terminal.print_table(["line", "at", "models"], rows, right_aligned=[0])
-    terminal.say()
+    terminal.print_text()
     for models, letter in letters.items():
-        terminal.say(f"{letter}: {', '.join(models)}")
+        terminal.print_text(f"{letter}: {', '.join(models)}")
     lines = {place.line for place in places}
-    terminal.say(f"{counted(len(places), 'place')} on {counted(len(lines), 'line')}")
+    terminal.print_text(f"{counted(len(places), 'place')} on {counted(len(lines), 'line')}")
 
 
 def _letters_of(number: int) -> str:

@@ -11,7 +11,7 @@ from mutator._common.message_text import counted
 from mutator.cli import review_view
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, WorkspaceOptions, with_workspace_options
-from mutator.cli.review_options import By, Groups, MutantOptions, OnlyGroups, reviewer
+from mutator.cli.review_options import By, Groups, MutantOptions, OnlyGroups, reviewer_or_git_user
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def _build_decision_command(action: str, help_text: str) -> Callable[..., None]:
         as_json: Json = False,
         workspace_options: WorkspaceOptions,
     ) -> None:
-        terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
+        terminal, by_name = Terminal(as_json), reviewer_or_git_user(workspace_options, by)
         reviewed = mutant_options.load(terminal, workspace_options)
         if groups_to_decide := _choose_groups(reviewed, action, groups, only, is_confirmed=yes):
             decide = reviewed.approve if action == "approve" else reviewed.reject
@@ -67,7 +67,7 @@ def clear(
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Withdraw decisions; remarks and flags stay."""
-    terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
+    terminal, by_name = Terminal(as_json), reviewer_or_git_user(workspace_options, by)
     reviewed = mutant_options.load(terminal, workspace_options)
     _print_decided(terminal, reviewed.clear(selected := reviewed.find(groups), by_name, remark), selected)
 
@@ -83,7 +83,7 @@ def remark(
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Add a remark to groups."""
-    terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
+    terminal, by_name = Terminal(as_json), reviewer_or_git_user(workspace_options, by)
     reviewed = mutant_options.load(terminal, workspace_options)
     _print_decided(terminal, reviewed.remark(selected := reviewed.find(groups), by_name, text), selected)
 
@@ -98,7 +98,7 @@ def _build_flag_command(adds_flag: bool, help_text: str) -> Callable[..., None]:
         as_json: Json = False,
         workspace_options: WorkspaceOptions,
     ) -> None:
-        terminal, by_name = Terminal(as_json), reviewer(workspace_options, by)
+        terminal, by_name = Terminal(as_json), reviewer_or_git_user(workspace_options, by)
         reviewed = mutant_options.load(terminal, workspace_options)
         selected = reviewed.find(groups)
         _print_decided(
@@ -158,5 +158,5 @@ def _print_decided(terminal: Terminal, reviewed: "mutator.ReviewedGroups", group
         state = review.state(group).value
         description = review.describe(group) or state
         description += ", flagged" * (review.flag(group.id) is not None)
-        terminal.say(f"{group.id} {description}", style=review_view.STYLE_BY_STATE[state])
-    terminal.say(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")
+        terminal.print_text(f"{group.id} {description}", style=review_view.STYLE_BY_STATE[state])
+    terminal.print_text(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")

@@ -60,7 +60,7 @@ class MutantOptions:
             )
 
 
-def reviewer(workspace_options: WorkspaceOptions, by: str | None) -> str:
+def reviewer_or_git_user(workspace_options: WorkspaceOptions, by: str | None) -> str:
     from mutator.api.reviews import reviewer_name
 
     name = reviewer_name(workspace_options.workspace()) if by is None else by

@@ -19,9 +19,9 @@ def print_status(terminal: Terminal, reviewed: "mutator.ReviewedGroups", campaig
         terminal.print_json(_status_as_json(reviewed))
         return
     counts = review_view.describe_counts(review, reviewed.groups)
-    terminal.say(f"{short_path(review.path)}: {counted(len(reviewed.groups), 'group')}: {counts}")
+    terminal.print_text(f"{short_path(review.path)}: {counted(len(reviewed.groups), 'group')}: {counts}")
     if review.four_eyes:
-        terminal.say("four eyes: nobody can approve what they changed last")
+        terminal.print_text("four eyes: nobody can approve what they changed last")
     if not campaign:
         changed = [(group, review.describe(group)) for group in reviewed.groups if review.stale_parts(group)]
         _print_groups(terminal, "changed since the decision", changed)
@@ -30,7 +30,7 @@ def print_status(terminal: Terminal, reviewed: "mutator.ReviewedGroups", campaig
     if campaign:
         _print_groups(terminal, f"approvals that {campaign} lacks", reviewed.lacking)
         if not reviewed.lacking:
-            terminal.say(f"all groups of {campaign} are approved", style="green")
+            terminal.print_text(f"all groups of {campaign} are approved", style="green")
 
 
 def _status_as_json(reviewed: "mutator.ReviewedGroups") -> dict[str, Any]:
@@ -56,6 +56,6 @@ def _status_as_json(reviewed: "mutator.ReviewedGroups") -> dict[str, Any]:
 
 def _print_groups(terminal: Terminal, heading: str, groups_with_notes: "Sequence[tuple[Group, str]]") -> None:
     if groups_with_notes:
-        terminal.say(f"{heading}:", style="bold")
+        terminal.print_text(f"{heading}:", style="bold")
     for group, note in groups_with_notes:
-        terminal.say(f"  {group.id}  {note}: {group.label}")
+        terminal.print_text(f"  {group.id}  {note}: {group.label}")

@@ -71,7 +71,7 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
         # in a pipe, each group is one line
         flat = [(*row[:2], row[2].replace("\n", "; "), *row[3:]) for row in rows]
         terminal.print_table(["group", "state", "what", "when", "faults", "runs"], flat, right_aligned=(4, 5))
-    terminal.say(f"{counted(len(groups), 'group')}: {describe_counts(review, groups)}")
+    terminal.print_text(f"{counted(len(groups), 'group')}: {describe_counts(review, groups)}")
     unlisted = review.entries.keys() - {group.id for group in groups}
     if unlisted:
         terminal.print_note(f"blocks of the review file for groups that are not listed: {len(unlisted)}")
@@ -89,28 +89,28 @@ def _describe_trigger(group: "Group") -> str:
 
 def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
     state, flag = review.state(group).value, review.flag(group.id)
-    terminal.say(f"group {group.id}: {state}", style=STYLE_BY_STATE[state])
+    terminal.print_text(f"group {group.id}: {state}", style=STYLE_BY_STATE[state])
     if decision := review.describe(group):
-        terminal.say(decision)
+        terminal.print_text(decision)
     if flag:
-        terminal.say(f"flagged by {flag.by} on {flag.at[:10]}")
+        terminal.print_text(f"flagged by {flag.by} on {flag.at[:10]}")
     for remark in review.remarks(group.id):
-        terminal.say(f"{remark.by}{f' on {remark.at[:10]}' if remark.at else ''}: {remark.text}")
+        terminal.print_text(f"{remark.by}{f' on {remark.at[:10]}' if remark.at else ''}: {remark.text}")
 
 
 def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
     _print_head(terminal, review, group)
-    terminal.say(f"  {group.label}", style="bold")
-    terminal.say()
+    terminal.print_text(f"  {group.label}", style="bold")
+    terminal.print_text()
     if changes := review.diff_since_decision(group):
         terminal.print_diff(changes)
     elif review.stale_parts(group):
-        terminal.say("the diff that the reviewer saw was not kept")
+        terminal.print_text("the diff that the reviewer saw was not kept")
     else:
-        terminal.say(
+        terminal.print_text(
             "nothing has changed since the decision" if review.decision(group.id) else "no decision yet"
         )
-    terminal.say()
+    terminal.print_text()
 
 
 def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
@@ -118,22 +118,22 @@ def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
 
     _print_head(terminal, review, group)
     for injection in group.injection_labels:
-        terminal.say(f"  {injection}", style="bold")
+        terminal.print_text(f"  {injection}", style="bold")
     runs = "" if group.experiment_count is None else f", {counted(group.experiment_count, 'experiment')}"
     if group.value_ranges:
-        terminal.say(f"values: {describe_value_ranges(group)}")
-    terminal.say(f"when: {_describe_trigger(group)}; {counted(len(group.faults), 'fault')}{runs}")
+        terminal.print_text(f"values: {describe_value_ranges(group)}")
+    terminal.print_text(f"when: {_describe_trigger(group)}; {counted(len(group.faults), 'fault')}{runs}")
     conditions = condition_lines(group.triggers)
     for line in conditions[:MOST_CONDITIONS]:
-        terminal.say(f"  {line}")
+        terminal.print_text(f"  {line}")
     if (more := len(conditions) - MOST_CONDITIONS) > 0:
-        terminal.say(f"  and {more} more")
-    terminal.say()
+        terminal.print_text(f"  and {more} more")
+    terminal.print_text()
     terminal.print_diff(group.diff)
-    terminal.say()
+    terminal.print_text()
     heads, rows = value_table(group)
     if rows:
         terminal.print_table(heads, rows[:MOST_VALUE_ROWS], right_aligned=range(2, len(heads)))
         if len(rows) > MOST_VALUE_ROWS:
-            terminal.say(f"{len(rows) - MOST_VALUE_ROWS} more; `--json` has all of them")
-    terminal.say()
+            terminal.print_text(f"{len(rows) - MOST_VALUE_ROWS} more; `--json` has all of them")
+    terminal.print_text()

@@ -48,15 +48,15 @@ def walk_through(
             waiting.insert(0, (number, group))  # shown again, with what the other reviewer decided
             continue
         style = review_view.STYLE_BY_STATE[reviewed.review.state(group).value]
-        terminal.say(f"{group.id} {reviewed.review.describe(group)}", style=style)
+        terminal.print_text(f"{group.id} {reviewed.review.describe(group)}", style=style)
     review = reviewed.review
-    terminal.say(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")
+    terminal.print_text(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")
 
 
 def _ask_for_key(terminal: Terminal, position: str) -> str:
     choices = "  ".join(f"[{key}] {word}" for key, word in WORD_BY_KEY.items())
     while True:
-        terminal.say(f"{position}:  {choices}", style="bold")
+        terminal.print_text(f"{position}:  {choices}", style="bold")
         try:
             key = typer.getchar().lower()
         except EOFError:  # Ctrl-D

@@ -18,7 +18,7 @@ from mutator.cli.review_options import (
     Groups,
     MutantOptions,
     OnlyGroups,
-    reviewer,
+    reviewer_or_git_user,
 )
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def _write_pictures(
             groups, target, folder, workspace=workspace_options.workspace()
         )
     for path, value in value_by_file.items():
-        terminal.say(short_path(Path(path)) + (f": {value}" if value else ""))
+        terminal.print_text(short_path(Path(path)) + (f": {value}" if value else ""))
     for group in groups:
         if group.id not in files_by_group:
             terminal.print_note(f"{group.id} has no pictures: it is not an image effect in a single place")
@@ -194,7 +194,7 @@ def walk(
         reviewed = mutant_options.load(terminal, workspace_options)
         return reviewed.matching(only, exclude)
 
-    walk_through(terminal, load_groups, lambda: reviewer(workspace_options, by))
+    walk_through(terminal, load_groups, lambda: reviewer_or_git_user(workspace_options, by))
 
 
 @with_workspace_options
@@ -213,6 +213,6 @@ def page(
     reviewed.write_page(out)
     if as_json:
         terminal.print_json({"page": str(out), "groups": len(reviewed.groups)})
-    terminal.say(
+    terminal.print_text(
         f"{counted(len(reviewed.groups), 'group')} in {short_path(out)} ({out.stat().st_size / 1e6:.2f} MB)"
     )

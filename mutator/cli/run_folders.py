@@ -27,7 +27,7 @@ def register(app: typer.Typer) -> None:
     app.command("clean", epilog=CLEAN_EXAMPLES)(clean)
 
 
-def print_counts(terminal: Terminal, run: "Run") -> None:
+def print_outcome_counts(terminal: Terminal, run: "Run") -> None:
     counts = run.counts()
     terminal.print_table(
         counts.heads, counts.rows, right_aligned=tuple(counts.right_aligned), last_is_total=True
@@ -37,9 +37,9 @@ def print_counts(terminal: Terminal, run: "Run") -> None:
         terminal.print_table(score.heads, score.rows, right_aligned=tuple(score.right_aligned))
     with suppress(MutatorError):  # the note needs the library
         if note := run.alerts_note():
-            terminal.say(note)
+            terminal.print_text(note)
     if run.folder.stop_note:
-        terminal.say(run.folder.stop_note)
+        terminal.print_text(run.folder.stop_note)
     terminal.print_result(f"outcomes: {', '.join(f'{name} {n}' for name, n in run.endings.items())}")
 
 
@@ -71,10 +71,10 @@ def merge(
         counts = {"run": str(out), "shards": len(shards), "experiments": planned}
         terminal.print_json(counts | asdict(seals))
     results = short_path(out / "results.csv")
-    terminal.say(f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {results}")
+    terminal.print_text(f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {results}")
     for name, value in seals.digest_by_name().items():
-        terminal.say(f"{name}: {value}")
-    terminal.say(f"report: {shlex.join(['mutator', 'report', str(out)])}", whole=True)
+        terminal.print_text(f"{name}: {value}")
+    terminal.print_text(f"report: {shlex.join(['mutator', 'report', str(out)])}", without_folding=True)
 
 
 REPORT_EXAMPLES = """\b
@@ -117,10 +117,10 @@ def report(
                 "rows": report_files.rows,
             }
         )
-    print_counts(terminal, loaded_run)
+    print_outcome_counts(terminal, loaded_run)
     for summary in report_files.summaries:
         terminal.print_table(summary.heads, summary.rows, right_aligned=tuple(summary.right_aligned))
-    terminal.say(f"report: {short_path(report_files.markdown)} and {short_path(report_files.page)}")
+    terminal.print_text(f"report: {short_path(report_files.markdown)} and {short_path(report_files.page)}")
     loaded_run.check_equivalence()  # last, because the report is wanted even if this fails
 
 
@@ -130,9 +130,9 @@ def _write_history(terminal: Terminal, folder: Path) -> None:
     if terminal.as_json:
         terminal.print_json({**paths, "runs": history.runs, "left_out": list(history.left_out)})
     for reason in history.left_out:
-        terminal.say(f"left out: {reason}")
+        terminal.print_text(f"left out: {reason}")
     files = f"{short_path(history.markdown)} and {short_path(history.page)}"
-    terminal.say(f"history of {counted(history.runs, 'run')}: {files}")
+    terminal.print_text(f"history of {counted(history.runs, 'run')}: {files}")
 
 
 def workspace_if_any(workspace_options: WorkspaceOptions) -> "Workspace | None":
@@ -174,4 +174,4 @@ def clean(
             return
     for run in runs:
         delete_run_folder(run)
-        terminal.say(f"deleted {short_path(run)}")
+        terminal.print_text(f"deleted {short_path(run)}")

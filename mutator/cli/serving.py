@@ -53,7 +53,7 @@ def serve(
     terminal = Terminal()
 
     def ready(address: str) -> None:
-        terminal.say(address, whole=True)
+        terminal.print_text(address, without_folding=True)
         terminal.print_note("Ctrl-C stops the server")
         if browser:
             webbrowser.open(address)

@@ -18,7 +18,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 QUERY_LABEL = "Query over results.csv"
-MOST_EXAMINED = 5  # candidates for each figure; examining one means unpacking two series
+MOST_EXAMINED_CANDIDATES = 5  # candidates for each figure; examining one means unpacking two series
 
 
 def build_example_drawings(
@@ -68,7 +68,7 @@ def _build_drawing(frame: pd.DataFrame, traces: RunTraces | None, figure: Action
     if missing := [name for name in figure.action_channels if name not in recorded]:
         return _empty_drawing(figure, f"the target records no {missing[0]}")
     faults = plan_file.load_faults(traces.folder.path)
-    examined = rows.head(MOST_EXAMINED).to_dict("records")
+    examined = rows.head(MOST_EXAMINED_CANDIDATES).to_dict("records")
     for rank, row in enumerate(examined, start=1):
         record = traces.record(row["experiment_id"])
         golden, faulty = traces.sampled_traces_of(record.experiment_id)
@@ -113,5 +113,5 @@ def _describe_example(
         f"{row['trigger']}: experiment {row['experiment_id']}. "
         f"The query finds {counted(match_count, 'experiment')}. "
         f"Sorted by {figure.order_column}, largest first, this is number {rank}, and the first (of at most "
-        f"{MOST_EXAMINED} examined) whose traces show that {figure.what_it_shows}."
+        f"{MOST_EXAMINED_CANDIDATES} examined) whose traces show that {figure.what_it_shows}."
     )

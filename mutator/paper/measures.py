@@ -47,7 +47,7 @@ class Estimate:
     low: float
     high: float
     n: int  # runs or pairs
-    count: int | None = None  # those with the property, if they can be counted
+    count_with_property: int | None = None  # those with the property, if they can be counted
     text: str
 
     def __str__(self) -> str:
@@ -133,7 +133,7 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
         low=low,
         high=high,
         n=discordant,
-        count=matched.first_only,
+        count_with_property=matched.first_only,
         text=f"{counted(matched.pair_count, 'pair')}; hazard only in the guided run: {matched.first_only}, "
         f"only in the random run: {matched.second_only} (McNemar p {matched.p:.2g})",
     )
@@ -177,7 +177,12 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 def estimate_of_share(share: Share) -> Estimate:
     return Estimate(
-        value=share.rate, low=share.low, high=share.high, n=share.of, count=share.count, text=str(share)
+        value=share.rate,
+        low=share.low,
+        high=share.high,
+        n=share.of,
+        count_with_property=share.count,
+        text=str(share),
     )
 
 

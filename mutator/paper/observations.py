@@ -67,7 +67,7 @@ class ClaimRule(StrictModel):
 
     def _verdict_on_occurrence(self, estimate: Estimate) -> ClaimVerdict:
         must_occur = self.some is not None
-        if estimate.count:
+        if estimate.count_with_property:
             return ClaimVerdict.HOLDS if must_occur else ClaimVerdict.FAILS
         if estimate.n and estimate.high <= (self.some or self.never or 0.0):
             return ClaimVerdict.FAILS if must_occur else ClaimVerdict.HOLDS

@@ -17,7 +17,7 @@ paper. An observation holds if all claims that it depends on hold, and does not 
 not; otherwise there is not enough data. The intervals treat runs as independent, except where whole faults
 are resampled, so the true uncertainty is at least as large."""
 
-SESSION_CODE = """\
+SESSION_SETUP_CODE = """\
 from mutator.paper.measures import *
 from mutator.statistics.results_frame import load_usable_results
 
@@ -34,7 +34,7 @@ def claims_table(observation: JudgedObservation) -> TextTable:
         first_row = [
             claim.number,
             _claim_text(claim),
-            describe_published(claim),
+            describe_paper_result(claim),
             str(claim.verdict_on_paper or "-"),
         ]
         if len(claim.answers) == 1:
@@ -50,7 +50,7 @@ def claims_table(observation: JudgedObservation) -> TextTable:
     return TextTable(heads=CLAIM_HEADS, rows=rows)
 
 
-def describe_published(claim: JudgedClaim) -> str:
+def describe_paper_result(claim: JudgedClaim) -> str:
     """Return what the paper says about a claim, counts first."""
     estimate = claim.claim.published_estimate()
     return (
@@ -59,20 +59,24 @@ def describe_published(claim: JudgedClaim) -> str:
     )
 
 
-def session_code(ends: Sequence[tuple[str, float]]) -> str:
+def session_setup_code(ends: Sequence[tuple[str, float]]) -> str:
     if not ends:
-        return SESSION_CODE
+        return SESSION_SETUP_CODE
     times = ", ".join(f'"{scenario}": {end:g}' for scenario, end in ends)
-    return f'{SESSION_CODE}\nruns["t_end"] = runs["scenario"].map({{{times}}})'
+    return f'{SESSION_SETUP_CODE}\nruns["t_end"] = runs["scenario"].map({{{times}}})'
 
 
-def render_markdown(
+def render_observations_markdown(
     observations: Sequence[JudgedObservation], ends: Sequence[tuple[str, float]], coverage: str
 ) -> str:
     parts = ["# The paper's observations", coverage, verdicts_markdown(observations), rules_text()]
     for observation in observations:
         parts += [f"## {observation_heading(observation)}", claims_table(observation).as_markdown()]
-    parts += ["## The queries", "In the run folder, in Python:", f"```python\n{session_code(ends)}\n```"]
+    parts += [
+        "## The queries",
+        "In the run folder, in Python:",
+        f"```python\n{session_setup_code(ends)}\n```",
+    ]
     for observation in observations:
         for claim in observation.claims:
             queries = "\n".join(answer.query for answer in claim.answers) or f"# {claim.reason}"
@@ -114,7 +118,7 @@ def _sheet_rows(observations: Sequence[JudgedObservation]) -> Iterator[tuple[She
         for claim in observation.claims:
             head = (observation.number, claim.number, int(claim.claim.needed), claim.claim.claim_text)
             paper, by_rule, rule = (
-                describe_published(claim),
+                describe_paper_result(claim),
                 str(claim.verdict_on_paper or ""),
                 str(claim.claim.claim_rule or ""),
             )

@@ -12,7 +12,7 @@ from mutator.paper import observations, observations_by_seed, observations_page
 from mutator.paper.observations import ClaimVerdict
 from mutator.paper.published_numbers import has_published_numbers, load_published_numbers
 from mutator.report.panel import Panel, rendered
-from mutator.report.panels.tables_panel import csv_files
+from mutator.report.panels.tables_panel import sheet_csv_files
 from mutator.report.reported_run import ReportedRun
 from mutator.statistics.results_frame import select_common_columns
 
@@ -69,7 +69,7 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
     missing = _missing_fault_types(fault_types, run.frame)
     if len(missing) == len(fault_types):
         return None
-    ends = run.latest_golden_ends() or {}
+    ends = run.latest_golden_end_by_scenario() or {}
     file_words = re.findall(r"\w+", read_bounded(file, MOST_YAML_BYTES).decode())
     frame = select_common_columns(run.frame, *file_words)  # the queries use only columns that the file names
     frame = frame.assign(t_end=frame["scenario"].map(ends))  # `median_time` needs the ends of the runs
@@ -86,7 +86,7 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
         observations_page.observations_sheet(judged),
         *([observations_by_seed.observations_by_seed_sheet(by_seed)] if by_seed else ()),
     ]
-    text = observations_page.render_markdown(judged, ends_by_scenario, coverage)
+    text = observations_page.render_observations_markdown(judged, ends_by_scenario, coverage)
     parts = [
         "## The paper's observations",
         coverage,
@@ -104,7 +104,7 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
         observations=sorted(judged, key=lambda observation: observation.verdict is ClaimVerdict.UNDECIDED),
         undecided=ClaimVerdict.UNDECIDED.value,
         table=observations_page.claims_table,
-        session=observations_page.session_code(ends_by_scenario),
+        session=observations_page.session_setup_code(ends_by_scenario),
         rules=observations_page.rules_text(),
         of_seeds=seeds_table,
         about_seeds=observations_by_seed.SEEDS_NOTE,
@@ -115,7 +115,7 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
         markdown="\n\n".join(parts),
         html=html,
         summary=seeds_table,
-        files={MARKDOWN_FILE: text.encode(), **csv_files(sheets)},
+        files={MARKDOWN_FILE: text.encode(), **sheet_csv_files(sheets)},
     )
 
 

@@ -20,11 +20,11 @@ class PublishedNumbers:
     tally_by_scenario: dict[tuple[str, str], Tally]  # by method and scenario
     tally_by_fault_type: dict[tuple[str, str], Tally]  # by method and module/fault type
     driver_reaction_s: float
-    least_alert_to_hazard_s: float  # the scenarios' smallest and largest mean
-    most_alert_to_hazard_s: float
+    least_mean_alert_to_hazard_s: float  # the scenarios' smallest and largest mean
+    most_mean_alert_to_hazard_s: float
 
-    def as_published(self) -> PublishedCounts:
-        least, most = self.least_alert_to_hazard_s, self.most_alert_to_hazard_s
+    def as_published_counts(self) -> PublishedCounts:
+        least, most = self.least_mean_alert_to_hazard_s, self.most_mean_alert_to_hazard_s
         return PublishedCounts(
             source="paper",
             by_scenario=self.tally_by_scenario,
@@ -105,8 +105,8 @@ def load_published_numbers(references: Path) -> PublishedNumbers:
         tally_by_scenario=tally_by_scenario,
         tally_by_fault_type=tally_by_fault_type,
         driver_reaction_s=times.driver_reaction_s,
-        least_alert_to_hazard_s=times.mean_alert_to_hazard_s.least,
-        most_alert_to_hazard_s=times.mean_alert_to_hazard_s.most,
+        least_mean_alert_to_hazard_s=times.mean_alert_to_hazard_s.least,
+        most_mean_alert_to_hazard_s=times.mean_alert_to_hazard_s.most,
     )
 
 

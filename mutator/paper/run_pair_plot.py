@@ -57,7 +57,7 @@ def plot_run_pair(
         axis.tick_params(labelbottom=axis is axes[-1])
     axes[-1].set_xlabel("time [s]", fontsize=style.TEXT_POINTS)
     _draw_marks(
-        axes, [mark for mark in without_later_alerts(marks) if first_s <= mark.t <= last_s], last_s - first_s
+        axes, [mark for mark in with_first_alert_only(marks) if first_s <= mark.t <= last_s], last_s - first_s
     )
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(
@@ -67,7 +67,7 @@ def plot_run_pair(
     return figure
 
 
-def without_later_alerts(marks: Iterable[EventMark]) -> list[EventMark]:
+def with_first_alert_only(marks: Iterable[EventMark]) -> list[EventMark]:
     shown_marks: list[EventMark] = []
     for mark in marks:
         if mark.kind is not EventKind.ALERT or all(m.kind is not EventKind.ALERT for m in shown_marks):

@@ -16,7 +16,7 @@ def published_counts_for(run: ReportedRun) -> PublishedCounts | None:
         return None
     numbers = load_published_numbers(references)
     shared_fault_types = {kind for _, kind in numbers.tally_by_fault_type} & set(run.frame["kind"])
-    return numbers.as_published() if shared_fault_types else None
+    return numbers.as_published_counts() if shared_fault_types else None
 
 
 def example_drawings_for(run: ReportedRun) -> tuple[Drawing, ...]:

@@ -10,8 +10,8 @@ from mutator.outcomes.golden_comparison import Trace
 
 StepFlags = np.ndarray[tuple[int], np.dtype[np.bool_]]  # one flag per step
 
-MIN_APPLIED_SHARE = 0.01  # share of full gas or brake; less is ignored
-MIN_WRONG_S = 0.5  # minimum duration of wrong gas or brake
+MIN_APPLIED_PEDAL_SHARE = 0.01  # share of full gas or brake; less is ignored
+MIN_WRONG_PEDAL_S = 0.5  # minimum duration of wrong gas or brake
 MIN_BRAKE_S = 0.1  # braking for less than this is ignored
 MOST_TOO_SHORT_SHARE = 0.5  # up to this share of the golden run's braking time, braking is too short
 MOST_ALERT_TO_RELEASE_S = 1.0  # maximum time from the alert to the last gas or brake
@@ -58,11 +58,11 @@ class RunPair:
             alert_s=record.alerts[0][1] if record.alerts else None,
         )
 
-    def steps_applied(self, channel: str) -> tuple[StepFlags, StepFlags]:
+    def steps_applied_by_golden_and_faulty(self, channel: str) -> tuple[StepFlags, StepFlags]:
         """Return the steps of the search in which the golden and the faulty run apply `channel`."""
         within = (self.times_s >= self.start_s) & (self.times_s <= self.end_s)
-        return within & (self.golden[channel] > MIN_APPLIED_SHARE), within & (
-            self.faulty[channel] > MIN_APPLIED_SHARE
+        return within & (self.golden[channel] > MIN_APPLIED_PEDAL_SHARE), within & (
+            self.faulty[channel] > MIN_APPLIED_PEDAL_SHARE
         )
 
     def duration_s(self, steps: StepFlags) -> float:
@@ -92,7 +92,7 @@ def find_brake_too_short(pair: RunPair) -> StepFlags | None:
 
     None unless the faulty run brakes, too, but at most half as long.
     """
-    golden, faulty = pair.steps_applied("brake")
+    golden, faulty = pair.steps_applied_by_golden_and_faulty("brake")
     if not MIN_BRAKE_S <= pair.duration_s(faulty) <= MOST_TOO_SHORT_SHARE * pair.duration_s(golden):
         return None
     return golden & ~faulty
@@ -105,14 +105,14 @@ def build_wrong_time_finder(channel: str) -> StepFinder:
     """
 
     def find_steps(pair: RunPair) -> StepFlags | None:
-        golden, faulty = pair.steps_applied(channel)
+        golden, faulty = pair.steps_applied_by_golden_and_faulty(channel)
         only_faulty = faulty & ~golden
-        return only_faulty if pair.duration_s(only_faulty) >= MIN_WRONG_S else None
+        return only_faulty if pair.duration_s(only_faulty) >= MIN_WRONG_PEDAL_S else None
 
     return find_steps
 
 
-def find_both_unavailable(pair: RunPair) -> StepFlags | None:
+def find_gas_and_brake_unavailable(pair: RunPair) -> StepFlags | None:
     """Return the steps after the last gas or brake of the faulty run.
 
     None unless this last use came soon after the alert and the golden run still uses both.
@@ -121,7 +121,8 @@ def find_both_unavailable(pair: RunPair) -> StepFlags | None:
     last_use_s = pair.times_s[is_used].max(initial=pair.start_s)
     after_last_use: StepFlags = pair.times_s > last_use_s
     missed_s = [
-        pair.duration_s(after_last_use & (pair.golden[name] > MIN_APPLIED_SHARE)) for name in ("gas", "brake")
+        pair.duration_s(after_last_use & (pair.golden[name] > MIN_APPLIED_PEDAL_SHARE))
+        for name in ("gas", "brake")
     ]
     if (
         pair.alert_s is None
@@ -154,7 +155,7 @@ ACTION_FIGURES = (
         title="Unsafe control action: gas at a wrong time",
         query=f"{_WRONG_DATA_QUERY} and t_h1 > t_activation",
         order_column="max_dev_gas",
-        what_it_shows=f"between activation and H1 the faulty run applies gas for {MIN_WRONG_S} s or more "
+        what_it_shows=f"between activation and H1 the faulty run applies gas for {MIN_WRONG_PEDAL_S} s or more "
         "while the fault-free run does not (grey)",
         find_steps=build_wrong_time_finder("gas"),
         action_channels=("gas",),
@@ -166,7 +167,7 @@ ACTION_FIGURES = (
         title="Unsafe control action: brake at a wrong time",
         query=f"{_WRONG_DATA_QUERY} and t_h2 > t_activation",
         order_column="max_dev_brake",
-        what_it_shows=f"between activation and H2 the faulty run brakes for {MIN_WRONG_S} s or more while "
+        what_it_shows=f"between activation and H2 the faulty run brakes for {MIN_WRONG_PEDAL_S} s or more while "
         "the fault-free run does not (grey)",
         find_steps=build_wrong_time_finder("brake"),
         action_channels=("brake",),
@@ -182,7 +183,7 @@ ACTION_FIGURES = (
         what_it_shows=f"at most {MOST_ALERT_TO_RELEASE_S:.0f} s after the first alert, the faulty run stops "
         f"applying gas and brake (grey), while the fault-free run still applies each for "
         f"{MIN_MISSED_USE_S} s or more",
-        find_steps=find_both_unavailable,
+        find_steps=find_gas_and_brake_unavailable,
         action_channels=("gas", "brake"),
         panels=(_GAS, _BRAKE, _SPEED),
         hazard=None,

@@ -14,7 +14,7 @@ from mutator.reference import (
     operators_page,
     python_api,
 )
-from mutator.reference.json_schemas import build_editor_schema, file_formats
+from mutator.reference.json_schemas import build_editor_schema, yaml_formats
 from mutator.workspace import Workspace
 
 PAGES_FOLDER = Path("docs") / "reference"
@@ -41,7 +41,7 @@ def render_files(workspace: Workspace) -> dict[Path, str]:
         STUB_PATH: python_api.render_stub()
     }
     fault_models = workspace.fault_models()
-    for file_format in file_formats(workspace.readings()):
+    for file_format in yaml_formats(workspace.readings()):
         text = json.dumps(build_editor_schema(file_format, fault_models), indent=1, ensure_ascii=False)
         files[SCHEMAS_FOLDER / f"{file_format.name}.json"] = text + "\n"
     return files

@@ -58,7 +58,7 @@ _FIXED_FORMATS: tuple[tuple[type[StrictModel], str, str], ...] = (
 )
 
 
-def file_formats(declared_readings: Readings) -> tuple[YamlFormat, ...]:
+def yaml_formats(declared_readings: Readings) -> tuple[YamlFormat, ...]:
     specs = (spec.build_spec_model(declared_readings), spec.SCHEMA, "faults/*/*.yaml")
     return (
         *(
@@ -86,10 +86,10 @@ def schema_by_model(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
     """
     file_schema = model.model_json_schema(by_alias=True)
     schemas = {model.__name__: file_schema} | file_schema.pop("$defs", {})
-    return {short_name(name): _with_descriptions(part) for name, part in schemas.items()}
+    return {short_model_name(name): _with_descriptions(part) for name, part in schemas.items()}
 
 
-def short_name(name: str) -> str:
+def short_model_name(name: str) -> str:
     """Return `Variant` for `_VariantModel`; other names stay unchanged."""
     match = _MODEL_NAME_PATTERN.match(name)
     return match[1] if match else name
@@ -121,7 +121,7 @@ def _without_generated_texts(value: Any) -> Any:
             key: _without_generated_texts(inner) for key, inner in value["properties"].items()
         }
     if "$ref" in cleaned:
-        cleaned["$ref"] = f"#/definitions/{short_name(cleaned['$ref'].rpartition('/')[2])}"
+        cleaned["$ref"] = f"#/definitions/{short_model_name(cleaned['$ref'].rpartition('/')[2])}"
     return cleaned
 
 
@@ -136,7 +136,7 @@ def build_editor_schema(file_format: YamlFormat, fault_models: FaultModels) -> d
         part.pop("description", None)
         for value in part.get("properties", {}).values():
             value["description"] = _MARKDOWN_LINK_PATTERN.sub(r"\1", value["description"])
-    file_schema = schemas.pop(short_name(file_format.model.__name__))
+    file_schema = schemas.pop(short_model_name(file_format.model.__name__))
     key = {"const": file_format.schema, "description": "The format of this file and its version."}
     file_schema["properties"] = {"schema": key} | file_schema["properties"]
     file_schema["required"] = ["schema", *file_schema["required"]]
@@ -154,7 +154,7 @@ def _add_fault_models(injection: dict[str, Any], fault_models: FaultModels) -> N
 def _parameters_rule(model: FaultModel) -> dict[str, Any]:
     condition = {"required": ["model"], "properties": {"model": {"const": model.name}}}
     patterns = {
-        f"^({'|'.join(parameter_keys(param))})$": _value_schema(param) | {"description": param.about}
+        f"^({'|'.join(spec_keys_of_parameter(param))})$": _value_schema(param) | {"description": param.about}
         for param in model.params
         if param.type != "seed"
     }
@@ -162,7 +162,7 @@ def _parameters_rule(model: FaultModel) -> dict[str, Any]:
     return {"if": condition, "then": {"properties": {"params": params}}}
 
 
-def parameter_keys(param: ParamSchema) -> Iterator[str]:
+def spec_keys_of_parameter(param: ParamSchema) -> Iterator[str]:
     """Yield the keys of a parameter in a spec, one for each possible unit."""
     if param.unit in (None, TARGET_UNIT):
         yield param.name

@@ -35,21 +35,23 @@ def write_licences(clone: Path) -> None:
     listed.
     """
     page_path = clone / PAGE_PATH
-    licence_by_package = licences_in(page_path.read_text(encoding="utf-8")) if page_path.exists() else {}
+    licence_by_package = (
+        licence_by_package_in(page_path.read_text(encoding="utf-8")) if page_path.exists() else {}
+    )
     group_by_package = _first_group_by_package(clone)
     rows = [
         (name, group_by_package.get(name, "others"), _licence_of(name, licence_by_package))
-        for name in constrained_packages(clone)
+        for name in packages_in_constraints(clone)
     ]
     table = TextTable(heads=("package", "needed by", "licence"), rows=rows).as_markdown(escape=False)
     page_path.write_text(f"{_PAGE_HEAD}{table}\n", encoding="utf-8")
 
 
-def licences_in(page: str) -> dict[str, str]:
+def licence_by_package_in(page: str) -> dict[str, str]:
     return {name: licence for name, licence in _TABLE_ROW_PATTERN.findall(page) if name != "package"}
 
 
-def constrained_packages(clone: Path) -> tuple[str, ...]:
+def packages_in_constraints(clone: Path) -> tuple[str, ...]:
     text = (clone / "constraints.txt").read_text(encoding="utf-8")
     return tuple(sorted(set(re.findall(r"^([\w.-]+)==", text, re.MULTILINE))))
 

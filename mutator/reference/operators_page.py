@@ -33,7 +33,7 @@ function in proportion to its number of mutants, so each mutant has the same cha
 
 ## The faults
 """
-_FAULT_FIELDS = (
+_FIELDS_OF_OPERATOR_FAULTS = (
     ("spec", "`operators/<operator>/<path>::<function>`"),
     ("module, fault type", "`operators`, the operator"),
     (
@@ -51,7 +51,7 @@ _FAULT_FIELDS = (
 
 def render_operators_page(workspace: Workspace) -> str:
     replacements = TextTable(heads=("operator", "where", "replacement"), rows=list(_replacement_rows()))
-    fields = TextTable(heads=("field", "what it is"), rows=_FAULT_FIELDS)
+    fields = TextTable(heads=("field", "what it is"), rows=_FIELDS_OF_OPERATOR_FAULTS)
     tables = [table.as_markdown(escape=False) for table in (replacements, fields)]
     return (
         "\n".join(

@@ -84,7 +84,7 @@ def list_undocumented() -> list[str]:
     missing = [
         name
         for name in (*_public_functions(), *_public_classes())
-        if not _parse_definition(getattr(mutator, name))[1]
+        if not _node_and_docstring(getattr(mutator, name))[1]
     ]
     for name, cls in _public_classes().items():
         missing += [f"{name}.{member.name}" for member in members_of(cls) if not member.meaning]
@@ -119,7 +119,7 @@ def _heading_of(cls: type) -> str:
 
 
 def _function_section(name: str) -> Iterator[str]:
-    node, text = _parse_definition(getattr(mutator, name))
+    node, text = _node_and_docstring(getattr(mutator, name))
     signature_text = _signature_text(node, f"mutator.{name}", one_per_line=True)
     yield f"### mutator.{name}\n"
     yield f"```python\n{signature_text}\n```\n"
@@ -132,7 +132,7 @@ def _function_section(name: str) -> Iterator[str]:
 
 def _class_section(name: str, cls: type) -> Iterator[str]:
     yield f"### {name}\n"
-    yield f"{_parse_definition(cls)[1]}\n"
+    yield f"{_node_and_docstring(cls)[1]}\n"
     parents = [base.__name__ for base in cls.__mro__[1:] if base in _public_classes().values()]
     if parents:
         yield f"It has the members of [{parents[0]}](#{parents[0].lower()}).\n"
@@ -160,7 +160,7 @@ def _public_classes_in(text: str) -> list[str]:
     return list(dict.fromkeys(name for name in re.findall(r"\w+", text) if name in _public_classes()))
 
 
-def _parse_definition(definition: Any) -> tuple[Any, str]:
+def _node_and_docstring(definition: Any) -> tuple[Any, str]:
     node: Any = ast.parse(dedent(inspect.getsource(definition))).body[0]
     return node, ast.get_docstring(node) or ""
 
@@ -174,7 +174,7 @@ def _members_defined_in(cls: type) -> Iterator[ApiMember]:
             )
         return
     lines = dedent(inspect.getsource(cls)).splitlines()
-    for node in _parse_definition(cls)[0].body:
+    for node in _node_and_docstring(cls)[0].body:
         if isinstance(node, FunctionNode):
             if node.name == "__init__":
                 yield from _members_set_in_init(node, lines)

@@ -10,13 +10,13 @@ from mutator.reference.json_schemas import schema_by_model
 
 # models used in several kinds of files, and the page with their section
 _PAGE_BY_SHARED_MODEL = {"Injection": "fault-spec.md", "Location": "fault-spec.md"}
-_BOUND_WORDS = {
+_WORDS_BY_BOUND_KEY = {
     "minimum": "at least",
     "maximum": "at most",
     "exclusiveMinimum": "above",
     "exclusiveMaximum": "below",
 }
-_TYPE_WORDS = {
+_WORDS_BY_JSON_TYPE = {
     "string": "text",
     "number": "number",
     "integer": "whole number",
@@ -114,7 +114,7 @@ class _KeyTables:
         if value["type"] == "object":
             inner = value.get("additionalProperties")
             return f"mapping to {self._type_text(inner)}" if isinstance(inner, dict) else "mapping"
-        return _TYPE_WORDS[value["type"]] + _bounds_text(value)
+        return _WORDS_BY_JSON_TYPE[value["type"]] + _bounds_text(value)
 
     def _reference_text(self, name: str) -> str:
         part = self._parts[name]
@@ -135,5 +135,5 @@ def _alternatives_text(values: list[str]) -> str:
 
 
 def _bounds_text(value: dict[str, Any]) -> str:
-    bounds = [f"{word} {value[key]:g}" for key, word in _BOUND_WORDS.items() if key in value]
+    bounds = [f"{word} {value[key]:g}" for key, word in _WORDS_BY_BOUND_KEY.items() if key in value]
     return f" ({', '.join(bounds)})" if bounds else ""

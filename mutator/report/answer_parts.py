@@ -45,7 +45,7 @@ class ExplainedCodes:
         return f"{self.prefix} {', '.join(self.codes)}".lstrip()
 
 
-Cell = str | PageLink | ShareBar | ExplainedCodes
+AnswerCell = str | PageLink | ShareBar | ExplainedCodes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,7 @@ class AnswerTable:
     """A small table."""
 
     heads: tuple[str, ...]
-    rows: Sequence[tuple[Cell, ...]]
+    rows: Sequence[tuple[AnswerCell, ...]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ class ReportAnswer:
     paragraph: str
     tables: tuple[AnswerTable, ...] = ()  # tables without rows are not shown
     links: tuple[PageLink, ...] = ()
-    is_wide: bool = False
+    has_wide_tables: bool = False
 
 
 def filtered_list_fragment(filters: Mapping[str, Sequence[str]], sort: str = "") -> str:
@@ -99,7 +99,7 @@ def share_bar(part: int, whole: int) -> ShareBar:
     return ShareBar(part, whole, f"{part:,} of {whole:,}")
 
 
-def hazard_warnings(frame: pd.DataFrame) -> np.ndarray:
+def warning_filter_values(frame: pd.DataFrame) -> np.ndarray:
     """Return the value of the page's filter `warning` for each row of a frame of results; '' without a
     hazard.
     """

@@ -20,8 +20,8 @@ from mutator.report.answer_parts import (
     fault_type_counts,
     fault_type_link,
     filtered_list_fragment,
-    hazard_warnings,
     share_bar,
+    warning_filter_values,
     was_or_were,
 )
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
@@ -54,7 +54,9 @@ def _frame_for_answers(run: ReportedRun) -> pd.DataFrame:
     """
     frame = run.frame
     extended = frame.assign(
-        place=frame[RANK_COLUMN], untimed_path=frame[UNTIMED_PATH_COLUMN], warning=hazard_warnings(frame)
+        place=frame[RANK_COLUMN],
+        untimed_path=frame[UNTIMED_PATH_COLUMN],
+        warning=warning_filter_values(frame),
     )
     listed_ids = worst_hazard_ids(extended)
     rows = rows_of(run.results[run.results["experiment_id"].isin(listed_ids)], run.faults)

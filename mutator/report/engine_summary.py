@@ -33,7 +33,7 @@ class EngineSummary:
 
     table: TextTable
     equivalence_text: str
-    equivalence_state: str
+    equivalence_in_brief: str
     has_failed_equivalence: bool  # an experiment had a different result on the reference engine
 
 
@@ -47,7 +47,7 @@ def summarize_engines(
     sentence, state, failed = _describe_equivalence(folder, records)
     table = TextTable(heads=("how", "experiments"), rows=list(_table_rows(counts_by_mode)))
     return EngineSummary(
-        table=table, equivalence_text=sentence, equivalence_state=state, has_failed_equivalence=failed
+        table=table, equivalence_text=sentence, equivalence_in_brief=state, has_failed_equivalence=failed
     )
 
 

@@ -31,10 +31,10 @@ class ExperimentFacts:
     each timed experiment; its engine is '' if not recorded.
     """
 
-    ranks: np.ndarray
-    path_numbers: np.ndarray
-    untimed_paths: tuple[UntimedPath, ...]
-    alerts_by_id: AlertsByExperiment
+    worst_first_ranks: np.ndarray
+    untimed_path_indices: np.ndarray
+    distinct_untimed_paths: tuple[UntimedPath, ...]
+    alerts_by_hazardous_id: AlertsByExperiment
     timings: "DataFrame"
 
     @classmethod
@@ -51,7 +51,7 @@ class ExperimentFacts:
         path_numbers = np.full(len(results), -1, dtype=np.int32)
         alerts: dict[str, _TimedAlerts] = {}
         for number, (all_inputs, batch_alerts) in enumerate(
-            _inputs_and_alerts_by_batch(results, records, faults, fault_paths)
+            _path_inputs_and_hazard_alerts_by_batch(results, records, faults, fault_paths)
         ):
             alerts |= batch_alerts
             for row, inputs in enumerate(all_inputs, start=number * _EXPERIMENTS_IN_BATCH):
@@ -69,7 +69,7 @@ class ExperimentFacts:
         )
 
 
-def _inputs_and_alerts_by_batch(
+def _path_inputs_and_hazard_alerts_by_batch(
     results: "DataFrame",
     records: Mapping[str, Record],
     faults: Mapping[str, Fault],

@@ -18,12 +18,12 @@ from mutator.config.location_syntax import location_as_yaml
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.readable_patches import readable_patch
-from mutator.report.answer_parts import hazard_warnings
+from mutator.report.answer_parts import warning_filter_values
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
 from mutator.report.fault_path_data import RunFaultPaths
-from mutator.report.glossary import code_meanings
+from mutator.report.glossary import code_meanings_by_column
 from mutator.report.heat_map_data import build_heat_map
-from mutator.report.page_series import series_facts
+from mutator.report.page_series import series_facts_for_page
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines import SourceLines
@@ -80,12 +80,12 @@ def build_list_data(run: ReportedRun) -> ExperimentListData:
     if run.paths:
         data["paths"] = run.paths.page_data(ids)
     facts = {
-        **_target_facts(folder, workspace),
-        "series": series_facts(folder),
+        **_film_and_scene_facts(folder, workspace),
+        "series": series_facts_for_page(folder),
         "metrics": folder.head.metrics,
         "severity": as_json_types(folder.head.severity),
         "hazards": as_json_types(folder.head.about_hazards),
-        "meanings": code_meanings(run),
+        "meanings": code_meanings_by_column(run),
     }
     return ExperimentListData(
         facts_json=Markup(json.dumps(facts).replace("<", "\\u003c")),
@@ -106,22 +106,22 @@ def _describe_truncation(run: ReportedRun) -> str:
     )
 
 
-def _target_facts(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
+def _film_and_scene_facts(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
     """Whether films can be made (true without a manifest), and the scene for the replay."""
     try:
         manifest = workspace.manifest(folder.head.target) if workspace else None
     except MutatorError:
         manifest = None
     filmed = manifest is None or manifest.film is not None
-    return {"filmed": filmed, "scene": scene_facts(manifest) if manifest else None}
+    return {"filmed": filmed, "scene": scene_as_json(manifest) if manifest else None}
 
 
 def _listed_results(run: ReportedRun) -> "DataFrame":
     """Return the results that the page lists, in reading order, with rank and path."""
-    is_listed = run.experiment_facts.ranks < MOST_LISTED_EXPERIMENTS
+    is_listed = run.experiment_facts.worst_first_ranks < MOST_LISTED_EXPERIMENTS
     extra_columns = {
-        RANK_COLUMN: run.experiment_facts.ranks[is_listed],
-        UNTIMED_PATH_COLUMN: run.experiment_facts.path_numbers[is_listed],
+        RANK_COLUMN: run.experiment_facts.worst_first_ranks[is_listed],
+        UNTIMED_PATH_COLUMN: run.experiment_facts.untimed_path_indices[is_listed],
     }
     return run.results[is_listed].assign(**extra_columns).sort_values(LIST_ORDER)
 
@@ -164,11 +164,11 @@ def results_table_data(
     columns["ending"] = endings_of_rows(results)
     columns["hazards"] = joined_hazards(results)
     if has_alerts:
-        columns["warning"] = hazard_warnings(results)
+        columns["warning"] = warning_filter_values(results)
     columns["rank"] = results[RANK_COLUMN] + 1
     columns["t_hazard"] = hazard_times(results).min(axis=1)
     if paths:
-        columns["through"] = paths.passed_links(results[UNTIMED_PATH_COLUMN])
+        columns["through"] = paths.joined_passed_links(results[UNTIMED_PATH_COLUMN])
     if source:
         columns |= _operator_columns(source, results, rows)
     columns_data = [{"name": name, **column_data(name, values)} for name, values in columns.items()]
@@ -197,7 +197,7 @@ def _operator_columns(
         "variant": [
             row.variant.removesuffix(f" {change}" if change else "") for row, change in rows_and_changes
         ],
-        "line": [source.places.get(name, "") for name in faults],
+        "line": [source.path_and_line_by_fault.get(name, "") for name in faults],
         "lasting": [PERMANENT if row.trigger == ALWAYS_NAME else TRANSIENT for row in rows],
     }
 
@@ -330,7 +330,7 @@ def media_by_experiment(
     return {name: files for name, files in files_by_experiment.items() if any(files.values())}
 
 
-def scene_facts(manifest: TargetManifest) -> dict[str, Any] | None:
+def scene_as_json(manifest: TargetManifest) -> dict[str, Any] | None:
     """Return the data that web/replay/scene.js draws; None if the target's manifest has no scene."""
     scene = manifest.scene
     if scene is None:

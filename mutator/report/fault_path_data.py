@@ -51,9 +51,9 @@ class RunFaultPaths:
 
     fault_paths: FaultPaths
     channels: Sequence[ChannelFacts]
-    by_id: Mapping[str, FaultPath]
+    path_by_experiment: Mapping[str, FaultPath]
     records: Mapping[str, Record]
-    untimed_paths: Sequence[UntimedPath] = ()
+    distinct_untimed_paths: Sequence[UntimedPath] = ()
 
     @classmethod
     def of(
@@ -73,13 +73,13 @@ class RunFaultPaths:
             untimed_paths=untimed_paths,
         )
 
-    def passed_links(self, path_numbers: Iterable[int]) -> list[str]:
+    def joined_passed_links(self, untimed_path_indices: Iterable[int]) -> list[str]:
         """Return the links that each fault got through, joined by `;`. The page filters by them."""
         texts = [
             ";".join(link_name(c.tail, c.tip) for c in path.links if c.state is LinkState.THROUGH)
-            for path in self.untimed_paths
+            for path in self.distinct_untimed_paths
         ]
-        return [texts[number] if number >= 0 else "" for number in path_numbers]
+        return [texts[number] if number >= 0 else "" for number in untimed_path_indices]
 
     def page_data(self, ids: Sequence[str]) -> dict[str, Any]:
         """Return the page's data for the experiments `ids`: the shape of each path (-1: none), and for each
@@ -92,7 +92,7 @@ class RunFaultPaths:
         first_times: list[list[float | None]] = [[] for _ in names]
         largest_deviations: list[list[float | str | None]] = [[] for _ in names]
         for row, name in enumerate(ids):
-            path = self.by_id.get(name)
+            path = self.path_by_experiment.get(name)
             components = (
                 [[s.name, s.state.value, column] for s, column in _components_with_columns(path)]
                 if path
@@ -101,7 +101,7 @@ class RunFaultPaths:
             key = repr(components)
             shape_codes.append(shapes.setdefault(key, len(shapes)) if components else -1)
             columns.setdefault(key, components)
-            if latest_times := self._latest_times(path):
+            if latest_times := self._latest_time_by_component(path):
                 latest_times_by_row[row] = latest_times
             departures = self.records[name].left if name in self.records else ()
             departures_by_channel = {channel: (time, most) for channel, time, most in departures}
@@ -121,7 +121,7 @@ class RunFaultPaths:
         }
 
     @staticmethod
-    def _latest_times(path: FaultPath | None) -> dict[str, float]:
+    def _latest_time_by_component(path: FaultPath | None) -> dict[str, float]:
         return {s.name: round(s.t_by, 4) for s in (path.components if path else ()) if s.t_by is not None}
 
     def component_label(self, component: str) -> str:
@@ -162,44 +162,44 @@ class PathCounts:
     `masked_by_components` counts masked faults by the set of components that stopped them.
     """
 
-    active: int = 0
-    reached: Counter[str] = field(default_factory=Counter)
-    passed: Counter[str] = field(default_factory=Counter)
-    injected: Counter[str] = field(default_factory=Counter)
-    stopped: Counter[str] = field(default_factory=Counter)
-    masked: Counter[str] = field(default_factory=Counter)
-    masked_by_components: Counter[tuple[str, ...]] = field(default_factory=Counter)
+    active_fault_count: int = 0
+    reached_by_link: Counter[str] = field(default_factory=Counter)
+    passed_by_link: Counter[str] = field(default_factory=Counter)
+    injected_by_component: Counter[str] = field(default_factory=Counter)
+    stopped_by_component: Counter[str] = field(default_factory=Counter)
+    masked_by_component: Counter[str] = field(default_factory=Counter)
+    masked_by_component_set: Counter[tuple[str, ...]] = field(default_factory=Counter)
 
     def add(self, path: FaultPath | UntimedPath, count: int = 1) -> None:
-        self.active += count
+        self.active_fault_count += count
         link_states = [(c.name, c.tip, c.state) for c in path.links]
         stopped = {tip for _, tip, state in link_states if state is LinkState.STOPPED}
         for counter, names in (
             (
-                self.reached,
+                self.reached_by_link,
                 [n for n, _, state in link_states if state in (LinkState.THROUGH, LinkState.STOPPED)],
             ),
-            (self.passed, [name for name, _, state in link_states if state is LinkState.THROUGH]),
-            (self.injected, path.injected),
-            (self.stopped, stopped.union(path.stopped_at)),
-            (self.masked, path.stopped_at),
+            (self.passed_by_link, [name for name, _, state in link_states if state is LinkState.THROUGH]),
+            (self.injected_by_component, path.injected),
+            (self.stopped_by_component, stopped.union(path.stopped_at)),
+            (self.masked_by_component, path.stopped_at),
         ):
             for name in names:
                 counter[name] += count
         if path.stopped_at:
-            self.masked_by_components[path.stopped_at] += count
+            self.masked_by_component_set[path.stopped_at] += count
 
 
 def path_counts_by_fault_type(
-    kinds: "pd.Series[str]", path_numbers: "np.ndarray", paths: RunFaultPaths
+    fault_types: "pd.Series[str]", untimed_path_indices: "np.ndarray", paths: RunFaultPaths
 ) -> Mapping[str, PathCounts]:
     """Return counts of all faults, then by fault type. `path_numbers`: the path of each row or -1."""
     import pandas as pd
 
     counts: dict[str, PathCounts] = defaultdict(PathCounts)
-    rows = pd.DataFrame({"kind": kinds.to_numpy(), "untimed_path": path_numbers})
+    rows = pd.DataFrame({"kind": fault_types.to_numpy(), "untimed_path": untimed_path_indices})
     for kind, group in rows[rows["untimed_path"] >= 0].groupby("kind"):
         for code, count in group["untimed_path"].value_counts(sort=False).items():
             for name in (ALL_FAULT_TYPES, str(kind)):
-                counts[name].add(paths.untimed_paths[int(str(code))], int(count))
+                counts[name].add(paths.distinct_untimed_paths[int(str(code))], int(count))
     return dict(counts)

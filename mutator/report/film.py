@@ -36,16 +36,16 @@ class Shot:
 
 
 @dataclass(frozen=True, slots=True)
-class Filming:
+class ExperimentFilmer:
     """Films the experiments of a run."""
 
     workspace: Workspace
     folder: RunFolder
     target: TargetManifest
-    filming_target: TargetManifest  # the same target, with film recording switched on
+    film_recording_target: TargetManifest  # the same target, with film recording switched on
 
     @classmethod
-    def of(cls, workspace: Workspace, folder: RunFolder) -> "Filming":
+    def of(cls, workspace: Workspace, folder: RunFolder) -> "ExperimentFilmer":
         """Prepare to film. Raise MutatorError if the target cannot be filmed or has changed since the
         run.
         """
@@ -54,9 +54,11 @@ class Filming:
 
     def rerun_golden(self, experiment: Experiment, out: Path) -> Path:
         """Rerun an experiment's golden run into the folder `out`."""
-        return run_golden(self.workspace, self.filming_target, experiment, out, limits=self.folder.limits)
+        return run_golden(
+            self.workspace, self.film_recording_target, experiment, out, limits=self.folder.limits
+        )
 
-    def take_shots(
+    def rerun_and_write_shots(
         self,
         experiment: Experiment,
         stored_record: Record | None,
@@ -71,7 +73,7 @@ class Filming:
         with ScratchFolder("mutator-film-") as scratch:
             single = run_single(
                 self.workspace,
-                self.filming_target,
+                self.film_recording_target,
                 experiment,
                 scratch,
                 limits=self.folder.limits,

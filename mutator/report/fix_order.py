@@ -10,8 +10,8 @@ from mutator.outcomes.fault_paths import UntimedPath
 from mutator.report.answer_parts import (
     ALERT_BEFORE_HAZARD,
     SILENT_HAZARD_WARNINGS,
+    AnswerCell,
     AnswerTable,
-    Cell,
     PageLink,
     ReportAnswer,
     describe_share,
@@ -47,7 +47,7 @@ def fix_first_answer(frame: pd.DataFrame, paths: RunFaultPaths | None, *, has_al
         {"warning": SILENT_HAZARD_WARNINGS} if has_alerts else {"outcome": ["hazard"]}
     )
     rows = [
-        _table_row(
+        _fault_type_row(
             kind,
             frame[frame["kind"] == kind],
             counted_hazards[counted_hazards["kind"] == kind],
@@ -60,7 +60,7 @@ def fix_first_answer(frame: pd.DataFrame, paths: RunFaultPaths | None, *, has_al
     return ReportAnswer(
         name="first",
         title="What to fix first",
-        is_wide=True,
+        has_wide_tables=True,
         paragraph=_rule_paragraph(order, counted_hazards, classes, plural_noun),
         tables=(AnswerTable(heads=tuple(heads), rows=rows),),
     )
@@ -115,14 +115,14 @@ def _rule_paragraph(
     return paragraph
 
 
-def _table_row(
+def _fault_type_row(
     kind: str,
     results_of_type: pd.DataFrame,
     counted_hazards: pd.DataFrame,
     classes: Sequence[str],
     list_filter: Mapping[str, Sequence[str]],
     paths: RunFaultPaths | None,
-) -> tuple[Cell, ...]:
+) -> tuple[AnswerCell, ...]:
     counts_by_class = [(name, len(_hazards_of_class(counted_hazards, name))) for name in classes]
     if SEVERITY_COLUMN in counted_hazards:
         named = [
@@ -136,7 +136,7 @@ def _table_row(
     worst = next((name for name, n in counts_by_class if n), "")
     filters = {"kind": [kind], **list_filter}
     severe = {SEVERITY_COLUMN: [worst or NO_CONTACT_VALUE]} if SEVERITY_COLUMN in counted_hazards else {}
-    row: list[Cell] = [
+    row: list[AnswerCell] = [
         fault_type_link(kind, **list_filter),
         PageLink(numbers, filtered_list_fragment({**filters, **severe}, "rank")),
         PageLink(f"{times_to_hazard.min():.2f} s", f"e={fastest}&{filtered_list_fragment(filters, 'rank')}"),
@@ -152,11 +152,11 @@ def _table_row(
 
 def _component_that_passed_most(
     kind: str, hazards: pd.DataFrame, list_filter: Mapping[str, Sequence[str]], paths: RunFaultPaths
-) -> Cell:
+) -> AnswerCell:
     """Return the component that most often let this fault type through to the first changed actuator."""
     passed: Counter[str] = Counter()
     links: dict[str, set[str]] = {}
-    for untimed_path, count in _untimed_paths(hazards, paths):
+    for untimed_path, count in _untimed_path_counts(hazards, paths):
         if link := untimed_path.entry_link:
             passed[link.tail] += count
             links.setdefault(link.tail, set()).add(link_name(link.tail, link.tip))
@@ -169,16 +169,16 @@ def _component_that_passed_most(
     return PageLink(f"{paths.component_label(component)}: {passed[component]} of {len(hazards)}", fragment)
 
 
-def _untimed_paths(frame: pd.DataFrame, paths: RunFaultPaths) -> Iterator[tuple[UntimedPath, int]]:
+def _untimed_path_counts(frame: pd.DataFrame, paths: RunFaultPaths) -> Iterator[tuple[UntimedPath, int]]:
     for code, count in frame["untimed_path"].value_counts(sort=False).items():
         if (place := int(str(code))) >= 0:
-            yield paths.untimed_paths[place], int(count)
+            yield paths.distinct_untimed_paths[place], int(count)
 
 
-def _component_that_stopped_most(kind: str, active: pd.DataFrame, paths: RunFaultPaths) -> Cell:
+def _component_that_stopped_most(kind: str, active: pd.DataFrame, paths: RunFaultPaths) -> AnswerCell:
     """Return the component that stopped most faults of this type, a candidate for stopping the rest."""
     stopped: Counter[str] = Counter()
-    for untimed_path, count in _untimed_paths(active, paths):
+    for untimed_path, count in _untimed_path_counts(active, paths):
         for name in untimed_path.stopped_at:
             stopped[name] += count
     if not stopped:

@@ -55,7 +55,7 @@ def glossary_of(run: ReportedRun) -> Glossary:
     return {title: terms for title, terms in sections.items() if terms}
 
 
-def code_meanings(run: ReportedRun) -> Glossary:
+def code_meanings_by_column(run: ReportedRun) -> Glossary:
     """Return the meanings of the codes in the list of experiments: column -> code -> meaning."""
     glossary = glossary_of(run)
     triggers = glossary.get("Triggers", {})

@@ -12,7 +12,7 @@ from mutator.report.reported_run import ReportedRun
 from mutator.statistics.results_frame import hazard_names
 from mutator.targets.contact_severity import SEVERITY_CLASSES
 
-Cells = list[list[Any]]  # by row; each cell has a count or value, and its base (the number of runs)
+HeatMapCells = list[list[Any]]  # by row; each cell has a count or value, and its base (the number of runs)
 
 
 def build_heat_map(run: ReportedRun) -> dict[str, Any]:
@@ -22,20 +22,24 @@ def build_heat_map(run: ReportedRun) -> dict[str, Any]:
     categories = (("kind", kinds), ("scenario", scenarios))
     y, x = (pd.Categorical(frame[name], categories=of).codes.astype(np.int64) for name, of in categories)
     shape = (len(kinds) + 1, len(scenarios) + 1)
-    cells: dict[str, Cells] = {}
-    for name, part, of in _share_measures(frame, alerts=run.folder.has_alerts):
-        cells[name] = _pair_cells(_count_cells(y, x, part & of, shape), _count_cells(y, x, of, shape))
+    cells: dict[str, HeatMapCells] = {}
+    for name, part, of in _share_and_base_row_masks(frame, has_alerts=run.folder.has_alerts):
+        cells[name] = _count_and_base_cells(
+            _count_cells(y, x, part & of, shape), _count_cells(y, x, of, shape)
+        )
     active = frame["is_activated"].to_numpy(dtype=bool)
     for metric in run.folder.head.metrics:
         values = frame[metric.name].to_numpy(dtype=float)
         has_value = active & ~np.isnan(values)
-        cells |= _metric_cells(
+        cells |= _median_and_worst_cells(
             metric.name, metric.worse, values[has_value], y[has_value], x[has_value], shape
         )
     return {"kinds": kinds, "scenarios": scenarios, "cells": cells}
 
 
-def _share_measures(frame: pd.DataFrame, *, alerts: bool) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+def _share_and_base_row_masks(
+    frame: pd.DataFrame, *, has_alerts: bool
+) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     """Yield the name of each share, the rows that it counts, and the rows in its base."""
 
     def flags(name: str) -> np.ndarray:
@@ -47,7 +51,7 @@ def _share_measures(frame: pd.DataFrame, *, alerts: bool) -> Iterator[tuple[str,
     yield "hazards-injected", hazard, every
     yield "activated", active, every
     yield "manifested", flags("is_manifested"), active
-    if alerts:
+    if has_alerts:
         alert = (frame["alerts"] != "").to_numpy()
         yield "alerts", alert, active
         yield "silent", frame["reaction_time"].isna().to_numpy(), hazard
@@ -60,25 +64,25 @@ def _share_measures(frame: pd.DataFrame, *, alerts: bool) -> Iterator[tuple[str,
             yield f"severity-{name}", worst >= place, active
 
 
-def _count_cells(y: np.ndarray, x: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+def _count_cells(y: np.ndarray, x: np.ndarray, row_mask: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     inner = (shape[0] - 1) * (shape[1] - 1)
     with_totals = np.zeros(shape, dtype=np.int64)
-    counts = np.bincount((y * (shape[1] - 1) + x)[rows], minlength=inner)
+    counts = np.bincount((y * (shape[1] - 1) + x)[row_mask], minlength=inner)
     with_totals[:-1, :-1] = counts.reshape(shape[0] - 1, shape[1] - 1)
     with_totals[-1] = with_totals.sum(axis=0)
     with_totals[:, -1] = with_totals.sum(axis=1)
     return with_totals
 
 
-def _pair_cells(part: np.ndarray, whole: np.ndarray) -> Cells:
+def _count_and_base_cells(part: np.ndarray, whole: np.ndarray) -> HeatMapCells:
     return [list(map(int, pair)) for pair in zip(part.ravel(), whole.ravel(), strict=True)]
 
 
-def _metric_cells(
+def _median_and_worst_cells(
     name: str, worse: str, values: np.ndarray, y: np.ndarray, x: np.ndarray, shape: tuple[int, int]
-) -> Mapping[str, Cells]:
-    medians: Cells = []
-    worsts: Cells = []
+) -> Mapping[str, HeatMapCells]:
+    medians: HeatMapCells = []
+    worsts: HeatMapCells = []
     for row in range(shape[0]):
         in_row = np.ones(len(values), dtype=bool) if row == shape[0] - 1 else y == row
         for column in range(shape[1]):

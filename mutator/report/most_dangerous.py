@@ -7,8 +7,8 @@ from typing import Any
 import pandas as pd
 
 from mutator.report.answer_parts import (
+    AnswerCell,
     AnswerTable,
-    Cell,
     ExplainedCodes,
     PageLink,
     ReportAnswer,
@@ -57,7 +57,7 @@ def most_dangerous_answer(
     return ReportAnswer(
         name="dangerous",
         title="What is dangerous",
-        is_wide=True,
+        has_wide_tables=True,
         paragraph="No fault was activated." if active.empty else paragraph,
         tables=(*_worst_tables(ranked, units, has_alerts=has_alerts), AnswerTable(heads=heads, rows=rows)),
         links=_list_links(ranked),
@@ -143,7 +143,7 @@ def _worst_table(
     """
     contact_column = find_contact_column(ranked)
     heads = [first_head, "scenario", "hazards"]
-    columns: list[Iterable[Cell]] = [ranked["scenario"], map(ExplainedCodes, ranked["hazard_names"])]
+    columns: list[Iterable[AnswerCell]] = [ranked["scenario"], map(ExplainedCodes, ranked["hazard_names"])]
     if SEVERITY_COLUMN in ranked and (ranked[SEVERITY_COLUMN] != "").any():
         heads.append("severity")
         columns.append(

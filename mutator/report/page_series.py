@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from mutator.workspace import Workspace
 
 
-def series_facts(folder: RunFolder) -> dict[str, Any]:
+def series_facts_for_page(folder: RunFolder) -> dict[str, Any]:
     """Whether series are packed, which experiments have their own file, and the columns with the largest
     deviation of each channel, which its curves must have. The page must not request a missing file, because
     the browser's console would show an error.
@@ -24,7 +24,7 @@ def series_facts(folder: RunFolder) -> dict[str, Any]:
     return {"packed": series.is_packed, "kept": series.kept_ids(), "deviations": columns}
 
 
-def write_missing_series(folder: RunFolder, workspace: "Workspace") -> None:
+def write_missing_series_of_traces(folder: RunFolder, workspace: "Workspace") -> None:
     """Write the missing or damaged series of experiments whose traces are kept."""
     traces, series = RunTraces(workspace, folder), SeriesFolder(folder.path)
     for name in sorted(path.name for path in (folder.path / "traces").glob("*")):

@@ -49,10 +49,16 @@ def counts_for_drawing(
 ) -> dict[str, Any]:
     """Return what path_counts.js changes in the drawing to show other counts."""
     return {
-        "active": counts.active,
-        "links": {name: _link_look(counts.passed[name], counts.reached[name]) for name in links},
+        "active": counts.active_fault_count,
+        "links": {
+            name: _link_look(counts.passed_by_link[name], counts.reached_by_link[name]) for name in links
+        },
         "components": {
-            name: _box_look(counts.injected[name], counts.stopped[name], counts.masked[name])
+            name: _box_look(
+                counts.injected_by_component[name],
+                counts.stopped_by_component[name],
+                counts.masked_by_component[name],
+            )
             for name in structure.components
         },
     }
@@ -76,7 +82,7 @@ def _idle_link_svg(arrow: LinkArrow, link: LinkModel) -> Iterator[str]:
 
 
 def _link_svg(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
-    kind, width, share = _link_look(counts.passed[name], counts.reached[name])
+    kind, width, share = _link_look(counts.passed_by_link[name], counts.reached_by_link[name])
     short = _is_short(arrow)
     first, _, last = share.partition(", ") if short else (share, "", "")
     yield (
@@ -107,7 +113,11 @@ def _box_look(injected: int, stopped: int, masked: int) -> tuple[str, str, str]:
 
 
 def _box_svg(name: str, box: ComponentBox, label: str, about: str, counts: PathCounts) -> Iterator[str]:
-    classes, first, last = _box_look(counts.injected[name], counts.stopped[name], counts.masked[name])
+    classes, first, last = _box_look(
+        counts.injected_by_component[name],
+        counts.stopped_by_component[name],
+        counts.masked_by_component[name],
+    )
     middle, top = box.x + box.width / 2, box.y + box.height / 2
     yield (
         f'<a class="{classes}" data-component="{escape(name)}" href="#stopped_at={quote(name)}">'

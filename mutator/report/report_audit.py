@@ -22,10 +22,12 @@ def audit_report(folder: RunFolder, workspace: Workspace | None) -> tuple[int, I
     stored = {name for name in names if not name.startswith(_COMPARISON_PREFIX)} - {
         STAMP_FILE.removeprefix(f"{REPORT_FOLDER}/")
     }
-    return len(stored), _differences(folder, workspace, stored)
+    return len(stored), _differences_from_rebuilt_report(folder, workspace, stored)
 
 
-def _differences(folder: RunFolder, workspace: Workspace | None, stored: set[str]) -> Iterator[MutatorError]:
+def _differences_from_rebuilt_report(
+    folder: RunFolder, workspace: Workspace | None, stored: set[str]
+) -> Iterator[MutatorError]:
     built = build_report(folder, workspace).files
     for name in sorted({*built, *stored}):
         path = path_below(folder.path / REPORT_FOLDER, name)

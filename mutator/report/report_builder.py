@@ -19,7 +19,7 @@ from mutator.report.markdown_and_html import (
     study_html,
     study_markdown,
 )
-from mutator.report.page_series import write_missing_series
+from mutator.report.page_series import write_missing_series_of_traces
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.panels import PANELS, build_study_panels
 from mutator.report.panels.answers_panel import build_answers_panel
@@ -52,7 +52,7 @@ class BuiltReport:
     """
 
     files: Mapping[str, bytes]
-    rows: int
+    experiment_count: int
     summaries: tuple[TextTable, ...]
 
 
@@ -70,11 +70,11 @@ def write_report(run: Path, workspace: Workspace | None) -> WrittenReport:
     """
     folder = RunFolder.open(run)
     if workspace:
-        write_missing_series(folder, workspace)
+        write_missing_series_of_traces(folder, workspace)
     sources = inputs_digest(folder, workspace)
     built = build_report(folder, workspace)
     write_report_files(run, sources, built.files)
-    return _written_report(run, built.rows, built.summaries)
+    return _written_report(run, built.experiment_count, built.summaries)
 
 
 def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
@@ -82,17 +82,17 @@ def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
     reported = ReportedRun.open(folder, workspace)
     with computing_meanwhile(
         lambda: build_list_data(reported), process_count_for(len(reported.results))
-    ) as browse:
-        study = build_study_panels(reported)
-        content = _build_content(replace(reported, is_compared=bool(study)), browse)
-    panels = (*content.panels, *study)
+    ) as wait_for_list_data:
+        study_panels = build_study_panels(reported)
+        content = _build_content(replace(reported, is_compared=bool(study_panels)), wait_for_list_data)
+    panels = (*content.panels, *study_panels)
     files = {name: data for panel in panels for name, data in panel.files.items()}
     files |= {MARKDOWN_FILE: report_markdown(content).encode(), PAGE_FILE: report_html(content).encode()}
-    if study:
-        files |= {"STUDY.md": study_markdown(content, study).encode()}
-        files |= {"study.html": study_html(content, study).encode()}
+    if study_panels:
+        files |= {"STUDY.md": study_markdown(content, study_panels).encode()}
+        files |= {"study.html": study_html(content, study_panels).encode()}
     summaries = tuple(panel.summary for panel in panels if panel.summary)
-    return BuiltReport(files=files, rows=len(reported.results), summaries=summaries)
+    return BuiltReport(files=files, experiment_count=len(reported.results), summaries=summaries)
 
 
 def _written_report(run: Path, rows: int, summaries: tuple[TextTable, ...] = ()) -> WrittenReport:
@@ -100,8 +100,8 @@ def _written_report(run: Path, rows: int, summaries: tuple[TextTable, ...] = ())
     return WrittenReport(markdown=out / MARKDOWN_FILE, page=out / PAGE_FILE, rows=rows, summaries=summaries)
 
 
-def _build_content(run: ReportedRun, browse: Callable[[], ExperimentListData]) -> ReportContent:
-    panels = [panel for panel_of in PANELS if (panel := panel_of(run)) is not None]
+def _build_content(run: ReportedRun, wait_for_list_data: Callable[[], ExperimentListData]) -> ReportContent:
+    panels = [panel for build_panel in PANELS if (panel := build_panel(run)) is not None]
     return ReportContent(
         title=run.folder.head.campaign,
         alarm=run.engine_summary.equivalence_text
@@ -110,10 +110,10 @@ def _build_content(run: ReportedRun, browse: Callable[[], ExperimentListData]) -
         outcome_counts=count_endings(run.results),
         plan_text=_describe_plan(run.folder),
         glossary=glossary_of(run),
-        study_citation=run.published_work.about if run.published_work and run.is_compared else "",
+        study_citation=run.published_work.about if run.published_work and run.has_study_page else "",
         answers=build_answers_panel(run),
         panels=panels,
-        experiment_list=browse(),
+        experiment_list=wait_for_list_data(),
     )
 
 

@@ -10,7 +10,7 @@ from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
-from mutator.report.page_series import series_facts
+from mutator.report.page_series import series_facts_for_page
 from mutator.report.panel import REPORT_FOLDER
 from mutator.store import file_digests
 from mutator.store import series_folder as series_store
@@ -37,14 +37,14 @@ _TOP_NAMES_NOT_READ = {
     *SIGNATURE_FILES,
 }
 _ASSET_SUFFIXES = (".css", ".html", ".js", ".txt")
-_LINKED_SUFFIXES = (".mp4", ".gif")  # the report contains only the names of such files
+_SUFFIXES_WITHOUT_DIGEST = (".mp4", ".gif")  # the report contains only the names of such files
 
 
 def inputs_digest(folder: RunFolder, workspace: Workspace | None) -> str:
     """Return the digest of all inputs of a report, including the sources of mutator."""
     run = folder.path
     series = [
-        series_facts(folder),
+        series_facts_for_page(folder),
         file_digests.sha256_of_file(run / series_store.FOLDER / f"{series_store.INDEX_NAME}.js"),
     ]
     return digest(
@@ -52,7 +52,7 @@ def inputs_digest(folder: RunFolder, workspace: Workspace | None) -> str:
             STAMP_SCHEMA,
             _mutator_digests(),
             run.name,
-            list(_input_files(run)),
+            list(_input_file_digests(run)),
             series,
             _library_digests(folder, workspace),
         ]
@@ -109,7 +109,7 @@ def _mutator_digests() -> object:
     ]
 
 
-def _input_files(run: Path) -> Iterator[tuple[str, str]]:
+def _input_file_digests(run: Path) -> Iterator[tuple[str, str]]:
     """Yield the names and digests of the files that a report can read. What does not belong in a run folder
     is not opened.
     """
@@ -122,7 +122,7 @@ def _input_files(run: Path) -> Iterator[tuple[str, str]]:
         inside = sorted(top.rglob("*")) if top.is_dir() else [top]
         for path in (path for path in inside if not path.is_dir() and not path.name.startswith(".")):
             name = path.relative_to(run).as_posix()
-            yield name, "" if path.suffix in _LINKED_SUFFIXES else file_digests.sha256_of_file(path)
+            yield name, "" if path.suffix in _SUFFIXES_WITHOUT_DIGEST else file_digests.sha256_of_file(path)
 
 
 def _library_digests(folder: RunFolder, workspace: Workspace | None) -> object:

@@ -44,7 +44,7 @@ class ReportedRun:
     published_work: "PublishedWork | None"
     experiment_facts: ExperimentFacts
     engine_summary: EngineSummary | None = None
-    is_compared: bool = False
+    has_study_page: bool = False
     paths: RunFaultPaths | None = None
     source_lines: SourceLines | None = None
     faults: Mapping[str, Fault] = field(default_factory=dict)
@@ -63,13 +63,15 @@ class ReportedRun:
             workspace=workspace,
             results=results,
             frame=prepare_results(
-                results.assign(**{RANK_COLUMN: facts.ranks, UNTIMED_PATH_COLUMN: facts.path_numbers})
+                results.assign(
+                    **{RANK_COLUMN: facts.worst_first_ranks, UNTIMED_PATH_COLUMN: facts.untimed_path_indices}
+                )
             ),
             engine_summary=summarize_engines(folder, records, facts.timings),
             published_work=_find_published_work(folder) if workspace else None,
             experiment_facts=facts,
             faults=faults,
-            paths=RunFaultPaths.of(folder, fault_paths, experiments, records, facts.untimed_paths)
+            paths=RunFaultPaths.of(folder, fault_paths, experiments, records, facts.distinct_untimed_paths)
             if fault_paths
             else None,
             source_lines=SourceLines.of(folder, workspace, results, faults),
@@ -96,7 +98,7 @@ class ReportedRun:
         except (MutatorError, KeyError):
             return ()
 
-    def latest_golden_ends(self) -> dict[str, float] | None:
+    def latest_golden_end_by_scenario(self) -> dict[str, float] | None:
         """Return the latest end of each scenario's golden runs, in simulated seconds; None if one cannot be
         read.
         """

@@ -38,7 +38,7 @@ class LineMark:
     """The worst ending of a line's mutants, the number of mutants with it, and the number of all."""
 
     worst_ending: str
-    worst: int
+    worst_mutant_count: int
     mutant_count: int
 
 
@@ -72,7 +72,7 @@ class SourceLines:
     """
 
     files: tuple[MarkedFile, ...] = ()
-    places: Mapping[str, str] = field(default_factory=dict)
+    path_and_line_by_fault: Mapping[str, str] = field(default_factory=dict)
     change_by_fault: Mapping[str, str]
     reason_without_files: str = ""
 
@@ -158,7 +158,11 @@ def _line_marks(
         yield (
             place,
             lasting,
-            LineMark(worst_ending=ENDINGS_WORST_FIRST[worst], worst=worst_count, mutant_count=len(ranks)),
+            LineMark(
+                worst_ending=ENDINGS_WORST_FIRST[worst],
+                worst_mutant_count=worst_count,
+                mutant_count=len(ranks),
+            ),
         )
 
 

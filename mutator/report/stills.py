@@ -10,7 +10,7 @@ from mutator._common.confined_files import path_below
 from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
-from mutator.report.film import Filming, Shot
+from mutator.report.film import ExperimentFilmer, Shot
 from mutator.results.ranking import ranks_of_rows
 from mutator.results.table_reader import Results
 from mutator.store.planned_experiments import PlannedExperiments
@@ -18,9 +18,9 @@ from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_progress import Progress, StagePace
 from mutator.workspace import Workspace
 
-MOST_EXPERIMENTS = 10
-PLANNED_PER_EXPERIMENT = 20  # small campaigns should not spend most of their time on stills
-BUDGET_S = 120.0  # no further experiment starts after this time
+MOST_FILMED_EXPERIMENTS = 10
+PLANNED_PER_FILMED_EXPERIMENT = 20  # small campaigns should not spend most of their time on stills
+LAST_START_S = 120.0  # no further experiment starts after this time
 
 OnProgress = Callable[[Progress], None]
 
@@ -36,16 +36,16 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, on_pro
     if not missing_stills:
         return ""
     try:
-        filming = Filming.of(workspace, folder)
+        filming = ExperimentFilmer.of(workspace, folder)
     except MutatorError as error:
         return f"{next(iter(missing_stills))}: {error}"
-    deadline = time.monotonic() + BUDGET_S
+    deadline = time.monotonic() + LAST_START_S
 
     def take_and_report_problem(name: str, golden: Future[Path]) -> str:
         if time.monotonic() > deadline:
             return ""
         try:
-            same = filming.take_shots(
+            same = filming.rerun_and_write_shots(
                 experiments[name], records[name], missing_stills[name], golden=golden.result()
             )
         except MutatorError as error:
@@ -56,7 +56,7 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, on_pro
     with ScratchFolder("mutator-stills-") as scratch:
         try:
             experiment_by_golden = {
-                _golden_key(experiments[name]): experiments[name] for name in missing_stills
+                _golden_run_key(experiments[name]): experiments[name] for name in missing_stills
             }
             # golden runs are submitted first; otherwise all threads could wait for one that has not started
             goldens = {
@@ -64,7 +64,7 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, on_pro
                 for key, future in experiment_by_golden.items()
             }
             futures = [
-                pool.submit(take_and_report_problem, name, goldens[_golden_key(experiments[name])])
+                pool.submit(take_and_report_problem, name, goldens[_golden_run_key(experiments[name])])
                 for name in missing_stills
             ]
             pace = StagePace("pictures", len(futures))
@@ -76,7 +76,7 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, on_pro
             pool.shutdown(cancel_futures=True)
 
 
-def _golden_key(experiment: Experiment) -> str:
+def _golden_run_key(experiment: Experiment) -> str:
     return GoldenRun.for_experiment(experiment, several_seeds=True).key
 
 
@@ -93,7 +93,9 @@ def _missing_stills_by_id(
     order = [row for row in ranks_of_rows(frame).argsort() if is_manifested[row]]
     ids = (str(frame["experiment_id"].iloc[row]) for row in order)
     with_pictures = (name for name in ids if change_names & set(experiments[name].changes))
-    worst_ids = islice(with_pictures, min(MOST_EXPERIMENTS, folder.planned_count // PLANNED_PER_EXPERIMENT))
+    worst_ids = islice(
+        with_pictures, min(MOST_FILMED_EXPERIMENTS, folder.planned_count // PLANNED_PER_FILMED_EXPERIMENT)
+    )
     stills_by_id = {name: _missing_stills(folder, name, records[name]) for name in worst_ids}
     return {name: shots for name, shots in stills_by_id.items() if shots}
 

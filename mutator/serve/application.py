@@ -23,7 +23,7 @@ from mutator.serve.page_tokens import HOME_PAGE, PageTokens, review_page_name
 from mutator.serve.report_pages import RunPages
 from mutator.serve.responses import OpenFileResponse, media_type_of, on_error
 from mutator.serve.served_reviews import ServedReviews
-from mutator.serve.served_runs import ServedRuns, open_file, report_address, summarize_run
+from mutator.serve.served_runs import ServedRuns, open_plain_file, report_address, summarize_run
 from mutator.web import asset_names, asset_text
 from mutator.workspace import Workspace
 
@@ -70,7 +70,7 @@ def build_application(site: ServedSite) -> Starlette:
         *_page_routes(site),
         Route("/api/library", _in_thread(lambda _: JSONResponse(form_choices(site.workspace)))),
         Route("/api/runs", _in_thread(lambda _: JSONResponse({"runs": site.summarize_runs()}))),
-        Route("/api/review/{target}", _in_thread(reviews.states)),
+        Route("/api/review/{target}", _in_thread(reviews.group_reviews)),
         Route("/api/review/{target}", _json_post(reviews.decide), methods=["POST"]),
         Route("/api/review/{target}/{group}/changes", _in_thread(reviews.changes_since_decision)),
         Route("/api/review/{target}/{group}/pictures", _in_thread(reviews.picture_levels)),
@@ -126,7 +126,7 @@ def _page_routes(site: ServedSite) -> list[Route]:
         if trial_name is None:
             raise NotServed("no such plot")
         return OpenFileResponse(
-            open_file(site.runs.folder_for_new_runs, f"{TRIALS_FOLDER}/{trial_name[0]}/{_PLOT_FILE}"),
+            open_plain_file(site.runs.folder_for_new_runs, f"{TRIALS_FOLDER}/{trial_name[0]}/{_PLOT_FILE}"),
             _PLOT_FILE,
         )
 

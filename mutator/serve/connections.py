@@ -15,7 +15,7 @@ _MOST_CONNECTIONS = 100  # connections; a browser opens six
 _DESCRIPTORS_PER_CONNECTION = 4  # the others are for files of runs, pipes of jobs and caches
 
 
-class Connection(H11Protocol):
+class LimitedConnection(H11Protocol):
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self._opened_at = self.loop.time()
@@ -24,7 +24,7 @@ class Connection(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
         self._expect_request()
-        others = [cast(Connection, other) for other in self.connections if other is not self]
+        others = [cast(LimitedConnection, other) for other in self.connections if other is not self]
         others = [other for other in others if not other.transport.is_closing()]
         if len(others) >= _most_connections():
             min(others, key=lambda other: (other._is_answering, other._opened_at)).transport.abort()

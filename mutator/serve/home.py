@@ -15,7 +15,9 @@ _MOST_PAIRS = 20  # pairs of runs offered for comparison
 
 def home_page(workspace: Workspace, runs: Sequence[Mapping[str, Any]], token: str) -> str:
     targets = tuple(workspace.targets)
-    return _render_page("home.html", runs=runs, pairs=_comparable_pairs(runs), targets=targets, token=token)
+    return _render_page(
+        "home.html", runs=runs, pairs=_consecutive_comparable_pairs(runs), targets=targets, token=token
+    )
 
 
 def error_page(facts: Mapping[str, Any]) -> str:
@@ -42,7 +44,7 @@ def form_choices(workspace: Workspace) -> dict[str, Any]:
     return choices
 
 
-def _comparable_pairs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
+def _consecutive_comparable_pairs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
     """Return pairs of consecutive runs with the same campaign and target."""
     latest: dict[tuple[str, str], str] = {}
     pairs = []

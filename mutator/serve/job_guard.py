@@ -10,13 +10,13 @@ import sys
 
 from mutator.engines.in_target import process_guard
 
-PATIENCE_S = 20.0  # a command's time to clean up workers, scratch folders and half-written files
+MOST_CLEANUP_S = 20.0  # a command's time to clean up workers, scratch folders and half-written files
 
 
 def main() -> int:
     """Run the command; return its exit code, or 128 plus the signal that ended it."""
     server_pipe = int(sys.argv[1])
-    child_end = process_guard.fork_guarded(server_pipe, patience_s=PATIENCE_S)
+    child_end = process_guard.fork_guarded(server_pipe, patience_s=MOST_CLEANUP_S)
     if child_end is None:
         os.close(server_pipe)
         os.execv(sys.executable, [sys.executable, "-P", "-m", "mutator", *sys.argv[2:]])

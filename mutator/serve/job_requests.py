@@ -101,7 +101,7 @@ class JobCommand:
 
     order: JobRequest
     title: str
-    words: tuple[str, ...]
+    argv: tuple[str, ...]
     run_folder: Path | None = None
     requesting_run: Path | None = None  # the run whose report can request it
     result_address: str | None = None  # the page with the result
@@ -151,7 +151,7 @@ class RequestChecker:
         return JobCommand(
             order=request,
             title=f"{request.experiment} of {request.run}: {what}",
-            words=(*arguments, f"--run={folder}", *self._workspace_options()),
+            argv=(*arguments, f"--run={folder}", *self._workspace_options()),
             run_folder=folder,
             requesting_run=folder,
             result_address=f"{report_address(request.run)}#e={request.experiment}",
@@ -164,7 +164,7 @@ class RequestChecker:
         return JobCommand(
             order=request,
             title=title,
-            words=arguments,
+            argv=arguments,
             run_folder=folder,
             requesting_run=folder,
             result_address=result,
@@ -196,7 +196,7 @@ class RequestChecker:
         }
         arguments = ("try", request.spec, *_joined_options(options), *self._workspace_options())
         return JobCommand(
-            order=request, title=f"{request.spec} in {request.scenario}, {request.trigger}", words=arguments
+            order=request, title=f"{request.spec} in {request.scenario}, {request.trigger}", argv=arguments
         )
 
     def _campaign_command(self, request: CampaignRequest) -> JobCommand:
@@ -215,7 +215,7 @@ class RequestChecker:
         return JobCommand(
             order=request,
             title=f"{request.campaign} into {request.name}",
-            words=("run", request.campaign, *_joined_options(options), *self._workspace_options()),
+            argv=("run", request.campaign, *_joined_options(options), *self._workspace_options()),
             run_folder=folder,
         )
 

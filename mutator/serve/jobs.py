@@ -20,7 +20,7 @@ from mutator.errors import JobEnded, MutatorError, NotServed
 from mutator.execution.progress_text import describe_outcomes
 from mutator.serve.job_events import EventReader, FileEvent, JobEvent, PhaseEvent
 from mutator.serve.job_requests import TRIALS_FOLDER, JobCommand
-from mutator.serve.responses import without_folders
+from mutator.serve.responses import without_absolute_folders
 
 _GUARD_MODULE = "mutator.serve.job_guard"
 _OUTPUT_COLUMNS = "200"  # line width of a job's output; pages wrap the lines
@@ -199,7 +199,7 @@ class ServeJobs:
                 return None
             try:
                 process = subprocess.Popen(
-                    [sys.executable, "-P", "-m", _GUARD_MODULE, str(guard_end), *job.work.words],
+                    [sys.executable, "-P", "-m", _GUARD_MODULE, str(guard_end), *job.work.argv],
                     pass_fds=[guard_end, events],
                     env={**os.environ, "COLUMNS": _OUTPUT_COLUMNS, EVENTS_FD_VARIABLE: str(events)},
                     stdin=subprocess.DEVNULL,
@@ -262,7 +262,7 @@ def _printable_bytes(data: bytes | bytearray) -> str:
 
 
 def _printable_text(text: str) -> str:
-    text = without_folders(_ESCAPE_CODE_PATTERN.sub("", text))
+    text = without_absolute_folders(_ESCAPE_CODE_PATTERN.sub("", text))
     return "".join(c for c in text if c.isprintable() or c in "\n\t")
 
 

@@ -20,12 +20,12 @@ class ReviewApi:
     def __init__(self, reviews: ServedReviews, runs: ServedRuns, tokens: PageTokens) -> None:
         self._reviews, self._runs, self._tokens = reviews, runs, tokens
 
-    def states(self, request: Request) -> Response:
-        return JSONResponse(self._reviews.states(selected_groups(self._reviews, request)))
+    def group_reviews(self, request: Request) -> Response:
+        return JSONResponse(self._reviews.group_reviews(selected_groups(self._reviews, request)))
 
     def decide(self, request: Request, body: bytes) -> Response:
         """Save decisions, remarks and flags: all or none. Only the target's review page can send them."""
-        self._tokens.check(_token_of(request), review_page_name(request.path_params["target"]))
+        self._tokens.check_page(_token_of(request), review_page_name(request.path_params["target"]))
         selection, decisions = (
             selected_groups(self._reviews, request),
             SentDecisions.model_validate_json(body),
@@ -45,11 +45,11 @@ class ReviewApi:
         """Return a group's results in a run; null if the run does not have the group."""
         run = self._runs.folder(request.query_params.get("run", ""))
         selection = selected_groups(self._reviews, request)
-        return JSONResponse(self._reviews.typical(selection, request.path_params["group"], run))
+        return JSONResponse(self._reviews.typical_results(selection, request.path_params["group"], run))
 
     def picture_levels(self, request: Request) -> Response:
         selection = selected_groups(self._reviews, request)
-        return JSONResponse({"levels": self._reviews.levels(selection, request.path_params["group"])})
+        return JSONResponse({"levels": self._reviews.picture_levels(selection, request.path_params["group"])})
 
     def picture_before(self, request: Request) -> Response:
         return self._picture(request, after=False)
@@ -93,7 +93,7 @@ class JobApi:
 
     def _check_token(self, request: Request, command: JobCommand) -> None:
         pages = [run_page_name(command.requesting_run)] if command.requesting_run else []
-        self._tokens.check(_token_of(request), HOME_PAGE, *pages)
+        self._tokens.check_page(_token_of(request), HOME_PAGE, *pages)
 
 
 def _token_of(request: Request) -> str:
@@ -115,4 +115,6 @@ def selected_groups(reviews: ServedReviews, request: Request) -> GroupSelection:
     specs = [value for name, value in parameters if name == "spec"]
     if len(campaigns) > 1:
         raise MutatorError("several campaigns in the address", expected="one campaign")
-    return reviews.select(request.path_params["target"], campaigns[0] if campaigns else None, specs)
+    return reviews.checked_selection(
+        request.path_params["target"], campaigns[0] if campaigns else None, specs
+    )

@@ -27,7 +27,7 @@ class PageTokens:
         # names of folders need not be valid UTF-8
         return hmac.new(self._key, page.encode("utf-8", "surrogateescape"), hashlib.sha256).hexdigest()
 
-    def check(self, token: str, *pages: str) -> None:
+    def check_page(self, token: str, *pages: str) -> None:
         """Raise UnknownPage unless the token is that of one of these pages."""
         if not any(hmac.compare_digest(self.token_of(page).encode(), token.encode()) for page in pages):
             raise PageRefused(

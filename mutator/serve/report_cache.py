@@ -24,16 +24,18 @@ class ReportCache:
     def __init__(self) -> None:
         self._memory: dict[str, Mapping[str, bytes]] = {}
 
-    def report_file(self, key: str, name: str, build: Callable[[], Mapping[str, bytes]]) -> bytes | None:
+    def cached_or_built_file(
+        self, inputs_digest: str, name: str, build: Callable[[], Mapping[str, bytes]]
+    ) -> bytes | None:
         """Return a file of a report, or None if it has no such file. `build` builds a report that is not
         cached.
         """
-        files = self._memory.pop(key, None) or _read_cached(key)
+        files = self._memory.pop(inputs_digest, None) or _read_cached(inputs_digest)
         if files is None:
             files = build()
             with suppress(OSError, MutatorError):  # the cache cannot be written
-                _write_cached(key, files)
-        self._memory[key] = files
+                _write_cached(inputs_digest, files)
+        self._memory[inputs_digest] = files
         for old in list(self._memory)[:-_MOST_IN_MEMORY]:
             del self._memory[old]
         return files.get(name)

@@ -21,7 +21,7 @@ from mutator.results.table_reader import Results
 from mutator.serve.page_tokens import PageTokens, run_page_name
 from mutator.serve.report_cache import ReportCache
 from mutator.serve.responses import UNTRUSTED_FILE_HEADERS, OpenFileResponse, media_type_of
-from mutator.serve.served_runs import ServedRuns, open_in_run
+from mutator.serve.served_runs import ServedRuns, open_served_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import read_script, script_bytes
 from mutator.web import load_order
@@ -53,7 +53,7 @@ class RunPages:
             return Response(
                 _read_series_script(run, name), media_type=media_type_of(name), headers=UNTRUSTED_FILE_HEADERS
             )
-        return OpenFileResponse(open_in_run(run, name), name)
+        return OpenFileResponse(open_served_file(run, name), name)
 
     def comparison_file(self, a: str, b: str, name: str) -> Response:
         """Open a file of a comparison of two runs; MutatorError if they cannot be compared."""
@@ -77,7 +77,7 @@ class RunPages:
         folder = RunFolder.open(run)
         with self._page_lock:
             key = inputs_digest(folder, self._workspace)
-            data = self._reports.report_file(key, name, lambda: self._build_report_files(folder))
+            data = self._reports.cached_or_built_file(key, name, lambda: self._build_report_files(folder))
         if data is None:
             raise NotServed("no such file", expected="a file of the report")
         if not name.endswith(".html"):
@@ -119,7 +119,7 @@ class RunPages:
 def _read_series_script(run: Path, name: str) -> bytes:
     """Read a script of series; Absent unless it equals the output of `write_script` for the same data."""
     path = run / name
-    with open_in_run(run, name) as file:
+    with open_served_file(run, name) as file:
         data = read_open_file(file, path)
     try:
         if script_bytes(path.stem, read_script(path)) == data:

@@ -54,7 +54,7 @@ def media_type_of(name: str) -> str:
     return _MEDIA_TYPES[Path(name).suffix]
 
 
-def without_folders(text: str) -> str:
+def without_absolute_folders(text: str) -> str:
     """Shorten absolute paths in a text."""
     for folder, instead in ((Path.cwd(), ""), (Path.home(), "/_/"), (Path(tempfile.gettempdir()), "/_/")):
         if folder != Path("/"):
@@ -65,7 +65,9 @@ def without_folders(text: str) -> str:
 def error_facts(error: MutatorError) -> dict[str, Any]:
     place = error.where or error.argument
     parts = {"got": error.got, "where": place, "expected": error.expected, "remedy": error.remedy}
-    facts: dict[str, Any] = {name: without_folders(text) if text else None for name, text in parts.items()}
+    facts: dict[str, Any] = {
+        name: without_absolute_folders(text) if text else None for name, text in parts.items()
+    }
     if error.where and error.line is not None:
         facts["where"] += f":{error.line}"
     return {"error": facts}

@@ -71,7 +71,7 @@ class ServedReviews:
     def reviewer(self) -> str:
         return find_user_name(self.workspace.library) or ""
 
-    def select(self, target: str, campaign: str | None, specs: Sequence[str]) -> GroupSelection:
+    def checked_selection(self, target: str, campaign: str | None, specs: Sequence[str]) -> GroupSelection:
         if target not in self.workspace.targets:
             raise NotServed(f"no target '{target}'", expected=f"one of {', '.join(self.workspace.targets)}")
         if campaign is not None and campaign not in self.workspace.campaigns:
@@ -89,7 +89,7 @@ class ServedReviews:
 
     def groups(self, selection: GroupSelection) -> tuple[Group, ...]:
         with self._groups_lock:
-            stamp = self._input_files(selection.target)
+            stamp = self._input_file_stamps(selection.target)
             if (cached := self._cached_groups.pop(selection, None)) is None or cached[0] != stamp:
                 cached = stamp, self._build_groups(selection)
             self._cached_groups[selection] = cached
@@ -117,12 +117,16 @@ class ServedReviews:
         }
         return review_page_html(review, review.in_list_order(groups), selection.cli_options, page_settings)
 
-    def states(self, selection: GroupSelection) -> dict[str, Any]:
+    def group_reviews(self, selection: GroupSelection) -> dict[str, Any]:
         groups = self.groups(
             selection
         )  # first, because this can take seconds, and others can decide meanwhile
         review = load_review(self.workspace, selection.target)
-        return {"target": selection.target, "by": self.reviewer, "groups": _states(review, groups)}
+        return {
+            "target": selection.target,
+            "by": self.reviewer,
+            "groups": _review_json_by_group(review, groups),
+        }
 
     def decide(self, selection: GroupSelection, decisions: SentDecisions) -> dict[str, Any]:
         """Save all changes or none; GroupsChanged if a group or a diff was changed elsewhere."""
@@ -154,8 +158,12 @@ class ServedReviews:
             review = record_actions(self.workspace, selection.target, changes, decisions.seen)
         except ReviewConflict as conflict:
             others = [group_by_id[name] for name in conflict.groups]
-            raise GroupsChanged(conflict.got, _states(conflict.review, others)) from None
-        return {"target": selection.target, "by": self.reviewer, "groups": _states(review, changed_groups)}
+            raise GroupsChanged(conflict.got, _review_json_by_group(conflict.review, others)) from None
+        return {
+            "target": selection.target,
+            "by": self.reviewer,
+            "groups": _review_json_by_group(review, changed_groups),
+        }
 
     def diff_since_decision(self, selection: GroupSelection, name: str) -> str:
         return load_review(self.workspace, selection.target).diff_since_decision(self.group(selection, name))
@@ -173,7 +181,7 @@ class ServedReviews:
             )
         return before_and_after[after]
 
-    def levels(self, selection: GroupSelection, name: str) -> list[dict[str, str]]:
+    def picture_levels(self, selection: GroupSelection, name: str) -> list[dict[str, str]]:
         """Return the levels that have frames, with their values as text."""
         manifest, group = self.workspace.manifest(selection.target), self.group(selection, name)
         pictures_of_group = effect_pictures.pictures_of_groups(self.workspace, manifest, [group]).get(name)
@@ -183,7 +191,7 @@ class ServedReviews:
             else []
         )
 
-    def typical(self, selection: GroupSelection, name: str, run: Path) -> dict[str, Any] | None:
+    def typical_results(self, selection: GroupSelection, name: str, run: Path) -> dict[str, Any] | None:
         """Return the group's results in a run; None if the run does not have the group."""
         folder, group = RunFolder.open(run), self.group(selection, name)
         if folder.head.target != selection.target:
@@ -194,7 +202,7 @@ class ServedReviews:
     def _check_diffs_unchanged(
         self, selection: GroupSelection, groups: Sequence[Group], digests: Mapping[str, str]
     ) -> None:
-        current_states = _states(load_review(self.workspace, selection.target), groups)
+        current_states = _review_json_by_group(load_review(self.workspace, selection.target), groups)
         changed_states = {
             name: facts
             for name, facts in current_states.items()
@@ -215,17 +223,17 @@ class ServedReviews:
             raise NotServed(f"campaign '{selection.campaign}' belongs to target '{plan.campaign.target}'")
         return mutant_groups.groups_of_plan(workspace, plan)
 
-    def _input_files(self, target: str) -> object:
+    def _input_file_stamps(self, target: str) -> object:
         manifest = self.workspace.manifest(target)
         places = (self.workspace.library, self.workspace.templates, manifest.root)
-        return [_files_in(place) for place in places]
+        return [_file_stamps_in(place) for place in places]
 
 
-def _states(review: Review, groups: Iterable[Group]) -> dict[str, Any]:
+def _review_json_by_group(review: Review, groups: Iterable[Group]) -> dict[str, Any]:
     return {group.id: review_as_json(review, group) for group in groups}
 
 
-def _files_in(root: Path) -> list[tuple[str, int, int]]:
+def _file_stamps_in(root: Path) -> list[tuple[str, int, int]]:
     files = []
     for folder, subfolders, names in os.walk(root):
         subfolders[:] = sorted({*subfolders} - _SKIPPED_FOLDERS)

@@ -17,7 +17,7 @@ from mutator.store.run_folder import RunFolder
 
 REPORT_PAGE = "report/index.html"
 # folder in a run folder -> served file types
-SERVED_SUFFIXES: Mapping[str, tuple[str, ...]] = {
+SERVED_SUFFIXES_BY_FOLDER: Mapping[str, tuple[str, ...]] = {
     "": (".csv",),
     "plots": (".svg", ".png", ".jpg", ".mp4", ".gif"),
     "series": (".js",),
@@ -104,15 +104,15 @@ def _count_outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
     return count_endings(Results(run).frame("status", "outcome"))
 
 
-def open_in_run(run: Path, name: str) -> BinaryIO:
+def open_served_file(run: Path, name: str) -> BinaryIO:
     """Open a file of a run; Absent if it is not served."""
     folder, _, last = name.rpartition("/")
-    if Path(last).suffix not in SERVED_SUFFIXES.get(folder, ()):
+    if Path(last).suffix not in SERVED_SUFFIXES_BY_FOLDER.get(folder, ()):
         raise _no_such_file()
-    return open_file(run, name)
+    return open_plain_file(run, name)
 
 
-def open_file(root: Path, name: str) -> BinaryIO:
+def open_plain_file(root: Path, name: str) -> BinaryIO:
     """Open a file below a folder without following links; Absent if there is no plain file."""
     try:
         return open_below(root, name)

@@ -8,7 +8,7 @@ import uvicorn
 
 from mutator.errors import MutatorError
 from mutator.serve.application import ServedSite, build_application
-from mutator.serve.connections import Connection
+from mutator.serve.connections import LimitedConnection
 from mutator.serve.security import HOST, GuardedApplication
 
 _BACKLOG = 64  # connections to accept at once
@@ -34,7 +34,7 @@ def serve(site: ServedSite, *, port: int, on_ready: Callable[[str], None]) -> No
 def build_server(site: ServedSite, *, port: int, token: str) -> uvicorn.Server:
     config = uvicorn.Config(
         GuardedApplication(build_application(site), port=port, token=token),
-        http=Connection,
+        http=LimitedConnection,
         backlog=_BACKLOG,
         access_log=False,  # the log would show the token
         log_level="error",

@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from mutator.reference.generated_files import SCHEMAS_FOLDER
-from mutator.reference.json_schemas import file_formats
+from mutator.reference.json_schemas import yaml_formats
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
@@ -266,7 +266,7 @@ def test_the_guide_has_editor_settings_for_every_schema() -> None:
     [settings] = [json.loads(text) for _, kind, text in FENCE.findall(page) if kind == "json"]
     expected = {
         f"./{SCHEMAS_FOLDER.as_posix()}/{kind.name}.json": kind.files_glob
-        for kind in file_formats(Workspace.find(root=CLONE).readings())
+        for kind in yaml_formats(Workspace.find(root=CLONE).readings())
     }
     expected[f"./{SCHEMAS_FOLDER.as_posix()}/scenario.json"] = "fault_library/scenarios/*.yaml"
     assert settings["yaml.schemas"] == expected

@@ -138,7 +138,7 @@ def test_output_to_a_pipe_is_folded_at_100_columns_by_default(
     if columns:
         monkeypatch.setenv("COLUMNS", columns)
     terminal = Terminal()
-    terminal.say(LONG)
+    terminal.print_text(LONG)
     terminal.print_note(LONG)
     terminal.print_error(LONG)
     out, err = capsys.readouterr()
@@ -146,7 +146,7 @@ def test_output_to_a_pipe_is_folded_at_100_columns_by_default(
         assert len(line) <= width
     assert max(map(len, out.splitlines())) > width - 20
     assert " ".join(out.split()) == LONG
-    terminal.say(LONG, whole=True)
+    terminal.print_text(LONG, without_folding=True)
     terminal.print_table(["a", "b"], [(LONG, COMMAND)])
     whole = capsys.readouterr().out.splitlines()
     assert whole[0] == LONG
@@ -156,7 +156,7 @@ def test_output_to_a_pipe_is_folded_at_100_columns_by_default(
 def test_output_to_a_terminal_is_folded_at_its_width(
     capsys: pytest.CaptureFixture[str], terminal: None
 ) -> None:
-    Terminal().say(f"{LONG}; or {COMMAND}")
+    Terminal().print_text(f"{LONG}; or {COMMAND}")
     lines = ANSI.sub("", capsys.readouterr().out).splitlines()
     assert all(len(line) <= 120 for line in lines)
     assert " ".join(" ".join(lines).split()) == f"{LONG}; or {COMMAND}"
@@ -171,7 +171,7 @@ def test_json_is_never_folded(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPa
 
 def test_no_text_controls_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     terminal = Terminal()
-    terminal.say("kernel \x1b[2J\x9b1m\r\tx")
+    terminal.print_text("kernel \x1b[2J\x9b1m\r\tx")
     terminal.print_table(["a"], [["\x1b]0;x\x07"]])
     terminal.print_error("\x08")
     out, err = capsys.readouterr()

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from mutator._common.files import is_half_written
-from mutator.serve.job_guard import PATIENCE_S
+from mutator.serve.job_guard import MOST_CLEANUP_S
 from mutator.workspace import Workspace
 
 CAMPAIGN = {"kind": "campaign", "campaign": "toy", "name": "new", "limit": 6, "workers": 2}
@@ -134,7 +134,7 @@ def kill(server: Server, number: int) -> int:
     pids = descendants(server.process.pid)
     server.process.send_signal(number)
     server.process.wait()
-    wait_until_gone(pids, PATIENCE_S + 10)
+    wait_until_gone(pids, MOST_CLEANUP_S + 10)
     assert server.token not in (server.folder / "stderr").read_text()
     return len(pids)
 

@@ -37,9 +37,9 @@ def build_study_panels(run: ReportedRun) -> tuple[Panel, ...]:
     if not run.published_work:
         return ()
     with STUDIES.blaming_package(run.folder.head.study or ""):
-        panels = [panel for panel_of in run.published_work.panels if (panel := panel_of(run))]
+        panels = [panel for build_panel in run.published_work.panels if (panel := build_panel(run))]
         general_panels = (
-            (tables_panel.build_published_panel(run), figures_panel.build_study_figures_panel(run))
+            (tables_panel.build_published_comparison_panel(run), figures_panel.build_study_figures_panel(run))
             if panels
             else ()
         )

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from markupsafe import Markup
 
 from mutator._common.table_rendering import TextTable
-from mutator.report.answer_parts import AnswerTable, Cell, ExplainedCodes, PageLink, ShareBar
+from mutator.report.answer_parts import AnswerCell, AnswerTable, ExplainedCodes, PageLink, ShareBar
 from mutator.report.answers import build_answers
-from mutator.report.glossary import Glossary, code_meanings
+from mutator.report.glossary import Glossary, code_meanings_by_column
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 
@@ -41,8 +41,8 @@ def build_answers_panel(run: ReportedRun) -> Panel:
     for answer in answers:
         tables = [_plain_table(table).as_markdown() for table in answer.tables if table.rows]
         parts += [f"## {answer.title}", answer.paragraph, *tables]
-    columns = [[a for a in answers if a.is_wide], [a for a in answers if not a.is_wide]]
-    meanings = code_meanings(run)
+    columns = [[a for a in answers if a.has_wide_tables], [a for a in answers if not a.has_wide_tables]]
+    meanings = code_meanings_by_column(run)
     html = rendered(_HTML_TEMPLATE, columns=columns, table=lambda listing: _table_html(listing, meanings))
     return Panel(anchor="answers", link="Answers", markdown="\n\n".join(parts), html=html)
 
@@ -64,7 +64,7 @@ def _table_html(answer_table: AnswerTable, meanings: Glossary) -> Markup:
     return TextTable(heads=answer_table.heads, rows=rows).as_html("plain")
 
 
-def _labelled_cell_html(head: str, cell: Cell, meanings: Mapping[str, str]) -> str:
+def _labelled_cell_html(head: str, cell: AnswerCell, meanings: Mapping[str, str]) -> str:
     html = (
         _explained_cell_html(cell, meanings) if isinstance(cell, str | ExplainedCodes) else _cell_html(cell)
     )
@@ -80,7 +80,7 @@ def _explained_cell_html(cell: str | ExplainedCodes, meanings: Mapping[str, str]
     return Markup('<abbr title="{}">{}</abbr>').format(about, text) if about else text
 
 
-def _cell_html(cell: Cell) -> str:
+def _cell_html(cell: AnswerCell) -> str:
     if isinstance(cell, PageLink):
         text = Markup("<wbr>").join(re.split(r"(?<=[/_])", cell.text))  # long names can break here
         return Markup('<a href="#{}">{}</a>').format(cell.fragment, text)

@@ -66,7 +66,9 @@ def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the counts of links and components; None if no path is known."""
     paths = run.paths
     counts = (
-        path_counts_by_fault_type(fault_types_of(run.results), run.experiment_facts.path_numbers, paths)
+        path_counts_by_fault_type(
+            fault_types_of(run.results), run.experiment_facts.untimed_path_indices, paths
+        )
         if paths
         else {}
     )
@@ -103,12 +105,12 @@ def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
     return Panel(anchor="fault-paths", link="Fault paths", markdown="\n\n".join(parts), html=html)
 
 
-Links = Mapping[str, tuple[str, str, str]]  # tail, tip, and what the link carries
+LinkPartsByName = Mapping[str, tuple[str, str, str]]  # tail, tip, and what the link carries
 
 
-def _links_in_order(paths: RunFaultPaths) -> Links:
+def _links_in_order(paths: RunFaultPaths) -> LinkPartsByName:
     """Return the links that occur in any path, in the order of the control structure."""
-    links = {c.name: c for untimed_path in paths.untimed_paths for c in untimed_path.links}
+    links = {c.name: c for untimed_path in paths.distinct_untimed_paths for c in untimed_path.links}
     structure = paths.fault_paths.structure
     structure_links = structure.links if structure else {}
     order = [
@@ -125,16 +127,16 @@ def _links_in_order(paths: RunFaultPaths) -> Links:
     }
 
 
-def _links_table(links: Links, counts: PathCounts, paths: RunFaultPaths) -> TextTable:
+def _links_table(links: LinkPartsByName, counts: PathCounts, paths: RunFaultPaths) -> TextTable:
     rows = [
         (
             paths.component_label(tail),
             paths.component_label(tip),
             carries,
-            describe_passed_share(counts.passed[name], came),
+            describe_passed_share(counts.passed_by_link[name], came),
         )
         for name, (tail, tip, carries) in links.items()
-        if (came := counts.reached[name])
+        if (came := counts.reached_by_link[name])
     ]
     return TextTable(
         heads=("from", "to", "what it carries", "got through, of those that reached it"), rows=rows
@@ -146,7 +148,7 @@ def _masked_faults_table(counts: Mapping[str, PathCounts], paths: RunFaultPaths)
     them. None if no fault was masked.
     """
     ends = sorted(
-        counts[ALL_FAULT_TYPES].masked_by_components,
+        counts[ALL_FAULT_TYPES].masked_by_component_set,
         key=lambda names: (len(names), list(map(paths.component_label, names))),
     )
     if not ends:
@@ -161,8 +163,8 @@ def _masked_faults_table(counts: Mapping[str, PathCounts], paths: RunFaultPaths)
     rows: list[Sequence[str]] = [
         (
             kind,
-            *map(str, (counts[kind].active, counts[kind].masked_by_components.total())),
-            *(str(counts[kind].masked_by_components[names]) for names in ends),
+            *map(str, (counts[kind].active_fault_count, counts[kind].masked_by_component_set.total())),
+            *(str(counts[kind].masked_by_component_set[names]) for names in ends),
         )
         for kind in order
     ]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from mutator.model import OPERATORS_MODULE
 from mutator.outcomes.fault_free_runs import alerts_by_drive
 from mutator.report.panel import Panel, rendered
-from mutator.report.panels.tables_panel import sheet_files
+from mutator.report.panels.tables_panel import sheet_csv_and_markdown_files
 from mutator.report.reported_run import ReportedRun
 from mutator.statistics.mutation_score import mutation_score_sheet
 from mutator.statistics.statistics_sheet import Sheet
@@ -36,7 +36,10 @@ def build_mutation_score_panel(run: ReportedRun) -> Panel | None:
         run.folder.head.operators,
     )
     html = rendered(
-        _HTML_TEMPLATE, score=score, general=_score_part(score, False), functions=_score_part(score, True)
+        _HTML_TEMPLATE,
+        score=score,
+        general=_select_score_lines(score, False),
+        functions=_select_score_lines(score, True),
     )
     return Panel(
         anchor="score",
@@ -44,10 +47,10 @@ def build_mutation_score_panel(run: ReportedRun) -> Panel | None:
         markdown=score.as_markdown().rstrip(),
         html=html,
         style="report/source.css",
-        files=sheet_files([score]),
+        files=sheet_csv_and_markdown_files([score]),
     )
 
 
-def _score_part(score: Sheet, of_functions: bool) -> Sheet:
+def _select_score_lines(score: Sheet, of_functions: bool) -> Sheet:
     """Return the lines of functions if `of_functions`; otherwise all other lines."""
     return replace(score, lines=tuple(line for line in score.lines if ("::" in str(line[0])) == of_functions))

@@ -61,7 +61,7 @@ def _provenance_facts(run: ReportedRun) -> list[tuple[str, str]]:
     chosen = without_keys(head.as_json(), UNSEALED_KEYS[HEAD])["choices"]
     facts = {
         "experiments": f"{len(run.results)} of {folder.planned_count} planned",
-        **({"proof": run.engine_summary.equivalence_state} if run.engine_summary else {}),
+        **({"proof": run.engine_summary.equivalence_in_brief} if run.engine_summary else {}),
         **({"reviewed": reviewed} if reviewed else {}),
         **digests_or_why_no_seal(folder),
         "campaign": head.campaign,
@@ -87,7 +87,7 @@ def _study_fact(run: ReportedRun) -> dict[str, str]:
         return {}
     if run.published_work and run.workspace:
         problems = study_problems(name, run.published_work, run.workspace)
-        not_compared = "" if run.is_compared else "; these results cannot be compared with it"
+        not_compared = "" if run.has_study_page else "; these results cannot be compared with it"
         why = (
             f"; problem with its data (see `mutator check`): {problems[0].got}" if problems else not_compared
         )

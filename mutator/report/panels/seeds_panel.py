@@ -2,7 +2,7 @@
 
 from mutator._common.table_rendering import TextTable
 from mutator.report.panel import Panel, rendered
-from mutator.report.panels.tables_panel import sheet_files
+from mutator.report.panels.tables_panel import sheet_csv_and_markdown_files
 from mutator.report.reported_run import ReportedRun
 from mutator.statistics.seed_spread import ALL_FAULTS, seeds_by_fault_type_sheet, seeds_of, seeds_sheet
 from mutator.statistics.statistics_sheet import Sheet, cell_text
@@ -35,7 +35,7 @@ def build_seeds_panel(run: ReportedRun) -> Panel | None:
         markdown=markdown,
         html=html,
         summary=_summary_table(sheets[0]),
-        files=sheet_files(sheets),
+        files=sheet_csv_and_markdown_files(sheets),
     )
 
 

@@ -114,7 +114,7 @@ def _worst_lines_table(files: Sequence[MarkedFile]) -> TextTable:
 
 
 def _describe_mark(mark: LineMark) -> str:
-    return f"{_ENDING_MEANINGS[mark.worst_ending].partition(':')[0]} {mark.worst}/{mark.mutant_count}"
+    return f"{_ENDING_MEANINGS[mark.worst_ending].partition(':')[0]} {mark.worst_mutant_count}/{mark.mutant_count}"
 
 
 def _rows_html(file: MarkedFile) -> Markup:
@@ -141,8 +141,8 @@ def _row_html(file: MarkedFile, line: int, text: Markup) -> Markup:
 
 
 def _mark_html(mark: LineMark, line: int, place: str, lasting: str) -> Markup:
-    share = f"{mark.worst}/{mark.mutant_count}"
-    words = f"line {line}, {lasting}: {_ENDING_MEANINGS[mark.worst_ending]} for {mark.worst} of "
+    share = f"{mark.worst_mutant_count}/{mark.mutant_count}"
+    words = f"line {line}, {lasting}: {_ENDING_MEANINGS[mark.worst_ending]} for {mark.worst_mutant_count} of "
     words += counted(mark.mutant_count, "mutant")
     query = _search_fragment(place, f"lasting={lasting}")
     return _MARK_HTML.format(

@@ -67,7 +67,7 @@ def build_tables_panel(run: ReportedRun) -> Panel:
     """
     runs = run.fault_free_runs()
     golden_alerts_note = fault_free_alerts_note(runs)
-    statistic_sheets = () if run.is_compared else _statistic_sheets(run, None)
+    statistic_sheets = () if run.has_study_page else _statistic_sheets(run, None)
     counts, sheets = (
         _count_tables(run),
         [
@@ -96,11 +96,11 @@ def build_tables_panel(run: ReportedRun) -> Panel:
         link="Tables",
         markdown="\n\n".join(parts),
         html=html,
-        files=sheet_files(sheets),
+        files=sheet_csv_and_markdown_files(sheets),
     )
 
 
-def build_published_panel(run: ReportedRun) -> Panel | None:
+def build_published_comparison_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of the run's statistics next to the published ones of its study; None if there are
     none.
     """
@@ -112,7 +112,13 @@ def build_published_panel(run: ReportedRun) -> Panel | None:
     title = "Tables next to the published ones"
     markdown = "\n\n".join([f"## {title}", *(f"#{sheet.as_markdown().rstrip()}" for sheet in sheets)])
     html = rendered(_HTML_TEMPLATE, title=title, counts=(), fault_free=None, sheets=sheets)
-    return Panel(anchor="tables", link="Tables", markdown=markdown, html=html, files=sheet_files(sheets))
+    return Panel(
+        anchor="tables",
+        link="Tables",
+        markdown=markdown,
+        html=html,
+        files=sheet_csv_and_markdown_files(sheets),
+    )
 
 
 def _count_tables(run: ReportedRun) -> list[tuple[str, TextTable]]:
@@ -126,8 +132,8 @@ def _count_tables(run: ReportedRun) -> list[tuple[str, TextTable]]:
 
 
 def _statistic_sheets(run: ReportedRun, published: PublishedCounts | None) -> tuple[Sheet, ...]:
-    alerts = run.experiment_facts.alerts_by_id if run.folder.has_alerts else None
-    return run_sheets(run.frame, published, alerts, run.latest_golden_ends())
+    alerts = run.experiment_facts.alerts_by_hazardous_id if run.folder.has_alerts else None
+    return run_sheets(run.frame, published, alerts, run.latest_golden_end_by_scenario())
 
 
 def _distribution_sheets(run: ReportedRun) -> tuple[Sheet, ...]:
@@ -146,11 +152,11 @@ def _with_alerts_note(sheet: Sheet, note: str) -> Sheet:
     return replace(sheet, note=f"{sheet.note} {note}")
 
 
-def sheet_files(sheets: Collection[Sheet]) -> dict[str, bytes]:
+def sheet_csv_and_markdown_files(sheets: Collection[Sheet]) -> dict[str, bytes]:
     """Each table as tables/<name>.csv and <name>.md."""
     texts = {f"{TABLES_FOLDER}/{sheet.name}.md": sheet.as_markdown().encode() for sheet in sheets}
-    return texts | csv_files(sheets)
+    return texts | sheet_csv_files(sheets)
 
 
-def csv_files(sheets: Collection[Sheet]) -> dict[str, bytes]:
+def sheet_csv_files(sheets: Collection[Sheet]) -> dict[str, bytes]:
     return {f"{TABLES_FOLDER}/{sheet.name}.csv": sheet.as_csv().encode() for sheet in sheets}

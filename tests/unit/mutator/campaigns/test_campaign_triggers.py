@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator.api.mutant_files import MutantSet
-from mutator.api.selection import find_trigger
+from mutator.api.selection import context_or_parsed_trigger
 from mutator.campaigns.plan import build_plan
 from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
@@ -101,4 +101,4 @@ def test_without_a_context_table_mutants_have_the_trigger_always(pole: Workspace
     triggers = {trigger.name for _, trigger in MutantSet.of_specs(["sensor/angle"], workspace=pole).pairs}
     assert triggers == {"always"}
     with pytest.raises(MutatorError, match=r"expected a time in s, `always`, or a condition"):
-        find_trigger(pole, "C1", 0.0, ("t",))
+        context_or_parsed_trigger(pole, "C1", 0.0, ("t",))

@@ -214,4 +214,4 @@ def test_the_query_in_the_report_gives_the_reported_numbers() -> None:
     answers = [answer for one in told for claim in one.claims for answer in claim.answers]
     assert len(answers) > 30
     assert [eval(answer.query, names).text for answer in answers] == [a.result.text for a in answers]
-    assert all(a.query in observations_page.render_markdown(told, (), "") for a in answers)
+    assert all(a.query in observations_page.render_observations_markdown(told, (), "") for a in answers)

@@ -62,7 +62,7 @@ def test_the_guided_advantage_reverses_per_injected_fault(paper: PublishedNumber
 
 def test_our_counts_are_in_the_row_below_the_papers(paper: PublishedNumbers) -> None:
     frame = results(HIT, HIT | {"alerts": "fcw", "t_alert": 9}, {}, {"scenario": "S9", "t_activation": 2})
-    lines = summary_sheet("guided", tally_by_scenario(frame), paper.as_published()).table().rows
+    lines = summary_sheet("guided", tally_by_scenario(frame), paper.as_published_counts()).table().rows
     hazards = [line[2:] for line in lines if line[:2] == ["hazards", "activated"]]
     assert hazards[0][:3] == ["paper", "35.1 % (215/613; 31.4 to 38.9)", "-"]
     assert hazards[1][0] == "here"
@@ -77,7 +77,7 @@ def test_our_counts_are_in_the_row_below_the_papers(paper: PublishedNumbers) -> 
 
 def test_hazards_are_given_per_activated_and_per_injected_fault(paper: PublishedNumbers) -> None:
     frame = results({"fault_type": "zeta"}, HIT, {}, {"fault_type": "jamming", "t_activation": 3})
-    sheet = coverage_sheet("guided", tally_by_fault_type(frame), paper.as_published())
+    sheet = coverage_sheet("guided", tally_by_fault_type(frame), paper.as_published_counts())
     kinds = [line[0] for line in sheet.lines]
     assert kinds == [k for k in ("radar/chaff", "radar/jamming", "radar/zeta", "total") for _ in range(2)]
     chaff = sheet.table().rows[1]
@@ -85,7 +85,7 @@ def test_hazards_are_given_per_activated_and_per_injected_fault(paper: Published
 
 
 def test_the_csv_has_a_column_for_each_number(paper: PublishedNumbers) -> None:
-    sheet = coverage_sheet("guided", tally_by_fault_type(results(HIT)), paper.as_published())
+    sheet = coverage_sheet("guided", tally_by_fault_type(results(HIT)), paper.as_published_counts())
     lines = list(csv.DictReader(io.StringIO(sheet.as_csv())))
     assert lines[0]["hazards/activated: count"] == "154"
     assert lines[0]["hazards/activated: of"] == "432"
@@ -118,8 +118,8 @@ def test_within_fault_types_guided_faults_are_ahead_only_per_activated_fault(pap
 def test_the_papers_counts_and_ours_get_the_same_statistical_tests(paper: PublishedNumbers) -> None:
     frame = results(HIT, HIT | {"method": "random", "trigger": "random/C2"})
     overall, kinds = (
-        hazard_odds_sheet(frame, paper.as_published()),
-        hazards_by_fault_type_sheet(frame, paper.as_published()),
+        hazard_odds_sheet(frame, paper.as_published_counts()),
+        hazards_by_fault_type_sheet(frame, paper.as_published_counts()),
     )
     assert [line[:2] for line in overall.lines] == [
         (whole, source) for whole in ("activated", "injected") for source in ("paper", "here")

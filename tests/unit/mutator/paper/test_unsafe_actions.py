@@ -11,8 +11,8 @@ from mutator.paper.unsafe_actions import (
     RunPair,
     StepFinder,
     build_wrong_time_finder,
-    find_both_unavailable,
     find_brake_too_short,
+    find_gas_and_brake_unavailable,
 )
 
 T = np.arange(0, 10, 0.1)
@@ -91,8 +91,8 @@ def test_gas_and_brake_are_unavailable_if_they_end_soon_after_the_alert(
     golden: dict[str, np.ndarray], last: float, shown: tuple[float, float] | None
 ) -> None:
     given = pair(golden, {"brake": during(1, last)})
-    assert stretch(find_both_unavailable, given) == shown
-    assert find_both_unavailable(replace(given, alert_s=None)) is None
+    assert stretch(find_gas_and_brake_unavailable, given) == shown
+    assert find_gas_and_brake_unavailable(replace(given, alert_s=None)) is None
 
 
 def test_runs_are_compared_up_to_the_end_of_the_shorter_one(record: Callable[..., Record]) -> None:

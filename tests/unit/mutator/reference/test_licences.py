@@ -9,18 +9,18 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.reference.licences import (
     PAGE_PATH,
-    constrained_packages,
-    licences_in,
+    licence_by_package_in,
+    packages_in_constraints,
     stated_licence,
     write_licences,
 )
 
 CLONE = Path(__file__).parents[4]
-TABLE = licences_in((CLONE / PAGE_PATH).read_text(encoding="utf-8"))
+TABLE = licence_by_package_in((CLONE / PAGE_PATH).read_text(encoding="utf-8"))
 
 
 def test_every_constrained_package_has_a_licence() -> None:
-    assert tuple(TABLE) == constrained_packages(CLONE)
+    assert tuple(TABLE) == packages_in_constraints(CLONE)
     assert all(licence.strip() for licence in TABLE.values())
 
 
@@ -53,7 +53,7 @@ def test_a_package_that_is_not_installed_keeps_its_licence(tmp_path: Path) -> No
     page = clone(tmp_path, "pytest", "no_such") / PAGE_PATH
     page.write_text("| gone | others | MIT |\n| no_such | others | BSD |\n")
     write_licences(tmp_path)
-    assert licences_in(page.read_text()) == {"no_such": "BSD", "pytest": "MIT"}
+    assert licence_by_package_in(page.read_text()) == {"no_such": "BSD", "pytest": "MIT"}
     assert "| no_such | `test` | BSD |" in page.read_text()
     assert "| pytest | mutator | MIT |" in page.read_text()
     with pytest.raises(MutatorError, match="no known licence for another; install another"):

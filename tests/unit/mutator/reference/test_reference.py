@@ -22,12 +22,12 @@ from mutator.reference.generated_files import (
     render_files,
     write_files,
 )
-from mutator.reference.json_schemas import YamlFormat, file_formats, schema_by_model
+from mutator.reference.json_schemas import YamlFormat, schema_by_model, yaml_formats
 from mutator.reference.yaml_key_tables import order_models
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
-FORMATS = file_formats(Workspace.find(CLONE).readings())
+FORMATS = yaml_formats(Workspace.find(CLONE).readings())
 CHAFF = CLONE / "fault_library" / "faults" / "radar" / "chaff.yaml"
 
 

@@ -144,7 +144,7 @@ def test_complete_partial_and_missing_proofs_are_distinguished(
     assert told is not None
     assert said in told.equivalence_text
     assert told.equivalence_text.endswith(said) == (proven != 3)
-    assert told.equivalence_state == state
+    assert told.equivalence_in_brief == state
     assert not told.has_failed_equivalence
 
 

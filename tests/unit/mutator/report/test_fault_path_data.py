@@ -56,7 +56,7 @@ def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Recor
     }
     by_id = {"a": far, "c": held, "d": far}
     found = RunFaultPaths(
-        fault_paths=FaultPaths(CHANNELS, None), channels=CHANNELS, by_id=by_id, records=records
+        fault_paths=FaultPaths(CHANNELS, None), channels=CHANNELS, path_by_experiment=by_id, records=records
     )
     data = found.page_data(["a", "b", "c", "d"])
     assert data["shape"] == [0, -1, 1, 0]
@@ -79,11 +79,11 @@ def test_the_page_filters_by_the_links_that_a_fault_got_through() -> None:
     found = RunFaultPaths(
         fault_paths=FaultPaths(CHANNELS, None),
         channels=CHANNELS,
-        by_id={},
+        path_by_experiment={},
         records={},
-        untimed_paths=untimed_paths,
+        distinct_untimed_paths=untimed_paths,
     )
-    assert found.passed_links([1, -1, 0]) == ["eyes→pedals;pedals→car", "", ""]
+    assert found.joined_passed_links([1, -1, 0]) == ["eyes→pedals;pedals→car", "", ""]
 
 
 def test_faults_are_counted_by_link_and_component() -> None:
@@ -100,23 +100,26 @@ def test_faults_are_counted_by_link_and_component() -> None:
     )
     counts.add(path(ComponentState.INJECTED, ComponentState.UNRECORDED, ComponentState.REACHED))
     counts.add(path(ComponentState.INJECTED, ComponentState.REACHED, ComponentState.UNCHANGED))
-    assert counts.active == 4
-    assert counts.passed == {"eyes-pedals": 2, "pedals-car": 2}
-    assert counts.reached == {"eyes-pedals": 3, "pedals-car": 4}
-    assert (counts.injected, counts.stopped) == ({"eyes": 4}, {"car": 2, "pedals": 1})
-    assert counts.masked == {"pedals": 1}
-    assert counts.masked_by_components == {("pedals",): 1}
+    assert counts.active_fault_count == 4
+    assert counts.passed_by_link == {"eyes-pedals": 2, "pedals-car": 2}
+    assert counts.reached_by_link == {"eyes-pedals": 3, "pedals-car": 4}
+    assert (counts.injected_by_component, counts.stopped_by_component) == (
+        {"eyes": 4},
+        {"car": 2, "pedals": 1},
+    )
+    assert counts.masked_by_component == {"pedals": 1}
+    assert counts.masked_by_component_set == {("pedals",): 1}
 
 
 def test_the_drawing_of_other_counts_is_the_one_that_the_page_changes_to(clone: Workspace) -> None:
     """The script puts `drawn_counts` into the drawing of all faults."""
     structure = load_hazard_analysis(clone.library / "stpa").structure
     links, name = list(structure.links), next(iter(structure.components))
-    counts = PathCounts(active=8)
-    counts.reached.update({links[0]: 8, links[1]: 3})
-    counts.passed.update({links[0]: 1})
-    counts.injected.update({name: 8})
-    counts.masked.update({name: 2})
+    counts = PathCounts(active_fault_count=8)
+    counts.reached_by_link.update({links[0]: 8, links[1]: 3})
+    counts.passed_by_link.update({links[0]: 1})
+    counts.injected_by_component.update({name: 8})
+    counts.masked_by_component.update({name: 2})
     drawn = counts_for_drawing(structure, counts, links)
     assert drawn["active"] == 8
     assert drawn["links"][links[0]] == ("through", "2.5px", "1 of 8, 12 %")

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from mutator.report.experiment_list import scene_facts
+from mutator.report.experiment_list import scene_as_json
 from mutator.triggers.formula_json import JsonTree
 from mutator.workspace import Workspace
 
@@ -17,7 +17,7 @@ def names(tree: JsonTree) -> Iterator[str]:
 
 def test_the_shipped_scene_uses_channels_of_the_target() -> None:
     manifest = Workspace.find().manifest("openpilot")
-    scene = scene_facts(manifest)
+    scene = scene_as_json(manifest)
     assert scene is not None
     trees = [actor[key] for actor in scene["actors"] for key in ("x", "y", "heading", "visible")]
     used = {name for tree in (*trees, scene["speed"]) for name in names(tree)}

@@ -58,8 +58,8 @@ def test_lines_have_the_worst_outcome_of_their_mutants(toycar: Workspace, run: P
     assert source is not None
     (file,) = source.files
     wanted = file.marks[at("wanted =")]
-    assert wanted["permanent"] == LineMark(worst_ending="hazard", worst=5, mutant_count=6)
-    assert wanted["transient"] == LineMark(worst_ending="masked", worst=6, mutant_count=6)
+    assert wanted["permanent"] == LineMark(worst_ending="hazard", worst_mutant_count=5, mutant_count=6)
+    assert wanted["transient"] == LineMark(worst_ending="masked", worst_mutant_count=6, mutant_count=6)
     assert at("gas =") not in file.marks and at("brake =") not in file.marks
     assert file.line_counts_by_ending() == {"hazard": 2}
     assert file.shown_lines == (range(at("def drive"), len(file.lines) + 1),)

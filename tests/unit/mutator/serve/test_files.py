@@ -16,7 +16,7 @@ from mutator.results import table_building
 from mutator.serve.page_tokens import PageTokens
 from mutator.serve.report_cache import ReportCache
 from mutator.serve.report_pages import RunPages
-from mutator.serve.responses import without_folders
+from mutator.serve.responses import without_absolute_folders
 from mutator.serve.served_runs import ServedRuns
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import script_bytes
@@ -298,4 +298,4 @@ def test_text_of_runs_is_escaped(client: Client) -> None:
     ],
 )
 def test_only_the_last_part_of_a_path_is_shown(text: str, told: str) -> None:
-    assert without_folders(text) == told
+    assert without_absolute_folders(text) == told

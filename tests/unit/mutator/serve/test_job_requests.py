@@ -119,31 +119,31 @@ def test_requests_become_command_lines(desk: RequestChecker) -> None:
     place = (f"--library={desk.workspace.library}", f"--templates={desk.workspace.templates}")
     about = {"run": "first", "experiment": experiment}
     of_run = (f"--run={run}", *place)
-    assert work(desk, kind="rerun", **about).words == ("rerun", experiment, *of_run)
-    assert work(desk, kind="plot", **about).words == ("rerun", experiment, "--trace", *of_run)
+    assert work(desk, kind="rerun", **about).argv == ("rerun", experiment, *of_run)
+    assert work(desk, kind="plot", **about).argv == ("rerun", experiment, "--trace", *of_run)
     film = f"--video={run}/plots/{experiment}.mp4"
-    assert work(desk, kind="film", **about).words == ("show", experiment, film, *of_run)
+    assert work(desk, kind="film", **about).argv == ("show", experiment, film, *of_run)
     still = work(desk, kind="still", t=3, **about)
-    assert still.words == ("show", experiment, "--still=3.00", *of_run)
+    assert still.argv == ("show", experiment, "--still=3.00", *of_run)
     assert still.result_address == f"/runs/first/report/index.html#e={experiment}"
-    assert work(desk, kind="report", run="first").words == ("report", str(run), *place)
+    assert work(desk, kind="report", run="first").argv == ("report", str(run), *place)
     given = {"value": -2.5, "seed": 3, "variant": "shifted", "trigger": "v_ego > 3"}
     options = ("--scenario=A", "--trigger=v_ego > 3", "--variant=shifted", "--value=-2.5", "--seed=3")
-    assert work(desk, **TRY, **given).words == (
+    assert work(desk, **TRY, **given).argv == (
         "try",
         "sensor/lane",
         *options,
         f"--out={run.parent}/try",
         *place,
     )
-    words = work(desk, **CAMPAIGN, only="scenario == 'A'", workers=1).words
+    words = work(desk, **CAMPAIGN, only="scenario == 'A'", workers=1).argv
     options = (f"--out={run.parent}/new", "--limit=20", "--only=scenario == 'A'", "--workers=1")
     assert words == ("run", "small", *options, *place)
 
 
 @pytest.mark.parametrize("trigger", ["always", "10", "1.5", "near", "near_far/near", "t >= 2 and v_ego > 3"])
 def test_a_trigger_becomes_an_option_of_try(desk: RequestChecker, trigger: str) -> None:
-    assert f"--trigger={trigger}" in work(desk, **TRY, trigger=trigger).words
+    assert f"--trigger={trigger}" in work(desk, **TRY, trigger=trigger).argv
 
 
 def test_a_new_run_cannot_be_a_link(desk: RequestChecker, tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_a_failed_job_gives_the_reason(busy: Client) -> None:
 
 def job(**given: Any) -> ServeJob:
     order = RerunRequest(kind="rerun", run="first", experiment="0" * 16)
-    return ServeJob(id="1", work=JobCommand(order=order, title="again", words=()), **given)
+    return ServeJob(id="1", work=JobCommand(order=order, title="again", argv=()), **given)
 
 
 def test_the_output_of_a_job_is_plain_text() -> None:
