@@ -148,11 +148,11 @@ def write(size: int, out: Path) -> dict[str, float]:
         UNTIMED_PATH_COLUMN: run.experiment_facts.untimed_path_indices,
     }
     table = packed_script_element(
-        report_browse.results_table_data(run.results.assign(**more), run.faults, run.paths), "table"
+        report_browse.results_table_data(run.results.assign(**more), run.faults, run.run_fault_paths), "table"
     )
-    assert run.paths is not None
+    assert run.run_fault_paths is not None
     ids = run.results["experiment_id"].tolist()
-    paths = packed_script_element(run.paths.page_data(ids), "paths")
+    paths = packed_script_element(run.run_fault_paths.page_data(ids), "paths")
     table_s = process_time() - began
     shown = [experiments[name] for name in ids]
     records = [record(e, n) for n, e in enumerate(shown)]

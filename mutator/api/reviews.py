@@ -55,7 +55,7 @@ class ReviewedGroups:
         return replace(self, review=load_decisions(self.workspace, self.review.target))
 
     def matching(self, only: str | None = None, exclude: str | None = None) -> "ReviewedGroups":
-        """Return the groups that match the filters, which are expressions over the result of `facts`."""
+        """Return the groups that match the filters, which are expressions over `group_facts`."""
         groups = self.groups
         for text, keeps_matches in ((only, True), (exclude, False)):
             if text is not None:

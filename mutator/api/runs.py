@@ -109,8 +109,9 @@ class Run(RunContents):
         return TextTable(heads=heads, rows=rows, right_aligned=range(1, len(heads)))
 
     def mutation_score(self) -> Sheet:
-        """Return the mutation score: the shares of operator mutants that changed an actuator, raised a new
-        alert or caused a hazard, in total, by operator and by function. Empty without such mutants.
+        """Return a sheet with the shares of the activated operator mutants that had each effect: changed an
+        actuator, raised a new alert, caused a hazard; in total, by operator and by function. Empty without
+        such mutants.
         """
         frame = self._results_frame
         if not (frame["module"] == OPERATORS_MODULE).any():
@@ -122,7 +123,7 @@ class Run(RunContents):
         return mutation_score_sheet(prepare_results(frame), self.faults, alerts, self.folder.head.operators)
 
     def mutation_totals(self) -> TextTable:
-        """Return the total mutation score. Empty without operator mutants."""
+        """Return the rows of `mutation_score` for all operator mutants. Empty without such mutants."""
         return totals_table(self.mutation_score())
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:

@@ -22,8 +22,8 @@ def serve_runs(
     """Serve runs (run folders, or folders of them; default: runs/) and the library's reviews, until the
     process is interrupted.
 
-    `ready` is called with the address. Whoever knows the address has the user's rights. `at_once` is the
-    number of parallel jobs. MutatorError for a missing folder, and for a port in use.
+    `on_ready` is called with the address. Whoever knows the address has the user's rights. At most
+    `most_parallel_jobs` jobs run at the same time. MutatorError for a missing folder, and for a port in use.
     """
     roots = tuple(map(Path, runs)) or (RUNS_FOLDER,)
     for root in roots:

@@ -59,7 +59,7 @@ class Terminal:
         return _build_console(stderr=True)
 
     def print_text(self, text: str = "", style: str | None = None, *, without_folding: bool = False) -> None:
-        """Print text; fold it unless `whole` is set, as for a command to copy."""
+        """Print text; fold it unless `without_folding` is set, as for a command to copy."""
         if not self.as_json:
             _print_text(self.out, text, style, without_folding=without_folding)
 
@@ -179,7 +179,9 @@ def option_of_argument(argument: str) -> str:
 def with_option_names(
     error: MutatorError, command_options: Mapping[str, str] = MappingProxyType({})
 ) -> MutatorError:
-    """Return the error with options instead of API arguments; `own` has options of a single command."""
+    """Return the error with options instead of API arguments; `command_options` has options of a single
+    command.
+    """
     if error.argument is None:
         return error
 

@@ -316,7 +316,7 @@ def _parse_operator_choice(
     seed: int | None,
     has_other_source: bool,
 ) -> "mutator.OperatorChoice | None":
-    """Collect the operator options, if any. `others`: whether specs or a campaign are given as well."""
+    """Collect the operator options, if any. `has_other_source`: specs or a campaign are given, too."""
     if operators is None:
         if places or scenario or all_lines or sample is not None:
             raise MutatorError(

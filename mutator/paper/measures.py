@@ -76,7 +76,7 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
     )
     interval = guided_against_random.resampled_rate_difference(
         selected_runs,
-        "injected",  # `chosen` has only the runs to count
+        "injected",  # the selected runs are only those to count
     )
     faults = counted(interval.fault_count, "fault")
     return Estimate(

@@ -155,8 +155,8 @@ ACTION_FIGURES = (
         title="Unsafe control action: gas at a wrong time",
         query=f"{_WRONG_DATA_QUERY} and t_h1 > t_activation",
         order_column="max_dev_gas",
-        what_it_shows=f"between activation and H1 the faulty run applies gas for {MIN_WRONG_PEDAL_S} s or more "
-        "while the fault-free run does not (grey)",
+        what_it_shows=f"between activation and H1 the faulty run applies gas for {MIN_WRONG_PEDAL_S} s or "
+        "more while the fault-free run does not (grey)",
         find_steps=build_wrong_time_finder("gas"),
         action_channels=("gas",),
         panels=(_GAS, _BRAKE, _DISTANCE),
@@ -167,8 +167,8 @@ ACTION_FIGURES = (
         title="Unsafe control action: brake at a wrong time",
         query=f"{_WRONG_DATA_QUERY} and t_h2 > t_activation",
         order_column="max_dev_brake",
-        what_it_shows=f"between activation and H2 the faulty run brakes for {MIN_WRONG_PEDAL_S} s or more while "
-        "the fault-free run does not (grey)",
+        what_it_shows=f"between activation and H2 the faulty run brakes for {MIN_WRONG_PEDAL_S} s or more "
+        "while the fault-free run does not (grey)",
         find_steps=build_wrong_time_finder("brake"),
         action_channels=("brake",),
         panels=(_BRAKE, _GAS, _SPEED),

@@ -50,7 +50,7 @@ AnswerCell = str | PageLink | ShareBar | ExplainedCodes
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerTable:
-    """A small table."""
+    """A small table in an answer: heads and rows, without a title."""
 
     heads: tuple[str, ...]
     rows: Sequence[tuple[AnswerCell, ...]]
@@ -58,7 +58,7 @@ class AnswerTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportAnswer:
-    """The answer to a question. `is_wide`: its tables have many columns."""
+    """The answer to a question. `has_wide_tables`: they have many columns."""
 
     name: str
     title: str

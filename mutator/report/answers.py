@@ -39,7 +39,7 @@ def build_answers(run: ReportedRun) -> tuple[ReportAnswer, ...]:
     has_alerts = run.folder.has_alerts
     answers = [most_dangerous_answer(frame, run.folder.head.metrics, has_alerts=has_alerts)]
     if (frame["outcome"] == "hazard").any():
-        answers.append(fix_first_answer(frame, run.paths, has_alerts=has_alerts))
+        answers.append(fix_first_answer(frame, run.run_fault_paths, has_alerts=has_alerts))
     if has_alerts:
         answers.append(silent_hazards_answer(frame, run.folder.stop_note))
     answers.append(tolerated_faults_answer(frame))

@@ -26,9 +26,9 @@ _TimedAlerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
 
 @dataclass(frozen=True, kw_only=True)
 class ExperimentFacts:
-    """`ranks` (from 0, the worst) and `path_numbers` (an index into `untimed_paths`, -1: none) have a number
-    for each row of the results. `alerts_by_id` has only experiments with a hazard. `timings` has a row for
-    each timed experiment; its engine is '' if not recorded.
+    """`worst_first_ranks` (from 0) and `untimed_path_indices` (into `distinct_untimed_paths`, -1: none) have
+    a number for each row of the results. `alerts_by_hazardous_id` has only experiments with a hazard.
+    `timings` has a row for each timed experiment; its engine is '' if not recorded.
     """
 
     worst_first_ranks: np.ndarray
@@ -61,10 +61,10 @@ class ExperimentFacts:
                     if code == len(untimed_paths):
                         untimed_paths.append(untimed_path)
         return cls(
-            ranks=ranks_of_rows(results),
-            path_numbers=path_numbers,
-            untimed_paths=tuple(untimed_paths),
-            alerts_by_id=alerts,
+            worst_first_ranks=ranks_of_rows(results),
+            untimed_path_indices=path_numbers,
+            distinct_untimed_paths=tuple(untimed_paths),
+            alerts_by_hazardous_id=alerts,
             timings=timings_frame(folder),
         )
 

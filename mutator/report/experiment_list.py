@@ -77,8 +77,8 @@ def build_list_data(run: ReportedRun) -> ExperimentListData:
     ids = listed["experiment_id"].tolist()
     data: dict[str, Any] = {"table": _list_table_data(run, listed), "details": _list_details_data(run, ids)}
     data["media"] = media_by_experiment(folder, folder.path / REPORT_FOLDER, MOST_EMBEDDED_STILL_BYTES)
-    if run.paths:
-        data["paths"] = run.paths.page_data(ids)
+    if run.run_fault_paths:
+        data["paths"] = run.run_fault_paths.page_data(ids)
     facts = {
         **_film_and_scene_facts(folder, workspace),
         "series": series_facts_for_page(folder),
@@ -128,7 +128,7 @@ def _listed_results(run: ReportedRun) -> "DataFrame":
 
 def _list_table_data(run: ReportedRun, listed: "DataFrame") -> dict[str, Any]:
     data = results_table_data(
-        listed, run.faults, run.paths, has_alerts=run.folder.has_alerts, source=run.source_lines
+        listed, run.faults, run.run_fault_paths, has_alerts=run.folder.has_alerts, source=run.source_lines
     )
     if len(listed) < len(run.results):
         data |= {"of": len(run.results), "map": build_heat_map(run)}

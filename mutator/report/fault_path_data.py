@@ -68,9 +68,9 @@ class RunFaultPaths:
         return cls(
             fault_paths=fault_paths,
             channels=folder.head.channels,
-            by_id=by_id,
+            path_by_experiment=by_id,
             records=records,
-            untimed_paths=untimed_paths,
+            distinct_untimed_paths=untimed_paths,
         )
 
     def joined_passed_links(self, untimed_path_indices: Iterable[int]) -> list[str]:
@@ -157,9 +157,9 @@ def _components_with_columns(path: FaultPath) -> Iterator[tuple[Any, int]]:
 
 @dataclass(slots=True, kw_only=True)
 class PathCounts:
-    """Counts over the paths of some faults. By link: how many `reached` its start and `passed`, if its
-    end is recorded. By component: how many were `injected`, `stopped`, and `masked` there.
-    `masked_by_components` counts masked faults by the set of components that stopped them.
+    """Counts over the paths of some faults. By link: how many reached its start, and how many passed it if
+    its end is recorded. By component: how many were injected, stopped, and masked there.
+    `masked_by_component_set` counts masked faults by the set of components that stopped them.
     """
 
     active_fault_count: int = 0
@@ -193,7 +193,7 @@ class PathCounts:
 def path_counts_by_fault_type(
     fault_types: "pd.Series[str]", untimed_path_indices: "np.ndarray", paths: RunFaultPaths
 ) -> Mapping[str, PathCounts]:
-    """Return counts of all faults, then by fault type. `path_numbers`: the path of each row or -1."""
+    """Return counts of all faults, then by fault type. `untimed_path_indices`: the path of each row or -1."""
     import pandas as pd
 
     counts: dict[str, PathCounts] = defaultdict(PathCounts)

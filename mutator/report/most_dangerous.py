@@ -139,7 +139,7 @@ def _worst_table(
     has_alerts: bool,
 ) -> AnswerTable:
     """Return the experiments with their measures of danger. Each link opens one of them in the list filtered
-    by `shown`.
+    by `list_filter`.
     """
     contact_column = find_contact_column(ranked)
     heads = [first_head, "scenario", "hazards"]

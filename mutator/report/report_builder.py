@@ -84,7 +84,7 @@ def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
         lambda: build_list_data(reported), process_count_for(len(reported.results))
     ) as wait_for_list_data:
         study_panels = build_study_panels(reported)
-        content = _build_content(replace(reported, is_compared=bool(study_panels)), wait_for_list_data)
+        content = _build_content(replace(reported, has_study_page=bool(study_panels)), wait_for_list_data)
     panels = (*content.panels, *study_panels)
     files = {name: data for panel in panels for name, data in panel.files.items()}
     files |= {MARKDOWN_FILE: report_markdown(content).encode(), PAGE_FILE: report_html(content).encode()}

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 class ReportedRun:
     """The data that a report is made from. `results` are all experiments with a record, `frame` the usable
     ones. `faults` are those of the plan; `experiments` (the plan) and `records` are read on access. Without a
-    workspace, no experiment can be rerun, and there is no study. `is_compared`: the study has its own page on
-    these results.
+    workspace, no experiment can be rerun, and there is no study. `has_study_page`: the study has its own
+    page on these results.
     """
 
     folder: RunFolder
@@ -45,7 +45,7 @@ class ReportedRun:
     experiment_facts: ExperimentFacts
     engine_summary: EngineSummary | None = None
     has_study_page: bool = False
-    paths: RunFaultPaths | None = None
+    run_fault_paths: RunFaultPaths | None = None
     source_lines: SourceLines | None = None
     faults: Mapping[str, Fault] = field(default_factory=dict)
     experiments: Mapping[str, Experiment] = field(default_factory=dict)
@@ -71,7 +71,9 @@ class ReportedRun:
             published_work=_find_published_work(folder) if workspace else None,
             experiment_facts=facts,
             faults=faults,
-            paths=RunFaultPaths.of(folder, fault_paths, experiments, records, facts.distinct_untimed_paths)
+            run_fault_paths=RunFaultPaths.of(
+                folder, fault_paths, experiments, records, facts.distinct_untimed_paths
+            )
             if fault_paths
             else None,
             source_lines=SourceLines.of(folder, workspace, results, faults),

@@ -66,7 +66,7 @@ class MarkedFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceLines:
-    """The files of a run, worst first. `line_by_fault` has lines such as `pkg/plan.py:42`;
+    """The files of a run, worst first. `path_and_line_by_fault` has texts such as `pkg/plan.py:42`;
     `change_by_fault` maps each fault of an operator to its change, such as `a + b -> a - b`.
     `reason_without_files` is empty if there are files.
     """
@@ -127,7 +127,7 @@ class SourceLines:
         )
         return cls(
             files=tuple(sorted(files, key=_worst_first_key)),
-            places={name: f"{path}:{line}" for name, (path, line) in line_by_fault.items()},
+            path_and_line_by_fault={name: f"{path}:{line}" for name, (path, line) in line_by_fault.items()},
             change_by_fault=changes,
         )
 

@@ -33,7 +33,7 @@ AsyncHandler = Callable[[Request], Awaitable[Response]]
 
 @dataclass(kw_only=True)
 class ServedSite:
-    """The content of the server: a library, runs, and jobs (at most `at_once` at a time)."""
+    """The content of the server: a library, runs, and jobs (at most `most_jobs_at_once` at a time)."""
 
     workspace: Workspace
     runs: ServedRuns

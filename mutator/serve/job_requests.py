@@ -99,7 +99,7 @@ _REQUEST_ADAPTER: TypeAdapter[JobRequest] = TypeAdapter(Annotated[JobRequest, Fi
 class JobCommand:
     """A checked request, with the arguments of its command line."""
 
-    order: JobRequest
+    job_request: JobRequest
     title: str
     argv: tuple[str, ...]
     run_folder: Path | None = None
@@ -149,7 +149,7 @@ class RequestChecker:
                 expected="the id of an experiment in the run",
             )
         return JobCommand(
-            order=request,
+            job_request=request,
             title=f"{request.experiment} of {request.run}: {what}",
             argv=(*arguments, f"--run={folder}", *self._workspace_options()),
             run_folder=folder,
@@ -162,7 +162,7 @@ class RequestChecker:
         arguments = ("report", str(folder), *self._workspace_options())
         title, result = f"report of {request.run}", report_address(request.run)
         return JobCommand(
-            order=request,
+            job_request=request,
             title=title,
             argv=arguments,
             run_folder=folder,
@@ -196,7 +196,9 @@ class RequestChecker:
         }
         arguments = ("try", request.spec, *_joined_options(options), *self._workspace_options())
         return JobCommand(
-            order=request, title=f"{request.spec} in {request.scenario}, {request.trigger}", argv=arguments
+            job_request=request,
+            title=f"{request.spec} in {request.scenario}, {request.trigger}",
+            argv=arguments,
         )
 
     def _campaign_command(self, request: CampaignRequest) -> JobCommand:
@@ -213,7 +215,7 @@ class RequestChecker:
             "--workers": min(request.workers or usable_cores(), usable_cores()),
         }
         return JobCommand(
-            order=request,
+            job_request=request,
             title=f"{request.campaign} into {request.name}",
             argv=("run", request.campaign, *_joined_options(options), *self._workspace_options()),
             run_folder=folder,

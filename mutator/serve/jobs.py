@@ -30,7 +30,7 @@ _MOST_MESSAGE_CHARACTERS = 500
 _MOST_ENDED_JOBS = 200  # ended jobs to keep, the newest
 _MOST_WAITING_JOBS = 50
 _ESCAPE_CODE_PATTERN = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")  # terminal escape codes
-_MOST_SHUTDOWN_S = 30.0  # for jobs to end with the server; longer than `job_guard.PATIENCE_S`
+_MOST_SHUTDOWN_S = 30.0  # for jobs to end with the server; longer than `job_guard.MOST_CLEANUP_S`
 
 
 class JobState(StrEnum):
@@ -46,7 +46,7 @@ class ServeJob:
     """A command line, with its progress and result."""
 
     id: str
-    work: JobCommand
+    job_command: JobCommand
     state: JobState = JobState.QUEUED
     progress: float | None = None  # progress of the current stage, from 0 to 1
     message: str = ""
@@ -61,8 +61,8 @@ class ServeJob:
     guard_pipe: int | None = None  # the writing end of the pipe to the job's guard
 
     def as_json(self) -> dict[str, Any]:
-        order = self.work.order
-        facts: dict[str, Any] = {"id": self.id, "kind": order.kind, "title": self.work.title}
+        order = self.job_command.job_request
+        facts: dict[str, Any] = {"id": self.id, "kind": order.kind, "title": self.job_command.title}
         facts |= {name: getattr(order, name, None) for name in ("run", "experiment")}
         facts |= {"state": self.state.value, "progress": self.progress, "message": self.message}
         facts |= {
@@ -105,14 +105,16 @@ class ServeJob:
 class ServeJobs:
     """The jobs of a server. `report_at` returns the address of a run's report."""
 
-    def __init__(self, at_once: int, report_at: Callable[[JobCommand], str | None]) -> None:
+    def __init__(self, most_jobs_at_once: int, report_at: Callable[[JobCommand], str | None]) -> None:
         self._jobs: dict[str, ServeJob] = {}
         self._count = 0
         self._waiting: queue.Queue[ServeJob | None] = queue.Queue()
         self._lock = threading.Lock()
         self._report_at = report_at
         self._closed = False
-        self._threads = [threading.Thread(target=self._run_jobs, daemon=True) for _ in range(at_once)]
+        self._threads = [
+            threading.Thread(target=self._run_jobs, daemon=True) for _ in range(most_jobs_at_once)
+        ]
         for thread in self._threads:
             thread.start()
 
@@ -124,7 +126,7 @@ class ServeJobs:
                     f"{_MOST_WAITING_JOBS} jobs are waiting", remedy="wait for them, or cancel some"
                 )
             self._count += 1
-            job = ServeJob(id=str(self._count), work=command)
+            job = ServeJob(id=str(self._count), job_command=command)
             self._jobs[job.id] = job
             for name in [name for name, job_in_list in self._jobs.items() if job_in_list.ended][
                 :-_MOST_ENDED_JOBS
@@ -199,7 +201,7 @@ class ServeJobs:
                 return None
             try:
                 process = subprocess.Popen(
-                    [sys.executable, "-P", "-m", _GUARD_MODULE, str(guard_end), *job.work.argv],
+                    [sys.executable, "-P", "-m", _GUARD_MODULE, str(guard_end), *job.job_command.argv],
                     pass_fds=[guard_end, events],
                     env={**os.environ, "COLUMNS": _OUTPUT_COLUMNS, EVENTS_FD_VARIABLE: str(events)},
                     stdin=subprocess.DEVNULL,
@@ -251,10 +253,10 @@ class ServeJobs:
                             ready.data(data)
 
     def _result_address(self, job: ServeJob) -> str | None:
-        if job.work.order.kind == "try":
+        if job.job_command.job_request.kind == "try":
             plot = job.path_by_kind.get("plot")
             return f"/{TRIALS_FOLDER}/{Path(plot).parent.name}/plot.svg" if plot else None
-        return job.work.result_address or self._report_at(job.work)
+        return job.job_command.result_address or self._report_at(job.job_command)
 
 
 def _printable_bytes(data: bytes | bytearray) -> str:

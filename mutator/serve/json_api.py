@@ -84,7 +84,7 @@ class JobApi:
 
     def cancel(self, request: Request, _: bytes) -> Response:
         job = self._jobs.get(request.path_params["job"])
-        self._check_token(request, job.work)
+        self._check_token(request, job.job_command)
         try:
             self._jobs.cancel(job.id)
         except JobEnded as err:

@@ -28,7 +28,7 @@ class PageTokens:
         return hmac.new(self._key, page.encode("utf-8", "surrogateescape"), hashlib.sha256).hexdigest()
 
     def check_page(self, token: str, *pages: str) -> None:
-        """Raise UnknownPage unless the token is that of one of these pages."""
+        """Raise PageRefused unless the token is that of one of these pages."""
         if not any(hmac.compare_digest(self.token_of(page).encode(), token.encode()) for page in pages):
             raise PageRefused(
                 "the request does not come from the page that may send it",

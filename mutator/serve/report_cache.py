@@ -19,7 +19,7 @@ _MOST_IN_MEMORY = 2  # a report can have 15 MB
 
 
 class ReportCache:
-    """The files of reports, by the digest of their inputs (`stamp.made_from`) and by name."""
+    """The files of reports, by the digest of their inputs (`report_digests.inputs_digest`) and by name."""
 
     def __init__(self) -> None:
         self._memory: dict[str, Mapping[str, bytes]] = {}

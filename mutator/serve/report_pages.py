@@ -45,7 +45,7 @@ class RunPages:
         self._comparison_cache: dict[tuple[str, str], dict[str, bytes]] = {}
 
     def run_file(self, key: str, name: str) -> Response:
-        """Open a file of a run, or a part of its report; Absent if it is not served."""
+        """Open a file of a run, or a part of its report; NotServed if it is not served."""
         run = self._runs.folder(key)
         if name.startswith(f"{REPORT_FOLDER}/"):
             return self._report_file(run, name.removeprefix(f"{REPORT_FOLDER}/"))
@@ -117,7 +117,7 @@ class RunPages:
 
 
 def _read_series_script(run: Path, name: str) -> bytes:
-    """Read a script of series; Absent unless it equals the output of `write_script` for the same data."""
+    """Read a script of series; NotServed unless it equals the output of `script_bytes` for the same data."""
     path = run / name
     with open_served_file(run, name) as file:
         data = read_open_file(file, path)

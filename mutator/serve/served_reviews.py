@@ -169,7 +169,7 @@ class ServedReviews:
         return load_review(self.workspace, selection.target).diff_since_decision(self.group(selection, name))
 
     def picture(self, selection: GroupSelection, name: str, level: str, *, after: bool) -> bytes:
-        """Return a frame before or after the group's effect, as a JPEG file; Absent if there is none."""
+        """Return a frame before or after the group's effect, as a JPEG file; NotServed if there is none."""
         manifest = self.workspace.manifest(selection.target)
         before_and_after = effect_pictures.pictures_at_level(
             self.workspace, manifest, self.group(selection, name), level

@@ -105,7 +105,7 @@ def _count_outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
 
 
 def open_served_file(run: Path, name: str) -> BinaryIO:
-    """Open a file of a run; Absent if it is not served."""
+    """Open a file of a run; NotServed if it is not served."""
     folder, _, last = name.rpartition("/")
     if Path(last).suffix not in SERVED_SUFFIXES_BY_FOLDER.get(folder, ()):
         raise _no_such_file()
@@ -113,7 +113,7 @@ def open_served_file(run: Path, name: str) -> BinaryIO:
 
 
 def open_plain_file(root: Path, name: str) -> BinaryIO:
-    """Open a file below a folder without following links; Absent if there is no plain file."""
+    """Open a file below a folder without following links; NotServed if there is no plain file."""
     try:
         return open_below(root, name)
     except (OSError, Outside):

@@ -83,7 +83,7 @@ def test_a_run_takes_stills_of_its_worst_experiments(
 ) -> None:
     manifest = root / "fault_library/targets/toycar.yaml"
     manifest.write_text(manifest.read_text().replace("still: [", "pictures: [alone]\n  still: ["))
-    monkeypatch.setattr(stills, "PLANNED_PER_EXPERIMENT", 2)
+    monkeypatch.setattr(stills, "PLANNED_PER_FILMED_EXPERIMENT", 2)
     words = ("run", "toy", "--only", "fault_type == 'distance'", "-n", "0", "--out", "runs/a")
     without = cli(*words, "--no-stills")
     assert without.code == 0 and "pictures" not in without.err

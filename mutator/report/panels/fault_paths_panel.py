@@ -64,7 +64,7 @@ names all components that stopped it.</p>
 
 def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the counts of links and components; None if no path is known."""
-    paths = run.paths
+    paths = run.run_fault_paths
     counts = (
         path_counts_by_fault_type(
             fault_types_of(run.results), run.experiment_facts.untimed_path_indices, paths

@@ -114,7 +114,8 @@ def _worst_lines_table(files: Sequence[MarkedFile]) -> TextTable:
 
 
 def _describe_mark(mark: LineMark) -> str:
-    return f"{_ENDING_MEANINGS[mark.worst_ending].partition(':')[0]} {mark.worst_mutant_count}/{mark.mutant_count}"
+    ending = _ENDING_MEANINGS[mark.worst_ending].partition(":")[0]
+    return f"{ending} {mark.worst_mutant_count}/{mark.mutant_count}"
 
 
 def _rows_html(file: MarkedFile) -> Markup:

@@ -178,7 +178,7 @@ def untimed_path(by: str = "", stopped_at: tuple[str, ...] = ()) -> UntimedPath:
 def test_the_component_that_let_most_faults_through_is_named() -> None:
     untimed_paths = (untimed_path("feet"), untimed_path("hands"), untimed_path(stopped_at=("eyes",)))
     labels = {"feet": "Feet", "eyes": "Eyes"}
-    structure = {"component_label": labels.__getitem__, "untimed_paths": untimed_paths}
+    structure = {"component_label": labels.__getitem__, "distinct_untimed_paths": untimed_paths}
     frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(untimed_path=[0, 0, 1, -1])
     masked = frame[:1].assign(experiment_id="masked", outcome="masked", untimed_path=2)
     answer = fix_first_answer(

@@ -19,14 +19,14 @@ from .conftest import TOKEN, Client
 SERVER = """
 import resource, sys
 from pathlib import Path
-from mutator.serve.application import Site
-from mutator.serve.served_runs import (Runs)
+from mutator.serve.application import ServedSite
+from mutator.serve.served_runs import ServedRuns
 from mutator.serve.server import serve
 from mutator.workspace import Workspace
 resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
 place = Path(sys.argv[1])
-site = Site(workspace=Workspace.find(place), runs=Runs((place,)))
-serve(site, port=0, ready=lambda address: print(address, flush=True))
+site = ServedSite(workspace=Workspace.find(place), runs=ServedRuns((place,)))
+serve(site, port=0, on_ready=lambda address: print(address, flush=True))
 """
 UNFINISHED = ["", "GET / HTTP/1.1\r\nHost: ", "POST /api/jobs HTTP/1.1\r\nContent-Length: 9\r\n{headers}\r\n"]
 

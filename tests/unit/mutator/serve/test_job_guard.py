@@ -14,7 +14,7 @@ import pytest
 GUARD = """
 import os, sys
 from mutator.serve import job_guard
-job_guard.PATIENCE_S = float(sys.argv.pop())
+job_guard.MOST_CLEANUP_S = float(sys.argv.pop())
 execv = os.execv
 job_guard.os.execv = lambda path, words: execv(path, [path, "-c", *words[4:]])
 sys.exit(job_guard.main())

@@ -113,7 +113,7 @@ def test_a_failed_job_gives_the_reason(busy: Client) -> None:
 
 def job(**given: Any) -> ServeJob:
     order = RerunRequest(kind="rerun", run="first", experiment="0" * 16)
-    return ServeJob(id="1", work=JobCommand(order=order, title="again", argv=()), **given)
+    return ServeJob(id="1", job_command=JobCommand(job_request=order, title="again", argv=()), **given)
 
 
 def test_the_output_of_a_job_is_plain_text() -> None:
@@ -174,7 +174,7 @@ def test_the_number_of_waiting_jobs_is_limited() -> None:
     """Without a limit, a page could fill the memory."""
     jobs = ServeJobs(0, lambda work: None)
     for _ in range(50):
-        assert jobs.submit(job().work).state is JobState.QUEUED
+        assert jobs.submit(job().job_command).state is JobState.QUEUED
     with pytest.raises(MutatorError, match="50 jobs are waiting"):
-        jobs.submit(job().work)
+        jobs.submit(job().job_command)
     jobs.close()
