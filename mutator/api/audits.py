@@ -10,7 +10,7 @@ from mutator._common.folder_locks import owning_run_folder
 from mutator._common.hashing import digest
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
-from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.audit.run_audit import AuditCheck, run_audit_checks
 from mutator.audit.run_repair import repair_run as put_aside
 from mutator.audit.seal import Seals, seals_of, unsealed_facts

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from mutator._common.argument_checks import check_type, check_whole_number
 from mutator.api.runs import Run
-from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.errors import IncompleteRun
 from mutator.execution.campaign_running import run_campaign

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 
 from mutator._common.shipped_files import write_new_library
-from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.checks import fast_engine_check, library_check
 from mutator.checks.doctor import examine_machine
 from mutator.checks.drive_check import drive_findings

@@ -11,7 +11,13 @@ from mutator._common.files import make_folder
 from mutator._common.message_text import counted
 from mutator.api.mutants import BuiltMutant, build_selected
 from mutator.api.operator_mutants import OperatorChoice, draw_operator_faults
-from mutator.api.selection import FaultChoice, SelectedTarget, WorkspaceLike, context_tables, open_workspace
+from mutator.api.target_and_fault_selection import (
+    FaultChoice,
+    SelectedTarget,
+    WorkspaceLike,
+    context_tables,
+    open_workspace,
+)
 from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from mutator._common.files import make_folder
 from mutator.api.notebook_html import diff_html, text_html
-from mutator.api.selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
+from mutator.api.target_and_fault_selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
 from mutator.mutants.mutant_building import Mutant, build, write_tree

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from mutator._common.argument_checks import check_whole_number
 from mutator._common.message_text import counted
-from mutator.api.selection import SelectedTarget
+from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.errors import MutatorError
 from mutator.model import Fault, Limits
 from mutator.operators.executed_lines import GoldenRunInputs, measure_executed_lines

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.campaigns.freezing import freeze_plan_with_tally
 from mutator.campaigns.plan import Plan, SeedBySeedPlan, build_plan, load_plan
 from mutator.engines.forkable import reasons_by_unforkable_variant

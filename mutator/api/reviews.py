@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
-from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.campaigns.filters import compile_filter
 from mutator.campaigns.git_clone import find_user_name
 from mutator.campaigns.plan import build_plan

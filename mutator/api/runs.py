@@ -13,7 +13,7 @@ from mutator.api.experiment_results import trace_frame
 from mutator.api.notebook_html import facts_html, text_html
 from mutator.api.run_contents import RunContents
 from mutator.api.run_experiments import RunExperiment
-from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.session import ProgressCallback, Summary

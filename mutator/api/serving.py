@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mutator._common.folder_search import RUNS_FOLDER
-from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
 from mutator.serve.application import ServedSite
 from mutator.serve.served_runs import ServedRuns

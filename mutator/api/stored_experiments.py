@@ -10,7 +10,7 @@ from mutator._common.confined_files import path_below
 from mutator._common.folder_search import run_folders
 from mutator.api.experiment_results import ExperimentResult
 from mutator.api.mutants import build_selected
-from mutator.api.selection import SelectedTarget
+from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Record
 from mutator.outcomes.fault_paths import FaultPath, FaultPaths, fault_paths_of

@@ -9,7 +9,7 @@ from mutator._common.confined_files import check_inside, check_only_plain_files,
 from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
-from mutator.api.selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
+from mutator.api.target_and_fault_selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.execution.single_run import SingleRun, run_single
 from mutator.figures.run_plot import save_figure

@@ -25,16 +25,16 @@ from mutator.cli import (
     caches,
     campaigns,
     comparisons,
-    experiments,
     exports,
-    faults,
     hazard_analysis,
-    library,
+    list_check_doctor,
+    merge_report_clean,
     new_library,
     places,
     reviews,
-    run_folders,
     serving,
+    show_and_rerun,
+    try_diff_generate,
 )
 from mutator.cli.console import Terminal, discard_output, ignoring_stderr_errors, show_error
 from mutator.cli.options import Library, Root, Sandbox, Target, Templates, WorkspaceOptions
@@ -125,18 +125,18 @@ def store_workspace_options(
 
 
 for module in (
-    library,
+    list_check_doctor,
     new_library,
     hazard_analysis,
     places,
-    faults,
+    try_diff_generate,
     reviews,
     campaigns,
-    run_folders,
+    merge_report_clean,
     audits,
     comparisons,
     exports,
-    experiments,
+    show_and_rerun,
     serving,
     caches,
 ):

@@ -14,6 +14,7 @@ from mutator._common.cpu_cores import usable_cores
 from mutator._common.message_text import counted, describe_seeds
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
+from mutator.cli.merge_report_clean import print_outcome_counts
 from mutator.cli.options import (
     AcceptVersions,
     Cluster,
@@ -31,7 +32,6 @@ from mutator.cli.options import (
     WorkspaceOptions,
     with_workspace_options,
 )
-from mutator.cli.run_folders import print_outcome_counts
 from mutator.errors import MutatorError
 from mutator.execution.progress_text import describe_duration
 

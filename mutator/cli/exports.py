@@ -8,8 +8,8 @@ import typer
 import mutator
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
+from mutator.cli.merge_report_clean import workspace_if_any
 from mutator.cli.options import Json, WorkspaceOptions, with_workspace_options
-from mutator.cli.run_folders import workspace_if_any
 from mutator.exports import ExportTable, Format, find_export
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from mutator._common.table_rendering import TextTable
-from mutator.paper.observations import ClaimVerdict, JudgedObservation, judge_observations
+from mutator.paper.observation_judging import ClaimVerdict, JudgedObservation, judge_observations
 from mutator.statistics.seed_spread import seeds_of
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 

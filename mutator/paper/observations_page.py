@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from mutator._common.table_rendering import TextTable
-from mutator.paper.observations import MIN_RUNS_FOR_VERDICT, JudgedClaim, JudgedObservation
+from mutator.paper.observation_judging import MIN_RUNS_FOR_VERDICT, JudgedClaim, JudgedObservation
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 
 RULES_TEXT = f"""\

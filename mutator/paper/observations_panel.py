@@ -8,8 +8,8 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.message_text import counted
 from mutator.config.yaml_files import MOST_YAML_BYTES
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note
-from mutator.paper import observations, observations_by_seed, observations_page
-from mutator.paper.observations import ClaimVerdict
+from mutator.paper import observation_judging, observations_by_seed, observations_page
+from mutator.paper.observation_judging import ClaimVerdict
 from mutator.paper.published_numbers import has_published_numbers, load_published_numbers
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import sheet_csv_files
@@ -60,7 +60,7 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
     if run.workspace is None:
         return None
     references = run.workspace.references
-    file = references / observations.FILE_NAME
+    file = references / observation_judging.FILE_NAME
     if not (file.is_file() and has_published_numbers(references)):
         return None
     fault_types = list(
@@ -73,7 +73,7 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
     file_words = re.findall(r"\w+", read_bounded(file, MOST_YAML_BYTES).decode())
     frame = select_common_columns(run.frame, *file_words)  # the queries use only columns that the file names
     frame = frame.assign(t_end=frame["scenario"].map(ends))  # `median_time` needs the ends of the runs
-    judged = observations.judge_observations(file, frame, list(_mixture_gaps(run, missing)))
+    judged = observation_judging.judge_observations(file, frame, list(_mixture_gaps(run, missing)))
     coverage = _describe_coverage(run, len(fault_types), missing)
     if all(observation.verdict is ClaimVerdict.UNDECIDED for observation in judged):
         return None

@@ -6,13 +6,13 @@ from pathlib import Path
 
 from mutator._common.shipped_files import check_not_shipped
 from mutator.reference import (
-    columns_and_channels,
-    command_line,
+    command_line_page,
     doors_page,
     fault_models_page,
-    format_pages,
     operators_page,
     python_api,
+    results_and_channels_pages,
+    yaml_format_pages,
 )
 from mutator.reference.json_schemas import build_editor_schema, yaml_formats
 from mutator.workspace import Workspace
@@ -22,17 +22,17 @@ SCHEMAS_FOLDER = PAGES_FOLDER / "schemas"
 STUB_PATH = Path("mutator") / "__init__.pyi"
 RENDER_BY_PAGE: dict[str, Callable[[Workspace], str]] = {
     "api.md": python_api.render_api_page,
-    "campaign.md": format_pages.render_campaigns_page,
-    "channels.md": columns_and_channels.render_channels_page,
-    "cluster-file.md": format_pages.render_clusters_page,
-    "cli.md": command_line.render_command_line_page,
+    "campaign.md": yaml_format_pages.render_campaigns_page,
+    "channels.md": results_and_channels_pages.render_channels_page,
+    "cluster-file.md": yaml_format_pages.render_clusters_page,
+    "cli.md": command_line_page.render_command_line_page,
     "doors.md": doors_page.render_doors_page,
     "fault-models.md": fault_models_page.render_fault_models_page,
-    "fault-spec.md": format_pages.render_fault_spec_page,
-    "hazard-analysis.md": format_pages.render_hazard_analysis_page,
+    "fault-spec.md": yaml_format_pages.render_fault_spec_page,
+    "hazard-analysis.md": yaml_format_pages.render_hazard_analysis_page,
     "operators.md": operators_page.render_operators_page,
-    "results.md": columns_and_channels.render_results_page,
-    "target-manifest.md": format_pages.render_manifests_page,
+    "results.md": results_and_channels_pages.render_results_page,
+    "target-manifest.md": yaml_format_pages.render_manifests_page,
 }
 
 

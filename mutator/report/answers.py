@@ -25,8 +25,8 @@ from mutator.report.answer_parts import (
     was_or_were,
 )
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
-from mutator.report.fix_order import fix_first_answer
-from mutator.report.most_dangerous import most_dangerous_answer, worst_hazard_ids
+from mutator.report.fix_first_answer import fix_first_answer
+from mutator.report.most_dangerous_answer import most_dangerous_answer, worst_hazard_ids
 from mutator.report.reported_run import ReportedRun
 from mutator.results.result_rows import ResultRow, rows_of
 

@@ -15,7 +15,7 @@ from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Re
 from starlette.routing import Route
 
 from mutator.errors import MutatorError, NotServed
-from mutator.serve.home import form_choices, home_page
+from mutator.serve.home_and_error_pages import form_choices, home_page
 from mutator.serve.job_requests import TRIALS_FOLDER, JobCommand, RequestChecker
 from mutator.serve.jobs import ServeJobs
 from mutator.serve.json_api import JobApi, ReviewApi, selected_groups

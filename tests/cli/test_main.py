@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from mutator import __version__
-from mutator.cli import library
+from mutator.cli import list_check_doctor
 from mutator.cli.app import SUBCOMMAND_GROUPS, app, main
 from mutator.errors import EXIT_CHECK_FAILED, CheckFailed, MutatorError
 
@@ -118,7 +118,7 @@ def fail_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     def broken(_: object) -> None:
         raise error
 
-    monkeypatch.setitem(library.LIST_BY_KIND, library.EntryKind.SPECS, broken)
+    monkeypatch.setitem(list_check_doctor.LIST_BY_KIND, list_check_doctor.EntryKind.SPECS, broken)
 
 
 def test_an_error_shows_place_expectation_and_remedy(

@@ -8,7 +8,7 @@ import pytest
 
 import mutator
 from mutator.api.mutant_files import pairs_of_campaign, pairs_of_specs, write_mutants
-from mutator.api.selection import SelectedTarget
+from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.errors import MutatorError
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace

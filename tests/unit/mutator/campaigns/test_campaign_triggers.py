@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator.api.mutant_files import MutantSet
-from mutator.api.selection import context_or_parsed_trigger
+from mutator.api.target_and_fault_selection import context_or_parsed_trigger
 from mutator.campaigns.plan import build_plan
 from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError

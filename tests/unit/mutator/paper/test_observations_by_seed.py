@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from mutator.paper.observations import ClaimVerdict, judge_observations
+from mutator.paper.observation_judging import ClaimVerdict, judge_observations
 from mutator.paper.observations_by_seed import (
     judge_by_seed,
     observations_by_seed_sheet,

@@ -20,8 +20,8 @@ from mutator.report.answer_parts import (
 )
 from mutator.report.answers import build_answers
 from mutator.report.fault_path_data import RunFaultPaths
-from mutator.report.fix_order import fix_first_answer
-from mutator.report.most_dangerous import most_dangerous_answer
+from mutator.report.fix_first_answer import fix_first_answer
+from mutator.report.most_dangerous_answer import most_dangerous_answer
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.reported_run import ReportedRun
 from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns

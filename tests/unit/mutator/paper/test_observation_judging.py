@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.paper import observations, observations_page
+from mutator.paper import observation_judging, observations_page
 from mutator.paper.measures import Estimate, estimate_of_difference, estimate_of_share, median_time
-from mutator.paper.observations import (
+from mutator.paper.observation_judging import (
     ClaimRule,
     ClaimVerdict,
     JudgedClaim,
@@ -27,7 +27,7 @@ from mutator.statistics.tallies import Tally
 from ..statistics.results_frame import results
 
 REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
-FILE = REFERENCES / observations.FILE_NAME
+FILE = REFERENCES / observation_judging.FILE_NAME
 HOLDS, FAILS, UNDECIDED = ClaimVerdict
 ACTIVATED = {"t_activation": 1.0}
 EVENTS = {  # the events of a run, by the count that includes it

@@ -93,7 +93,7 @@ def try_spec(
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Inject one fault and run it once: diff, verdict, plot."""
-    from mutator.api.selection import FaultChoice, SelectedTarget, middle_of_each_variant
+    from mutator.api.target_and_fault_selection import FaultChoice, SelectedTarget, middle_of_each_variant
     from mutator.cli.experiment_view import print_trial
 
     terminal = Terminal(as_json)
@@ -174,7 +174,7 @@ def diff(
         _print_diffs(terminal, [(experiment.fault.label, experiment.id, experiment.patch)], whole_patch=patch)
         return
     from mutator.api.mutants import build_selected
-    from mutator.api.selection import FaultChoice, SelectedTarget, middle_of_each_variant
+    from mutator.api.target_and_fault_selection import FaultChoice, SelectedTarget, middle_of_each_variant
 
     selected_target = SelectedTarget.of(workspace, manifest)
     choice = FaultChoice(spec=spec_or_experiment, variant=variant, value=value, seed=seed, reading=reading)

@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import pytest
 
-from mutator.serve import connections
+from mutator.serve import connection_limits
 from mutator.serve.security import HOST
 
 from .conftest import TOKEN, Client
@@ -93,7 +93,7 @@ def test_hundreds_of_connections_do_not_stop_the_server(low_limit: int, sent: st
 def test_a_request_that_never_arrives_is_given_up(
     client: Client, sent: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connections, "MOST_REQUEST_S", 0.3)
+    monkeypatch.setattr(connection_limits, "MOST_REQUEST_S", 0.3)
     with socket.create_connection((HOST, client.port), timeout=5) as one:
         own = {
             "Host": f"{HOST}:{client.port}",
@@ -107,14 +107,14 @@ def test_a_request_that_never_arrives_is_given_up(
 
 def test_a_long_response_is_not_given_up(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     """A first report can take longer than a request may take to arrive."""
-    monkeypatch.setattr(connections, "MOST_REQUEST_S", 0.1)
+    monkeypatch.setattr(connection_limits, "MOST_REQUEST_S", 0.1)
     summarize = client.site.summarize_runs
     monkeypatch.setattr(client.site, "summarize_runs", lambda: (time.sleep(0.4), summarize())[1])
     assert client.get("/api/runs").status == 200
 
 
 def test_the_oldest_idle_connection_makes_room(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "_MOST_CONNECTIONS", 3)
+    monkeypatch.setattr(connection_limits, "_MOST_CONNECTIONS", 3)
     sockets = [socket.create_connection((HOST, client.port), timeout=0.2) for _ in range(6)]
     assert client.get("/api/runs").status == 200
     assert [ended(one) for one in sockets] == [True, True, True, True, False, False]
