@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import mutator
 from mutator._common.message_text import counted
 from mutator.api.experiment_results import experiment_facts
+from mutator.api.results_worst_first import worst_results
 from mutator.api.stored_experiments import StoredExperiment, find_newest_run, open_stored_run
-from mutator.api.worst_results import worst_results
 from mutator.cli.console import NO_BREAK_SPACE, STYLE_BY_ENDING, Terminal, short_path
 from mutator.errors import MutatorError
 from mutator.mutants.readable_patches import readable_patch

@@ -20,10 +20,10 @@ from mutator.report.answer_parts import (
 )
 from mutator.report.answers import build_answers
 from mutator.report.fault_path_data import RunFaultPaths
-from mutator.report.fix_first_answer import fix_first_answer
-from mutator.report.most_dangerous_answer import most_dangerous_answer
+from mutator.report.most_dangerous_experiments import most_dangerous_answer
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.reported_run import ReportedRun
+from mutator.report.what_to_fix_first import fix_first_answer
 from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.store.checksummed_lines import line_file_bytes
 from mutator.store.run_folder import RunFolder

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.api import worst_results as module
-from mutator.api.worst_results import worst_results
+from mutator.api import results_worst_first as module
+from mutator.api.results_worst_first import worst_results
 from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
 from mutator.model import Outcome, Record
