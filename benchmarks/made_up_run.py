@@ -33,7 +33,7 @@ from mutator.mutants.mutant_building import build
 from mutator.outcomes.golden_comparison import load_trace
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.preflight import equivalence_check
-from mutator.preflight.preflight_rules import output_digest_of
+from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store import file_digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA

@@ -21,7 +21,8 @@ from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
-from mutator.preflight import preflight_cache, preflight_checks, preflight_rules
+from mutator.preflight import preflight_cache, preflight_checks
+from mutator.preflight import check_run_problems
 from mutator.store.check_results import FILE
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_lines import LineWriter
@@ -76,7 +77,7 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
         out.mkdir(parents=True)
         for name in looked_at.manifest.output_files:
             (out / name).write_bytes(bytes(500_000))
-        goldens[key] = preflight_rules.output_digest_of(looked_at.manifest, out)
+        goldens[key] = check_run_problems.output_digest_of(looked_at.manifest, out)
     said = {"schema": CHECKS_SCHEMA, "digest": looked_at.digest, "results": [], "goldens": goldens}
     looked_at._store_in_run_folder(json_bytes(said | {"run_cpu_s": 1.0}))
     preflight_cache.store_checks(

@@ -25,7 +25,7 @@ from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
 from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.mutant_building import build
-from mutator.mutants.readable_patches import readable_patch
+from mutator.mutants.file_patches import readable_patch
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.report import experiment_list as report_browse
 from mutator.report import markdown_and_html as report_page

@@ -8,10 +8,10 @@ from pathlib import Path
 from mutator._common.shipped_files import write_new_library
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.checks import fast_engine_check, library_check
+from mutator.checks.check_by_running import drive_findings
 from mutator.checks.doctor import examine_machine
-from mutator.checks.drive_check import drive_findings
 from mutator.checks.findings import Finding
-from mutator.checks.unused_draws import unused_draws_finding
+from mutator.checks.unused_draws_and_parameters import unused_draws_finding
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import parsed_file
 from mutator.mutants.possible_places import ListedPlace, places_of

@@ -8,8 +8,8 @@ from mutator.api.notebook_html import diff_html, text_html
 from mutator.api.target_and_fault_selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
+from mutator.mutants.file_patches import readable_patch
 from mutator.mutants.mutant_building import Mutant, build, write_tree
-from mutator.mutants.readable_patches import readable_patch
 from mutator.targets.manifest import TargetManifest
 
 

@@ -11,7 +11,7 @@ from mutator.api.results_worst_first import worst_results
 from mutator.api.stored_experiments import StoredExperiment, find_newest_run, open_stored_run
 from mutator.cli.console import NO_BREAK_SPACE, STYLE_BY_ENDING, Terminal, short_path
 from mutator.errors import MutatorError
-from mutator.mutants.readable_patches import readable_patch
+from mutator.mutants.file_patches import readable_patch
 
 if TYPE_CHECKING:
     from mutator.api.experiment_results import ExperimentResult

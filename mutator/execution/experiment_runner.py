@@ -25,7 +25,7 @@ from mutator.outcomes.golden_comparison import Trace
 from mutator.outcomes.hazards_and_metrics import RunJudgement, load_judged_run, load_manifest_channels
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.outcomes.verdict_rules import first_events_after, outcome_of
-from mutator.preflight.preflight_rules import output_digest_of
+from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store.run_folder import GoldenRun
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries

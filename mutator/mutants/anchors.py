@@ -13,7 +13,11 @@ from mutator.mutants.constants_and_defaults import (
     choose_constant_or_default,
     list_constants_and_defaults,
 )
-from mutator.mutants.expression_anchors import choose_expression, describe_valid_nth, normalized_anchor_name
+from mutator.mutants.expression_resolution import (
+    choose_expression,
+    describe_valid_nth,
+    normalized_anchor_name,
+)
 from mutator.mutants.expressions import Expression, list_expressions
 from mutator.mutants.name_scopes import names_by_function, normalize_identifier
 from mutator.mutants.node_positions import NodePosition, positions_by_ast
@@ -24,7 +28,7 @@ from mutator.mutants.source_parsing import (
     parse_with_python,
     translate_libcst_errors,
 )
-from mutator.mutants.standalone_functions import list_outermost_function_lines
+from mutator.mutants.standalone_compilation import list_outermost_function_lines
 from mutator.mutants.statements import Function, Statement, collect_functions
 from mutator.targets.source_tree import SourceTree
 

@@ -20,7 +20,7 @@ from mutator.mutants.changed_file_reuse import (
     reuse_cache,
     reuse_key,
 )
-from mutator.mutants.compile_check import certainly_compiles
+from mutator.mutants.compile_check_by_function import certainly_compiles
 from mutator.mutants.injected_lines import OBSERVE_TAG, observe_call
 from mutator.mutants.injection_edits import InjectionEdit, edits_of
 from mutator.mutants.normalized_source import compiles, normalized

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from mutator.engines.code_swap import behaviour_key
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.expressions import Expression
-from mutator.mutants.standalone_functions import compile_standalone
+from mutator.mutants.standalone_compilation import compile_standalone
 from mutator.operators.mutations import Mutation
 
 

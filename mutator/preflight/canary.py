@@ -10,7 +10,7 @@ from mutator.errors import MutatorError
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Experiment, Fault, fault_label
 from mutator.mutants.mutant_building import build
-from mutator.preflight.preflight_rules import CheckRun
+from mutator.preflight.check_run_problems import CheckRun
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

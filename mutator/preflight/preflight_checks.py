@@ -17,7 +17,7 @@ from mutator.campaigns.shared_runs import scenarios_sharing_runs
 from mutator.errors import CheckFailed, DiskFull, InvalidMutant, MutatorError
 from mutator.mutants.mutant_building import build
 from mutator.preflight import preflight_cache, unreached_triggers
-from mutator.preflight.preflight_rules import (
+from mutator.preflight.check_run_problems import (
     CheckRun,
     equal_scenarios_problem,
     golden_problem,

@@ -15,7 +15,7 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.model import Experiment
 from mutator.mutants.mutant_building import build
 from mutator.preflight import canary, unreached_triggers
-from mutator.preflight.preflight_rules import CheckRun, read_check_run
+from mutator.preflight.check_run_problems import CheckRun, read_check_run
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress, StagePace
 from mutator.targets.manifest import TargetManifest

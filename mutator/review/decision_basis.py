@@ -8,8 +8,8 @@ from functools import lru_cache
 
 from mutator._common.hashing import content_id
 from mutator.model import FaultLocation
+from mutator.mutants.file_patches import adds_file, file_patches
 from mutator.mutants.injected_lines import adds_fault
-from mutator.mutants.readable_patches import adds_file, file_patches
 from mutator.review.entries import BasisDigests
 from mutator.review.patch_shapes import HOLE_CHARACTER, without_values
 from mutator.targets.source_tree import SourceTree

@@ -15,7 +15,7 @@ from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.campaigns import run_environment
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
-from mutator.preflight.preflight_rules import output_digest_of
+from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store.run_folder import GoldenRun
 from mutator.targets.manifest import TargetManifest
 

@@ -35,7 +35,7 @@ from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.experiment_runner import ExperimentRunner, FinishedExperiment, LoadedGoldens
 from mutator.execution.worker import timing_of
 from mutator.model import Experiment
-from mutator.preflight.preflight_rules import read_check_run
+from mutator.preflight.check_run_problems import read_check_run
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.patch_files import pack_patches
 from mutator.store.records import record_as_json

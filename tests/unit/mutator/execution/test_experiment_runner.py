@@ -15,7 +15,7 @@ from mutator.errors import MutatorError
 from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.outcomes import trace_files
-from mutator.preflight.preflight_rules import output_digest_of
+from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 

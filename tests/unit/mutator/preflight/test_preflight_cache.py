@@ -15,8 +15,8 @@ from mutator.campaigns.plan import build_plan
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.preflight import preflight_cache
+from mutator.preflight.check_run_problems import output_digest_of
 from mutator.preflight.preflight_checks import run_checks
-from mutator.preflight.preflight_rules import output_digest_of
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

@@ -12,8 +12,8 @@ from mutator.campaigns.plan import build_plan, load_plan
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.preflight.canary import run_until_hazard
+from mutator.preflight.check_run_problems import CheckRun
 from mutator.preflight.preflight_checks import run_checks
-from mutator.preflight.preflight_rules import CheckRun
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder

@@ -32,7 +32,7 @@ from mutator.mutants.injected_lines import tag_of
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import is_probe_path
 from mutator.preflight import canary
-from mutator.preflight.preflight_rules import CheckRun, golden_problem, null_mutant_problem, read_check_run
+from mutator.preflight.check_run_problems import CheckRun, golden_problem, null_mutant_problem, read_check_run
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace

@@ -7,7 +7,7 @@ from dataclasses import replace
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.changed_file_reuse import ReuseKey
 from mutator.mutants.splicing import Edit, EditRank, apply_edits, join_pieces, sort_edits
-from mutator.mutants.standalone_functions import compile_standalone
+from mutator.mutants.standalone_compilation import compile_standalone
 
 
 def certainly_compiles(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> bool:

@@ -6,7 +6,7 @@ import pytest
 
 from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.changed_file_reuse import reuse_key
-from mutator.mutants.compile_check import certainly_compiles
+from mutator.mutants.compile_check_by_function import certainly_compiles
 from mutator.mutants.splicing import Edit, EditRank, probe_import_edit
 
 SOURCE = b"""\

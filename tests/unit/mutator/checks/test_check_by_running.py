@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.checks import drive_check
-from mutator.checks.drive_check import drive_findings
+from mutator.checks import check_by_running
+from mutator.checks.check_by_running import drive_findings
 from mutator.checks.findings import CheckState, Finding
 from mutator.checks.reachability import ReachTracker
 from mutator.errors import MutatorError
@@ -128,7 +128,7 @@ def test_a_thread_pool_is_reported_with_its_line(
         "        wheel = self.pool.submit(float, wheel).result()\n        return gas, brake, wheel",
     )
     if long:
-        monkeypatch.setattr(drive_check, "_MOST_REPEATED_RUN_S", 0.0)
+        monkeypatch.setattr(check_by_running, "_MOST_REPEATED_RUN_S", 0.0)
     found = findings(toy)
     assert found["golden A"].level is CheckState.OK
     fast = found["fast engines"]
