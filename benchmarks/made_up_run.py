@@ -69,7 +69,7 @@ def make(size: int, out: Path) -> str:
     patches = patches_of(workspace, first)
     records = made_up_records(workspace, first)
     write_segments(folder, ids, records, patches)
-    equivalence_check.mark_as_needed(out)
+    equivalence_check.mark_check_as_needed(out)
     write_proof(folder, ids, records, patches)
     write_series(workspace, folder, ids, first)
     append_stretch(
@@ -242,7 +242,7 @@ def write_proof(
         folder.path / PROOF_FOLDER / "0001-gw0.jsonl",
         {"plan": folder.head.plan, "schema": SCHEMA},
     )
-    wanted = set(equivalence_check.sample_ids(folder))
+    wanted = set(equivalence_check.sample_ids_in_folder(folder))
     counts = [0] * WORKERS
     for number, name in enumerate(ids):
         worker = number // PIECE % WORKERS

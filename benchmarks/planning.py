@@ -21,8 +21,7 @@ from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
-from mutator.preflight import preflight_cache, preflight_checks
-from mutator.preflight import check_run_problems
+from mutator.preflight import check_run_problems, preflight_cache, preflight_checks
 from mutator.store.check_results import FILE
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_lines import LineWriter
@@ -80,8 +79,8 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
         goldens[key] = check_run_problems.output_digest_of(looked_at.manifest, out)
     said = {"schema": CHECKS_SCHEMA, "digest": looked_at.digest, "results": [], "goldens": goldens}
     looked_at._store_in_run_folder(json_bytes(said | {"run_cpu_s": 1.0}))
-    preflight_cache.store_checks(
-        preflight_cache.entry_path(looked_at.digest), folder.path, FILE, looked_at.pending_folder
+    preflight_cache.store_passed_checks(
+        preflight_cache.cached_checks_path(looked_at.digest), folder.path, FILE, looked_at.pending_folder
     )
 
 

@@ -24,8 +24,8 @@ from markupsafe import Markup
 from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
 from mutator.model import Experiment, Record, Trigger
+from mutator.mutants.file_patches import patch_without_new_files
 from mutator.mutants.mutant_building import build
-from mutator.mutants.file_patches import readable_patch
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.report import experiment_list as report_browse
 from mutator.report import markdown_and_html as report_page
@@ -106,9 +106,9 @@ def patches(workspace: Workspace, experiments: Sequence[Experiment]) -> Iterator
     for experiment in experiments:
         key = (experiment.fault.id, experiment.trigger)
         if key not in known:
-            known[key] = readable_patch(build(manifest, models, experiment.fault, experiment.trigger).patch)[
-                0
-            ]
+            known[key] = patch_without_new_files(
+                build(manifest, models, experiment.fault, experiment.trigger).patch
+            )[0]
         yield experiment.id, "", known[key]
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mutator.api.notebook_html import diff_html, facts_html, text_html
 from mutator.figures.run_plot import draw_run, event_marks
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
-from mutator.mutants.file_patches import readable_patch
+from mutator.mutants.file_patches import patch_without_new_files
 from mutator.outcomes.golden_comparison import Trace, values_on_steps
 from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.verdict_rules import (
@@ -122,7 +122,7 @@ class ExperimentResult(ABC):
     @property
     def diff(self) -> str:
         """The source diff without the probe, for reading."""
-        return readable_patch(self.patch)[0]
+        return patch_without_new_files(self.patch)[0]
 
     def propagation(self) -> "pd.DataFrame":
         """Return the channels that differ from the golden run, earliest first: name (index), component, role,

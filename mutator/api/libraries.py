@@ -8,10 +8,10 @@ from pathlib import Path
 from mutator._common.shipped_files import write_new_library
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.checks import fast_engine_check, library_check
-from mutator.checks.check_by_running import drive_findings
+from mutator.checks.check_by_running import findings_from_running
 from mutator.checks.doctor import examine_machine
 from mutator.checks.findings import Finding
-from mutator.checks.unused_draws_and_parameters import unused_draws_finding
+from mutator.checks.unused_draws_and_parameters import unused_draws_and_parameters_finding
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import parsed_file
 from mutator.mutants.possible_places import ListedPlace, places_of
@@ -90,12 +90,12 @@ def check_target(
     name = opened_workspace.target_name(target)
     manifest = opened_workspace.manifest(name)
     findings = (
-        drive_findings(opened_workspace, name, scenarios)
+        findings_from_running(opened_workspace, name, scenarios)
         if drive
-        else [fast_engine_check.loading_finding(manifest)]
+        else [fast_engine_check.import_and_fork_finding(manifest)]
     )
-    unused = unused_draws_finding(opened_workspace.specs(), opened_workspace.fault_models())
-    return [*findings, fast_engine_check.variants_finding(opened_workspace, manifest), unused]
+    unused = unused_draws_and_parameters_finding(opened_workspace.specs(), opened_workspace.fault_models())
+    return [*findings, fast_engine_check.unloadable_variants_finding(opened_workspace, manifest), unused]
 
 
 def check_hazard_analysis(

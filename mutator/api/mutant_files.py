@@ -21,7 +21,7 @@ from mutator.api.target_and_fault_selection import (
 from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
-from mutator.mutants.mutant_building import write_tree
+from mutator.mutants.mutant_building import write_mutated_tree
 from mutator.store.plan_choices import Choices
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
@@ -212,7 +212,7 @@ def _write_mutant(built_mutant: BuiltMutant, out: Path, *, trees: bool) -> dict[
     (path_below(out, patch.as_posix())).write_bytes(mutant.patch_bytes)
     tree = Path("trees") / mutant.id
     if trees:
-        write_tree(built_mutant.manifest, mutant, path_below(out, tree.as_posix()))
+        write_mutated_tree(built_mutant.manifest, mutant, path_below(out, tree.as_posix()))
     cells = (
         mutant.id,
         fault.id,

@@ -8,8 +8,8 @@ from mutator.api.notebook_html import diff_html, text_html
 from mutator.api.target_and_fault_selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
-from mutator.mutants.file_patches import readable_patch
-from mutator.mutants.mutant_building import Mutant, build, write_tree
+from mutator.mutants.file_patches import patch_without_new_files
+from mutator.mutants.mutant_building import Mutant, build, write_mutated_tree
 from mutator.targets.manifest import TargetManifest
 
 
@@ -41,7 +41,7 @@ class BuiltMutant:
     @property
     def diff(self) -> str:
         """The patch without the probe, for reading."""
-        return readable_patch(self.patch)[0]
+        return patch_without_new_files(self.patch)[0]
 
     @property
     def files(self) -> dict[str, bytes]:
@@ -56,7 +56,7 @@ class BuiltMutant:
             raise MutatorError(
                 "not empty", where=out, expected="a new or empty folder", remedy="choose another folder"
             )
-        write_tree(self.manifest, self.mutant, out)
+        write_mutated_tree(self.manifest, self.mutant, out)
         return out
 
 

@@ -230,7 +230,7 @@ def proof_problems(
             yield MutatorError("missing", where=proof_folder, expected=f"a proof of the engine `{forked[0]}`")
         return
     record_by_id = {stored.record.experiment_id: stored.record for stored in records}
-    sampled = set(equivalence_check.sample_ids(folder))
+    sampled = set(equivalence_check.sample_ids_in_folder(folder))
     for proven_record in proven:
         record = record_by_id.get(proven_record.record.experiment_id)
         if record is not None and record != proven_record.record:

@@ -11,7 +11,7 @@ from mutator.model import Fault, Limits
 from mutator.operators.executed_lines import ExecutedLines, GoldenRunInputs, measure_executed_lines
 from mutator.operators.mutation_selection import SelectedMutations, sample_mutations, select_mutations
 from mutator.operators.mutations import Mutation
-from mutator.operators.statement_facts import facts_of
+from mutator.operators.statement_facts import statement_facts_of
 from mutator.targets.manifest import TargetManifest
 
 
@@ -78,6 +78,6 @@ class OperatorFaults:
     def _is_executed(self, mutation: Mutation, lines: Mapping[str, Collection[int]]) -> bool:
         path = mutation.location.path
         # mutations count lines from 0, measured lines begin at 1
-        return mutation.line + 1 in facts_of(self._manifest.tree, path).extend_to_statements(
+        return mutation.line + 1 in statement_facts_of(self._manifest.tree, path).extend_to_statements(
             lines.get(path, ())
         )

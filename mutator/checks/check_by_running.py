@@ -32,7 +32,12 @@ from mutator.mutants.injected_lines import tag_of
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import is_probe_path
 from mutator.preflight import canary
-from mutator.preflight.check_run_problems import CheckRun, golden_problem, null_mutant_problem, read_check_run
+from mutator.preflight.check_run_problems import (
+    CheckRun,
+    golden_pair_problem,
+    null_mutant_problem,
+    read_check_run,
+)
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
@@ -42,7 +47,7 @@ _MOST_REPEATED_RUN_S = 5.0  # slower golden runs are not repeated for the fast e
 _MOST_PLACES = 20  # places listed in a finding
 
 
-def drive_findings(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
+def findings_from_running(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
     """Return the findings from golden runs of the scenarios (default: those of the target's campaigns, or
     else all).
 
@@ -51,7 +56,7 @@ def drive_findings(workspace: Workspace, target: str, scenarios: Sequence[str] =
     unknown scenario or a mistake in the library; `library_problems` reports all such mistakes.
     """
     with ScratchFolder("mutator-drive-") as scratch:
-        return _DriveCheck(workspace, target, scenarios, scratch).findings()
+        return _RunningCheck(workspace, target, scenarios, scratch).findings()
 
 
 @dataclass(frozen=True)
@@ -67,7 +72,7 @@ class _GoldenRuns:
     again: JobResult
 
 
-class _DriveCheck:
+class _RunningCheck:
     def __init__(self, workspace: Workspace, target: str, scenarios: Sequence[str], scratch: Path) -> None:
         self.workspace = workspace
         self.manifest: TargetManifest = workspace.manifest(target)
@@ -79,7 +84,7 @@ class _DriveCheck:
             workspace.scenario(name)
         self.campaigns = [c for c in target_campaigns if set(c.scenarios) & set(self.scenarios)]
         self.reach_tracker = ReachTracker(workspace, self.manifest, self.campaigns)
-        settings = [_scenario_changes(workspace, campaign) for campaign in self.campaigns] or [()]
+        settings = [_campaign_changes(workspace, campaign) for campaign in self.campaigns] or [()]
         self.usual_changes = () if () in settings else settings[0]
         self.changes_of_campaigns = list(dict.fromkeys(settings))
         limits = self.campaigns[0].limits if self.campaigns else Limits()
@@ -92,9 +97,9 @@ class _DriveCheck:
     def findings(self) -> list[Finding]:
         with ThreadPoolExecutor(usable_cores()) as pool:
             jobs = [job for name in self.scenarios for job in self._first_jobs(name)]
-            runs = dict(zip((job.name for job in jobs), pool.map(self._run, jobs), strict=True))
-            goldens = {name: self._golden_runs(name, runs) for name in self.scenarios}
-            findings = [self._determinism_finding(name, golden) for name, golden in goldens.items()]
+            runs = dict(zip((job.name for job in jobs), pool.map(self._execute, jobs), strict=True))
+            goldens = {name: self._complete_golden_runs(name, runs) for name in self.scenarios}
+            findings = [self._golden_runs_finding(name, golden) for name, golden in goldens.items()]
             if all(self._check_run(golden.first).problem for golden in goldens.values()):
                 return findings  # failed runs allow no further findings
             findings += (
@@ -107,7 +112,7 @@ class _DriveCheck:
             )
             for name, golden in goldens.items():
                 self._record_reach(name, self.usual_changes, golden.watched)
-            canaries = pool.map(self._canary_finding, self._canary_experiments())
+            canaries = pool.map(self._canary_finding, self._distinct_canaries())
             self._run_with_further_changes()
             return [*findings, *self.reach_tracker.findings(), *canaries]
 
@@ -117,7 +122,7 @@ class _DriveCheck:
         yield self._pristine_job("first", scenario, self.usual_changes)
         yield self._counting_job(scenario, self.usual_changes)
 
-    def _golden_runs(self, scenario: str, runs: Mapping[str, JobResult]) -> _GoldenRuns:
+    def _complete_golden_runs(self, scenario: str, runs: Mapping[str, JobResult]) -> _GoldenRuns:
         first, watched = runs[f"first-{scenario}"], runs[f"counting-{scenario}"]
         first_run, watched_run = self._check_run(first), self._check_run(watched)
         if first_run.problem or (
@@ -127,8 +132,10 @@ class _DriveCheck:
         again = replace(self._pristine_job("again", scenario, self.usual_changes), hash_seed=_OTHER_HASH_SEED)
         if watched_run.problem:  # watching might be the cause
             counting = self._counting_job(scenario, self.usual_changes)
-            watched = self._run(replace(counting, name=f"unwatched-{scenario}", watch_nondeterminism=False))
-        return _GoldenRuns(first, watched, self._run(again))
+            watched = self._execute(
+                replace(counting, name=f"unwatched-{scenario}", watch_nondeterminism=False)
+            )
+        return _GoldenRuns(first, watched, self._execute(again))
 
     def _pristine_job(self, kind: str, scenario: str, changes: tuple[str, ...]) -> Job:
         file = self.workspace.scenario(scenario)
@@ -145,7 +152,7 @@ class _DriveCheck:
             watch_nondeterminism=True,
         )
 
-    def _run(self, job: Job) -> JobResult:
+    def _execute(self, job: Job) -> JobResult:
         folder = path_below(self.engine.work_folder, f"{job.name}-{'-'.join(job.changes)}")
         return self.engine.execute(job, folder)
 
@@ -154,20 +161,20 @@ class _DriveCheck:
 
     # Determinism
 
-    def _determinism_finding(self, scenario: str, golden: _GoldenRuns) -> Finding:
+    def _golden_runs_finding(self, scenario: str, golden: _GoldenRuns) -> Finding:
         """Check that the runs give the same bytes and reach no hazard."""
         name = f"golden {scenario}"
         first, watched, again = (
             self._check_run(execution) for execution in (golden.first, golden.watched, golden.again)
         )
-        problem = golden_problem(first, again)
+        problem = golden_pair_problem(first, again)
         if not problem and not (problem := null_mutant_problem(first, watched)):
             success = f"the same bytes twice, in {golden.first.wall_s:.1f} s each"
             return Finding(name=name, level=CheckState.OK, found=success)
         if first.problem or again.problem or watched.problem or first.output_digest == again.output_digest:
             remedy = "fix the target, the scenario or the manifest: no campaign can start"
             return Finding(name=name, level=CheckState.FAIL, found=problem, remedy=remedy)
-        same = self._check_run(self._run(self._pristine_job("same", scenario, self.usual_changes)))
+        same = self._check_run(self._execute(self._pristine_job("same", scenario, self.usual_changes)))
         return self._nondeterminism_finding(name, golden, by_hash=same.output_digest == first.output_digest)
 
     def _nondeterminism_finding(self, name: str, golden: _GoldenRuns, *, by_hash: bool) -> Finding:
@@ -191,7 +198,7 @@ class _DriveCheck:
         noted = [
             note
             | {
-                "line": _target_line(files[note["file"]], note["line"])
+                "line": _target_line_of_mutant_line(files[note["file"]], note["line"])
                 if note["file"] in files
                 else note["line"]
             }
@@ -229,7 +236,11 @@ class _DriveCheck:
         is_tried = is_deterministic and golden.first.wall_s <= _MOST_REPEATED_RUN_S
         refusal = forkable.find_obstacle_before_loading(self.manifest)
         if not refusal:
-            refusal = self._forking_refusal(scenario, golden) if is_tried else _thread_refusal(golden.watched)
+            refusal = (
+                self._forking_refusal(scenario, golden)
+                if is_tried
+                else _forking_refusal_by_threads(golden.watched)
+            )
         if refusal is None and not is_tried:
             why = (
                 f"because a golden run takes {golden.first.wall_s:.0f} s"
@@ -301,14 +312,14 @@ class _DriveCheck:
 
     def _run_counting_mutant(self, scenario: str, changes: tuple[str, ...]) -> None:
         changes = tuple(dict.fromkeys(changes))
-        self._record_reach(scenario, changes, self._run(self._counting_job(scenario, changes)))
+        self._record_reach(scenario, changes, self._execute(self._counting_job(scenario, changes)))
 
     # Canaries
 
-    def _canary_experiments(self) -> list[tuple[str, Experiment, str]]:
+    def _distinct_canaries(self) -> list[tuple[str, Experiment, str]]:
         """Campaign, canary and hazard. Canaries that differ only in their setting are tried once."""
         canaries: dict[object, tuple[str, Experiment, str]] = {}
-        for campaign in sorted(self.campaigns, key=lambda c: len(_scenario_changes(self.workspace, c))):
+        for campaign in sorted(self.campaigns, key=lambda c: len(_campaign_changes(self.workspace, c))):
             reading = _reading_of(self.workspace, campaign)
             if campaign.canary not in canaries and campaign.canary.scenario in self.scenarios:
                 experiment = CampaignExpansion(
@@ -321,10 +332,12 @@ class _DriveCheck:
         campaign, experiment, hazard = canary_experiment
 
         def run(tried: Experiment) -> CheckRun:
-            return self._check_run(self._run(canary.build_canary_job(self.workspace, self.manifest, tried)))
+            return self._check_run(
+                self._execute(canary.build_canary_job(self.workspace, self.manifest, tried))
+            )
 
         problem, success = canary.run_until_hazard(
-            canary.canary_variants(self.workspace, self.manifest, experiment), run, hazard
+            canary.canary_with_other_values(self.workspace, self.manifest, experiment), run, hazard
         )
         return Finding(
             name=f"canary {campaign}",
@@ -336,7 +349,7 @@ class _DriveCheck:
         )
 
 
-def _thread_refusal(execution: JobResult) -> NotForkable | None:
+def _forking_refusal_by_threads(execution: JobResult) -> NotForkable | None:
     threads = execution.watch_report.get("threads", [])
     return NotForkable(describe_too_many_threads(threads), remedy_for_threads(threads)) if threads else None
 
@@ -345,11 +358,11 @@ def _reading_of(workspace: Workspace, campaign: Campaign) -> str:
     return campaign.reading or workspace.readings().default_name
 
 
-def _scenario_changes(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:
+def _campaign_changes(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:
     return campaign.changes_in(_reading_of(workspace, campaign))
 
 
-def _target_line(data: bytes, line: int) -> int:
+def _target_line_of_mutant_line(data: bytes, line: int) -> int:
     """Convert a line number in a mutant's file to the one in the target's own file."""
     tags = map(tag_of, data.splitlines()[: line - 1])
     return line - sum(tag is not None and tag.replaced_line is None for tag in tags)

@@ -17,7 +17,7 @@ from packaging.requirements import Requirement
 
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.message_text import counted
-from mutator.checks.fast_engine_check import loading_finding
+from mutator.checks.fast_engine_check import import_and_fork_finding
 from mutator.checks.findings import CheckState, Finding
 from mutator.engines.sandbox import reason_not_available as shortcoming_of_sandbox
 from mutator.errors import MutatorError
@@ -152,6 +152,6 @@ def _library_findings(workspace: "Workspace") -> Iterator[Finding]:
             overlay = f" and {manifest.overlay}" if manifest.overlay else ""
             summary = f"{manifest.root}{overlay}: {counted(len(manifest.tree.files), 'file')}"
             yield Finding(name=f"target {name}", level=CheckState.OK, found=summary)
-            yield replace(loading_finding(manifest), name=f"fast engines, {name}")
+            yield replace(import_and_fork_finding(manifest), name=f"fast engines, {name}")
         except MutatorError as e:
             yield Finding(name=f"target {name}", level=CheckState.FAIL, found=str(e), remedy=e.remedy or "")

@@ -14,10 +14,10 @@ from mutator.workspace import Workspace
 FINDING_NAME = "fast engines"
 _FALLBACK_NOTE = "campaigns then run on the reference engine"
 _DRIVE_CHECK_NOTE = "`mutator check --drive` names the lines that start threads in Python"
-_MOST_LISTED = 3  # reasons
+_MOST_LISTED_REASONS = 3  # reasons
 
 
-def loading_finding(manifest: TargetManifest) -> Finding:
+def import_and_fork_finding(manifest: TargetManifest) -> Finding:
     """Import the target's modules, and report whether it can then be forked."""
     with ScratchFolder("mutator-check-") as scratch:
         import_finding = forking_finding(find_obstacle_by_loading(manifest, scratch / "server"))
@@ -39,7 +39,7 @@ def forking_finding(refusal: NotForkable | None) -> Finding:
     )
 
 
-def variants_finding(workspace: Workspace, manifest: TargetManifest) -> Finding:
+def unloadable_variants_finding(workspace: Workspace, manifest: TargetManifest) -> Finding:
     """Return the finding about variants whose mutants cannot be put into a loaded program."""
     models = workspace.fault_models()
     faults = [f for spec in workspace.specs() for f in expand_spec(spec, 0, models=models, manifest=manifest)]
@@ -54,8 +54,8 @@ def variants_finding(workspace: Workspace, manifest: TargetManifest) -> Finding:
         message = f"{counted(count, 'variant')} can be forked"
         return Finding(name="faults for fast engines", level=CheckState.OK, found=message)
     listed_reasons = "; ".join(
-        f"{', '.join(names[:_MOST_LISTED])}{' and more' if len(names) > _MOST_LISTED else ''}: {why}"
-        for why, names in list(reasons.items())[:_MOST_LISTED]
+        f"{', '.join(names[:_MOST_LISTED_REASONS])}{' and more' if len(names) > _MOST_LISTED_REASONS else ''}: {why}"
+        for why, names in list(reasons.items())[:_MOST_LISTED_REASONS]
     )
     unforkable_count = sum(map(len, reasons.values()))
     return Finding(

@@ -19,7 +19,7 @@ from mutator.model import Fault
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import edits_of, injection_edit
 from mutator.mutants.mutant_building import build
-from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, unsplice
+from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, unsplice
 from mutator.onboarding.todo_marks import unfilled_mark_errors
 from mutator.stpa.analysis_checks import list_analysis_problems
 from mutator.stpa.context_tables import ContextTable
@@ -91,22 +91,22 @@ def campaign_problems(
             continue
         collector.result_of(partial(check_readings, campaign, readings))
         if manifest and manifest.name == campaign.target:
-            collector.result_of(partial(_check_triggers, campaign, manifest))
+            collector.result_of(partial(_check_listed_triggers, campaign, manifest))
         study = collector.result_of(partial(load_campaign_study, campaign))
         if study and campaign.study and campaign.study not in checked_studies:
             checked_studies.add(campaign.study)
             problems = study_problems(campaign.study, study, workspace)
-            collector.problems += [_located_problem(problem, campaign) for problem in problems]
+            collector.problems += [_problem_at_campaign(problem, campaign) for problem in problems]
     return collector.problems
 
 
-def _check_triggers(campaign: Campaign, manifest: TargetManifest) -> None:
+def _check_listed_triggers(campaign: Campaign, manifest: TargetManifest) -> None:
     build_listed_triggers(
         campaign.listed_triggers, campaign.yaml_source, manifest, armed_after_s=0.0, hold_s=None
     )
 
 
-def _located_problem(problem: MutatorError, campaign: Campaign) -> MutatorError:
+def _problem_at_campaign(problem: MutatorError, campaign: Campaign) -> MutatorError:
     """Locate a study's problem at the campaign that uses the study, unless the problem names a file."""
     if problem.where:
         return problem
@@ -141,10 +141,10 @@ def spec_problems(spec: FaultSpec, models: FaultModels, manifest: TargetManifest
             if reading in variant.injections_by_reading:
                 name = f"{spec.name}/{variant.name}"
                 fault = next(f for f in faults if f.spec == name)
-                yield from _build_problems(spec, variant, fault, models, manifest)
+                yield from _unbuildable_fault_problems(spec, variant, fault, models, manifest)
 
 
-def _build_problems(
+def _unbuildable_fault_problems(
     spec: FaultSpec, variant: Variant, fault: Fault, models: FaultModels, manifest: TargetManifest
 ) -> Iterator[MutatorError]:
     """Yield why a fault of a variant cannot be built, located at the injection that is the cause, if any."""
@@ -218,7 +218,7 @@ def apply_example(model: FaultModel, models: FaultModels, example: FaultModelExa
     file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
     injection = resolve_injection(example.injection, model, model.source)
     edit = injection_edit(file, models, injection, EXAMPLE_TAG)
-    after = join_pieces(apply_edits(file, as_line_edits(file, [edit])))
+    after = mutated_bytes(apply_edits(file, as_line_edits(file, [edit])))
     if unsplice(after) != file.data:
         raise MutatorError("the example does not un-splice to its `before`")
     return after.decode()

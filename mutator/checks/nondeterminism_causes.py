@@ -24,14 +24,14 @@ _UNKNOWN_CAUSE_REMEDY = (
 
 
 def likely_causes(
-    manifest: TargetManifest, watched: Mapping[str, Any], *, by_hash: bool
+    manifest: TargetManifest, watch_report: Mapping[str, Any], *, by_hash: bool
 ) -> tuple[list[FindingPlace], str]:
     """Return the most suspicious lines, likeliest first, and the remedies.
 
     `by_hash` means that runs agree with equal PYTHONHASHSEED and differ otherwise, which points to set order
     or hashes. `watched` has the notes of a watched run.
     """
-    notes = watched.get("noted", [])
+    notes = watch_report.get("noted", [])
     hashes = [note for note in notes if note["kind"] == HASH]
     others = [note for note in notes if note["kind"] != HASH]
     ordered = [(HASH, place) for place in set_order_places(manifest)]
@@ -58,8 +58,8 @@ def set_order_places(manifest: TargetManifest) -> list[FindingPlace]:
     return places
 
 
-def places_of_kind(watched: Mapping[str, Any], kind: str) -> list[FindingPlace]:
-    return [place_of_note(note) for note in watched.get("noted", []) if note["kind"] == kind]
+def places_of_kind(watch_report: Mapping[str, Any], kind: str) -> list[FindingPlace]:
+    return [place_of_note(note) for note in watch_report.get("noted", []) if note["kind"] == kind]
 
 
 def place_of_note(note: Mapping[str, Any]) -> FindingPlace:

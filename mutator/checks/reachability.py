@@ -37,7 +37,7 @@ class SpecStatement:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AwaitedTrigger:
+class LibraryTrigger:
     """A trigger of a context table or of a campaign's list, armed as in campaigns."""
 
     trigger: Trigger
@@ -55,7 +55,7 @@ class ReachTracker:
             workspace, manifest, [statement.location for statement in statements]
         )
         self.unexecuted_statements = statements
-        self.unreached_triggers = list(_awaited_triggers(workspace, manifest, campaigns))
+        self.unreached_triggers = list(_library_triggers(workspace, manifest, campaigns))
         self._trigger_count = len(self.unreached_triggers)
         self._scenarios_run: list[str] = []  # scenarios with their changes
         self._condition_by_trigger = {
@@ -170,16 +170,16 @@ def _with_counting_model(models: FaultModels) -> FaultModels:
     return replace(models, models={**models.models, _COUNTING_MODEL: count})
 
 
-def _awaited_triggers(
+def _library_triggers(
     workspace: Workspace, manifest: TargetManifest, campaigns: Sequence[Campaign]
-) -> Iterator[AwaitedTrigger]:
+) -> Iterator[LibraryTrigger]:
     """Yield the triggers that campaigns use, each armed as early as in any campaign, and the latest random
     times. Without campaigns, the triggers of all context tables.
     """
     armed_after_s_by_row: dict[tuple[str, str], float] = {}
     for campaign in campaigns:
         earliest = min(campaign.armed_after_s_by_reading.values(), default=manifest.armed_after_s)
-        for row in _context_rows(workspace, campaign):
+        for row in _context_table_and_row_ids(workspace, campaign):
             armed_after_s_by_row[row] = min(armed_after_s_by_row.get(row, earliest), earliest)
         yield from _listed_triggers(campaign, manifest, earliest)
         if (until := campaign.random_until_s) is not None and Method.RANDOM in campaign.methods:
@@ -187,7 +187,7 @@ def _awaited_triggers(
             place = _yaml_place(
                 campaign.path, campaign.yaml_source.line_of(("triggers", "random_until_s")), what
             )
-            yield AwaitedTrigger(trigger=trigger_at_time(until, name=campaign.name), place=place)
+            yield LibraryTrigger(trigger=trigger_at_time(until, name=campaign.name), place=place)
     for name in {table: None for table, _ in armed_after_s_by_row} if campaigns else workspace.context_tables:
         table = workspace.context_table(name)
         for trigger in table.triggers(armed_after_s=manifest.armed_after_s):
@@ -195,10 +195,10 @@ def _awaited_triggers(
                 after = armed_after_s_by_row.get((name, trigger.name), manifest.armed_after_s)
                 what = f"{name}, {trigger.name}: {trigger.condition}, armed after {after:g} s"
                 place = _yaml_place(table.source.path, table.source.line_of(("contexts", trigger.name)), what)
-                yield AwaitedTrigger(trigger=replace(trigger, armed_after_s=after), place=place)
+                yield LibraryTrigger(trigger=replace(trigger, armed_after_s=after), place=place)
 
 
-def _context_rows(workspace: Workspace, campaign: Campaign) -> list[tuple[str, str]]:
+def _context_table_and_row_ids(workspace: Workspace, campaign: Campaign) -> list[tuple[str, str]]:
     if campaign.context_table is None:
         return []
     rows = campaign.context_ids or [row.id for row in workspace.context_table(campaign.context_table).rows]
@@ -207,7 +207,7 @@ def _context_rows(workspace: Workspace, campaign: Campaign) -> list[tuple[str, s
 
 def _listed_triggers(
     campaign: Campaign, manifest: TargetManifest, armed_after_s: float
-) -> Iterator[AwaitedTrigger]:
+) -> Iterator[LibraryTrigger]:
     triggers = build_listed_triggers(
         campaign.listed_triggers,
         campaign.yaml_source,
@@ -217,7 +217,7 @@ def _listed_triggers(
     )
     for i, trigger in enumerate(triggers):
         what = f"{campaign.name}: {trigger.name}"
-        yield AwaitedTrigger(
+        yield LibraryTrigger(
             trigger=trigger,
             place=_yaml_place(campaign.path, campaign.yaml_source.line_of(("triggers", "list", i)), what),
         )

@@ -26,7 +26,7 @@ _ORDER_DEPENDENT_FUNCTIONS = (
 # functions whose result does not depend on the order
 _ORDER_FREE_FUNCTIONS = ("sorted", "min", "max", "any", "all", "len", *_SET_CONSTRUCTORS)
 _ORDER_DEPENDENT_METHODS = (".join", ".extend", ".fromkeys")
-_MOST_CHARACTERS = 60  # longest shown expression, in characters
+_MOST_SOURCE_CHARACTERS = 60  # longest shown expression, in characters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +69,11 @@ class _SetUseScope:
                 prefix = "" if self.name == "<module>" else f"{self.name}."
                 yield from _SetUseScope(node, prefix + node.name, self.set_names).set_order_uses()
             elif set_expression := next(
-                (expression for expression in self._expressions_in_order(node) if self._is_set(expression)),
+                (
+                    expression
+                    for expression in self._expressions_iterated_in_order(node)
+                    if self._is_set(expression)
+                ),
                 None,
             ):
                 line = getattr(node, "lineno", set_expression.lineno)
@@ -102,7 +106,7 @@ class _SetUseScope:
             return isinstance(function, ast.Name) and function.id in _SET_CONSTRUCTORS
         return isinstance(node, ast.Name | ast.Attribute) and ast.unparse(node) in self.set_names
 
-    def _expressions_in_order(self, node: ast.AST) -> Iterator[ast.expr]:
+    def _expressions_iterated_in_order(self, node: ast.AST) -> Iterator[ast.expr]:
         """Yield the expressions that a node iterates over in order."""
         if isinstance(node, ast.For | ast.AsyncFor):
             yield node.iter
@@ -152,4 +156,4 @@ def _is_keys_call(node: ast.expr) -> bool:
 
 def _shortened_source(node: ast.expr) -> str:
     text = ast.unparse(node)
-    return text if len(text) <= _MOST_CHARACTERS else f"{text[:_MOST_CHARACTERS]}..."
+    return text if len(text) <= _MOST_SOURCE_CHARACTERS else f"{text[:_MOST_SOURCE_CHARACTERS]}..."

@@ -16,7 +16,7 @@ from mutator.faults.injection_specs import DrawReference, InjectionSpec, parse_d
 _FINDING_NAME = "draws"
 
 
-def unused_draws_finding(specs: tuple[FaultSpec, ...], models: FaultModels) -> Finding:
+def unused_draws_and_parameters_finding(specs: tuple[FaultSpec, ...], models: FaultModels) -> Finding:
     places = [*_unused_draw_places(specs, models), *_unused_parameter_places(models)]
     if not places:
         return Finding(name=_FINDING_NAME, level=CheckState.OK, found="all drawn values are used")

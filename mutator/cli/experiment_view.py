@@ -11,7 +11,7 @@ from mutator.api.results_worst_first import worst_results
 from mutator.api.stored_experiments import StoredExperiment, find_newest_run, open_stored_run
 from mutator.cli.console import NO_BREAK_SPACE, STYLE_BY_ENDING, Terminal, short_path
 from mutator.errors import MutatorError
-from mutator.mutants.file_patches import readable_patch
+from mutator.mutants.file_patches import patch_without_new_files
 
 if TYPE_CHECKING:
     from mutator.api.experiment_results import ExperimentResult
@@ -82,7 +82,7 @@ def print_experiment(
     for name, value in facts.items():
         terminal.print_text(f"{name.ljust(width)}  {value}", style="bold" if name == "fault" else None)
     terminal.print_text()
-    diff, note = readable_patch(patch)
+    diff, note = patch_without_new_files(patch)
     terminal.print_diff(diff)
     terminal.print_text(note, style="dim")
     terminal.print_text()

@@ -24,7 +24,7 @@ from mutator.cli.options import (
     with_workspace_options,
 )
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
-from mutator.mutants.file_patches import readable_patch
+from mutator.mutants.file_patches import patch_without_new_files
 
 _DEFAULT_OUT = Path("runs/try")
 EXPERIMENT_ID_PATTERN = re.compile(r"[0-9a-f]{4,16}")  # an id, or enough of its start
@@ -193,7 +193,7 @@ def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole
     for fault, _, patch in diffs:
         # `patch` skips text before a diff, so piped output can include the heading.
         terminal.print_text(f"# {fault}", style="bold", without_folding=True)
-        text, note = (patch, "") if whole_patch else readable_patch(patch)
+        text, note = (patch, "") if whole_patch else patch_without_new_files(patch)
         terminal.print_diff(text)
         if note:
             terminal.print_note(note)

@@ -14,7 +14,7 @@ from types import CodeType
 
 from mutator.errors import NotSwappable
 from mutator.mutants.constant_imports import module_name
-from mutator.mutants.injected_lines import has_value_settings, tag_of
+from mutator.mutants.injected_lines import has_constant_or_default_settings, tag_of
 from mutator.mutants.probe import Probe, probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
@@ -104,7 +104,7 @@ def _swaps_and_imports_of_file(
 
 
 def _value_setters_of_file(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeType]]:
-    if not has_value_settings(mutated):
+    if not has_constant_or_default_settings(mutated):
         return []
     lines = _select_lines(mutated, value_setters=True)
     return [(module_name(path), _compile_cached(lines, filename))] if lines.strip() else []
@@ -112,7 +112,7 @@ def _value_setters_of_file(path: str, mutated: bytes, filename: str) -> list[tup
 
 def _select_lines(mutated: bytes, *, value_setters: bool) -> bytes:
     """Keep only a file's lines that set values in the probe, or only the others; line numbers stay."""
-    if not value_setters and not has_value_settings(mutated):
+    if not value_setters and not has_constant_or_default_settings(mutated):
         return mutated
     lines = mutated.splitlines(keepends=True)
     chosen = [((tag := tag_of(line)) is not None and tag.is_value_setting) is value_setters for line in lines]

@@ -47,7 +47,7 @@ from mutator.engines.thread_messages import describe_too_many_threads, remedy_fo
 from mutator.errors import ForkServerLost, NotForkable, NotSwappable
 from mutator.model import Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
-from mutator.mutants.probe import Probe, probe_module, probe_state_after, untriggered_report
+from mutator.mutants.probe import Probe, probe_attributes_after, probe_module, untriggered_report
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_code import stop_function_source
 from mutator.triggers.trigger_kinds import always_trigger
@@ -252,7 +252,7 @@ class ForkEngine:
             "probe": swap.probe_code,
             "functions": [(f.module, f.name_path, f.old_code, f.new_code) for f in swap.functions],
             "settings": swap.value_setters,
-            "probe_state": probe_state_after(
+            "probe_state": probe_attributes_after(
                 fork_point.observation_count, fork_point.earliest_time_s, fork_point.last_time_s
             ),
             "stop": stop_function_source(self._manifest) if job.stop_at_hazard else None,

@@ -40,7 +40,7 @@ from mutator.engines.target_processes import (
 )
 from mutator.model import Limits, Status
 from mutator.mutants.anchors import parsed_file
-from mutator.mutants.probe import probe_module, probe_state_after
+from mutator.mutants.probe import probe_attributes_after, probe_module
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_code import stop_function_source
 
@@ -198,7 +198,7 @@ class ReferenceEngine:
         return location.path, [line + 1 for line in range(first, max(last, first + 1))]
 
     def _observed_names(self) -> tuple[str, list[str]]:
-        holder, _ = probe_state_after(0, None, None)
+        holder, _ = probe_attributes_after(0, None, None)
         return holder, [value.name for value in self.manifest.observation.values]
 
     def _run_guarded(self, job: Job, request_path: Path, home: JobFolder) -> ProcessEnding:

@@ -39,7 +39,9 @@ def _progress_stages(session: Session) -> Iterator[Progress]:
     while (progress := experiments.poll()).done < progress.total:
         yield progress
     yield progress
-    proof = RecordTail("proof", folder.path / PROOF_FOLDER, len(equivalence_check.sample_ids(folder)))
+    proof = RecordTail(
+        "proof", folder.path / PROOF_FOLDER, len(equivalence_check.sample_ids_in_folder(folder))
+    )
     while session.proof:
         yield proof.poll()
     while True:

@@ -152,8 +152,8 @@ class Session:
         self._finished_count_before = sum(ending.is_final for ending in endings_of(records))
         pending_chunks = pending_chunks_of(self.folder, records)
         if pending_chunks and self.engine != REFERENCE:
-            equivalence_check.mark_as_needed(self.folder.path)
-        self.proof = equivalence_check.remaining_sample(self.folder)
+            equivalence_check.mark_check_as_needed(self.folder.path)
+        self.proof = equivalence_check.remaining_sampled_experiments(self.folder)
         if pending_chunks or self.proof or not checks_and_goldens_exist(self.folder):
             check_requirements(self.manifest)
             accepted_version_differences(self.folder, accept=self.accept_versions)
@@ -222,7 +222,7 @@ class Session:
         if (
             proven
             and finished_count == self.folder.planned_count
-            and (why := equivalence_check.reason_not_needed(self.folder)) is not None
+            and (why := equivalence_check.reason_check_not_needed(self.folder)) is not None
         ):
             proven, not_forked = None, why
             with self._noting_full_disk():

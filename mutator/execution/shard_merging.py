@@ -161,7 +161,7 @@ def _check_shard_finished(folder: RunFolder) -> None:
             remedy="resume it with the command that started it",
         )
     equivalence_check.compare_sample(folder, records)
-    if remaining_count := len(equivalence_check.remaining_sample(folder)):
+    if remaining_count := len(equivalence_check.remaining_sampled_experiments(folder)):
         raise MutatorError(
             f"unfinished: its proof has {counted(remaining_count, 'experiment')} left to run",
             where=folder.path,

@@ -103,7 +103,7 @@ class Worker:
         experiment was forked, nothing is run.
         """
         if self._needs_proof is None:
-            self._needs_proof = equivalence_check.reason_not_needed(self.folder) is None
+            self._needs_proof = equivalence_check.reason_check_not_needed(self.folder) is None
         if not self._needs_proof:
             return []
         if self._prover is None:

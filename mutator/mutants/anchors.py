@@ -19,10 +19,10 @@ from mutator.mutants.expression_resolution import (
     normalized_anchor_name,
 )
 from mutator.mutants.expressions import Expression, list_expressions
-from mutator.mutants.name_scopes import names_by_function, normalize_identifier
-from mutator.mutants.node_positions import NodePosition, positions_by_ast
+from mutator.mutants.name_scopes import normalize_identifier, used_names_by_function
+from mutator.mutants.node_positions import NodePosition, ast_node_positions
 from mutator.mutants.source_parsing import (
-    check_uninstrumented,
+    check_line_ends_and_uninstrumented,
     import_insertion_line,
     parse_with_libcst,
     parse_with_python,
@@ -74,7 +74,7 @@ class ParsedFile:
     def resolve_expression(self, location: FaultLocation) -> Expression:
         """Return the expression at the location; MutatorError with candidates unless exactly one matches."""
         functions = functions_named(self, location.function)
-        expressions = self.expressions_by_function.get(plain_function_name(location.function), ())
+        expressions = self.expressions_by_function.get(normalized_function_name(location.function), ())
         return choose_expression(expressions, location, self.full_path, functions[0].def_line)
 
     def resolve_constant_or_default(self, location: FaultLocation) -> ConstantOrDefault:
@@ -125,7 +125,7 @@ def parsed_file(tree: SourceTree, path: str) -> ParsedFile:
 def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
     """Parse a file of the target; MutatorError if it is not Python, or already has injected lines."""
     where = root / path
-    check_uninstrumented(data, where)
+    check_line_ends_and_uninstrumented(data, where)
     tree = parse_with_python(data, where)
     with translate_libcst_errors(where):
         module, positions = parse_with_libcst(data, where)
@@ -137,23 +137,23 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
             newline=module.default_newline.encode(),
             indent_unit=module.default_indent.encode(),
             import_line=import_insertion_line(module, positions),
-            functions_by_name=collect_functions(module, positions, names_by_function(data)),
+            functions_by_name=collect_functions(module, positions, used_names_by_function(data)),
             expressions_by_function=list_expressions(data, module, positions),
             constants_and_defaults=list_constants_and_defaults(data, tree),
             outermost_function_lines=tuple(list_outermost_function_lines(tree)),
-            ast_positions=positions_by_ast(tree),
+            ast_positions=ast_node_positions(tree),
             full_path=where,
         )
 
 
-def plain_function_name(function: str) -> str:
+def normalized_function_name(function: str) -> str:
     """Return a function's qualified name without `<locals>`, normalized as the compiler does."""
     return normalize_identifier(function.replace(".<locals>", ""))
 
 
 def functions_named(file: ParsedFile, function: str) -> tuple[Function, ...]:
     """Return the functions with that qualified name; MutatorError with candidates if there is none."""
-    name = plain_function_name(function)
+    name = normalized_function_name(function)
     functions = file.functions_by_name.get(name)
     if not functions:
         names = list(file.functions_by_name)
@@ -169,10 +169,10 @@ def functions_named(file: ParsedFile, function: str) -> tuple[Function, ...]:
 def _resolve_statement(file: ParsedFile, location: FaultLocation) -> ResolvedAnchor:
     functions = functions_named(file, location.function)
     if location.anchor.kind is AnchorKind.ENTRY:
-        return _resolve_entry(file, location, functions)
+        return _resolve_function_entry(file, location, functions)
     function, statement = _choose_statement(file, location, functions)
-    _refuse_awkward(file, location.anchor, statement)
-    _check_position(file, statement.position)
+    _check_anchor_fits_statement(file, location.anchor, statement)
+    _check_position_matches_ast(file, statement.position)
     if statement.block_first_line is not None:
         return _resolve_block_start(file, statement.block_first_line, function.used_names)
     first = statement.first_line
@@ -200,7 +200,7 @@ def _resolve_block_start(file: ParsedFile, first_line: int, names: frozenset[str
     )
 
 
-def _check_position(file: ParsedFile, position: NodePosition | None) -> None:
+def _check_position_matches_ast(file: ParsedFile, position: NodePosition | None) -> None:
     if (
         position is not None
         and position.with_byte_columns(file.lines, file.encoding) not in file.ast_positions
@@ -218,7 +218,7 @@ def _indentation_of(line: bytes) -> bytes:
     return line[: len(line) - len(line.lstrip(b" \t\f"))]
 
 
-def _resolve_entry(
+def _resolve_function_entry(
     file: ParsedFile, location: FaultLocation, functions: tuple[Function, ...]
 ) -> ResolvedAnchor:
     nth = location.anchor.nth
@@ -241,7 +241,7 @@ def _resolve_entry(
             expected="a body below the `def` line, and nothing else on the docstring's lines",
             remedy="anchor somewhere else, or reformat the target",
         )
-    _check_position(file, function.position)
+    _check_position_matches_ast(file, function.position)
     index, model_line = function.entry_lines
     return ResolvedAnchor(
         first_line=index,
@@ -332,7 +332,7 @@ def _describe_candidates(functions: tuple[Function, ...], verb: str) -> str:
     )
 
 
-def _refuse_awkward(file: ParsedFile, anchor: Anchor, statement: Statement) -> None:
+def _check_anchor_fits_statement(file: ParsedFile, anchor: Anchor, statement: Statement) -> None:
     after = anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL)
     reason = None
     if statement.block_first_line is not None and not after:

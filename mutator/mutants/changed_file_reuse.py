@@ -10,8 +10,8 @@ from pathlib import Path
 
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.injected_lines import tag_of
-from mutator.mutants.normalized_source import compiles, normalized
-from mutator.mutants.splicing import Edit, sort_edits
+from mutator.mutants.normalized_source import compiles, normalize_numbers_and_ids
+from mutator.mutants.splicing import LineEdit, sort_edits
 from mutator.targets.source_tree import SourceTree
 
 ReuseKey = tuple[tuple[int, int, int, bytes, str], ...]
@@ -59,7 +59,7 @@ def _empty_cache(path: str, data: bytes, root: Path) -> dict[ReuseKey, ReusableC
     return {}
 
 
-def reuse_key(file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> ReuseKey:
+def reuse_key(file: ParsedFile, edits: Sequence[LineEdit], injection_ids: Sequence[str]) -> ReuseKey:
     """Return what edits must have in common to share a reusable change; `ids` are the ids in their lines."""
     return tuple(
         (
@@ -67,17 +67,17 @@ def reuse_key(file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Re
             e.rank,
             e.indented_count,
             e.indent_unit,
-            normalized(b"".join(e.lines).decode(file.encoding), ids),
+            normalize_numbers_and_ids(b"".join(e.lines).decode(file.encoding), injection_ids),
         )
         for e in sort_edits(edits)
     )
 
 
-def inserted_lines(edits: Sequence[Edit]) -> list[bytes]:
+def inserted_lines(edits: Sequence[LineEdit]) -> list[bytes]:
     return [line.rstrip(b"\r\n") for line in chain.from_iterable(e.lines for e in sort_edits(edits))]
 
 
-def always_compiles(file: ParsedFile, change: ReusableChangedFile, key: ReuseKey) -> bool:
+def compiles_for_every_mutant(file: ParsedFile, change: ReusableChangedFile, key: ReuseKey) -> bool:
     """Return whether the change compiles with normalized lines, and so for every mutant with this key.
 
     Un-splicing needs no check: it depends only on the tags, which are part of the key.

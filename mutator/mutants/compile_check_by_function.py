@@ -6,11 +6,11 @@ from dataclasses import replace
 
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.changed_file_reuse import ReuseKey
-from mutator.mutants.splicing import Edit, EditRank, apply_edits, join_pieces, sort_edits
+from mutator.mutants.splicing import EditRank, LineEdit, apply_edits, mutated_bytes, sort_edits
 from mutator.mutants.standalone_compilation import compile_standalone
 
 
-def certainly_compiles(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> bool:
+def certainly_compiles_for_key(file: ParsedFile, edits: Iterable[LineEdit], key: ReuseKey) -> bool:
     """Return whether the file certainly compiles with these edits and with all others that have this key.
 
     True if the changed functions compile, both with these edits and with normalized ones, and the file
@@ -24,9 +24,9 @@ def certainly_compiles(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -
     return all(_functions_and_rest_compile(file, some) for some in (unchanged, normalized))
 
 
-def _functions_and_rest_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
-    functions: dict[range, list[Edit]] = defaultdict(list)
-    outside: list[Edit] = []
+def _functions_and_rest_compile(file: ParsedFile, edits: Iterable[LineEdit]) -> bool:
+    functions: dict[range, list[LineEdit]] = defaultdict(list)
+    outside: list[LineEdit] = []
     for edit in edits:
         function = file.outermost_function_at(
             edit.line_index - 1 if edit.rank is EditRank.AFTER_PREVIOUS else edit.line_index
@@ -40,21 +40,21 @@ def _functions_and_rest_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool
     )
 
 
-def _compiles_outside_functions(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
+def _compiles_outside_functions(file: ParsedFile, outside: tuple[LineEdit, ...]) -> bool:
     """Return whether the file compiles with `outside`, and `outside` has at most the probe's import."""
     if len(outside) > 1 or any(edit.line_index != file.import_line for edit in outside):
         return False
     if outside not in file.verified_edits:
         try:
-            compile(join_pieces(apply_edits(file, outside)), "<import>", "exec", dont_inherit=True)
+            compile(mutated_bytes(apply_edits(file, outside)), "<import>", "exec", dont_inherit=True)
         except (SyntaxError, ValueError, RecursionError):
             return False
         file.verified_edits.add(outside)
     return True
 
 
-def _function_compiles(file: ParsedFile, function: range, edits: Iterable[Edit]) -> bool:
+def _function_compiles(file: ParsedFile, function: range, edits: Iterable[LineEdit]) -> bool:
     alone = replace(file, lines=file.lines[function.start : function.stop])
     moved = [replace(edit, line_index=edit.line_index - function.start) for edit in edits]
-    data = join_pieces(apply_edits(alone, moved))
+    data = mutated_bytes(apply_edits(alone, moved))
     return compile_standalone(data.splitlines(keepends=True), file.encoding) is not None

@@ -35,7 +35,7 @@ class _ModuleImports:
     exported_names: frozenset[str] | None = None  # the names in `__all__`, if they are literal strings
 
 
-def imports_of_constant(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
+def dotted_names_importing_constant(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
     """Return `module.NAME` for each import of the constant `name` from the module at `path`.
 
     MutatorError if an import prevents setting the constant: a star import, an import into a class, or one in
@@ -49,7 +49,9 @@ def imports_of_constant(tree: SourceTree, path: str, name: str) -> tuple[str, ..
             for imported_name in file.imported_names:
                 if (imported_name.module, imported_name.name) not in (imported, (imported[0], _STAR)):
                     continue
-                reason = _refusal_reason(imported_name, file, imported[1], exported.get(imported[0]))
+                reason = _reason_import_prevents_setting(
+                    imported_name, file, imported[1], exported.get(imported[0])
+                )
                 if reason:
                     refusals.add(f"{file.path}:{imported_name.line} {reason}")
                 elif imported_name.name != _STAR and (file.module, imported_name.local_name) not in names:
@@ -64,7 +66,7 @@ def imports_of_constant(tree: SourceTree, path: str, name: str) -> tuple[str, ..
     return tuple(".".join(module_and_name) for module_and_name in names[1:])
 
 
-def _refusal_reason(
+def _reason_import_prevents_setting(
     imported_name: _ImportedName, file: _ModuleImports, name: str, exported: frozenset[str] | None
 ) -> str | None:
     """Return why an import prevents setting the constant. `*` imports the `exported` names, if known."""
@@ -100,11 +102,11 @@ def _module_imports(path: str, data: bytes, root: Path) -> _ModuleImports:
         module=module_name(path),
         imported_names=names,
         rebound_names=globals_set_in_functions(data) | assigned | repeated,
-        exported_names=_exported_names(tree),
+        exported_names=_names_in_dunder_all(tree),
     )
 
 
-def _exported_names(tree: ast.Module) -> frozenset[str] | None:
+def _names_in_dunder_all(tree: ast.Module) -> frozenset[str] | None:
     """Return the names in `__all__` if it is assigned once, as a list or tuple of literal strings."""
     targets = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "__all__"]
     for node in tree.body:

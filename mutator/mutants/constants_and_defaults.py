@@ -19,7 +19,7 @@ from mutator.model import AnchorKind, FaultLocation
 from mutator.mutants.expression_roles import blocks_of
 from mutator.mutants.name_scopes import globals_set_in_functions, normalize_identifier
 
-_READ_ONLY_BASES = ("Enum", "Flag", "NamedTuple", "TypedDict")  # endings of base class names
+_READ_ONLY_BASE_CLASS_ENDINGS = ("Enum", "Flag", "NamedTuple", "TypedDict")  # endings of base class names
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 _EnclosingClasses = tuple[ast.ClassDef, ...]  # enclosing classes, from the outermost
 _OwningStatement = ast.stmt | None
@@ -46,7 +46,7 @@ def list_constants_and_defaults(data: bytes, tree: ast.Module) -> tuple[Constant
     If a constant is assigned several times, the last assignment is used.
     """
     owned_values: dict[tuple[AnchorKind, str, str], tuple[ConstantOrDefault, _OwningStatement]] = {}
-    for value, owner in _ValueFinder(data).values_in_body(tree.body, ()):
+    for value, owner in _ConstantAndDefaultFinder(data).values_in_body(tree.body, ()):
         key = (value.kind, value.function, value.name)
         _, earlier_owner = owned_values.pop(key, (None, owner))
         if earlier_owner is not owner:
@@ -73,7 +73,7 @@ def parameters_with_default(arguments: ast.arguments) -> Iterator[tuple[str, ast
             yield argument.arg, keyword
 
 
-class _ValueFinder:
+class _ConstantAndDefaultFinder:
     """Walks the bodies of a module and its classes, and yields each value with its class or function."""
 
     def __init__(self, data: bytes) -> None:
@@ -82,68 +82,85 @@ class _ValueFinder:
         self.statement_end_lines = [token.start[0] for token in tokens if token.type == tokenize.NEWLINE]
 
     def values_in_body(
-        self, body: Sequence[ast.stmt], scope: _EnclosingClasses, around: ast.stmt | None = None
+        self,
+        body: Sequence[ast.stmt],
+        enclosing_classes: _EnclosingClasses,
+        enclosing_statement: ast.stmt | None = None,
     ) -> Iterator[tuple[ConstantOrDefault, _OwningStatement]]:
         for statement in body:
-            whole = around or statement
+            outermost_statement = enclosing_statement or statement
             match statement:
                 case ast.ClassDef():
-                    yield from self.values_in_body(statement.body, (*scope, statement))
+                    yield from self.values_in_body(statement.body, (*enclosing_classes, statement))
                 case ast.FunctionDef() | ast.AsyncFunctionDef():
-                    yield from self.defaults(statement, scope, whole)
+                    yield from self.defaults(statement, enclosing_classes, outermost_statement)
                 case ast.Assign(targets=targets, value=value):
-                    yield from self.constants(targets, value, scope, whole)
+                    yield from self.constants(targets, value, enclosing_classes, outermost_statement)
                 case (
                     ast.AnnAssign(target=target, value=ast.expr() as value)
                     | ast.AugAssign(target=target, value=value)
                 ):
-                    yield from self.constants([target], value, scope, whole)
+                    yield from self.constants([target], value, enclosing_classes, outermost_statement)
                 case _:
                     for block in blocks_of(statement):
-                        yield from self.values_in_body(block, scope, whole)
+                        yield from self.values_in_body(block, enclosing_classes, outermost_statement)
 
     def constants(
-        self, targets: Iterable[ast.expr], value: ast.expr, scope: _EnclosingClasses, whole: ast.stmt
+        self,
+        targets: Iterable[ast.expr],
+        value: ast.expr,
+        enclosing_classes: _EnclosingClasses,
+        outermost_statement: ast.stmt,
     ) -> Iterator[tuple[ConstantOrDefault, _OwningStatement]]:
         for name in (name for target in targets for name in _assigned_names(target)):
-            index, indent = self.insertion_point(whole)
+            index, indent = self.insertion_point(outermost_statement)
             yield (
                 ConstantOrDefault(
                     kind=AnchorKind.CONSTANT,
                     function="",
-                    name=".".join((*_class_names(scope), name)),
+                    name=".".join((*_class_names(enclosing_classes), name)),
                     first_line=value.lineno - 1,
                     end_line=value.end_lineno or 0,
                     insertion_line=index,
                     indent=indent,
-                    dotted_path=_dotted_path(scope, name),
-                    unsettable_reason=_unsettable_reason(scope[-1], value) if scope else None,
+                    dotted_path=_dotted_path(enclosing_classes, name),
+                    unsettable_reason=_unsettable_reason(enclosing_classes[-1], value)
+                    if enclosing_classes
+                    else None,
                 ),
-                scope[-1] if scope else None,
+                enclosing_classes[-1] if enclosing_classes else None,
             )
 
     def defaults(
-        self, function: _Function, scope: _EnclosingClasses, whole: ast.stmt
+        self, function: _Function, enclosing_classes: _EnclosingClasses, outermost_statement: ast.stmt
     ) -> Iterator[tuple[ConstantOrDefault, _OwningStatement]]:
         for name, value in parameters_with_default(function.args):
-            index, indent = self.insertion_point(whole)
+            index, indent = self.insertion_point(outermost_statement)
             yield (
                 ConstantOrDefault(
                     kind=AnchorKind.DEFAULT,
-                    function=".".join((*_class_names(scope), function.name)),
+                    function=".".join((*_class_names(enclosing_classes), function.name)),
                     name=name,
                     first_line=value.lineno - 1,
                     end_line=value.end_lineno or 0,
                     insertion_line=index,
                     indent=indent,
-                    dotted_path=_dotted_path(scope, function.name, name),
+                    dotted_path=_dotted_path(enclosing_classes, function.name, name),
                 ),
                 function,
             )
 
-    def insertion_point(self, whole: ast.stmt) -> tuple[int, bytes]:
-        line = self.lines[min(node.lineno for node in (whole, *getattr(whole, "decorator_list", ()))) - 1]
-        end = self.statement_end_lines[bisect_left(self.statement_end_lines, whole.end_lineno or 0)]
+    def insertion_point(self, outermost_statement: ast.stmt) -> tuple[int, bytes]:
+        line = self.lines[
+            min(
+                node.lineno
+                for node in (outermost_statement, *getattr(outermost_statement, "decorator_list", ()))
+            )
+            - 1
+        ]
+        end = self.statement_end_lines[
+            bisect_left(self.statement_end_lines, outermost_statement.end_lineno or 0)
+        ]
         return end, line[: len(line) - len(line.lstrip(b" \t\f"))]
 
 
@@ -158,17 +175,17 @@ def _assigned_names(target: ast.expr) -> Iterator[str]:
             yield from _assigned_names(value)
 
 
-def _class_names(scope: _EnclosingClasses) -> Iterator[str]:
-    return (node.name for node in scope)
+def _class_names(enclosing_classes: _EnclosingClasses) -> Iterator[str]:
+    return (node.name for node in enclosing_classes)
 
 
-def _dotted_path(scope: _EnclosingClasses, *names: str) -> str:
+def _dotted_path(enclosing_classes: _EnclosingClasses, *names: str) -> str:
     """Return the dotted path from the module, with private names spelled as the compiler spells them."""
     path, private = list[str](), ""
-    for name in (*_class_names(scope), *names):
+    for name in (*_class_names(enclosing_classes), *names):
         hidden = private and name.startswith("__") and not name.endswith("__")
         path.append(f"_{private}{name}" if hidden else name)
-        if len(path) <= len(scope):
+        if len(path) <= len(enclosing_classes):
             private = name.lstrip("_")
     return ".".join(path)
 
@@ -176,7 +193,7 @@ def _dotted_path(scope: _EnclosingClasses, *names: str) -> str:
 def _unsettable_reason(owner: ast.ClassDef, value: ast.expr) -> str | None:
     for base in owner.bases:
         name = ast.unparse(base)
-        if name.endswith(_READ_ONLY_BASES):
+        if name.endswith(_READ_ONLY_BASE_CLASS_ENDINGS):
             return f"its class derives from {name}, which does not allow a new value"
     if isinstance(value, ast.Call) and ast.unparse(value.func).endswith("field"):
         keywords = {keyword.arg for keyword in value.keywords}

@@ -26,7 +26,7 @@ def source_of(node: ast.AST) -> str:
         return ""
 
 
-def expressions_in(tree: ast.Module) -> Iterator[ExpressionInFunction]:
+def expressions_in_functions(tree: ast.Module) -> Iterator[ExpressionInFunction]:
     """Yield function name, expression and roles for each expression in a function's body."""
     yield from _expressions_in_scope(tree.body, (), inside=False)
 
@@ -67,62 +67,62 @@ def _expressions_in_statement(statement: ast.stmt) -> _ExpressionsWithRoles:
         ):
             yield from _expressions_in_assignment([target], value)
         case ast.Return(value=ast.expr() as value):
-            yield from _expressions_within(value, (AnchorKind.RETURN_VALUE, source_of(value), None))
+            yield from _expression_and_nested(value, (AnchorKind.RETURN_VALUE, source_of(value), None))
         case ast.If(test=test) | ast.While(test=test) | ast.Assert(test=test):
             yield from _expressions_in_condition(test)
         case ast.For(target=target, iter=value) | ast.AsyncFor(target=target, iter=value):
-            yield from _expressions_within(value)
-            yield from _expressions_in_target(target)
+            yield from _expression_and_nested(value)
+            yield from _expressions_in_assignment_target(target)
         case ast.With(items=items) | ast.AsyncWith(items=items):
             for item in items:
-                yield from _expressions_within(item.context_expr)
+                yield from _expression_and_nested(item.context_expr)
         case ast.Match(subject=subject, cases=cases):
-            yield from _expressions_within(subject)
+            yield from _expression_and_nested(subject)
             for case in cases:
                 if case.guard:
                     yield from _expressions_in_condition(case.guard)
         case ast.Expr(value=value) if not isinstance(value, ast.Constant):
-            yield from _expressions_within(value)
+            yield from _expression_and_nested(value)
         case ast.Raise(exc=ast.expr() as value):
-            yield from _expressions_within(value)
+            yield from _expression_and_nested(value)
 
 
 def _expressions_in_assignment(targets: Sequence[ast.expr], value: ast.expr) -> _ExpressionsWithRoles:
-    yield from _expressions_within(
+    yield from _expression_and_nested(
         value, *((AnchorKind.ASSIGNED_VALUE, source_of(target), None) for target in targets)
     )
     for target in targets:
-        yield from _expressions_in_target(target)
+        yield from _expressions_in_assignment_target(target)
 
 
 def _expressions_in_condition(test: ast.expr) -> _ExpressionsWithRoles:
-    yield from _expressions_within(test, (AnchorKind.CONDITION, source_of(test), None))
+    yield from _expression_and_nested(test, (AnchorKind.CONDITION, source_of(test), None))
 
 
-def _expressions_in_target(target: ast.expr) -> _ExpressionsWithRoles:
+def _expressions_in_assignment_target(target: ast.expr) -> _ExpressionsWithRoles:
     """Yield the expressions evaluated to find an assignment's target, such as an index."""
     match target:
         case ast.Tuple(elts=elements) | ast.List(elts=elements):
             for element in elements:
-                yield from _expressions_in_target(element)
+                yield from _expressions_in_assignment_target(element)
         case ast.Starred(value=value):
-            yield from _expressions_in_target(value)
+            yield from _expressions_in_assignment_target(value)
         case ast.Subscript(value=value, slice=index):
-            yield from _expressions_in_base(value)
-            yield from _expressions_within(index)
+            yield from _expressions_in_accessed_object(value)
+            yield from _expression_and_nested(index)
         case ast.Attribute(value=value):
-            yield from _expressions_in_base(value)
+            yield from _expressions_in_accessed_object(value)
 
 
-def _expressions_in_base(node: ast.expr) -> _ExpressionsWithRoles:
+def _expressions_in_accessed_object(node: ast.expr) -> _ExpressionsWithRoles:
     """Yield the object of an attribute, item or method. Plain names are skipped."""
     if isinstance(node, ast.Attribute):
-        yield from _expressions_in_base(node.value)
+        yield from _expressions_in_accessed_object(node.value)
     elif not isinstance(node, ast.Name):
-        yield from _expressions_within(node)
+        yield from _expression_and_nested(node)
 
 
-def _expressions_within(node: ast.expr, *roles: AnchorRole) -> _ExpressionsWithRoles:
+def _expression_and_nested(node: ast.expr, *roles: AnchorRole) -> _ExpressionsWithRoles:
     if isinstance(node, ast.JoinedStr):
         yield node, roles  # before Python 3.12, the expressions inside it have no positions
         return
@@ -137,15 +137,15 @@ def _expressions_within(node: ast.expr, *roles: AnchorRole) -> _ExpressionsWithR
         case ast.Call():
             yield from _expressions_in_call(node)
         case ast.Attribute() | ast.Subscript():
-            yield from _expressions_in_target(node)
+            yield from _expressions_in_assignment_target(node)
         case ast.IfExp(test=test, body=body, orelse=other):
-            yield from _expressions_within(body)
+            yield from _expression_and_nested(body)
             yield from _expressions_in_condition(test)
-            yield from _expressions_within(other)
+            yield from _expression_and_nested(other)
         case ast.NamedExpr(target=target, value=value):
-            yield from _expressions_within(value, (AnchorKind.ASSIGNED_VALUE, source_of(target), None))
+            yield from _expression_and_nested(value, (AnchorKind.ASSIGNED_VALUE, source_of(target), None))
         case ast.Lambda(body=body):
-            yield from _expressions_within(body)
+            yield from _expression_and_nested(body)
         case ast.UnaryOp(operand=ast.Constant()):
             pass  # -1 is one constant
         case ast.ListComp() | ast.SetComp() | ast.GeneratorExp() | ast.DictComp():
@@ -153,17 +153,17 @@ def _expressions_within(node: ast.expr, *roles: AnchorRole) -> _ExpressionsWithR
         case _:
             for child in ast.iter_child_nodes(node):
                 if isinstance(child, ast.expr):
-                    yield from _expressions_within(child)
+                    yield from _expression_and_nested(child)
 
 
 def _expressions_in_call(node: ast.Call) -> _ExpressionsWithRoles:
     called = source_of(node.func)
-    yield from _expressions_in_base(node.func)
+    yield from _expressions_in_accessed_object(node.func)
     for number, argument in enumerate(node.args, 1):
-        yield from _expressions_within(argument, (AnchorKind.ARGUMENT, called, str(number)))
+        yield from _expression_and_nested(argument, (AnchorKind.ARGUMENT, called, str(number)))
     for keyword in node.keywords:
         roles = [(AnchorKind.ARGUMENT, called, keyword.arg)] if keyword.arg else []
-        yield from _expressions_within(keyword.value, *roles)
+        yield from _expression_and_nested(keyword.value, *roles)
 
 
 def _expressions_in_comprehension(
@@ -171,8 +171,8 @@ def _expressions_in_comprehension(
 ) -> _ExpressionsWithRoles:
     values = (node.key, node.value) if isinstance(node, ast.DictComp) else (node.elt,)
     for value in values:
-        yield from _expressions_within(value)
+        yield from _expression_and_nested(value)
     for generator in node.generators:
-        yield from _expressions_within(generator.iter)
+        yield from _expression_and_nested(generator.iter)
         for test in generator.ifs:
             yield from _expressions_in_condition(test)

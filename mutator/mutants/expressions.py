@@ -14,7 +14,12 @@ from dataclasses import dataclass
 import libcst as cst
 
 from mutator.model import AnchorKind
-from mutator.mutants.expression_roles import AnchorRole, ExpressionInFunction, expressions_in, source_of
+from mutator.mutants.expression_roles import (
+    AnchorRole,
+    ExpressionInFunction,
+    expressions_in_functions,
+    source_of,
+)
 from mutator.mutants.node_positions import RangeByNode
 
 # line and column, from 0; in `Expression`, columns count bytes, elsewhere characters
@@ -71,14 +76,14 @@ def list_expressions(
     libcst_extents, untaggable, brackets = (
         _libcst_extents(positions),
         _untaggable_lines(data, tokens),
-        _closing_brackets(tokens),
+        _closing_bracket_ends(tokens),
     )
     expressions = []
-    for function, node, roles in expressions_in(ast.parse(data)):
+    for function, node, roles in expressions_in_functions(ast.parse(data)):
         start, end = _extent_of(lines, node)
         text, is_confirmed = (
             source_of(node),
-            all(_extent_of(lines, part) in libcst_extents for part in _nodes_to_confirm(node)),
+            all(_extent_of(lines, part) in libcst_extents for part in _nodes_libcst_must_have(node)),
         )
         if text and is_confirmed and untaggable.isdisjoint((start[0], end[0])):
             bare = isinstance(node, ast.NamedExpr) or (
@@ -133,11 +138,11 @@ def _extent_of(lines: Sequence[str], node: ast.expr) -> tuple[_LineColumn, _Line
     return point(node.lineno, node.col_offset), point(node.end_lineno, node.end_col_offset)
 
 
-def _nodes_to_confirm(node: ast.expr) -> Iterator[ast.expr]:
+def _nodes_libcst_must_have(node: ast.expr) -> Iterator[ast.expr]:
     """Yield the nodes that LibCST must also find: this node or, if it is a tuple, its elements."""
     if isinstance(node, ast.Tuple):
         for element in node.elts:
-            yield from _nodes_to_confirm(element)
+            yield from _nodes_libcst_must_have(element)
     else:
         yield node
 
@@ -150,7 +155,7 @@ def _libcst_extents(positions: RangeByNode) -> frozenset[tuple[_LineColumn, _Lin
     )
 
 
-def _closing_brackets(tokens: Iterable[tokenize.TokenInfo]) -> dict[_LineColumn, _LineColumn]:
+def _closing_bracket_ends(tokens: Iterable[tokenize.TokenInfo]) -> dict[_LineColumn, _LineColumn]:
     """Map the position of each opening bracket to the end of its closing bracket; lines from 0."""
     ends, starts = {}, list[_LineColumn]()
     for token in tokens:
@@ -193,17 +198,17 @@ def template_parts(expression: Expression) -> dict[str, object]:
         left = before[0] if len(before) == 1 else ast.BoolOp(node.op, before)
     called, arguments = None, list[str]()
     if isinstance(node, ast.Call):
-        called = _parenthesized(node.func)
+        called = _source_parenthesized_if_splittable(node.func)
         arguments = [ast.unparse(argument) for argument in (*node.args, *node.keywords)]
-    sides = [side and _parenthesized(side) for side in (left, right)]
+    sides = [side and _source_parenthesized_if_splittable(side) for side in (left, right)]
     return {"left": sides[0], "right": sides[1], "called": called, "arguments": arguments}
 
 
-def parenthesized(text: str) -> str:
+def parenthesized_if_splittable(text: str) -> str:
     """Return the source of an expression, in parentheses if an adjacent operator could split it."""
     return text if isinstance(ast.parse(text, mode="eval").body, _UNSPLITTABLE_NODES) else f"({text})"
 
 
-def _parenthesized(node: ast.expr) -> str:
+def _source_parenthesized_if_splittable(node: ast.expr) -> str:
     text = ast.unparse(node)
     return text if isinstance(node, _UNSPLITTABLE_NODES) else f"({text})"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 _NEW_PATH_PATTERN = re.compile(r"^\+\+\+ b/(.+?)\t?$", re.MULTILINE)  # a tab ends a path that has a space
 
 
-def readable_patch(patch: str) -> tuple[str, str]:
+def patch_without_new_files(patch: str) -> tuple[str, str]:
     """Return the patch without its new files, and a sentence that names them (empty if there are none)."""
     sections = list(file_patches(patch))
     left_out = [m[1] for s in sections if adds_file(s) and (m := _NEW_PATH_PATTERN.search(s))]

@@ -12,8 +12,8 @@ from typing import Any
 from mutator.config.location_syntax import PROBE_NAME
 from mutator.model import Injection
 
-IMPORT_TAG = "probe"  # on the line that imports the probe
-OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
+PROBE_IMPORT_TAG = "probe"  # on the line that imports the probe
+OBSERVATION_TAG = "observe"  # on the statement that passes the ground truth to the probe
 ORIGINAL_VALUE_NAME = "original"  # name of the original value in a line that sets a value
 # an id in quotes, in a name or in a tag (a tag can have several ids), but not a number of eight digits
 INJECTION_ID_PATTERN = (
@@ -38,10 +38,14 @@ _GUARD_PATTERN = re.compile(
     rf"\s*if (?:not )?\(?{_ACTIVE_CHECK_PATTERN}\)?(?: or {PROBE_NAME}\.steps\(\))?:\Z".encode()
 )
 _CHANGED_VALUE_PATTERN = re.compile(rf" if {_ACTIVE_CHECK_PATTERN} else ".encode())
-_PROBE_CHECKS = [f"{PROBE_NAME}.{name}" for name in ("call", "every", "active")]
-_SET_VALUE_PATTERN = re.compile(rf'\s*{PROBE_NAME}\.(?:constant|default)\("[0-9a-z]+", '.encode())
+_PROBE_CHECK_CALLS = [f"{PROBE_NAME}.{name}" for name in ("call", "every", "active")]
+_CONSTANT_OR_DEFAULT_SETTING_PATTERN = re.compile(
+    rf'\s*{PROBE_NAME}\.(?:constant|default)\("[0-9a-z]+", '.encode()
+)
 _TAGGED_ADDITION_PATTERN = re.compile(rf"^\+.*{_TAG_PATTERN}\r?$", re.MULTILINE)
-_FAULT_ADDITION_PATTERN = re.compile(rf"^\+.*{_TAG_START}(?!{IMPORT_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)
+_FAULT_ADDITION_PATTERN = re.compile(
+    rf"^\+.*{_TAG_START}(?!{PROBE_IMPORT_TAG}\b|{OBSERVATION_TAG}\b)", re.MULTILINE
+)
 # mutants whose probes differ only in these values can have the same shape, and share a review
 _PROBE_SETTING_PATTERN = re.compile(
     r"(?P<mutant>(?<![0-9A-Za-z])[0-9a-f]{16}(?![0-9A-Za-z]))"
@@ -66,7 +70,7 @@ class Tag:
     @property
     def is_of_fault(self) -> bool:
         """Whether the line belongs to a fault; other tagged lines are in every mutant."""
-        return self.id not in (IMPORT_TAG, OBSERVE_TAG)
+        return self.id not in (PROBE_IMPORT_TAG, OBSERVATION_TAG)
 
     @property
     def is_guard(self) -> bool:
@@ -89,7 +93,7 @@ class Tag:
 
     @property
     def is_value_setting(self) -> bool:
-        return _SET_VALUE_PATTERN.match(self.code) is not None
+        return _CONSTANT_OR_DEFAULT_SETTING_PATTERN.match(self.code) is not None
 
 
 def changed_value_positions(source: bytes) -> Iterator[tuple[str, int, int, int]]:
@@ -103,7 +107,7 @@ def changed_value_positions(source: bytes) -> Iterator[tuple[str, int, int, int]
             checks = [
                 term
                 for term in terms
-                if isinstance(term, ast.Call) and ast.unparse(term.func) in _PROBE_CHECKS
+                if isinstance(term, ast.Call) and ast.unparse(term.func) in _PROBE_CHECK_CALLS
             ]
             if checks and isinstance(name := checks[0].args[0], ast.Constant):
                 yield str(name.value), node.body.lineno, node.body.col_offset, checks[0].col_offset
@@ -129,7 +133,7 @@ def replacement_tag(ids: Iterable[str], replaced_line: bytes) -> bytes:
     return f"  {_TAG_START}{'+'.join(ids)} was:".encode() + replaced_line
 
 
-def active_check(tag: str) -> str:
+def active_check_source(tag: str) -> str:
     """Return the call that asks the probe whether the injection is active."""
     return f'{PROBE_NAME}.active("{tag}")'
 
@@ -143,7 +147,7 @@ def activation_condition(tag: str, injection: Injection) -> str:
     for name in ("call", "every"):
         if (number := getattr(injection, name)) is not None:
             terms.append(f'{PROBE_NAME}.{name}("{tag}", {number})')
-    return " and ".join([*terms, active_check(tag)])
+    return " and ".join([*terms, active_check_source(tag)])
 
 
 def changed_value_prefix(condition: str, changed: str) -> str:
@@ -169,17 +173,17 @@ def default_setting_line(tag: str, function: str, parameter: str, changed: str) 
     return f'{PROBE_NAME}.default("{tag}", {where}, lambda {ORIGINAL_VALUE_NAME}: {changed})'
 
 
-def has_value_settings(data: bytes) -> bool:
+def has_constant_or_default_settings(data: bytes) -> bool:
     return any(f"{PROBE_NAME}.{call}(".encode() in data for call in ("constant", "default"))
 
 
-def tags_for_scripts() -> dict[str, Any]:
-    return {"mark": _TAG_START, "probe": [IMPORT_TAG, OBSERVE_TAG]}
+def tags_for_page_scripts() -> dict[str, Any]:
+    return {"mark": _TAG_START, "probe": [PROBE_IMPORT_TAG, OBSERVATION_TAG]}
 
 
 def probe_import_line(package: str | None) -> str:
     return tagged_line(
-        f"from {package} import {PROBE_NAME}" if package else f"import {PROBE_NAME}", IMPORT_TAG
+        f"from {package} import {PROBE_NAME}" if package else f"import {PROBE_NAME}", PROBE_IMPORT_TAG
     )
 
 

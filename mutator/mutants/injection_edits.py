@@ -11,26 +11,26 @@ from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind, Te
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
 from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, parsed_file
 from mutator.mutants.changed_file_reuse import reuse_key
-from mutator.mutants.constant_imports import imports_of_constant
+from mutator.mutants.constant_imports import dotted_names_importing_constant
 from mutator.mutants.expressions import NO_TEMPLATE_PARTS, Expression, template_parts
 from mutator.mutants.injected_lines import (
     ORIGINAL_VALUE_NAME,
     activation_condition,
-    active_check,
+    active_check_source,
     constant_setting_line,
     default_setting_line,
 )
-from mutator.mutants.name_scopes import moved_names, normalize_identifier
+from mutator.mutants.name_scopes import normalize_identifier, rescoped_names
 from mutator.mutants.probe import injection_id
 from mutator.mutants.splicing import (
-    Edit,
-    ValueEdit,
+    ExpressionEdit,
+    LineEdit,
     apply_edits,
+    constant_or_default_edit,
+    expression_edit,
     guard_edit,
     insertion_edit,
-    join_pieces,
-    setting_edit,
-    value_edit,
+    mutated_bytes,
 )
 from mutator.mutants.statement_texts import one_line_texts
 from mutator.mutants.template_rendering import render_changed_value, render_snippet
@@ -45,7 +45,7 @@ class InjectionEdit:
 
     id: str
     file: ParsedFile
-    edit: Edit | ValueEdit
+    edit: LineEdit | ExpressionEdit
 
 
 def edits_of(
@@ -70,7 +70,7 @@ def injection_edit(
     injection: Injection,
     name: str,
     tree: SourceTree | None = None,
-) -> Edit | ValueEdit:
+) -> LineEdit | ExpressionEdit:
     """Return the edit of one injection in its file, tagged with `name`.
 
     `tree` has the files that might import a constant. MutatorError for a missing anchor, a name unknown in
@@ -78,46 +78,50 @@ def injection_edit(
     """
     model = models.get(injection.model)
     if injection.location.anchor.kind in VALUE_ANCHORS:
-        return _value_edit(file, model, injection, name)
+        return _expression_edit(file, model, injection, name)
     if injection.location.anchor.kind in FIXED_ANCHORS:
-        return _setting_edit(file, model, injection, name, tree)
+        return _constant_or_default_edit(file, model, injection, name, tree)
     anchor = file.resolve_statement(injection.location)
-    variables = _checked_variables(file, anchor.names_in_function, anchor.first_line, model, injection)
+    variables = _checked_variable_params(file, anchor.names_in_function, anchor.first_line, model, injection)
     texts: dict[str, str] = {}
     if model.needs is TemplateNeed.CALL:
-        raise _misfit_error(file, model, anchor.first_line)
+        raise _model_misfit_error(file, model, anchor.first_line)
     if model.needs is not None:
         anchor, texts = one_line_texts(file, anchor, model.needs)
-    _check_instance(file, anchor.names_in_function, anchor.first_line, injection)
-    code = _limited_snippet(
+    _check_instance_condition(file, anchor.names_in_function, anchor.first_line, injection)
+    code = _snippet_limited_to_instances(
         render_snippet(model, dict(injection.params), name, texts), injection, name, model
     )
     make_edit = guard_edit if model.kind is SnippetKind.GUARD else insertion_edit
     edit = make_edit(file, anchor, code, name)
     key = (variables, reuse_key(file, [edit], [name]))
     if key not in file.verified_edits:
-        _check_bound_names(file, anchor, model, code, variables.union(*map(_bound_names, texts.values())))
-        _check_scopes(file, anchor, edit)
+        _check_rebinds_no_used_name(
+            file, anchor, model, code, variables.union(*map(_bound_names, texts.values()))
+        )
+        _check_keeps_name_scopes(file, anchor, edit)
         file.verified_edits.add(key)
     return edit
 
 
-def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ValueEdit:
+def _expression_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ExpressionEdit:
     expression = file.resolve_expression(injection.location)
     params, parts = dict(injection.params), template_parts(expression)
     if model.needs is TemplateNeed.CALL and not parts["called"]:
-        raise _misfit_error(file, model, expression.start[0])
+        raise _model_misfit_error(file, model, expression.start[0])
     changed = render_changed_value(model, params, name, expression.one_line_source, parts)
     names = file.names_in_function_at(injection.location)
-    _checked_variables(file, names, expression.start[0], model, injection)
-    _check_instance(file, names, expression.start[0], injection)
-    _check_sets_nothing(file, model, expression, changed)
-    return value_edit(file, expression, changed, name, activation_condition(name, injection))
+    _checked_variable_params(file, names, expression.start[0], model, injection)
+    _check_instance_condition(file, names, expression.start[0], injection)
+    _check_binds_no_new_name(file, model, expression, changed)
+    return expression_edit(file, expression, changed, name, activation_condition(name, injection))
 
 
-def _check_sets_nothing(file: ParsedFile, model: FaultModel, expression: Expression, changed: str) -> None:
+def _check_binds_no_new_name(
+    file: ParsedFile, model: FaultModel, expression: Expression, changed: str
+) -> None:
     new_names = (
-        _names_set_in(ast.parse(changed, mode="eval")) - _names_set_in(expression.node)
+        _names_bound_by_walrus(ast.parse(changed, mode="eval")) - _names_bound_by_walrus(expression.node)
         if ":=" in changed
         else ()
     )
@@ -131,11 +135,11 @@ def _check_sets_nothing(file: ParsedFile, model: FaultModel, expression: Express
         )
 
 
-def _names_set_in(node: ast.AST) -> set[str]:
+def _names_bound_by_walrus(node: ast.AST) -> set[str]:
     return {part.target.id for part in ast.walk(node) if isinstance(part, ast.NamedExpr)}
 
 
-def _misfit_error(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
+def _model_misfit_error(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
     expected_by_need = {
         None: f"an expression with these parts: {', '.join(sorted(model.expression_parts))}",
         TemplateNeed.CALL: "a call: an anchor `result`, or another anchor whose expression is a call",
@@ -151,12 +155,12 @@ def _misfit_error(file: ParsedFile, model: FaultModel, line: int) -> MutatorErro
     )
 
 
-def _setting_edit(
+def _constant_or_default_edit(
     file: ParsedFile, model: FaultModel, injection: Injection, name: str, tree: SourceTree | None
-) -> Edit:
+) -> LineEdit:
     value, params = file.resolve_constant_or_default(injection.location), dict(injection.params)
     if model.needs is TemplateNeed.CALL or model.expression_parts:
-        raise _misfit_error(file, model, value.first_line)
+        raise _model_misfit_error(file, model, value.first_line)
     for param in model.params:
         if param.type == "variable" and params.get(param.name) is not None:
             raise MutatorError(
@@ -169,15 +173,15 @@ def _setting_edit(
     changed = render_changed_value(model, params, name, ORIGINAL_VALUE_NAME, NO_TEMPLATE_PARTS)
     if value.kind is AnchorKind.CONSTANT:
         of_module = "." not in value.name
-        imported = imports_of_constant(tree, file.path, value.name) if tree and of_module else ()
+        imported = dotted_names_importing_constant(tree, file.path, value.name) if tree and of_module else ()
         code = constant_setting_line(name, value.dotted_path, changed, imported)
     else:
         function, _, parameter = value.dotted_path.rpartition(".")
         code = default_setting_line(name, function, parameter, changed)
-    return setting_edit(file, value, code, name)
+    return constant_or_default_edit(file, value, code, name)
 
 
-def _checked_variables(
+def _checked_variable_params(
     file: ParsedFile, names: frozenset[str], first_line: int, model: FaultModel, injection: Injection
 ) -> frozenset[str]:
     params = dict(injection.params)
@@ -198,7 +202,9 @@ def _checked_variables(
     return frozenset(variables)
 
 
-def _check_instance(file: ParsedFile, names: frozenset[str], first_line: int, injection: Injection) -> None:
+def _check_instance_condition(
+    file: ParsedFile, names: frozenset[str], first_line: int, injection: Injection
+) -> None:
     unknown = names_in_condition(injection.where or "True") - names
     if unknown:
         raise MutatorError(
@@ -210,11 +216,11 @@ def _check_instance(file: ParsedFile, names: frozenset[str], first_line: int, in
         )
 
 
-def _limited_snippet(
+def _snippet_limited_to_instances(
     code: tuple[str, ...], injection: Injection, name: str, model: FaultModel
 ) -> tuple[str, ...]:
     """Add to the snippet a check for the instance or executions that the injection selects, if any."""
-    check, condition = active_check(name), activation_condition(name, injection)
+    check, condition = active_check_source(name), activation_condition(name, injection)
     if condition == check:
         return code
     limited_lines = {f"if {check}:": f"if {condition}:", f"if not {check}:": f"if not ({condition}):"}
@@ -228,7 +234,7 @@ def _limited_snippet(
     return tuple(limited_lines.get(line, line) for line in code)
 
 
-def _check_bound_names(
+def _check_rebinds_no_used_name(
     file: ParsedFile,
     anchor: ResolvedAnchor,
     model: FaultModel,
@@ -265,10 +271,10 @@ def _bound_names(code: str) -> Iterator[str]:
                 yield name
 
 
-def _check_scopes(file: ParsedFile, anchor: ResolvedAnchor, edit: Edit) -> None:
+def _check_keeps_name_scopes(file: ParsedFile, anchor: ResolvedAnchor, edit: LineEdit) -> None:
     inserted = range(edit.line_index + 1, edit.line_index + 1 + len(edit.lines))
     try:
-        moved = next(moved_names(file.data, join_pieces(apply_edits(file, [edit])), inserted), None)
+        moved = next(rescoped_names(file.data, mutated_bytes(apply_edits(file, [edit])), inserted), None)
     except SyntaxError:
         return  # the mutant does not compile, which building reports
     if moved:

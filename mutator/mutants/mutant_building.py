@@ -15,24 +15,24 @@ from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.mutants.changed_file_reuse import (
     ChangedFile,
     ReusableChangedFile,
-    always_compiles,
+    compiles_for_every_mutant,
     inserted_lines,
     reuse_cache,
     reuse_key,
 )
-from mutator.mutants.compile_check_by_function import certainly_compiles
-from mutator.mutants.injected_lines import OBSERVE_TAG, observe_call
+from mutator.mutants.compile_check_by_function import certainly_compiles_for_key
+from mutator.mutants.injected_lines import OBSERVATION_TAG, observe_call
 from mutator.mutants.injection_edits import InjectionEdit, edits_of
-from mutator.mutants.normalized_source import compiles, normalized
+from mutator.mutants.normalized_source import compiles, normalize_numbers_and_ids
 from mutator.mutants.patch_rendering import render_changed_file, render_new_file
 from mutator.mutants.probe import Probe, build_probe_settings, probe_path, render_probe
 from mutator.mutants.splicing import (
-    Edit,
-    ValueEdit,
+    ExpressionEdit,
+    LineEdit,
     apply_edits,
     as_line_edits,
     insertion_edit,
-    join_pieces,
+    mutated_bytes,
     probe_import_edit,
     unsplice,
 )
@@ -80,11 +80,11 @@ def _build_with(
     manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger, splicer: "_Splicer"
 ) -> Mutant:
     injections = fault.injections if fault else ()
-    changes = edits_of(manifest, models, injections)
-    ids = tuple(change.id for change in changes)
+    injection_edits = edits_of(manifest, models, injections)
+    ids = tuple(change.id for change in injection_edits)
     hold = fault.hold if fault and fault.hold else trigger.hold
     mutant_id = content_id([manifest.tree.digest, models.digest, fault.id if fault else None, trigger])
-    edits = _edits_by_path(manifest, changes)
+    edits = _edits_by_path(manifest, injection_edits)
     probe_file = probe_path(manifest.package)
     sets = any(injection.location.anchor.kind in FIXED_ANCHORS for injection in injections)
     probe = _build_probe(manifest, models, mutant_id, trigger, hold, ids, sets)
@@ -94,8 +94,10 @@ def _build_with(
     patches = {probe_file: render_new_file(probe_file, text)}
     for path, file_edits in edits.items():
         file = parsed_file(manifest.tree, path)
-        change = splicer.checked_change(file, [probe_import_edit(file, manifest.package), *file_edits], ids)
-        files[path], patches[path] = change.data, change.patch
+        injection_edit = splicer.checked_change(
+            file, [probe_import_edit(file, manifest.package), *file_edits], ids
+        )
+        files[path], patches[path] = injection_edit.data, injection_edit.patch
     return Mutant(
         id=mutant_id,
         files=dict(sorted(files.items())),
@@ -106,23 +108,25 @@ def _build_with(
     )
 
 
-def _edits_by_path(manifest: TargetManifest, changes: Sequence[InjectionEdit]) -> dict[str, list[Edit]]:
-    edits: dict[str, list[Edit | ValueEdit]] = {
+def _edits_by_path(
+    manifest: TargetManifest, injection_edits: Sequence[InjectionEdit]
+) -> dict[str, list[LineEdit]]:
+    edits: dict[str, list[LineEdit | ExpressionEdit]] = {
         manifest.observation.location.path: [_observation_edit(manifest)]
     }
-    for change in changes:
-        edits.setdefault(change.file.path, []).append(change.edit)
+    for injection_edit in injection_edits:
+        edits.setdefault(injection_edit.file.path, []).append(injection_edit.edit)
     return {
         path: as_line_edits(parsed_file(manifest.tree, path), file_edits)
         for path, file_edits in edits.items()
     }
 
 
-def _observation_edit(manifest: TargetManifest) -> Edit:
+def _observation_edit(manifest: TargetManifest) -> LineEdit:
     observation = manifest.observation
     file = parsed_file(manifest.tree, observation.location.path)
     anchor = file.resolve_statement(observation.location)
-    return insertion_edit(file, anchor, [observe_call(observation.name_expression_pairs)], OBSERVE_TAG)
+    return insertion_edit(file, anchor, [observe_call(observation.name_expression_pairs)], OBSERVATION_TAG)
 
 
 def _build_probe(
@@ -132,7 +136,7 @@ def _build_probe(
     trigger: Trigger,
     hold: Hold,
     ids: tuple[str, ...],
-    sets: bool,
+    sets_constants_or_defaults: bool,
 ) -> Probe:
     # also a package or an extension module of this name would be imported instead of the probe
     probe_stem = probe_path(manifest.package).removesuffix("py")
@@ -146,7 +150,9 @@ def _build_probe(
             remedy="rename the target's file, or point the manifest at the original tree",
         )
     observation, step_s = manifest.observation, manifest.step_s
-    settings = build_probe_settings(mutant_id, trigger, hold, ids, observation, step_s, sets=sets)
+    settings = build_probe_settings(
+        mutant_id, trigger, hold, ids, observation, step_s, sets=sets_constants_or_defaults
+    )
     return render_probe(models.probe_templates, settings)
 
 
@@ -169,14 +175,14 @@ class _Splicer:
     def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
         _check_compiles(text.encode(), where)
 
-    def checked_change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> ChangedFile:
+    def checked_change(self, file: ParsedFile, edits: Sequence[LineEdit], ids: Sequence[str]) -> ChangedFile:
         change = self.splice(file, edits)
         _check_compiles(change.data, file.full_path)
         return change
 
-    def splice(self, file: ParsedFile, edits: Sequence[Edit]) -> ChangedFile:
+    def splice(self, file: ParsedFile, edits: Sequence[LineEdit]) -> ChangedFile:
         pieces = apply_edits(file, edits)
-        data = join_pieces(pieces)
+        data = mutated_bytes(pieces)
         if unsplice(data) != file.data:
             raise InvalidMutant(
                 "removing the injected lines from the mutated file does not restore the original",
@@ -193,10 +199,10 @@ class _ReusingSplicer(_Splicer):
         self._tree = tree
 
     def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
-        if not compiles(normalized(text, ids).encode()):
+        if not compiles(normalize_numbers_and_ids(text, ids).encode()):
             super().check_probe(text, ids, where)
 
-    def checked_change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> ChangedFile:
+    def checked_change(self, file: ParsedFile, edits: Sequence[LineEdit], ids: Sequence[str]) -> ChangedFile:
         cache = reuse_cache(self._tree, file.path)
         key = reuse_key(file, edits, ids)
         if key in cache:
@@ -204,17 +210,17 @@ class _ReusingSplicer(_Splicer):
             if isinstance(cached, ChangedFile):  # only on reuse: most changes of values are used once
                 cached = cache[key] = ReusableChangedFile.from_changed_file(cached)
             return cached.with_lines(inserted_lines(edits))
-        if certainly_compiles(file, edits, key):
+        if certainly_compiles_for_key(file, edits, key):
             cache[key] = change = self.splice(file, edits)
             return change
         change = super().checked_change(file, edits, ids)
         reusable = ReusableChangedFile.from_changed_file(change)
-        if always_compiles(file, reusable, key):
+        if compiles_for_every_mutant(file, reusable, key):
             cache[key] = reusable
         return change
 
 
-def write_tree(manifest: TargetManifest, mutant: Mutant, dest: Path) -> None:
+def write_mutated_tree(manifest: TargetManifest, mutant: Mutant, dest: Path) -> None:
     for path, data in {**manifest.tree.files, **mutant.files}.items():
         place = path_below(dest, path)
         place.parent.mkdir(parents=True, exist_ok=True)

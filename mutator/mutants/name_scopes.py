@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 from symtable import Symbol, SymbolTable, symtable
 
-NamesByFunction = Mapping[tuple[int, str], frozenset[str]]
+UsedNamesByFunction = Mapping[tuple[int, str], frozenset[str]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MovedName:
+class RescopedName:
     """A name whose meaning has changed in a function or class."""
 
     name: str
@@ -22,12 +22,12 @@ class MovedName:
     scope_after: str
 
 
-def names_by_function(data: bytes) -> NamesByFunction:
+def used_names_by_function(data: bytes) -> UsedNamesByFunction:
     """Return the names that each function knows and uses, by the function's line (from 1) and name."""
-    return dict(_names_in_tables(_symbol_table(data), ""))
+    return dict(_used_names_by_function_in(_symbol_table(data), ""))
 
 
-def _names_in_tables(
+def _used_names_by_function_in(
     table: SymbolTable, private_prefix: str
 ) -> Iterator[tuple[tuple[int, str], frozenset[str]]]:
     """Like `names_by_function`; `private_prefix` is the compiler's for private names (`__x`) in a class."""
@@ -43,7 +43,7 @@ def _names_in_tables(
         }
         yield (table.get_lineno(), table.get_name()), frozenset(names)
     for child in table.get_children():
-        yield from _names_in_tables(child, private_prefix)
+        yield from _used_names_by_function_in(child, private_prefix)
 
 
 def globals_set_in_functions(data: bytes) -> frozenset[str]:
@@ -67,25 +67,27 @@ def normalize_identifier(name: str) -> str:
     return unicodedata.normalize("NFKC", name)
 
 
-def moved_names(before: bytes, after: bytes, inserted: Container[int]) -> Iterator[MovedName]:
+def rescoped_names(before: bytes, after: bytes, inserted_lines: Container[int]) -> Iterator[RescopedName]:
     """Yield the names whose meaning changes with the inserted lines.
 
     `inserted` are the numbers of these lines in `after`, from 1. SyntaxError if `after` is not valid.
     """
-    return _moved_between(_cached_symbol_table(before), _symbol_table(after), inserted)
+    return _rescoped_between(_cached_symbol_table(before), _symbol_table(after), inserted_lines)
 
 
-def _moved_between(before: SymbolTable, after: SymbolTable, inserted: Container[int]) -> Iterator[MovedName]:
+def _rescoped_between(
+    before: SymbolTable, after: SymbolTable, inserted_lines: Container[int]
+) -> Iterator[RescopedName]:
     homes = {symbol.get_name(): _scope_kind(symbol) for symbol in after.get_symbols()}
     for symbol in before.get_symbols():
         name, home = symbol.get_name(), _scope_kind(symbol)
         if homes.get(name, "unknown") != home:
-            yield MovedName(
+            yield RescopedName(
                 name=name, holder=before.get_name(), scope_before=home, scope_after=homes.get(name, "unknown")
             )
-    unchanged = [child for child in after.get_children() if child.get_lineno() not in inserted]
+    unchanged = [child for child in after.get_children() if child.get_lineno() not in inserted_lines]
     for child_before, child_after in zip(before.get_children(), unchanged, strict=False):
-        yield from _moved_between(child_before, child_after, inserted)
+        yield from _rescoped_between(child_before, child_after, inserted_lines)
 
 
 def _scope_kind(symbol: Symbol) -> str:

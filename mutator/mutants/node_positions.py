@@ -74,7 +74,7 @@ def _line_and_column(position: CodePosition) -> _LineColumn:
     return position.line, position.column
 
 
-def positions_by_ast(tree: ast.Module) -> frozenset[NodePosition]:
+def ast_node_positions(tree: ast.Module) -> frozenset[NodePosition]:
     """Return the positions of functions and anchorable statements, with columns in bytes of UTF-8."""
     positions = set()
     for node in ast.walk(tree):

@@ -21,7 +21,7 @@ _NUMBER_PATTERN = re.compile(  # the digit precedes the lookbehind because searc
 )
 
 
-def normalized(text: str, ids: Iterable[str]) -> str:
+def normalize_numbers_and_ids(text: str, ids: Iterable[str]) -> str:
     for i, name in enumerate(ids):
         text = text.replace(name, f"0f0f{i:04x}")
     return _NUMBER_PATTERN.sub(_zero_like, text)

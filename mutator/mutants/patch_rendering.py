@@ -18,8 +18,8 @@ class _Hunk:
     pieces: list[PatchPiece] = field(default_factory=list)
 
     def render(self) -> str:
-        old = _render_span(self.old_lines_before, _count_lines(self.pieces, "-"))
-        new = _render_span(self.new_lines_before, _count_lines(self.pieces, "+"))
+        old = _render_span(self.old_lines_before, _count_lines_of_side(self.pieces, "-"))
+        new = _render_span(self.new_lines_before, _count_lines_of_side(self.pieces, "+"))
         body = "".join(_render_line(piece.sign, line) for piece in self.pieces for line in piece.lines)
         return f"@@ -{old} +{new} @@\n{body}"
 
@@ -58,13 +58,13 @@ def _split_into_hunks(pieces: Sequence[PatchPiece]) -> Iterator[_Hunk]:
                 hunk = _Hunk(old + behind, new + behind, [PatchPiece(sign=" ", lines=tail)])
         else:
             hunk.pieces.append(piece)
-        old += _count_lines([piece], "-")
-        new += _count_lines([piece], "+")
+        old += _count_lines_of_side([piece], "-")
+        new += _count_lines_of_side([piece], "+")
     if any(piece.sign != " " for piece in hunk.pieces):
         yield hunk
 
 
-def _count_lines(pieces: Iterable[PatchPiece], sign: str) -> int:
+def _count_lines_of_side(pieces: Iterable[PatchPiece], sign: str) -> int:
     return sum(len(piece.lines) for piece in pieces if piece.sign in (" ", sign))
 
 

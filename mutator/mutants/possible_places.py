@@ -9,7 +9,7 @@ from mutator.config.location_syntax import is_assignable, is_dotted_name, locati
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind, TemplateNeed
 from mutator.model import Anchor, AnchorKind, FaultLocation
-from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, functions_named, plain_function_name
+from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, functions_named, normalized_function_name
 from mutator.mutants.expressions import NO_TEMPLATE_PARTS, Expression, template_parts
 from mutator.mutants.statement_texts import one_line_texts
 
@@ -47,7 +47,7 @@ def places_of(file: ParsedFile, models: FaultModels, function: str | None = None
     names = tuple(file.functions_by_name)
     if function is not None:
         functions_named(file, function)  # raises if there is none
-        names = (plain_function_name(function),)
+        names = (normalized_function_name(function),)
     places = [place for name in names for place in lister.places_in_function(name)]
     places += lister.constant_and_default_places(None if function is None else names[0])
     return sorted(places, key=lambda place: place.line)
@@ -124,11 +124,11 @@ class _PlaceLister:
             numbers.update(dict.fromkeys(expression.roles, 1))
             nth = numbers[role] if totals[role] > 1 else None
             location = self.location_at(function, Anchor(kind=kind, name=name, which=which, nth=nth))
-            models = tuple(model.name for model in self.models if can_change(model, expression))
+            models = tuple(model.name for model in self.models if can_change_value(model, expression))
             yield ListedPlace(line=expression.start[0] + 1, location=location, models=models)
 
     def constant_and_default_places(self, function: str | None) -> Iterator[ListedPlace]:
-        models = tuple(model.name for model in self.models if can_change(model, None))
+        models = tuple(model.name for model in self.models if can_change_value(model, None))
         for value in self.file.constants_and_defaults:
             if value.unsettable_reason is None and function in (None, value.function):
                 location = self.location_at(value.function, Anchor(kind=value.kind, name=value.name))
@@ -143,7 +143,7 @@ def is_writable_in_spec(name: str) -> bool:
     return not name or is_dotted_name(name) or is_assignable(name)
 
 
-def can_change(model: FaultModel, expression: Expression | None) -> bool:
+def can_change_value(model: FaultModel, expression: Expression | None) -> bool:
     """Return whether a model can change this expression or, for None, a constant or default."""
     if model.expression_template is None:
         return False

@@ -20,7 +20,12 @@ from mutator.mutants.template_rendering import render_template
 from mutator.targets.observed_values import Observation
 from mutator.triggers.conditions import TIME, canonical_condition, to_python
 
-_SETTINGS_IN_CODE = ("observed", "values", "counted", "sets")  # settings that the template of the code uses
+_SETTINGS_USED_BY_CODE_TEMPLATE = (
+    "observed",
+    "values",
+    "counted",
+    "sets",
+)  # settings that the template of the code uses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +141,7 @@ def build_probe_settings(
 def render_probe(templates: ProbeTemplates, settings: ProbeSettings) -> Probe:
     """Render the templates with these settings."""
     settings_parts = _render_parts(templates.settings, vars(settings))
-    code = {name: getattr(settings, name) for name in _SETTINGS_IN_CODE}
+    code = {name: getattr(settings, name) for name in _SETTINGS_USED_BY_CODE_TEMPLATE}
     code_parts = _render_code(templates.code, tuple(code.items()))
     return Probe(settings_parts=settings_parts, code_parts=code_parts, armed_after_s=settings.armed_after_s)
 
@@ -151,9 +156,9 @@ def _render_parts(parts: Sequence[TemplatePart], names: Mapping[str, object]) ->
 
 
 @lru_cache(maxsize=16)
-def _time_tolerance_s(shared: tuple[str, ...]) -> float:
+def _time_tolerance_s(code_parts: tuple[str, ...]) -> float:
     """Return the tolerance of comparisons of times, which the template of the code sets."""
-    for node in ast.walk(ast.parse("".join(shared))):
+    for node in ast.walk(ast.parse("".join(code_parts))):
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_TINY":
             return float(ast.literal_eval(node.value))
     raise AssertionError("a probe without _TINY")
@@ -162,13 +167,15 @@ def _time_tolerance_s(shared: tuple[str, ...]) -> float:
 # A running probe
 
 
-def probe_state_after(observed: int, began: float | None, t: float | None) -> tuple[str, dict[str, object]]:
+def probe_attributes_after(
+    observation_count: int, began: float | None, t: float | None
+) -> tuple[str, dict[str, object]]:
     """Return the name of the object in which a probe keeps its observations, and that object's attributes.
 
     The first of `observed` observations was at time `began` (s), the last at `t`. A probe that replaces
     another probe gets these attributes.
     """
-    return "_run", {"observed": observed, "began": began, "t": t} if observed else {}
+    return "_run", {"observed": observation_count, "began": began, "t": t} if observation_count else {}
 
 
 # What a probe reports
@@ -191,14 +198,14 @@ def report_problem(report: object, mutant: str, injections: Sequence[str]) -> st
     triggered, entries = report.get("triggered"), report.get("injections")
     if not isinstance(entries, dict) or entries.keys() != set(injections):
         return "the injections in its probe's report are not its own"
-    if not all(_is_valid_entry(entry, "count") for entry in entries.values()):
+    if not all(_is_valid_report_entry(entry, "count") for entry in entries.values()):
         return "its probe's report of the injections is damaged"
-    if not (triggered is None or (_is_valid_entry(triggered, "steps") and triggered["steps"])):
+    if not (triggered is None or (_is_valid_report_entry(triggered, "steps") and triggered["steps"])):
         return "its probe's report of the trigger is damaged"
     return "" if triggered or not activation_of(report) else "an injection was active and its trigger was not"
 
 
-def _is_valid_entry(entry: object, count_key: str) -> bool:
+def _is_valid_report_entry(entry: object, count_key: str) -> bool:
     """Return whether an entry is valid: a first time, a last time and a count, or None, None and 0."""
     if not isinstance(entry, dict) or entry.keys() != {"first", "last", count_key}:
         return False

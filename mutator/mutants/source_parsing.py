@@ -14,13 +14,13 @@ from mutator.errors import MutatorError
 from mutator.mutants.injected_lines import find_instrumented_line
 from mutator.mutants.node_positions import RangeByNode, line_after_statements
 
-MOST_NODES = 50_000  # of a file's syntax tree; LibCST takes about 0.1 ms and 4 kB for each
+MOST_SYNTAX_NODES = 50_000  # of a file's syntax tree; LibCST takes about 0.1 ms and 4 kB for each
 MOST_CHAIN_LINKS = 500  # LibCST recurses once for each link, and thousands would end the process
 # `splitlines` ends a line at a lone CR, but `patch` does not
 _LONE_CR_PATTERN = re.compile(rb"\r(?!\n)")
 
 
-def check_uninstrumented(data: bytes, where: Path) -> None:
+def check_line_ends_and_uninstrumented(data: bytes, where: Path) -> None:
     if match := _LONE_CR_PATTERN.search(data):
         raise MutatorError(
             "a line ends in CR alone",
@@ -63,7 +63,7 @@ def _check_tree_size(tree: ast.Module, where: Path) -> None:
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = [alias.name for alias in node.names] + [getattr(node, "module", None) or ""]
             links = max(name.count(".") for name in names)
-        if node_count > MOST_NODES or links > MOST_CHAIN_LINKS:
+        if node_count > MOST_SYNTAX_NODES or links > MOST_CHAIN_LINKS:
             excess = (
                 f"`and`, `or` or a dotted name with {links} parts" if links > MOST_CHAIN_LINKS else "its size"
             )
@@ -71,7 +71,7 @@ def _check_tree_size(tree: ast.Module, where: Path) -> None:
                 f"too large to be changed: {excess}",
                 where=where,
                 line=getattr(node, "lineno", None) if links > MOST_CHAIN_LINKS else None,
-                expected=f"at most {MOST_NODES:,} nodes in its syntax tree, and chains of {MOST_CHAIN_LINKS}",
+                expected=f"at most {MOST_SYNTAX_NODES:,} nodes in its syntax tree, and chains of {MOST_CHAIN_LINKS}",
                 remedy="split the file, or inject into another one",
             )
 
@@ -138,9 +138,9 @@ def import_insertion_line(module: cst.Module, positions: RangeByNode) -> int:
         after = line_after_statements(node, positions)
     if after is not None:
         return after
-    return _first_line(module.body[0], positions) if module.body else len(module.header)
+    return _first_line_with_decorators(module.body[0], positions) if module.body else len(module.header)
 
 
-def _first_line(node: cst.CSTNode, positions: RangeByNode) -> int:
+def _first_line_with_decorators(node: cst.CSTNode, positions: RangeByNode) -> int:
     decorators = node.decorators if isinstance(node, cst.FunctionDef | cst.ClassDef) else ()
     return min(positions[n].start.line for n in (node, *decorators)) - 1

@@ -17,7 +17,7 @@ from mutator.mutants.anchors import ParsedFile, ResolvedAnchor
 from mutator.mutants.constants_and_defaults import ConstantOrDefault
 from mutator.mutants.expressions import Expression
 from mutator.mutants.injected_lines import (
-    active_check,
+    active_check_source,
     changed_value_prefix,
     probe_import_line,
     replacement_tag,
@@ -37,7 +37,7 @@ class EditRank(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Edit:
+class LineEdit:
     """Lines to insert before line `line_index`; the `indented_count` lines that follow get `indent_unit`.
 
     An edit of rank INSTEAD replaces line `line_index`.
@@ -51,7 +51,7 @@ class Edit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ValueEdit:
+class ExpressionEdit:
     """The bytes to write before and after an expression, so that its value can become that of `changed`.
 
     `start` and `end` are a line and a byte offset, from 0.
@@ -73,7 +73,7 @@ class PatchPiece:
     lines: tuple[bytes, ...]
 
 
-def insertion_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], tag: str) -> Edit:
+def insertion_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], tag: str) -> LineEdit:
     """Return the edit that inserts `code` (4 spaces per indentation level) at `anchor`, each line tagged."""
     lines = _tagged_lines(file, anchor, code, tag)
     index, rank = (
@@ -81,10 +81,10 @@ def insertion_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str]
         if anchor.is_after
         else (anchor.first_line, EditRank.BEFORE)
     )
-    return Edit(line_index=index, rank=rank, lines=lines)
+    return LineEdit(line_index=index, rank=rank, lines=lines)
 
 
-def guard_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], tag: str) -> Edit:
+def guard_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], tag: str) -> LineEdit:
     """Return the edit that wraps the statement at `anchor` in `code`, whose last line opens a block."""
     if anchor.first_line == anchor.end_line or not anchor.is_alone or anchor.is_after:
         raise MutatorError(
@@ -95,7 +95,7 @@ def guard_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], ta
             remedy="anchor at the statement to omit",
         )
     lines = _tagged_lines(file, anchor, code, tag, anchor.indentable_count)
-    return Edit(
+    return LineEdit(
         line_index=anchor.first_line,
         rank=EditRank.GUARD,
         lines=lines,
@@ -104,24 +104,26 @@ def guard_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], ta
     )
 
 
-def setting_edit(file: ParsedFile, value: ConstantOrDefault, code: str, tag: str) -> Edit:
+def constant_or_default_edit(file: ParsedFile, value: ConstantOrDefault, code: str, tag: str) -> LineEdit:
     line = value.indent + _encode(file, tagged_line(code, tag), value.first_line) + file.newline
-    return Edit(line_index=value.insertion_line, rank=EditRank.AFTER_WHOLE, lines=(line,))
+    return LineEdit(line_index=value.insertion_line, rank=EditRank.AFTER_WHOLE, lines=(line,))
 
 
-def value_edit(
+def expression_edit(
     file: ParsedFile, expression: Expression, changed: str, tag: str, condition: str | None = None
-) -> ValueEdit:
+) -> ExpressionEdit:
     """Return the edit that gives `expression` the value `changed` while the injection `tag` is active.
 
     `changed` is source on one line. `condition` replaces the default call that asks the probe.
     """
     opened, closed = ("(", "))") if expression.is_bare else ("", ")")
-    return ValueEdit(
+    return ExpressionEdit(
         start=expression.start,
         end=expression.end,
         before=_encode(
-            file, changed_value_prefix(condition or active_check(tag), changed) + opened, expression.start[0]
+            file,
+            changed_value_prefix(condition or active_check_source(tag), changed) + opened,
+            expression.start[0],
         ),
         after=closed.encode(),
         changed=changed,
@@ -129,10 +131,10 @@ def value_edit(
     )
 
 
-def as_line_edits(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[Edit]:
+def as_line_edits(file: ParsedFile, edits: Iterable[LineEdit | ExpressionEdit]) -> list[LineEdit]:
     """Convert edits of values to edits that replace whole lines of the target; other edits are unchanged."""
     edits = list(edits)
-    values = sorted((e for e in edits if isinstance(e, ValueEdit)), key=lambda e: e.start)
+    values = sorted((e for e in edits if isinstance(e, ExpressionEdit)), key=lambda e: e.start)
     for earlier, following in pairwise(values):
         if following.start < earlier.end:
             raise MutatorError(
@@ -146,21 +148,25 @@ def as_line_edits(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[E
     for edit in values:
         texts_by_line[edit.start[0]].append((edit.start[1], edit.before, edit.tag))
         texts_by_line[edit.end[0]].append((edit.end[1], edit.after, edit.tag))
-    lines = [_replacement_edit(file, index, texts) for index, texts in texts_by_line.items()]
-    return [*(edit for edit in edits if isinstance(edit, Edit)), *lines]
+    lines = [_line_replacement_edit(file, index, texts) for index, texts in texts_by_line.items()]
+    return [*(edit for edit in edits if isinstance(edit, LineEdit)), *lines]
 
 
-def _replacement_edit(file: ParsedFile, line_index: int, texts: Sequence[tuple[int, bytes, str]]) -> Edit:
+def _line_replacement_edit(
+    file: ParsedFile, line_index: int, insertions: Sequence[tuple[int, bytes, str]]
+) -> LineEdit:
     whole = file.lines[line_index]
     original = whole.rstrip(b"\r\n")
     line = original
-    for column, text, _ in reversed(texts):
+    for column, text, _ in reversed(insertions):
         line = line[:column] + text + line[column:]
-    tag = replacement_tag(dict.fromkeys(tag for *_, tag in texts), original)
-    return Edit(line_index=line_index, rank=EditRank.INSTEAD, lines=(line + tag + whole[len(original) :],))
+    tag = replacement_tag(dict.fromkeys(tag for *_, tag in insertions), original)
+    return LineEdit(
+        line_index=line_index, rank=EditRank.INSTEAD, lines=(line + tag + whole[len(original) :],)
+    )
 
 
-def probe_import_edit(file: ParsedFile, package: str | None) -> Edit:
+def probe_import_edit(file: ParsedFile, package: str | None) -> LineEdit:
     if file.import_line == 0 and file.data.startswith(BOM_UTF8):
         raise MutatorError(
             "a byte order mark right before the first statement",
@@ -170,7 +176,7 @@ def probe_import_edit(file: ParsedFile, package: str | None) -> Edit:
             remedy="save the file without a byte order mark",
         )
     line = probe_import_line(package).encode(file.encoding)
-    return Edit(line_index=file.import_line, rank=EditRank.BEFORE, lines=(line + file.newline,))
+    return LineEdit(line_index=file.import_line, rank=EditRank.BEFORE, lines=(line + file.newline,))
 
 
 def _indent_unit_of(file: ParsedFile, indent: bytes) -> bytes:
@@ -203,7 +209,7 @@ def _encode(file: ParsedFile, text: str, line: int) -> bytes:
         ) from None
 
 
-def sort_edits(edits: Iterable[Edit]) -> list[Edit]:
+def sort_edits(edits: Iterable[LineEdit]) -> list[LineEdit]:
     """Sort edits from the top of the file to its end; edits of equal index and rank keep their order.
 
     Exception: lines inserted after a class follow those inserted after its last function.
@@ -211,11 +217,11 @@ def sort_edits(edits: Iterable[Edit]) -> list[Edit]:
     return sorted(edits, key=lambda e: (e.line_index, e.rank, -_indentation_depth(e)))
 
 
-def _indentation_depth(edit: Edit) -> int:
+def _indentation_depth(edit: LineEdit) -> int:
     return len(_indentation_of(edit.lines[0])) if edit.rank is EditRank.AFTER_WHOLE else 0
 
 
-def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[PatchPiece, ...]:
+def apply_edits(file: ParsedFile, edits: Iterable[LineEdit]) -> tuple[PatchPiece, ...]:
     """Return the edited file as pieces, for `join_pieces`; MutatorError if two guards wrap one statement."""
     pieces: list[PatchPiece] = []
     next_line = 0
@@ -277,7 +283,7 @@ def _move_last_newline(pieces: list[PatchPiece], added: list[bytes], newline: by
     return added
 
 
-def join_pieces(pieces: Iterable[PatchPiece]) -> bytes:
+def mutated_bytes(pieces: Iterable[PatchPiece]) -> bytes:
     return b"".join(line for piece in pieces if piece.sign != "-" for line in piece.lines)
 
 

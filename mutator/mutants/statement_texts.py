@@ -39,11 +39,13 @@ def one_line_texts(
                 file, anchor, "the next statement is missing, shares its lines, or opens a block"
             )
         texts["next_statement"] = _one_line_text(file, anchor, following)
-        anchor = _cover_next_statement(file, anchor, following)
+        anchor = _extend_to_next_statement(file, anchor, following)
     return anchor, texts
 
 
-def _cover_next_statement(file: ParsedFile, anchor: ResolvedAnchor, following: ast.stmt) -> ResolvedAnchor:
+def _extend_to_next_statement(
+    file: ParsedFile, anchor: ResolvedAnchor, following: ast.stmt
+) -> ResolvedAnchor:
     last = following.end_lineno or 0
     if anchor.indentable_count != anchor.end_line - anchor.first_line or _has_multiline_string(following):
         raise _unfit_error(file, anchor, "a string spans several lines, so its statement cannot be indented")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import libcst as cst
 
 from mutator.config.location_syntax import is_assignable
-from mutator.mutants.name_scopes import NamesByFunction, normalize_identifier
+from mutator.mutants.name_scopes import UsedNamesByFunction, normalize_identifier
 from mutator.mutants.node_positions import (
     NodePosition,
     RangeByNode,
@@ -67,7 +67,7 @@ class Function:
 
 
 def collect_functions(
-    module: cst.Module, positions: RangeByNode, names: NamesByFunction
+    module: cst.Module, positions: RangeByNode, names: UsedNamesByFunction
 ) -> dict[str, tuple[Function, ...]]:
     """Return all functions by qualified name (`Class.method`, `outer.inner`), in source order."""
     collector = _FunctionCollector(positions, names)
@@ -92,7 +92,7 @@ def item_name_of(node: cst.Subscript) -> str | None:
 
 
 class _FunctionCollector(cst.CSTVisitor):
-    def __init__(self, positions: RangeByNode, names: NamesByFunction) -> None:
+    def __init__(self, positions: RangeByNode, names: UsedNamesByFunction) -> None:
         super().__init__()
         self.positions = positions
         self.names_by_function = names
@@ -122,7 +122,7 @@ class _FunctionCollector(cst.CSTVisitor):
             position=function_position(original_node, self.positions),
             statements=tuple(sorted(statements, key=lambda s: s.first_line)),
             used_names=self.names_by_function.get((line, self.scope_names[-1]), frozenset()),
-            entry_lines=_entry_lines(original_node, self.positions),
+            entry_lines=_entry_and_indent_lines(original_node, self.positions),
         )
         self.functions.setdefault(".".join(self.scope_names), []).append(function)
         self.scope_names.pop()
@@ -161,8 +161,8 @@ class _FunctionCollector(cst.CSTVisitor):
         span = self.positions[node]
         last = line_after_statements(node, self.positions)
         for i, small in enumerate(node.body):
-            outer = _outer_call(small)
-            for call in _inner_calls(small, outer):
+            outer = _call_as_whole_value(small)
+            for call in _other_calls(small, outer):
                 self._add_unanchorable(
                     call, [dotted_name_of(call.func) or ""], "the call is part of an expression", calls=True
                 )
@@ -201,7 +201,7 @@ class _FunctionCollector(cst.CSTVisitor):
             Statement(
                 first_line=line,
                 end_line=opens,
-                assigned_names=tuple(_stable_names(names)),
+                assigned_names=tuple(_unique_stable_names(names)),
                 block_first_line=opens,
             )
         )
@@ -230,7 +230,7 @@ def _value_of(small: cst.BaseSmallStatement) -> cst.BaseExpression | None:
     return None
 
 
-def _outer_call(small: cst.BaseSmallStatement) -> cst.Call | None:
+def _call_as_whole_value(small: cst.BaseSmallStatement) -> cst.Call | None:
     value = _value_of(small)
     if isinstance(value, cst.Await):
         value = value.expression
@@ -250,11 +250,11 @@ def _assigned_called_and_returned(
     if isinstance(small, cst.Return):
         returned = called or dotted_name_of(small.value)
         returns = ["", returned] if returned else [""]
-    unique = tuple(_stable_names(assigns))
+    unique = tuple(_unique_stable_names(assigns))
     return unique, (called,) if called else (), tuple(returns)
 
 
-def _stable_names(names: Sequence[str]) -> Iterator[str]:
+def _unique_stable_names(names: Sequence[str]) -> Iterator[str]:
     """Yield the assigned names without duplicates, and without items whose index is assigned later.
 
     After `a[i], i = 1, 2`, `a[i]` names a different item.
@@ -276,7 +276,7 @@ def _target_names(node: cst.CSTNode) -> list[str]:
     return [name] if name else []
 
 
-def _inner_calls(small: cst.BaseSmallStatement, outer: cst.Call | None) -> Iterator[cst.Call]:
+def _other_calls(small: cst.BaseSmallStatement, outer: cst.Call | None) -> Iterator[cst.Call]:
     stack: list[cst.CSTNode] = [small]
     while stack:
         node = stack.pop()
@@ -298,7 +298,7 @@ def _has_multiline_string(small: cst.BaseSmallStatement, positions: RangeByNode)
     return False
 
 
-def _entry_lines(node: cst.FunctionDef, positions: RangeByNode) -> tuple[int, int] | None:
+def _entry_and_indent_lines(node: cst.FunctionDef, positions: RangeByNode) -> tuple[int, int] | None:
     body = node.body
     if not isinstance(body, cst.IndentedBlock):
         return None

@@ -14,9 +14,9 @@ from jinja2.exceptions import SecurityError
 from jinja2.runtime import Context as _Context
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
-MOST_CHARACTERS = 50_000  # of a template, and of its result
+MOST_TEMPLATE_OR_RESULT_CHARACTERS = 50_000  # of a template, and of its result
 MOST_TEMPLATE_NODES = 1000  # names, constants, operators, tags and pieces of text
-MOST_NESTING = 30  # nodes in nodes
+MOST_NESTED_NODES = 30  # nodes in nodes
 MOST_WORK_STEPS = 200_000  # loop turns times the nodes in the loop, and characters that are processed
 _MOST_NUMBER_BITS = 2048  # bits
 _ALLOWED_NODES = (
@@ -89,7 +89,7 @@ _JINJA_FILTERS = ("abs", "default", "float", "int", "length")  # of Jinja2's
 _TURN_COUNTER, _READ_COUNTER = "turns", "read"  # filters that count; no template can name them
 
 
-class CountingContext(_Context):
+class WorkCountingContext(_Context):
     """The names of one rendering, and how much work it has done."""
 
     work = 0
@@ -104,7 +104,7 @@ class CountingContext(_Context):
 class TemplateEnvironment(ImmutableSandboxedEnvironment):
     """Compiles templates that use only the allowed constructs, `functions` and `filters`."""
 
-    context_class = CountingContext
+    context_class = WorkCountingContext
     intercepted_binops = frozenset({"+", "-", "*", "/", "//", "%"})
 
     def __init__(
@@ -126,20 +126,25 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
             name: _counting_filter(function) for name, function in {**jinja_filters, **filters}.items()
         }
         self.filter_names = frozenset(self.filters)
-        self.filters |= {_TURN_COUNTER: _count_turns, _READ_COUNTER: _counting_filter(lambda value: value)}
+        self.filters |= {
+            _TURN_COUNTER: _count_loop_work,
+            _READ_COUNTER: _counting_filter(lambda value: value),
+        }
         self.globals = dict(functions)
         self.compiled_template = lru_cache(maxsize=256)(self._compile_template)
 
     def _compile_template(self, text: str) -> Template:
         """Return the template; TemplateSyntaxError with the line of a construct that is not allowed."""
-        if len(text) > MOST_CHARACTERS:
-            raise TemplateSyntaxError(f"{len(text)} characters instead of at most {MOST_CHARACTERS}", 1)
+        if len(text) > MOST_TEMPLATE_OR_RESULT_CHARACTERS:
+            raise TemplateSyntaxError(
+                f"{len(text)} characters instead of at most {MOST_TEMPLATE_OR_RESULT_CHARACTERS}", 1
+            )
         tree = self.parse(text)
         self._check_nodes(tree)
         for loop in tree.find_all(nodes.For):
             size = nodes.Const(_count_nodes(loop))
             loop.iter = _with_filter(loop.iter, _TURN_COUNTER, size)
-        _count_reads(tree)
+        _add_read_counters(tree)
         return Template.from_code(self, self.compile(tree), self.make_globals(None))
 
     def _check_nodes(self, tree: nodes.Template) -> None:
@@ -155,8 +160,8 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
             queue.extend((child, depth + 1, in_loop) for child in node.iter_child_nodes())
 
     def _problem_of_node(self, node: nodes.Node, depth: int, node_count: int, in_loop: bool) -> str:
-        if depth > MOST_NESTING or node_count > MOST_TEMPLATE_NODES:
-            return f"more than {MOST_TEMPLATE_NODES} parts, or nested more than {MOST_NESTING} deep"
+        if depth > MOST_NESTED_NODES or node_count > MOST_TEMPLATE_NODES:
+            return f"more than {MOST_TEMPLATE_NODES} parts, or nested more than {MOST_NESTED_NODES} deep"
         if not isinstance(node, _ALLOWED_NODES):
             return f"`{getattr(node, 'operator', None) or type(node).__name__.lower()}` is not allowed"
         if isinstance(node, nodes.For) and (in_loop or node.recursive):
@@ -189,7 +194,7 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
         """Calculate with numbers, and add texts or lists."""
         if operator == "+" and isinstance(left, str | list) and type(left) is type(right):
             context.add_work(len(left) + len(right))
-        elif not (_is_number(left) and _is_number(right)):
+        elif not (_is_number_within_limit(left) and _is_number_within_limit(right)):
             kinds = f"{type(left).__name__} {operator} {type(right).__name__}"
             raise SecurityError(f"{kinds} is not allowed")
         return super().call_binop(context, operator, left, right)
@@ -201,14 +206,14 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
     @staticmethod
     def concat(pieces: Iterable[str]) -> str:
         """Join the pieces of a result."""
-        return "".join(_limit_pieces(pieces))
+        return "".join(_pieces_within_limit(pieces))
 
 
 def _with_filter(node: nodes.Node, name: str, *args: nodes.Expr) -> nodes.Filter:
     return nodes.Filter(node, name, list(args), [], None, None, lineno=node.lineno)
 
 
-def _count_reads(tree: nodes.Template) -> None:
+def _add_read_counters(tree: nodes.Template) -> None:
     """Count what comparisons, the test `in` and slices read, each time they are evaluated."""
     for node in list(tree.find_all((nodes.Compare, nodes.Operand, nodes.Test, nodes.Getitem))):
         if isinstance(node, nodes.Compare | nodes.Operand):
@@ -220,12 +225,12 @@ def _count_reads(tree: nodes.Template) -> None:
             node.node = _with_filter(node.node, _READ_COUNTER)
 
 
-def _limit_pieces(pieces: Iterable[str]) -> Iterator[str]:
+def _pieces_within_limit(pieces: Iterable[str]) -> Iterator[str]:
     total = 0
     for piece in pieces:
         total += len(piece)
-        if total > MOST_CHARACTERS:
-            raise SecurityError(f"it writes more than {MOST_CHARACTERS} characters")
+        if total > MOST_TEMPLATE_OR_RESULT_CHARACTERS:
+            raise SecurityError(f"it writes more than {MOST_TEMPLATE_OR_RESULT_CHARACTERS} characters")
         yield piece
 
 
@@ -234,7 +239,7 @@ def _counting_filter(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @pass_context
     @wraps(function)
-    def counted(context: CountingContext, value: Any, *args: Any) -> Any:
+    def counted(context: WorkCountingContext, value: Any, *args: Any) -> Any:
         times = len(value) if isinstance(value, list | tuple) else 1
         context.add_work(_count_characters(value) + times * sum(map(_count_characters, args)))
         return function(value, *args)
@@ -243,7 +248,7 @@ def _counting_filter(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @pass_context
-def _count_turns(context: CountingContext, value: Any, size: int) -> Any:
+def _count_loop_work(context: WorkCountingContext, value: Any, size: int) -> Any:
     if not isinstance(value, list | tuple):
         raise SecurityError(f"a loop over a {type(value).__name__}")
     context.add_work(len(value) * size)
@@ -266,7 +271,7 @@ def _count_characters(value: object) -> int:
     return sum(map(_count_characters, value)) if isinstance(value, list | tuple) else 1
 
 
-def _is_number(value: object) -> bool:
+def _is_number_within_limit(value: object) -> bool:
     if isinstance(value, int):
         return value.bit_length() <= _MOST_NUMBER_BITS
     return isinstance(value, float)

@@ -21,10 +21,10 @@ from mutator.config.location_syntax import PROBE_NAME, is_assignable, is_dotted_
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAME_TYPES, FaultModel, ParamSchema, SnippetKind
 from mutator.model import Value
-from mutator.mutants.normalized_source import normalized
+from mutator.mutants.normalized_source import normalize_numbers_and_ids
 from mutator.mutants.template_language import TemplateEnvironment
 
-_MOST_EXACT_INTEGER = 2.0**53  # every integer up to this is exact as a double
+_MOST_INTEGER_EXACT_AS_FLOAT = 2.0**53  # every integer up to this is exact as a double
 _EXPECTED_BY_PARAM_TYPE = {  # by parameter type
     "variable": "the name of a variable",
     "import": "a dotted name to import",
@@ -53,7 +53,7 @@ def signed_term(value: int | float) -> str:
     """
     negative = math.copysign(1.0, value) < 0.0 and not math.isnan(value)
     size = -value if negative else value
-    whole = isinstance(size, float) and size <= _MOST_EXACT_INTEGER and size.is_integer()
+    whole = isinstance(size, float) and size <= _MOST_INTEGER_EXACT_AS_FLOAT and size.is_integer()
     return f"{'-' if negative else '+'} {python_literal(int(size) if whole else size)}"
 
 
@@ -140,7 +140,7 @@ def render_snippet(
         model.template, {"fi": injection_id, **names, **(statements or {})}, model.template_path
     )
     text = text.removesuffix("\n")
-    if not _is_valid_snippet(normalized(text, (injection_id,)), model.kind):
+    if not _is_valid_snippet(normalize_numbers_and_ids(text, (injection_id,)), model.kind):
         _check_snippet(text, model.kind, model.template_path)
     return tuple(text.split("\n"))
 
@@ -169,7 +169,7 @@ def render_changed_value(
     }
     names |= {"fi": injection_id, "original": original, **(parts or {})}
     text = render_template(model.expression_template, names, model.template_path)
-    plain = normalized(text, (injection_id,))
+    plain = normalize_numbers_and_ids(text, (injection_id,))
     if not _is_expression(plain):
         raise MutatorError(
             f"the template gives {text!r}",

@@ -19,7 +19,7 @@ from mutator.onboarding.todo_marks import TODO_MARK
 
 MOST_LISTED_CANDIDATES = 5  # maximum number of candidates for the step, and of values of each
 # parameters that get the step length instead of `...`
-_TIME_STEP_NAMES = ("dt", "delta_t", "time_step", "timestep")
+_TIME_STEP_PARAMETERS = ("dt", "delta_t", "time_step", "timestep")
 _PATH_BY_TEMPLATE = {
     "README.md": "README.md",
     "manifest.yaml": "fault_library/targets/{name}.yaml",
@@ -129,7 +129,7 @@ def _step_variables(best: StepCandidate | None) -> dict[str, Any]:
         "builder": best.class_name or "",
         "builds": best.constructor_arguments,
         "build_arguments": ", ".join(f"{argument}=..." for argument in best.constructor_arguments),
-        "call": f"{called}({_call_arguments(best)})",
+        "call": f"{called}({_render_call_arguments(best)})",
         "path": best.path,
         "function": best.name,
         "value": first,
@@ -139,8 +139,8 @@ def _step_variables(best: StepCandidate | None) -> dict[str, Any]:
     }
 
 
-def _call_arguments(best: StepCandidate) -> str:
+def _render_call_arguments(best: StepCandidate) -> str:
     """Return call arguments: the state first, then the time step, and `...` for all others."""
     first, *others = best.required_arguments or ("",)
-    texts = [f"{name}={'self.step_s' if name in _TIME_STEP_NAMES else '...'}" for name in others]
+    texts = [f"{name}={'self.step_s' if name in _TIME_STEP_PARAMETERS else '...'}" for name in others]
     return ", ".join(["state", *texts]) if first else ""

@@ -19,7 +19,7 @@ _STEP_WORDS_BY_SCORE = {  # names of step functions; a higher number is more cer
 }
 _SCORE_BY_STEP_WORD = {word: score for score, words in _STEP_WORDS_BY_SCORE.items() for word in words.split()}
 _CONTROLLER_PATTERN = re.compile("control|pid|pilot|planner|agent|driver|regulator|tracker|cruise|mpc")
-_WORLD_PATTERN = re.compile("env|sim|plant|world|render|viewer|logger|graphics|mixin|wrapper|test")
+_NON_CONTROLLER_PATTERN = re.compile("env|sim|plant|world|render|viewer|logger|graphics|mixin|wrapper|test")
 _MOST_STATE_POINTS = _MOST_VALUE_POINTS = 6  # further attributes or values do not add points
 _CONTROLLER_FILE_POINTS = 3  # points if the file name suggests a controller
 _NO_HINT_POINTS = -6  # points if neither the name nor calls suggest a step
@@ -135,7 +135,7 @@ def _name_score(name: str) -> int:
 def _class_score(name: str) -> int:
     lower = name.lower()
     # a `ControllerEnv` is a world, so a word of the world counts more
-    return 5 * bool(_CONTROLLER_PATTERN.search(lower)) - 6 * bool(_WORLD_PATTERN.search(lower))
+    return 5 * bool(_CONTROLLER_PATTERN.search(lower)) - 6 * bool(_NON_CONTROLLER_PATTERN.search(lower))
 
 
 def _required_arguments(function: Function, *, is_method: bool) -> tuple[str, ...]:

@@ -46,12 +46,12 @@ def measure_executed_lines(
             engine = ReferenceEngine(manifest, scratch / "work", limits)
             for i, golden_run in enumerate(golden_runs):
                 if lines_by_run[i] is None:
-                    lines_by_run[i] = _measure(engine, golden_run, scratch / "work" / f"lines-{i}")
+                    lines_by_run[i] = _run_and_note_lines(engine, golden_run, scratch / "work" / f"lines-{i}")
                     _save_cached(_cache_key(manifest, golden_run), lines_by_run[i] or {})
     return [lines or {} for lines in lines_by_run]
 
 
-def _measure(engine: ReferenceEngine, golden_run: GoldenRunInputs, folder: Path) -> ExecutedLines:
+def _run_and_note_lines(engine: ReferenceEngine, golden_run: GoldenRunInputs, folder: Path) -> ExecutedLines:
     job = Job(
         name=folder.name,
         scenario=golden_run.scenario,

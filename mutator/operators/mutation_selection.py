@@ -13,7 +13,7 @@ from mutator.mutants.anchors import parsed_file
 from mutator.operators.equal_code_filter import drop_equal_code
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutations import Mutation
-from mutator.operators.statement_facts import facts_of
+from mutator.operators.statement_facts import statement_facts_of
 from mutator.targets.allowed_locations import check_file_allowed
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches_any_glob
@@ -78,7 +78,7 @@ def _select_in_file(
     functions: Collection[str],
     executed: LinesByFile | None,
 ) -> SelectedMutations:
-    file, facts = parsed_file(manifest.tree, path), facts_of(manifest.tree, path)
+    file, facts = parsed_file(manifest.tree, path), statement_facts_of(manifest.tree, path)
     mutations = [
         mutation for name in functions for mutation in mutations_of(file, facts, name, models, operators)
     ]
@@ -163,13 +163,13 @@ def sample_mutations(selected: SelectedMutations, count: int | None, seed: int) 
     total = len(selected.mutations)
     if count is None or count >= total:
         return selected.mutations
-    strata_order = sorted(range(total), key=lambda i: _stratum(selected.mutations[i], seed))
+    strata_order = sorted(range(total), key=lambda i: _stratum_sort_key(selected.mutations[i], seed))
     start = float(random_generator(seed, "operators").random())
     chosen = {strata_order[int((k + start) * total / count)] for k in range(count)}
     return tuple(selected.mutations[i] for i in sorted(chosen))
 
 
-def _stratum(mutation: Mutation, seed: int) -> tuple[str, ...]:
+def _stratum_sort_key(mutation: Mutation, seed: int) -> tuple[str, ...]:
     at = mutation.location
     what = [seed, at, mutation.model, mutation.params]
     return (mutation.operator, at.path, at.function, digest(what))

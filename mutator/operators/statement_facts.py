@@ -42,7 +42,7 @@ def extent_of(node: ast.expr) -> NodeExtent:
     return node.lineno, node.col_offset, node.end_lineno, node.end_col_offset
 
 
-def facts_of(tree: SourceTree, path: str) -> StatementFacts:
+def statement_facts_of(tree: SourceTree, path: str) -> StatementFacts:
     return tree.derive_once(path, _collect_facts)
 
 

@@ -15,7 +15,7 @@ from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 
-def canary_variants(
+def canary_with_other_values(
     workspace: Workspace, manifest: TargetManifest, canary: Experiment
 ) -> Iterator[Experiment]:
     """Yield the canary, then the same fault with each other value of its variant, largest first."""

@@ -62,7 +62,7 @@ def output_digest_of(manifest: TargetManifest, out: Path) -> str:
         return ""
 
 
-def golden_problem(first: CheckRun, again: CheckRun) -> str:
+def golden_pair_problem(first: CheckRun, again: CheckRun) -> str:
     """Return the problem of a pair of golden runs; empty if there is none."""
     if first.problem or again.problem:
         return first.problem or again.problem

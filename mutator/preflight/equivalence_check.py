@@ -54,7 +54,7 @@ class EquivalenceResult:
         return f"{self.same} of {sampled} came out the same on the reference engine"
 
 
-def mark_as_needed(run: Path) -> None:
+def mark_check_as_needed(run: Path) -> None:
     """Record that the run has results that need an equivalence check."""
     with raising_disk_full(run):
         (run / PROOF_FOLDER).mkdir(exist_ok=True)
@@ -72,7 +72,7 @@ def choose_sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experim
     return tuple(chosen)
 
 
-def _whole_sample_ids(folder: RunFolder) -> set[str]:
+def _sample_ids_of_plan(folder: RunFolder) -> set[str]:
     """Ids of a plan's sample. For several seeds, each seed after the first adds one experiment in a
     hundred.
     """
@@ -80,8 +80,8 @@ def _whole_sample_ids(folder: RunFolder) -> set[str]:
 
 
 @lru_cache(maxsize=4)  # a session asks several times
-def _cached_sample_ids(run: Path, plan: str, seeds: int) -> tuple[str, ...]:
-    if seeds == 1:
+def _cached_sample_ids(run: Path, plan: str, seed_count: int) -> tuple[str, ...]:
+    if seed_count == 1:
         head = RunFolder.open_unverified(run).head
         return tuple(e.id for e in choose_sample(plan_file.load_experiments(run), head.seed))
     ids: list[str] = []
@@ -101,7 +101,7 @@ def _traits_to_cover(experiment: Experiment) -> Iterator[tuple[str, ...]]:
     yield (experiment.scenario,)
 
 
-def reason_not_needed(folder: RunFolder) -> str | None:
+def reason_check_not_needed(folder: RunFolder) -> str | None:
     """Return the most frequent reason why no experiment was forked; None if one was forked or still can be.
 
     Always None for a shard, because merged shards must all have a proof or none.
@@ -130,20 +130,22 @@ def remove_proof(folder: RunFolder) -> None:
         remove_folder(folder.path / PROOF_FOLDER)
 
 
-def remaining_sample(folder: RunFolder) -> tuple[SampledExperiment, ...]:
+def remaining_sampled_experiments(folder: RunFolder) -> tuple[SampledExperiment, ...]:
     """Return the part of the sample without a valid record in `proof/`; empty if no check is needed."""
     if not (folder.path / PROOF_FOLDER).is_dir():
         return ()
     records = folder.records(PROOF_FOLDER)
-    ids = [name for name in sample_ids(folder) if name not in records or not _is_result(records[name])]
-    if ids and reason_not_needed(folder) is not None:
+    ids = [
+        name for name in sample_ids_in_folder(folder) if name not in records or not _is_result(records[name])
+    ]
+    if ids and reason_check_not_needed(folder) is not None:
         return ()
     return tuple(SampledExperiment(number, name) for number, name in enumerate(ids))
 
 
-def sample_ids(folder: RunFolder) -> list[str]:
+def sample_ids_in_folder(folder: RunFolder) -> list[str]:
     """Ids of the sample in this folder's share, in plan order."""
-    sampled_ids = _whole_sample_ids(folder)
+    sampled_ids = _sample_ids_of_plan(folder)
     return [name for name in folder.planned_positions() if name in sampled_ids]
 
 
@@ -171,7 +173,9 @@ def compare_sample(folder: RunFolder, records: Mapping[str, Record]) -> Equivale
                 remedy="do not trust this run: rerun it with --engine reference, and report the problem",
             )
         same += 1
-    return EquivalenceResult(sampled=len(sample_ids(folder)), same=same, errors=tuple(sorted(errors)))
+    return EquivalenceResult(
+        sampled=len(sample_ids_in_folder(folder)), same=same, errors=tuple(sorted(errors))
+    )
 
 
 def describe_difference(record: Record, reference_record: Record) -> str:

@@ -10,14 +10,14 @@ from mutator._common.hashing import digest
 from mutator.preflight.unreached_triggers import OBSERVATIONS_FOLDER
 
 
-def entry_path(key: str) -> Path:
+def cached_checks_path(key: str) -> Path:
     """Return the path for checks with this digest. Machines with a shared home folder have separate entries,
     because the digest might not cover everything that changes last digits.
     """
     return path_below(shared_cache.checks_folder(), digest([key, platform.node()]))
 
 
-def store_checks(entry: Path, run: Path, file: str, observation_folder: Path) -> None:
+def store_passed_checks(entry: Path, run: Path, file: str, observation_folder: Path) -> None:
     """Store a run folder's golden runs, check results (`file`) and observations in `entry`, if the cache is
     writable.
     """

@@ -20,7 +20,7 @@ from mutator.preflight import preflight_cache, unreached_triggers
 from mutator.preflight.check_run_problems import (
     CheckRun,
     equal_scenarios_problem,
-    golden_problem,
+    golden_pair_problem,
     null_mutant_problem,
     output_digest_of,
 )
@@ -66,8 +66,8 @@ def run_checks(
             remedy="fix target, templates or canary (`mutator check --drive` shows details); the campaign "
             "starts only if all pass",
         )
-    preflight_cache.store_checks(
-        preflight_cache.entry_path(checks.digest), folder.path, FILE, checks.pending_folder
+    preflight_cache.store_passed_checks(
+        preflight_cache.cached_checks_path(checks.digest), folder.path, FILE, checks.pending_folder
     )
     return results
 
@@ -129,7 +129,7 @@ class _PreflightChecks:
         copy = self.pending_folder
         try:
             with raising_disk_full(copy):
-                cached_folders.copy_from_cache(preflight_cache.entry_path(self.digest), copy)
+                cached_folders.copy_from_cache(preflight_cache.cached_checks_path(self.digest), copy)
             stored = read_json(copy / FILE, SCHEMA)
             results = self._passed_results(stored, copy)
         except DiskFull:
@@ -138,11 +138,11 @@ class _PreflightChecks:
             return None  # missing or damaged
         if results is not None:
             if (
-                self._check_runner(self.folder.scratch_folder / "again").run_goldens(workers, notify)
+                self._build_check_runner(self.folder.scratch_folder / "again").run_goldens(workers, notify)
                 != stored["goldens"]
             ):
                 return None  # forged, or no longer true
-            self._check_same_as_before(stored["goldens"])
+            self._check_goldens_same_as_before(stored["goldens"])
             self._store_in_run_folder(read_bounded(copy / FILE))
         return results
 
@@ -163,10 +163,10 @@ class _PreflightChecks:
         if not anchors.passed:  # the runs would take minutes
             yield anchors
             return
-        runs, canary_verdict = self._check_runner(self.pending_folder).run_all(workers, notify)
-        results = [anchors, *self._judge_goldens(runs), _check_result("canary", *canary_verdict)]
+        runs, canary_verdict = self._build_check_runner(self.pending_folder).run_all(workers, notify)
+        results = [anchors, *self._judge_goldens(runs), _build_check_result("canary", *canary_verdict)]
         goldens = {golden_run.key: runs[GOLDEN, golden_run].output_digest for golden_run in self.golden_runs}
-        self._check_same_as_before(goldens)
+        self._check_goldens_same_as_before(goldens)
         cpu = [runs[GOLDEN, key].cpu_s for key in self.golden_runs]
         checks = {
             "schema": SCHEMA,
@@ -179,7 +179,7 @@ class _PreflightChecks:
         self._store_in_run_folder(json_bytes(checks))
         yield from results
 
-    def _check_runner(self, pending_folder: Path) -> CheckRunner:
+    def _build_check_runner(self, pending_folder: Path) -> CheckRunner:
         return CheckRunner(
             workspace=self.workspace,
             folder=self.folder,
@@ -204,7 +204,7 @@ class _PreflightChecks:
         path = self.folder.path / FILE
         return read_json(path, SCHEMA) if path.is_file() else None
 
-    def _check_same_as_before(self, goldens: dict[str, str]) -> None:
+    def _check_goldens_same_as_before(self, goldens: dict[str, str]) -> None:
         """Raise CheckFailed if a run that has records would continue with different golden runs, for example
         on another processor.
         """
@@ -231,11 +231,11 @@ class _PreflightChecks:
     def _judge_goldens(self, runs: CheckRunByName) -> Iterator[CheckResult]:
         for key in self.golden_runs:
             first, again, null = (runs[name, key] for name in (GOLDEN, GOLDEN_AGAIN, NULL_MUTANT))
-            detail = golden_problem(first, again)
-            yield _check_result(f"golden {key.key}", detail, "the same bytes twice")
+            detail = golden_pair_problem(first, again)
+            yield _build_check_result(f"golden {key.key}", detail, "the same bytes twice")
             if not first.problem:
                 detail = null_mutant_problem(first, null)
-                yield _check_result(f"null mutant {key.key}", detail, "the same bytes as golden")
+                yield _build_check_result(f"null mutant {key.key}", detail, "the same bytes as golden")
         yield from self._judge_equal_scenarios(runs)
 
     def _judge_equal_scenarios(self, runs: CheckRunByName) -> Iterator[CheckResult]:
@@ -248,7 +248,7 @@ class _PreflightChecks:
                 ]
         for golden_run, goldens in equal_runs.items():
             name = golden_run._replace(scenario="+".join(goldens)).key
-            yield _check_result(f"same {name}", equal_scenarios_problem(goldens), "one run for all")
+            yield _build_check_result(f"same {name}", equal_scenarios_problem(goldens), "one run for all")
 
     def _judge_anchors(self) -> CheckResult:
         """Check that each variant of the plan finds its statements. A mutant that does not compile
@@ -263,8 +263,10 @@ class _PreflightChecks:
             except MutatorError as err:
                 problems.setdefault(str(err), []).append(fault.spec)
         text = "; ".join(f"{', '.join(specs)}: {problem}" for problem, specs in problems.items())
-        return _check_result("anchors", text, f"{len(self.fault_by_variant)} variants found their statements")
+        return _build_check_result(
+            "anchors", text, f"{len(self.fault_by_variant)} variants found their statements"
+        )
 
 
-def _check_result(name: str, problem: str, success: str) -> CheckResult:
+def _build_check_result(name: str, problem: str, success: str) -> CheckResult:
     return CheckResult(name=name, passed=not problem, detail=problem or success)

@@ -87,7 +87,7 @@ class CheckRunner:
 
         hazard = self.folder.head.canary_hazard
         return canary.run_until_hazard(
-            canary.canary_variants(self.workspace, self.manifest, self.folder.canary), run, hazard
+            canary.canary_with_other_values(self.workspace, self.manifest, self.folder.canary), run, hazard
         )
 
     def _jobs_by_name(self) -> dict[tuple[str, Any], Job]:

@@ -79,10 +79,10 @@ def describe_unreached(
             holds_by_run[key, trigger] = is_ever_active(condition_by_trigger[trigger], observed[key])
         if not holds_by_run[key, trigger]:
             never[f"{trigger.name} in {experiment.scenario}"] += 1
-    return list(_describe_counts(total, late, never))
+    return list(_describe_unreached_counts(total, late, never))
 
 
-def _describe_counts(total: int, late: Counter[str], never: Counter[str]) -> Iterator[str]:
+def _describe_unreached_counts(total: int, late: Counter[str], never: Counter[str]) -> Iterator[str]:
     for counts, what in (
         (late, "the scenario ends before the time of"),
         (never, "no golden run reaches the trigger of"),

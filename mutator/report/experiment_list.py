@@ -17,7 +17,7 @@ from mutator._common.hashing import as_json_types
 from mutator.config.location_syntax import location_as_yaml
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
-from mutator.mutants.file_patches import readable_patch
+from mutator.mutants.file_patches import patch_without_new_files
 from mutator.report.answer_parts import warning_filter_values
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
 from mutator.report.fault_path_data import RunFaultPaths
@@ -301,7 +301,7 @@ def _readable_patches(run: ReportedRun, ids: Iterable[str]) -> Iterator[tuple[st
     for name in ids:
         data = run.folder.read_patch(name, run.records.get(name))
         if data is not None:
-            yield name, "", readable_patch(data.decode("utf-8", "replace"))[0]
+            yield name, "", patch_without_new_files(data.decode("utf-8", "replace"))[0]
 
 
 def media_by_experiment(

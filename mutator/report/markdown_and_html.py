@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from mutator._common.message_text import counted
 from mutator.model import Outcome
-from mutator.mutants.injected_lines import tags_for_scripts
+from mutator.mutants.injected_lines import tags_for_page_scripts
 from mutator.report.experiment_list import ExperimentListData
 from mutator.report.glossary import Glossary
 from mutator.report.panel import Panel, rendered
@@ -54,7 +54,7 @@ def report_html(content: ReportContent) -> str:
     html = rendered(
         asset_text("report/report.html"),
         content=content,
-        tags=Markup(json_script_element(tags_for_scripts(), "tags")),
+        tags=Markup(json_script_element(tags_for_page_scripts(), "tags")),
         outcome_names=[outcome.value for outcome in Outcome],
         styles=[
             Markup(asset_text(name))

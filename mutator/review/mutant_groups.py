@@ -23,7 +23,7 @@ from mutator.mutants.anchors import parsed_file
 from mutator.mutants.mutant_building import build
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.operator_lookup import OPERATOR_MODELS, operator_name_of
-from mutator.operators.statement_facts import facts_of
+from mutator.operators.statement_facts import statement_facts_of
 from mutator.review import patch_shapes
 from mutator.review.called_code import CalledCode
 from mutator.review.decision_basis import DecisionBasis, distinct_diffs, fault_hunks, function_sources
@@ -233,7 +233,7 @@ class _GroupBuilder:
     def _basis_of_operator(self, fault: Fault, operator: str) -> DecisionBasis:
         """Return the texts that determine all mutants of an operator in a function, selected or not."""
         location, tree = fault.injections[0].location, self.manifest.tree
-        file, facts = parsed_file(tree, location.path), facts_of(tree, location.path)
+        file, facts = parsed_file(tree, location.path), statement_facts_of(tree, location.path)
         mutations = list(mutations_of(file, facts, location.function, self.models, [operator]))
         models = {*OPERATOR_MODELS, *(mutation.model for mutation in mutations)}
         return DecisionBasis(

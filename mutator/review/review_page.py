@@ -11,7 +11,7 @@ from markupsafe import Markup
 from mutator._common.files import write_atomic
 from mutator._common.hashing import as_json_types, content_id
 from mutator.errors import MutatorError
-from mutator.mutants.injected_lines import tags_for_scripts
+from mutator.mutants.injected_lines import tags_for_page_scripts
 from mutator.review.decisions import Review, ReviewState
 from mutator.review.effect_pictures import has_pictures
 from mutator.review.mutant_groups import Group
@@ -57,7 +57,7 @@ def render_review_page(data: dict[str, Any]) -> str:
         count=len(data["groups"]),
         served=data.get("served") is not None,
         styles=[Markup(asset_text(name)) for name in load_order("review", ".css")],
-        tags=Markup(json_script_element(tags_for_scripts(), "tags")),
+        tags=Markup(json_script_element(tags_for_page_scripts(), "tags")),
         data=Markup(packed_script_element(data, "review")),
         scripts=[Markup(asset_text(name)) for name in load_order("review", ".js")],
     )

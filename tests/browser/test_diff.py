@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from mutator.mutants.injected_lines import tags_for_scripts
+from mutator.mutants.injected_lines import tags_for_page_scripts
 from mutator.web import asset_text
 
 CHANGED = 'x = (1 if _fi.active("a0") else "a\u2028b")  '
@@ -18,7 +18,7 @@ def test_a_tag_extends_to_the_end_of_its_line(browser: Any, end: str) -> None:
     patch = "diff --git a/m.py b/m.py\n--- a/m.py\n+++ b/m.py\n@@ -1,1 +1,3 @@\n" + end.join([*lines, ""])
     page = browser.new_page()
     page.set_content(
-        f'<script type="application/json" id="tags">{json.dumps(tags_for_scripts())}</script><p></p>'
+        f'<script type="application/json" id="tags">{json.dumps(tags_for_page_scripts())}</script><p></p>'
     )
     page.add_script_tag(
         content=f"{asset_text('shared/dom.js')}\n{asset_text('shared/diff.js')}\nglobalThis.Diff = Diff;"

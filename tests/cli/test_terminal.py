@@ -13,7 +13,7 @@ from mutator._common.message_text import wrap_text
 from mutator.cli.console import Terminal
 from mutator.cli.progress_display import campaign_progress
 from mutator.execution.progress_text import describe_duration
-from mutator.mutants.file_patches import readable_patch
+from mutator.mutants.file_patches import patch_without_new_files
 from mutator.store.run_progress import Progress
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
@@ -93,10 +93,10 @@ def test_durations_are_put_into_words(seconds: float, words: str) -> None:
 
 
 def test_a_diff_for_readers_leaves_out_new_files() -> None:
-    text, note = readable_patch(PATCH)
+    text, note = patch_without_new_files(PATCH)
     assert text == PATCH[PATCH.index("diff --git a/p/a.py") :]
     assert "p/_fi.py" in note
-    assert readable_patch(text) == (text, "")
+    assert patch_without_new_files(text) == (text, "")
 
 
 def test_each_stage_has_its_own_remaining_time(capsys: pytest.CaptureFixture[str]) -> None:

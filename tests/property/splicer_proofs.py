@@ -62,7 +62,7 @@ class Figures:
 @dataclass(frozen=True, slots=True)
 class _Placed:
     spot: Spot
-    edit: splicing.Edit
+    edit: splicing.LineEdit
     guard: bool = False
 
     @property
@@ -194,7 +194,7 @@ def _spliced(file: ParsedFile, group: Sequence[_Placed]) -> bytes:
     edits = [placed.edit for placed in group]
     with contextlib.suppress(MutatorError):  # a byte order mark right before the first statement
         edits.append(splicing.probe_import_edit(file, "pack"))
-    mutant = splicing.join_pieces(splicing.apply_edits(file, edits))
+    mutant = splicing.mutated_bytes(splicing.apply_edits(file, edits))
     try:
         compile(mutant, "m.py", "exec", dont_inherit=True)
     except SyntaxError as error:
@@ -264,4 +264,4 @@ def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
 def _forced(file: ParsedFile, spot: Spot, model: str, params: dict[str, Any]) -> bytes:
     site, code = file.resolve_statement(spot.location), render_snippet(_MODELS.get(model), params, "abcd0123")
     make = splicing.guard_edit if _MODELS.get(model).kind is SnippetKind.GUARD else splicing.insertion_edit
-    return splicing.join_pieces(splicing.apply_edits(file, [make(file, site, code, "abcd0123")]))
+    return splicing.mutated_bytes(splicing.apply_edits(file, [make(file, site, code, "abcd0123")]))

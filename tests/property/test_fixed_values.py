@@ -15,7 +15,7 @@ from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.constants_and_defaults import ConstantOrDefault
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.probe import build_probe_settings, render_probe
-from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, probe_import_edit, unsplice
+from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, probe_import_edit, unsplice
 from mutator.targets.observed_values import Observation
 
 from .test_value_anchors import MANY, models, module
@@ -41,7 +41,7 @@ def mutant(file: ParsedFile, cases: Sequence[tuple[ConstantOrDefault, FaultLocat
         assert file.resolve_constant_or_default(location) is one
         injection = Injection(location=location, model="stuck", params=(("value", "another"),))
         edits.append(injection_edit(file, models(), injection, f"{number:08x}"))  # type: ignore[arg-type]
-    data = join_pieces(apply_edits(file, as_line_edits(file, edits)))
+    data = mutated_bytes(apply_edits(file, as_line_edits(file, edits)))
     assert unsplice(data) == file.data, cases
     return data
 

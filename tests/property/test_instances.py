@@ -14,7 +14,7 @@ from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.injected_lines import tag_of
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, unsplice
+from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, unsplice
 
 from .test_value_anchors import FEW, MANY, anchors, models, module
 
@@ -88,7 +88,7 @@ def check(file: ParsedFile, injection: Injection) -> None:
     """Check that a mutant compiles, equals the module while its fault is inactive, and has a tag for its
     probe call."""
     edit = injection_edit(file, models(), injection, "0a1b2c3d")
-    data = join_pieces(apply_edits(file, as_line_edits(file, [edit])))
+    data = mutated_bytes(apply_edits(file, as_line_edits(file, [edit])))
     assert unsplice(data) == file.data, injection
     tree, inactive = ast.parse(data), Inactive()
     compile(tree, "<mutant>", "exec", dont_inherit=True)

@@ -135,7 +135,7 @@ def test_unsplicing_restores_every_byte(data: st.DataObject) -> None:
     chosen = data.draw(st.lists(st.sampled_from(names), unique=True)) if names else []
     guarded = [n for n in data.draw(st.permutations(names))[: len(names) // 2] if can_guard(source, n)]
     pieces = mutate(source, chosen, guarded)
-    result = splicing.join_pieces(pieces)
+    result = splicing.mutated_bytes(pieces)
     compile(result, "m.py", "exec")
     assert splicing.unsplice(result) == source
     assert b"".join(x for p in pieces if p.sign != "+" for x in p.lines) == source
@@ -151,7 +151,7 @@ def test_splicing_equals_inserting_into_the_tree(data: st.DataObject) -> None:
     source, names = data.draw(sources())
     chosen = data.draw(st.lists(st.sampled_from(names), unique=True)) if names else []
     guarded = [n for n in names if n not in chosen and can_guard(source, n)][:2]
-    result = splicing.join_pieces(mutate(source, chosen, guarded))
+    result = splicing.mutated_bytes(mutate(source, chosen, guarded))
     without_import = b"".join(
         line for line in result.splitlines(keepends=True) if not line.rstrip().endswith(b"fi:probe")
     )

@@ -11,7 +11,7 @@ from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
 from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import apply_edits, join_pieces, unsplice
+from mutator.mutants.splicing import apply_edits, mutated_bytes, unsplice
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
@@ -70,7 +70,7 @@ def test_statements_of_the_controller_are_repeated_and_exchanged(
             except MutatorError as error:
                 assert any(excuse in error.got for excuse in EXCUSES), error
                 continue
-            data = join_pieces(apply_edits(file, [edit]))  # type: ignore[list-item]
+            data = mutated_bytes(apply_edits(file, [edit]))  # type: ignore[list-item]
             compile(data, "m.py", "exec")
             assert unsplice(data) == file.data
             assert ast.dump(_Inactive().visit(ast.parse(data))) == whole

@@ -18,10 +18,17 @@ from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
 from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.expressions import Expression
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import Edit, ValueEdit, apply_edits, as_line_edits, join_pieces, unsplice
+from mutator.mutants.splicing import (
+    ExpressionEdit,
+    LineEdit,
+    apply_edits,
+    as_line_edits,
+    mutated_bytes,
+    unsplice,
+)
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutations import Mutation
-from mutator.operators.statement_facts import facts_of
+from mutator.operators.statement_facts import statement_facts_of
 from mutator.targets.source_tree import SourceTree
 
 TEMPLATES = Path(__file__).parents[2] / "templates"
@@ -104,13 +111,13 @@ class Inactive(ast.NodeTransformer):
 Case = tuple[Expression, FaultLocation]
 
 
-def edit_of(file: ParsedFile, case: Case, number: int) -> ValueEdit:
+def edit_of(file: ParsedFile, case: Case, number: int) -> ExpressionEdit:
     expression, location = case
     assert file.resolve_expression(location) is expression, location
     name, params = MODELS[number % len(MODELS)]
     injection = Injection(location=location, model=name, params=params)
     edit = injection_edit(file, models(), injection, f"{number:08x}")
-    assert isinstance(edit, ValueEdit)
+    assert isinstance(edit, ExpressionEdit)
     return edit
 
 
@@ -135,8 +142,8 @@ def check(file: ParsedFile, cases: Sequence[Case]) -> None:
     assert sorted(kept) == sorted(ast.dump(expression.node) for expression, _ in cases), cases
 
 
-def check_edits(file: ParsedFile, edits: Sequence[Edit | ValueEdit], cases: object) -> list[str]:
-    data = join_pieces(apply_edits(file, as_line_edits(file, edits)))
+def check_edits(file: ParsedFile, edits: Sequence[LineEdit | ExpressionEdit], cases: object) -> list[str]:
+    data = mutated_bytes(apply_edits(file, as_line_edits(file, edits)))
     assert unsplice(data) == file.data, cases
     tree = ast.parse(data)
     compile(tree, "<mutant>", "exec", dont_inherit=True)
@@ -168,7 +175,7 @@ def test_20000_mutants_differ_only_in_their_changed_values() -> None:
 
 def mutations(file: ParsedFile) -> Iterator[Mutation]:
     tree = SourceTree(root=Path(), files={file.path: file.data}, digest="", _digest_inputs={})
-    facts = facts_of(tree, file.path)
+    facts = statement_facts_of(tree, file.path)
     for function in file.functions_by_name:
         yield from mutations_of(file, facts, function, models(), OPERATORS.shipped_names())
 
@@ -180,7 +187,7 @@ def checked_mutations(names: Sequence[str], count: int) -> int:
     for file in files:
         own = [mutation for one, mutation in chosen if one is file]
         for first in range(0, len(own), TOGETHER):
-            edits: list[Edit | ValueEdit] = []
+            edits: list[LineEdit | ExpressionEdit] = []
             for number, mutation in enumerate(own[first : first + TOGETHER]):
                 injection = mutation.to_fault("as_is").injections[0]
                 edit = injection_edit(file, models(), injection, f"{number:08x}")

@@ -197,7 +197,7 @@ class WorkDispatcher:
     def _drop_unneeded_proof(self) -> None:
         if self._queue.has_run_all and self._session.proof and not self._is_proof_need_settled:
             self._is_proof_need_settled = True  # so that this is computed only once
-            if equivalence_check.reason_not_needed(self._session.folder) is not None:
+            if equivalence_check.reason_check_not_needed(self._session.folder) is not None:
                 self._queue.drop_proof_pieces()
 
     async def _admit_and_employ(self, worker: _PresentWorker) -> None:

@@ -16,9 +16,9 @@ from mutator.exports import Export, ExportRequest
 from mutator.faults.fault_models import FaultModels, SnippetKind
 from mutator.model import OPERATORS_MODULE, Experiment, Fault, Injection, Outcome, Record, Status
 from mutator.mutants.anchors import ParsedFile, parsed_file
-from mutator.mutants.expressions import parenthesized
+from mutator.mutants.expressions import parenthesized_if_splittable
 from mutator.mutants.injection_edits import edits_of
-from mutator.mutants.splicing import Edit, EditRank, ValueEdit, sort_edits
+from mutator.mutants.splicing import EditRank, ExpressionEdit, LineEdit, sort_edits
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -94,9 +94,9 @@ def _replacement_of(manifest: TargetManifest, models: FaultModels, fault: Fault)
     first = fault.injections[0]
     file, model = parsed_file(manifest.tree, first.location.path), models.get(first.model)
     edit, span = edits_of(manifest, models, [first])[0].edit, file.line_span(first.location)
-    if isinstance(edit, ValueEdit):
+    if isinstance(edit, ExpressionEdit):
         # `parenthesized` adds parentheses if an adjacent operator could bind more tightly
-        return _replacement_at(file, edit.start, edit.end, parenthesized(edit.changed))
+        return _replacement_at(file, edit.start, edit.end, parenthesized_if_splittable(edit.changed))
     if fault.module == OPERATORS_MODULE and model.kind is SnippetKind.GUARD:  # the mutant omits the statement
         line, last = file.lines[span[0]], file.lines[span[1] - 1].rstrip(b"\r\n")
         start = len(line) - len(line.lstrip())
@@ -117,7 +117,9 @@ def _replacement_at(
     return {"location": {"start": first, "end": last}, "replacement": replacement}
 
 
-def _replacement_of_lines(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> dict[str, Any]:
+def _replacement_of_lines(
+    file: ParsedFile, span: tuple[int, int], edits: Sequence[LineEdit]
+) -> dict[str, Any]:
     """Replace all anchored lines (at a function's entry, the line after the insertion)."""
     first = min(span[0], *(edit.line_index for edit in edits), len(file.lines) - 1)
     last = max(span[1], first + 1)

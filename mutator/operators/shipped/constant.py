@@ -10,10 +10,12 @@ from mutator.operators.statement_facts import StatementFacts
 
 
 def _rules(expression: Expression, facts: StatementFacts) -> Iterator[MutationRule]:
-    yield from (mutation_rule("operator_constant", to=value) for value in _replacements(expression.node))
+    yield from (
+        mutation_rule("operator_constant", to=value) for value in _replacement_values(expression.node)
+    )
 
 
-def _replacements(node: ast.expr) -> list[Value]:
+def _replacement_values(node: ast.expr) -> list[Value]:
     """Return distinct replacements of a constant: 0, 1, -1, one more, one less, negated."""
     sign = 1
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):

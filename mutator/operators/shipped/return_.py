@@ -8,7 +8,7 @@ from mutator.mutants.expressions import Expression
 from mutator.operators import MutationRule, Operator, mutation_rule
 from mutator.operators.statement_facts import StatementFacts
 
-_EMPTY_LITERAL_BY_NODES: tuple[tuple[tuple[type[ast.expr], ...], str], ...] = (
+_NODES_AND_EMPTY_LITERAL: tuple[tuple[tuple[type[ast.expr], ...], str], ...] = (
     ((ast.List, ast.ListComp), "[]"),
     ((ast.Dict, ast.DictComp), "{}"),
     ((ast.Set, ast.SetComp), "set()"),
@@ -21,7 +21,7 @@ def _rules(expression: Expression, facts: StatementFacts) -> Iterator[MutationRu
     if not expression.matches_anchor(AnchorKind.RETURN_VALUE, "", None) or _is_constant(node, type(None)):
         return
     yield mutation_rule("operator_constant", to=None)
-    for kinds, empty in _EMPTY_LITERAL_BY_NODES:
+    for kinds, empty in _NODES_AND_EMPTY_LITERAL:
         if isinstance(node, kinds):
             yield mutation_rule("operator_empty", to=empty)
             return

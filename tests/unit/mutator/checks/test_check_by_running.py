@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.checks import check_by_running
-from mutator.checks.check_by_running import drive_findings
+from mutator.checks.check_by_running import findings_from_running
 from mutator.checks.findings import CheckState, Finding
 from mutator.checks.reachability import ReachTracker
 from mutator.errors import MutatorError
@@ -36,7 +36,7 @@ def line_of(toy: Workspace, text: str, file: str = "driver.py") -> int:
 
 
 def findings(toy: Workspace) -> dict[str, Finding]:
-    return {finding.name: finding for finding in drive_findings(toy, "toycar", SCENARIO)}
+    return {finding.name: finding for finding in findings_from_running(toy, "toycar", SCENARIO)}
 
 
 def test_a_sound_target_passes_every_check(toy: Workspace) -> None:
@@ -261,4 +261,4 @@ def test_a_target_without_a_stepwise_entry_is_reported(toy: Workspace) -> None:
 
 def test_an_unknown_scenario_is_refused(toy: Workspace) -> None:
     with pytest.raises(MutatorError, match="nowhere"):
-        drive_findings(toy, "toycar", ["nowhere"])
+        findings_from_running(toy, "toycar", ["nowhere"])

@@ -9,7 +9,7 @@ import pytest
 from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
 from mutator.model import Hold, Trigger
 from mutator.mutants.mutant_building import build
-from mutator.mutants.probe import Probe, probe_state_after
+from mutator.mutants.probe import Probe, probe_attributes_after
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
 
@@ -132,7 +132,7 @@ def test_a_probe_with_restored_state_equals_one_that_observed_the_steps(probe, t
         exec(probe(trigger).text, module)
     for values in SEEN.values[: start.observation_count]:
         saw["observe"](*values)
-    holder, state = probe_state_after(start.observation_count, start.earliest_time_s, start.last_time_s)
+    holder, state = probe_attributes_after(start.observation_count, start.earliest_time_s, start.last_time_s)
     for name, value in state.items():
         setattr(given[holder], name, value)
     states = [

@@ -12,7 +12,7 @@ from mutator.mutants.anchors import parse_file
 from mutator.mutants.changed_file_reuse import (
     ChangedFile,
     ReusableChangedFile,
-    always_compiles,
+    compiles_for_every_mutant,
     inserted_lines,
     reuse_cache,
     reuse_key,
@@ -46,9 +46,9 @@ def change(
     make = splicing.guard_edit if guard else splicing.insertion_edit
     edits = [make(file, site, [code], name), splicing.probe_import_edit(file, "pack")]
     pieces = splicing.apply_edits(file, edits)
-    made = ChangedFile(data=splicing.join_pieces(pieces), patch=render_changed_file("m.py", pieces))
+    made = ChangedFile(data=splicing.mutated_bytes(pieces), patch=render_changed_file("m.py", pieces))
     reusable = ReusableChangedFile.from_changed_file(made)
-    compiles = always_compiles(file, reusable, reuse_key(file, edits, [name]))
+    compiles = compiles_for_every_mutant(file, reusable, reuse_key(file, edits, [name]))
     return reusable, made, inserted_lines(edits), compiles
 
 
@@ -73,12 +73,14 @@ def test_a_change_of_a_value_and_inserted_lines_can_be_reused_together(text: str
         after = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x")
         site = file.resolve_statement(FaultLocation(path="m.py", function="f", anchor=after))
         observes = splicing.insertion_edit(file, site, ["_fi.observe(t=x)"], "observe")
-        edits = splicing.as_line_edits(file, [observes, splicing.value_edit(file, value_at, value, name)])
+        edits = splicing.as_line_edits(
+            file, [observes, splicing.expression_edit(file, value_at, value, name)]
+        )
         pieces = splicing.apply_edits(file, edits)
-        made = ChangedFile(data=splicing.join_pieces(pieces), patch=render_changed_file("m.py", pieces))
+        made = ChangedFile(data=splicing.mutated_bytes(pieces), patch=render_changed_file("m.py", pieces))
         reusable = ReusableChangedFile.from_changed_file(made)
         assert splicing.unsplice(made.data) == file.data
-        assert always_compiles(file, reusable, reuse_key(file, edits, [name]))
+        assert compiles_for_every_mutant(file, reusable, reuse_key(file, edits, [name]))
         return reusable, made, inserted_lines(edits)
 
     (reusable, *_), (other, made, lines) = changed("00000001", "3.25"), changed("abcdefab", "1e-300")

@@ -6,8 +6,8 @@ import pytest
 
 from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.changed_file_reuse import reuse_key
-from mutator.mutants.compile_check_by_function import certainly_compiles
-from mutator.mutants.splicing import Edit, EditRank, probe_import_edit
+from mutator.mutants.compile_check_by_function import certainly_compiles_for_key
+from mutator.mutants.splicing import EditRank, LineEdit, probe_import_edit
 
 SOURCE = b"""\
 LIMIT = 1
@@ -50,6 +50,6 @@ def test_compiling_a_changed_function_shows_whether_the_file_compiles(
 ) -> None:
     edits = [
         probe_import_edit(file, None),
-        Edit(line_index=line, rank=EditRank.INSTEAD, lines=(text,)),
+        LineEdit(line_index=line, rank=EditRank.INSTEAD, lines=(text,)),
     ]
-    assert certainly_compiles(file, edits, reuse_key(file, edits, ["0a"])) is known
+    assert certainly_compiles_for_key(file, edits, reuse_key(file, edits, ["0a"])) is known

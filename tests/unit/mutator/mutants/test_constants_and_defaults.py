@@ -12,9 +12,9 @@ from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger
 from mutator.mutants import probe as contract
 from mutator.mutants.anchors import parse_file
-from mutator.mutants.constant_imports import imports_of_constant
+from mutator.mutants.constant_imports import dotted_names_importing_constant
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, probe_import_edit, unsplice
+from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, probe_import_edit, unsplice
 from mutator.targets.observed_values import Observation
 from mutator.targets.source_tree import read_tree
 from mutator.workspace import Workspace
@@ -102,7 +102,7 @@ def mutant(clone: Workspace, *locations: FaultLocation) -> bytes:
         )
         for one, name in zip(locations, "abcdefghijklmnop", strict=False)
     ]
-    data = join_pieces(apply_edits(file, as_line_edits(file, [probe_import_edit(file, None), *edits])))
+    data = mutated_bytes(apply_edits(file, as_line_edits(file, [probe_import_edit(file, None), *edits])))
     assert unsplice(data) == file.data
     return data
 
@@ -203,7 +203,7 @@ def test_modules_that_import_a_constant_are_found(tmp_path: Path) -> None:
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / path).write_text(text)
     tree = read_tree(tmp_path, ["**"])
-    assert sorted(imports_of_constant(tree, "pkg/limits.py", "LIMIT")) == [
+    assert sorted(dotted_names_importing_constant(tree, "pkg/limits.py", "LIMIT")) == [
         "pkg.LIMIT",
         "pkg.sub.a.L",
         "pkg.sub.b.LIMIT",
@@ -220,9 +220,9 @@ def test_imports_that_cannot_be_changed_are_listed(tmp_path: Path) -> None:
     texts |= {"kept": "__all__ = ['other']\nLIMIT, other = 1, 2\n", "d": "from kept import *\n"}
     for name, text in texts.items():
         (tmp_path / f"{name}.py").write_text(text)
-    assert imports_of_constant(read_tree(tmp_path, ["**"]), "kept.py", "LIMIT") == (), (
+    assert dotted_names_importing_constant(read_tree(tmp_path, ["**"]), "kept.py", "LIMIT") == (), (
         "`*` does not include it"
     )
     words = "a.py:1 imports \\*; b.py:2 imports it into a class; c.py:1 imports it, and also sets LIMIT in"
     with pytest.raises(MutatorError, match=words):
-        imports_of_constant(read_tree(tmp_path, ["**"]), "limits.py", "LIMIT")
+        dotted_names_importing_constant(read_tree(tmp_path, ["**"]), "limits.py", "LIMIT")

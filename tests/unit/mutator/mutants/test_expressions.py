@@ -8,7 +8,7 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.model import VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 from mutator.mutants.anchors import ParsedFile, parse_file
-from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, unsplice, value_edit
+from mutator.mutants.splicing import apply_edits, as_line_edits, expression_edit, mutated_bytes, unsplice
 
 SOURCE = '''\
 LIMIT = 3
@@ -52,10 +52,10 @@ def location(
 def changed(source: str, *changes: tuple[FaultLocation, str]) -> str:
     file = parsed(source)
     edits = [
-        value_edit(file, file.resolve_expression(place), text, f"a{number}")
+        expression_edit(file, file.resolve_expression(place), text, f"a{number}")
         for number, (place, text) in enumerate(changes)
     ]
-    data = join_pieces(apply_edits(file, as_line_edits(file, edits)))
+    data = mutated_bytes(apply_edits(file, as_line_edits(file, edits)))
     assert unsplice(data) == file.data
     return data.decode()
 
@@ -208,8 +208,8 @@ def test_files_in_other_encodings_are_changed_at_the_right_column() -> None:
     source = '# coding: latin-1\ndef f(é):\n    return "ü" + é + 1\n'
     file = parse_file("m.py", source.encode("latin-1"), Path())
     place = location("value", "'ü' + é", function="f")
-    edit = value_edit(file, file.resolve_expression(place), "é", "a0")
-    data = join_pieces(apply_edits(file, as_line_edits(file, [edit])))
+    edit = expression_edit(file, file.resolve_expression(place), "é", "a0")
+    data = mutated_bytes(apply_edits(file, as_line_edits(file, [edit])))
     assert data.decode("latin-1").splitlines()[2] == (
         '    return (é if _fi.active("a0") else "ü" + é) + 1  # fi:a0 was:    return "ü" + é + 1'
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator.faults.fault_models import SnippetKind
-from mutator.mutants.template_language import MOST_CHARACTERS
+from mutator.mutants.template_language import MOST_TEMPLATE_OR_RESULT_CHARACTERS
 from mutator.mutants.template_rendering import render_snippet, render_template
 from tests.costs import is_cheap, is_refused
 from tests.unit.mutator.mutants.test_template_rendering import model
@@ -96,7 +96,7 @@ HOSTILE = {
     "many conditions": "{% if by %}" * 5000 + "{% endif %}" * 5000,
     "many branches": "{% if by %}" + "{% elif by %}" * 5000 + "{% endif %}",
     "many outputs": "{{ by }}" * 5_000,
-    "a long template": "y" * (MOST_CHARACTERS + 1),
+    "a long template": "y" * (MOST_TEMPLATE_OR_RESULT_CHARACTERS + 1),
     "open brackets": "{{" * 20_000,
     "open tags": "{%" * 20_000,
     "dots": "{{ " + "1." * 20_000 + " }}",

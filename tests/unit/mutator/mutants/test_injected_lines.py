@@ -11,7 +11,7 @@ def test_injected_lines_are_recognized_by_their_tags(clone: Workspace) -> None:
     lines = {
         injected_lines.probe_import_line("car"): ("probe", 0, False),
         injected_lines.tagged_line(
-            injected_lines.observe_call([("t", "now.time")]), injected_lines.OBSERVE_TAG
+            injected_lines.observe_call([("t", "now.time")]), injected_lines.OBSERVATION_TAG
         ): (
             "observe",
             0,
@@ -48,9 +48,9 @@ def test_a_similar_comment_is_not_a_tag(clone: Workspace) -> None:
 
 
 def test_pages_use_the_tags_defined_in_python() -> None:
-    words = injected_lines.tags_for_scripts()
+    words = injected_lines.tags_for_page_scripts()
     for tag in words["probe"]:
         assert injected_lines.tagged_line("x", tag) == f"x  {words['mark']}{tag}"
-    assert words["probe"] == [injected_lines.IMPORT_TAG, injected_lines.OBSERVE_TAG]
+    assert words["probe"] == [injected_lines.PROBE_IMPORT_TAG, injected_lines.OBSERVATION_TAG]
     assert "fi:" not in asset_text("shared/diff.js")
     assert not re.search("|".join(rf"{tag}\W*\|" for tag in words["probe"]), asset_text("shared/diff.js"))

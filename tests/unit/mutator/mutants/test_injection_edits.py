@@ -12,7 +12,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection, Value
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces
+from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes
 from mutator.workspace import Workspace
 
 MODELS = Workspace.find(root=Path(__file__).parents[4]).fault_models()
@@ -65,7 +65,7 @@ def injected(
     place = FaultLocation(path="m.py", function=function, anchor=anchor or Anchor(kind=AnchorKind.ENTRY))
     given = {"value": 1.0, **params} if model == "stuck" else params
     injection = Injection(location=place, model=model, params=tuple(sorted(given.items())))
-    return join_pieces(
+    return mutated_bytes(
         apply_edits(file, as_line_edits(file, [injection_edit(file, models, injection, "ab12")]))
     ).decode()
 

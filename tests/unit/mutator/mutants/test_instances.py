@@ -16,7 +16,7 @@ from mutator.mutants import injected_lines
 from mutator.mutants import probe as contract
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, probe_import_edit, unsplice
+from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, probe_import_edit, unsplice
 from mutator.targets.observed_values import Observation
 from mutator.workspace import Workspace
 
@@ -38,7 +38,7 @@ def mutant(clone: Workspace, anchor: Anchor, model: str = "offset", **given: Any
     location = FaultLocation(path="m.py", function="drive", anchor=anchor)
     file = parse_file("m.py", SOURCE.encode(), Path("x"))
     edit = injection_edit(file, clone.fault_models(), Injection(location=location, model=model, **given), "a")
-    data = join_pieces(apply_edits(file, as_line_edits(file, [probe_import_edit(file, None), edit])))
+    data = mutated_bytes(apply_edits(file, as_line_edits(file, [probe_import_edit(file, None), edit])))
     assert unsplice(data) == file.data
     return data
 

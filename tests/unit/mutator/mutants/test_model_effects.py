@@ -12,7 +12,7 @@ from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Tr
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.probe import build_probe_settings, render_probe
-from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, unsplice
+from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, unsplice
 from mutator.triggers.conditions import canonical_condition
 from mutator.workspace import Workspace
 
@@ -28,7 +28,7 @@ class Toy:
         file = parse_file("m.py", source.encode(), Path("root"))
         place = FaultLocation(path="m.py", function="f", anchor=anchor)
         injection = Injection(location=place, model=model, params=tuple(sorted(params.items())))
-        data = join_pieces(
+        data = mutated_bytes(
             apply_edits(file, as_line_edits(file, [injection_edit(file, models, injection, "ab12")]))
         )
         assert unsplice(data) == file.data

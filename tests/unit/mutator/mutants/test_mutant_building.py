@@ -13,7 +13,7 @@ from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Trigger
 from mutator.mutants import mutant_building
-from mutator.mutants.mutant_building import Mutant, write_tree
+from mutator.mutants.mutant_building import Mutant, write_mutated_tree
 from mutator.mutants.probe import probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import read_tree
@@ -93,7 +93,7 @@ def test_the_patch_the_tree_and_the_digest_agree(toy: Workspace, tmp_path: Path)
     before = manifest.tree.digest
     made = build(toy, toy_faults(toy)["both"])
     files = (*manifest.file_globs, probe_path(manifest.package))
-    write_tree(manifest, made, tmp_path / "tree")
+    write_mutated_tree(manifest, made, tmp_path / "tree")
     assert read_tree(tmp_path / "tree", files).digest == made.tree_digest != before
     if shutil.which("patch"):
         shutil.copytree(manifest.root, tmp_path / "copy")
@@ -125,7 +125,7 @@ def test_the_hold_of_a_fault_overrides_the_hold_of_the_trigger(toy: Workspace) -
 
 
 def run(toy: Workspace, made: Mutant, place: Path, steps: int = 100) -> dict[str, object]:
-    write_tree(toy.manifest("toy"), made, place / "tree")
+    write_mutated_tree(toy.manifest("toy"), made, place / "tree")
     program = (
         "import json; from toycar.world import World; from toycar import _fi; w = World(); gaps = []\n"
         f"for _ in range({steps}): w.step(); gaps.append(w.gap)\n"

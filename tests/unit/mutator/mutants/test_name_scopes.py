@@ -2,7 +2,7 @@
 
 import pytest
 
-from mutator.mutants.name_scopes import MovedName, moved_names, names_by_function
+from mutator.mutants.name_scopes import RescopedName, rescoped_names, used_names_by_function
 
 SOURCE = """\
 limit = 3
@@ -18,7 +18,7 @@ def genexpr(x=(i for i in 'ab')): return (µ for µ in x)
 
 
 def test_a_function_knows_its_own_and_outer_names() -> None:
-    names = names_by_function(SOURCE.encode())
+    names = used_names_by_function(SOURCE.encode())
     go = names[4, "go"]
     assert {"self", "x", "__own", "limit", "inner", "max"} <= go
     assert not {"speed", "y", "key", "z", "far", "__seat"} & go
@@ -28,8 +28,8 @@ def test_a_function_knows_its_own_and_outer_names() -> None:
 
 def test_the_files_encoding_is_used() -> None:
     latin = "# coding: latin-1\ndef f(\xe9): return \xe9\n".encode("latin-1")
-    assert names_by_function(latin) == {(2, "f"): {"\xe9"}}
-    assert names_by_function("\ufeffdef f(\xe9): pass\r\n".encode()) == {(1, "f"): {"\xe9"}}
+    assert used_names_by_function(latin) == {(2, "f"): {"\xe9"}}
+    assert used_names_by_function("\ufeffdef f(\xe9): pass\r\n".encode()) == {(1, "f"): {"\xe9"}}
 
 
 READS = "def f(x):\n    #\n    return limit + x\n"
@@ -73,8 +73,8 @@ def test_an_inserted_binding_can_change_the_scope_of_a_name(
 ) -> None:
     place = next(i for i, line in enumerate(source.splitlines(), 1) if line.strip() == "#")
     made = source.replace("#", inserted)
-    found = next(moved_names(source.replace("#", "pass").encode(), made.encode(), {place}), None)
-    expected = moved and MovedName(
+    found = next(rescoped_names(source.replace("#", "pass").encode(), made.encode(), {place}), None)
+    expected = moved and RescopedName(
         name=moved[0], holder=moved[1], scope_before=moved[2], scope_after=moved[3]
     )
     assert found == expected

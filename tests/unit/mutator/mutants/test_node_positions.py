@@ -10,7 +10,7 @@ from libcst.metadata import MetadataWrapper, PositionProvider
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.anchors import ParsedFile, parse_file
-from mutator.mutants.node_positions import NodePosition, line_after_statements, positions_by_ast
+from mutator.mutants.node_positions import NodePosition, ast_node_positions, line_after_statements
 
 SOURCE = '''\
 @deco
@@ -54,7 +54,7 @@ def test_a_statement_that_the_parsers_place_on_different_lines_is_refused(
     kind: AnchorKind, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The test makes `ast` find the anchored statement one line further down."""
-    later = positions_by_ast(ast.parse("\ndef f(x):\n    x = 1\n    return x\n"))
+    later = ast_node_positions(ast.parse("\ndef f(x):\n    x = 1\n    return x\n"))
     monkeypatch.setattr("mutator.mutants.anchors.positions_by_ast", lambda tree: later)
     file = parsed("def f(x):\n    x = 1\n    return x\n")
     name = "" if kind is AnchorKind.ENTRY else "x"

@@ -25,7 +25,7 @@ def make(data: bytes, names: list[str], guard: bool) -> tuple[str, bytes]:
         maker = splicing.guard_edit if guard else splicing.insertion_edit
         edits.append(maker(file, site, ["if 1:"] if guard else ["x = 1"], "ab"))
     pieces = splicing.apply_edits(file, edits)
-    return patch_rendering.render_changed_file("pack/m.py", pieces), splicing.join_pieces(pieces)
+    return patch_rendering.render_changed_file("pack/m.py", pieces), splicing.mutated_bytes(pieces)
 
 
 @pytest.mark.parametrize("guard", [False, True])

@@ -19,7 +19,7 @@ def parsed(text: str | bytes) -> ParsedFile:
 
 def edit(
     file: ParsedFile, kind: AnchorKind, name: str = "x", *, guard: bool = False, nth: int | None = None
-) -> splicing.Edit:
+) -> splicing.LineEdit:
     location = FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name=name, nth=nth))
     make, code = (splicing.guard_edit, GUARD) if guard else (splicing.insertion_edit, CODE)
     return make(file, file.resolve_statement(location), code, "ab12")
@@ -28,7 +28,7 @@ def edit(
 def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool = False) -> bytes:
     """Return the mutated bytes, after checking that they compile and that the original can be restored."""
     file = parsed(text)
-    result = splicing.join_pieces(splicing.apply_edits(file, [edit(file, kind, name, guard=guard)]))
+    result = splicing.mutated_bytes(splicing.apply_edits(file, [edit(file, kind, name, guard=guard)]))
     compile(result, "m.py", "exec")
     assert splicing.unsplice(result) == file.data
     return result
@@ -142,7 +142,7 @@ def test_several_edits_at_one_statement_can_be_combined() -> None:
         edit(file, AnchorKind.AFTER_ASSIGN),
         edit(file, AnchorKind.AFTER_CALL, "g"),
     ]
-    result = splicing.join_pieces(splicing.apply_edits(file, edits))
+    result = splicing.mutated_bytes(splicing.apply_edits(file, edits))
     compile(result, "m.py", "exec")
     assert splicing.unsplice(result) == file.data
     margins = [len(line) - len(line.lstrip()) for line in result.decode().splitlines()[3:]]
@@ -160,7 +160,7 @@ def test_two_guards_around_one_statement_are_refused() -> None:
 def test_two_edits_at_the_end_of_a_file_without_a_newline_can_be_undone() -> None:
     file = parsed("def f(x):\n    x = g(1)")
     edits = [edit(file, AnchorKind.AFTER_ASSIGN), edit(file, AnchorKind.AFTER_CALL, "g")]
-    result = splicing.join_pieces(splicing.apply_edits(file, edits))
+    result = splicing.mutated_bytes(splicing.apply_edits(file, edits))
     assert result.count(b"# fi:ab12\n") == 3 and result.endswith(b"# fi:ab12")
     assert splicing.unsplice(result) == file.data
 
@@ -176,7 +176,7 @@ def test_a_snippet_that_the_files_encoding_cannot_represent_is_refused() -> None
 
 def test_the_import_of_the_probe_is_tagged() -> None:
     file = parsed('"""Doc."""\nfrom __future__ import annotations\n\nimport os\n')
-    result = splicing.join_pieces(splicing.apply_edits(file, [splicing.probe_import_edit(file, "pack")]))
+    result = splicing.mutated_bytes(splicing.apply_edits(file, [splicing.probe_import_edit(file, "pack")]))
     assert result.decode() == (
         '"""Doc."""\nfrom __future__ import annotations\nfrom pack import _fi  # fi:probe\n\nimport os\n'
     )
@@ -184,7 +184,7 @@ def test_the_import_of_the_probe_is_tagged() -> None:
 
 def test_a_byte_order_mark_stays_first() -> None:
     file = parsed(b"\xef\xbb\xbf'Doc.'\nx = 1\n")
-    result = splicing.join_pieces(splicing.apply_edits(file, [splicing.probe_import_edit(file, "pack")]))
+    result = splicing.mutated_bytes(splicing.apply_edits(file, [splicing.probe_import_edit(file, "pack")]))
     compile(result, "m.py", "exec")
     assert result.startswith(b"\xef\xbb\xbf'Doc.'\nfrom pack")
     with pytest.raises(MutatorError, match="a byte order mark right before"):

@@ -47,7 +47,7 @@ def test_executed_lines_are_cached(
     manifest = toycar.manifest("toycar")
     drive = GoldenRunInputs(scenario=toycar.scenario("A"), changes=(), seed=7)
     runs: list[str] = []
-    measured = executed_lines._measure
+    measured = executed_lines._run_and_note_lines
     monkeypatch.setattr(executed_lines, "_measure", lambda *given: (runs.append("run"), measured(*given))[1])
     [first] = measure_executed_lines(manifest, [drive], LIMITS)
     assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 1

@@ -15,7 +15,7 @@ from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutation_selection import SelectedMutations, sample_mutations, select_mutations
 from mutator.operators.mutations import Mutation
 from mutator.operators.operator_lookup import find_operator, unique_operator_names
-from mutator.operators.statement_facts import facts_of
+from mutator.operators.statement_facts import statement_facts_of
 from mutator.targets.source_tree import read_tree
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
@@ -33,7 +33,9 @@ def make(tmp_path: Path, clone: Workspace) -> Make:
         tree = read_tree(tmp_path, ["m.py"])
         file, names = parsed_file(tree, "m.py"), unique_operator_names(operators or OPERATORS.names())
         return list(
-            drop_equal_code(file, mutations_of(file, facts_of(tree, "m.py"), "f", models, names)).mutations
+            drop_equal_code(
+                file, mutations_of(file, statement_facts_of(tree, "m.py"), "f", models, names)
+            ).mutations
         )
 
     return made
@@ -88,7 +90,7 @@ def test_mutants_of_a_file_with_a_byte_order_mark_compile(tmp_path: Path, clone:
     (tmp_path / "m.py").write_bytes("\ufeffdef f(a):\n    return a + 1\n".encode())
     tree = read_tree(tmp_path, ["m.py"])
     file, models = parsed_file(tree, "m.py"), clone.fault_models()
-    made = mutations_of(file, facts_of(tree, "m.py"), "f", models, ["arithmetic"])
+    made = mutations_of(file, statement_facts_of(tree, "m.py"), "f", models, ["arithmetic"])
     assert made and not drop_equal_code(file, made).invalid_count
 
 

@@ -62,7 +62,7 @@ def test_an_incomplete_check_is_resumed(toycar: Workspace, proven: Path, reseal:
     path.write_text(path.read_text().splitlines()[0] + "\n")
     reseal(proven, finished=False)
     folder = RunFolder.open(proven)
-    assert len(equivalence_check.remaining_sample(folder)) == 2
+    assert len(equivalence_check.remaining_sampled_experiments(folder)) == 2
     records = load_records(proven)
     assert equivalence_check.compare_sample(folder, records) == equivalence_check.EquivalenceResult(
         sampled=2, same=0
@@ -73,7 +73,7 @@ def test_an_incomplete_check_is_resumed(toycar: Workspace, proven: Path, reseal:
         0,
         0,
     )
-    assert equivalence_check.remaining_sample(folder) == ()
+    assert equivalence_check.remaining_sampled_experiments(folder) == ()
 
 
 @pytest.mark.slow
@@ -197,7 +197,7 @@ def test_runs_of_an_unneeded_check_are_deleted(threaded: Workspace, tmp_path: Pa
         writer.append(line)
     writer.close()
     file_digests.close_segments(run)
-    assert equivalence_check.remaining_sample(folder) == ()
+    assert equivalence_check.remaining_sampled_experiments(folder) == ()
     summary = run_campaign(threaded, "small", run, engine="fork")
     assert (summary.proof, summary.seal) == (None, seal)
     assert not (run / "proof").exists()
@@ -208,7 +208,7 @@ def test_an_experiment_that_must_run_again_can_be_forked(toycar: Workspace, tmp_
     run = tmp_path / "run"
     run_campaign(toycar, "small", run, engine="reference", choices=Choices(limit=2))
     folder = RunFolder.open(run)
-    assert equivalence_check.reason_not_needed(folder) is not None
+    assert equivalence_check.reason_check_not_needed(folder) is not None
     for path in (run / "records").iterdir():
         path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
-    assert equivalence_check.reason_not_needed(RunFolder.open_unverified(run)) is None
+    assert equivalence_check.reason_check_not_needed(RunFolder.open_unverified(run)) is None

@@ -150,7 +150,7 @@ def test_a_forged_golden_run_is_ignored(
 def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache: Path) -> None:
     good = (cache / "checks.json").read_bytes()
     (cache / "checks.json").write_bytes(b"")
-    preflight_cache.store_checks(cache, checked[1].path, "checks.json", checked[1].scratch_folder)
+    preflight_cache.store_passed_checks(cache, checked[1].path, "checks.json", checked[1].scratch_folder)
     assert (cache / "checks.json").read_bytes() == good
     assert list(cache.parent.iterdir()) == [cache]
 
@@ -159,7 +159,7 @@ def test_a_cache_that_cannot_be_created_is_not_an_error(
     checked: tuple[Workspace, RunFolder], tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
-    preflight_cache.store_checks(
+    preflight_cache.store_passed_checks(
         tmp_path / "file" / "entry", checked[1].path, "checks.json", checked[1].scratch_folder
     )
     assert (tmp_path / "file").read_text() == ""
