@@ -346,17 +346,19 @@ def operator_faults(file: ParsedFile) -> Iterator[Fault]:
     for function, known in file.expressions_by_function.items():
         seen: list[str] = []
         for expression in known:
-            seen.append(expression.text)
+            seen.append(expression.anchor_name)
             if not isinstance(expression.node, ast.BinOp):
                 continue
-            anchor = Anchor(kind=AnchorKind.VALUE, name=expression.text, nth=seen.count(expression.text))
+            anchor = Anchor(
+                kind=AnchorKind.VALUE, name=expression.anchor_name, nth=seen.count(expression.anchor_name)
+            )
             place = FaultLocation(path=file.path, function=function, anchor=anchor)
             yield Fault(
                 spec=f"operators/arithmetic/{file.path}::{function}",
                 module="operators",
                 fault_type="arithmetic",
                 reading="as_described",
-                value=f"{expression.text} -> -({expression.text})",
+                value=f"{expression.anchor_name} -> -({expression.anchor_name})",
                 unit="-",
                 aim="H3",
                 injections=(Injection(location=place, model="scale", params=(("factor", -1),)),),

@@ -68,7 +68,7 @@ class _GoldenRuns:
     """
 
     first: JobResult
-    watched: JobResult
+    watched_counting: JobResult
     again: JobResult
 
 
@@ -111,7 +111,7 @@ class _RunningCheck:
                 self._forking_finding(goldens, is_deterministic=findings[0].level is CheckState.OK)
             )
             for name, golden in goldens.items():
-                self._record_reach(name, self.usual_changes, golden.watched)
+                self._record_reach(name, self.usual_changes, golden.watched_counting)
             canaries = pool.map(self._canary_finding, self._distinct_canaries())
             self._run_with_further_changes()
             return [*findings, *self.reach_tracker.findings(), *canaries]
@@ -165,7 +165,7 @@ class _RunningCheck:
         """Check that the runs give the same bytes and reach no hazard."""
         name = f"golden {scenario}"
         first, watched, again = (
-            self._check_run(execution) for execution in (golden.first, golden.watched, golden.again)
+            self._check_run(execution) for execution in (golden.first, golden.watched_counting, golden.again)
         )
         problem = golden_pair_problem(first, again)
         if not problem and not (problem := null_mutant_problem(first, watched)):
@@ -180,7 +180,7 @@ class _RunningCheck:
     def _nondeterminism_finding(self, name: str, golden: _GoldenRuns, *, by_hash: bool) -> Finding:
         where = describe_first_difference(self.manifest, golden.first.out, golden.again.out)
         places, remedy = nondeterminism_causes.likely_causes(
-            self.manifest, self._notes_with_target_lines(golden), by_hash=by_hash
+            self.manifest, self._notes_with_target_lines(golden), depends_on_hash_seed=by_hash
         )
         which = ", but only if their hash seeds differ" if by_hash else ""
         likely = f"; likely {'cause' if len(places) == 1 else 'causes'}:" if places else ""
@@ -202,10 +202,10 @@ class _RunningCheck:
                 if note["file"] in files
                 else note["line"]
             }
-            for note in golden.watched.watch_report.get("noted", ())
+            for note in golden.watched_counting.watch_report.get("noted", ())
             if not is_probe_path(note["file"])
         ]
-        return {**golden.watched.watch_report, "noted": noted}
+        return {**golden.watched_counting.watch_report, "noted": noted}
 
     def _clock_findings(self, goldens: Mapping[str, _GoldenRuns]) -> list[Finding]:
         places = [
@@ -239,7 +239,7 @@ class _RunningCheck:
             refusal = (
                 self._forking_refusal(scenario, golden)
                 if is_tried
-                else _forking_refusal_by_threads(golden.watched)
+                else _forking_refusal_by_threads(golden.watched_counting)
             )
         if refusal is None and not is_tried:
             why = (

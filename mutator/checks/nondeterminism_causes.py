@@ -24,7 +24,7 @@ _UNKNOWN_CAUSE_REMEDY = (
 
 
 def likely_causes(
-    manifest: TargetManifest, watch_report: Mapping[str, Any], *, by_hash: bool
+    manifest: TargetManifest, watch_report: Mapping[str, Any], *, depends_on_hash_seed: bool
 ) -> tuple[list[FindingPlace], str]:
     """Return the most suspicious lines, likeliest first, and the remedies.
 
@@ -37,9 +37,9 @@ def likely_causes(
     ordered = [(HASH, place) for place in set_order_places(manifest)]
     by_hashes = [*((HASH, place_of_note(note)) for note in hashes), *ordered]
     by_others = [(note["kind"], place_of_note(note)) for note in others]
-    suspects = by_hashes if by_hash else (by_others or by_hashes)
+    suspects = by_hashes if depends_on_hash_seed else (by_others or by_hashes)
     remedies = dict.fromkeys(_REMEDY_BY_KIND[kind] for kind, _ in suspects[:_MOST_PLACES])
-    unknown = _REMEDY_BY_KIND[HASH] if by_hash else _UNKNOWN_CAUSE_REMEDY
+    unknown = _REMEDY_BY_KIND[HASH] if depends_on_hash_seed else _UNKNOWN_CAUSE_REMEDY
     return [place for _, place in suspects[:_MOST_PLACES]], "; ".join(remedies) or unknown
 
 

@@ -115,7 +115,10 @@ def _select_lines(mutated: bytes, *, value_setters: bool) -> bytes:
     if not value_setters and not has_constant_or_default_settings(mutated):
         return mutated
     lines = mutated.splitlines(keepends=True)
-    chosen = [((tag := tag_of(line)) is not None and tag.is_value_setting) is value_setters for line in lines]
+    chosen = [
+        ((tag := tag_of(line)) is not None and tag.is_constant_or_default_setting) is value_setters
+        for line in lines
+    ]
     if all(chosen):
         return mutated
     return b"".join(
@@ -138,8 +141,8 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
         raise NotSwappable(f"{path} has a changed value that does not ask the probe first")
     for line in lines:
         tag = tag_of(line)
-        if tag and tag.is_of_fault and tag.replaced_line is None and not tag.is_value_setting:
-            indent = len(tag.code) - len(tag.code.lstrip())
+        if tag and tag.is_of_fault and tag.replaced_line is None and not tag.is_constant_or_default_setting:
+            indent = len(tag.line_without_tag) - len(tag.line_without_tag.lstrip())
             if tag.id == before and indent == margin and tag.is_else_of_guard:
                 before = ""  # the next injected lines must ask the probe again
                 continue
@@ -147,7 +150,7 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
                 margin = indent
                 if not tag.is_guard:
                     raise NotSwappable(f"{path} has an injected statement that does not ask the probe first")
-            elif match := _IMPORT_PATTERN.match(tag.code):
+            elif match := _IMPORT_PATTERN.match(tag.line_without_tag):
                 imports.append((match[1] or match[2]).decode())
         before = tag.id if tag else ""
     return tuple(imports)

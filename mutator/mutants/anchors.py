@@ -42,11 +42,11 @@ class ResolvedAnchor:
 
     first_line: int
     end_line: int
-    is_after: bool
+    inserts_after: bool
     is_alone: bool
     indentable_count: int  # lines that a guard can indent: all, or only the first if a string spans lines
     indent: bytes
-    names_in_function: frozenset[str]  # used in the function
+    names_used_in_function: frozenset[str]  # used in the function
 
 
 @dataclass(frozen=True)
@@ -98,10 +98,10 @@ class ParsedFile:
         """Return the lines of the outermost function that contains this line (from 0)."""
         return next((lines for lines in self.outermost_function_lines if line in lines), None)
 
-    def names_in_function_at(self, location: FaultLocation) -> frozenset[str]:
+    def names_used_in_function_at(self, location: FaultLocation) -> frozenset[str]:
         """Return the names used in the function that contains the location."""
         if location.anchor.kind not in VALUE_ANCHORS:
-            return self.resolve_statement(location).names_in_function
+            return self.resolve_statement(location).names_used_in_function
         line = self.resolve_expression(location).start[0]
         above = [
             function for function in functions_named(self, location.function) if function.def_line <= line
@@ -173,17 +173,17 @@ def _resolve_statement(file: ParsedFile, location: FaultLocation) -> ResolvedAnc
     function, statement = _choose_statement(file, location, functions)
     _check_anchor_fits_statement(file, location.anchor, statement)
     _check_position_matches_ast(file, statement.position)
-    if statement.block_first_line is not None:
-        return _resolve_block_start(file, statement.block_first_line, function.used_names)
+    if statement.headed_block_first_line is not None:
+        return _resolve_block_start(file, statement.headed_block_first_line, function.used_names)
     first = statement.first_line
     return ResolvedAnchor(
         first_line=first,
         end_line=statement.end_line,
-        is_after=location.anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL),
+        inserts_after=location.anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL),
         is_alone=statement.is_alone,
         indentable_count=1 if statement.has_multiline_string else statement.end_line - first,
         indent=_indentation_of(file.lines[first]),
-        names_in_function=function.used_names,
+        names_used_in_function=function.used_names,
     )
 
 
@@ -192,11 +192,11 @@ def _resolve_block_start(file: ParsedFile, first_line: int, names: frozenset[str
     return ResolvedAnchor(
         first_line=first_line,
         end_line=first_line,
-        is_after=True,
+        inserts_after=True,
         is_alone=True,
         indentable_count=0,
         indent=indent,
-        names_in_function=names,
+        names_used_in_function=names,
     )
 
 
@@ -233,7 +233,7 @@ def _resolve_function_entry(
             remedy=f"give `nth`, {describe_valid_nth(len(functions))}",
         )
     function = functions[(nth or 1) - 1]
-    if function.entry_lines is None:
+    if function.entry_and_indent_lines is None:
         raise MutatorError(
             f"nothing can be inserted at the entry of function '{location.function}'",
             where=file.full_path,
@@ -242,15 +242,15 @@ def _resolve_function_entry(
             remedy="anchor somewhere else, or reformat the target",
         )
     _check_position_matches_ast(file, function.position)
-    index, model_line = function.entry_lines
+    index, model_line = function.entry_and_indent_lines
     return ResolvedAnchor(
         first_line=index,
         end_line=index,
-        is_after=index != model_line,
+        inserts_after=index != model_line,
         is_alone=True,
         indentable_count=0,
         indent=_indentation_of(file.lines[model_line]),
-        names_in_function=function.used_names,
+        names_used_in_function=function.used_names,
     )
 
 
@@ -264,9 +264,9 @@ def _choose_statement(
     # heads of blocks are numbered last, so that `nth` in older specs selects the same statements
     matches = sorted(
         (pair for pair in pairs if pair[1].unanchorable_reason is None),
-        key=lambda pair: pair[1].block_first_line is not None,
+        key=lambda pair: pair[1].headed_block_first_line is not None,
     )
-    statements = sum(s.block_first_line is None for _, s in matches)
+    statements = sum(s.headed_block_first_line is None for _, s in matches)
     nth = anchor.nth
     # one statement is no ambiguity, even if heads of blocks bind the same name
     if matches and (1 in (len(matches), statements) if nth is None else nth <= len(matches)):
@@ -335,9 +335,9 @@ def _describe_candidates(functions: tuple[Function, ...], verb: str) -> str:
 def _check_anchor_fits_statement(file: ParsedFile, anchor: Anchor, statement: Statement) -> None:
     after = anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL)
     reason = None
-    if statement.block_first_line is not None and not after:
+    if statement.headed_block_first_line is not None and not after:
         reason = "is the head of a block"
-    elif statement.is_one_line_suite:
+    elif statement.is_in_one_line_suite:
         reason = "is on the line of its `if`, `for` or `def`"
     elif after and statement.is_return:
         reason = "returns, so nothing after it runs"

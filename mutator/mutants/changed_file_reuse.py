@@ -41,7 +41,7 @@ class ReusableChangedFile:
             patch_parts=tuple(_decode_patch(part) for part in _split_at_tagged_lines(patch, b"+")),
         )
 
-    def with_lines(self, lines: Sequence[bytes]) -> ChangedFile:
+    def with_inserted_lines(self, lines: Sequence[bytes]) -> ChangedFile:
         """Insert these lines, given without their line ends."""
         data: list[bytes] = [b""] * (2 * len(lines) + 1)
         patch = [""] * len(data)
@@ -65,7 +65,7 @@ def reuse_key(file: ParsedFile, edits: Sequence[LineEdit], injection_ids: Sequen
         (
             e.line_index,
             e.rank,
-            e.indented_count,
+            e.indented_line_count,
             e.indent_unit,
             normalize_numbers_and_ids(b"".join(e.lines).decode(file.encoding), injection_ids),
         )
@@ -84,7 +84,7 @@ def compiles_for_every_mutant(file: ParsedFile, change: ReusableChangedFile, key
     """
     texts = (text.rstrip("\r\n") for *_, text in key)  # the file's last line can lack a line end
     lines = "\n".join(texts).encode(file.encoding).splitlines()
-    return compiles(change.with_lines(lines).data)
+    return compiles(change.with_inserted_lines(lines).data)
 
 
 def _split_at_tagged_lines(data: bytes, sign: bytes) -> list[bytes]:

@@ -29,9 +29,11 @@ def _functions_and_rest_compile(file: ParsedFile, edits: Iterable[LineEdit]) -> 
     outside: list[LineEdit] = []
     for edit in edits:
         function = file.outermost_function_at(
-            edit.line_index - 1 if edit.rank is EditRank.AFTER_PREVIOUS else edit.line_index
+            edit.line_index - 1 if edit.rank is EditRank.AFTER_PREVIOUS_LINE else edit.line_index
         )
-        if function is None or edit.rank is EditRank.AFTER_WHOLE:  # such lines are between functions
+        if (
+            function is None or edit.rank is EditRank.AFTER_WHOLE_STATEMENT
+        ):  # such lines are between functions
             outside.append(edit)
         else:
             functions[function].append(edit)

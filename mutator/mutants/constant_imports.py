@@ -19,7 +19,7 @@ _STAR = "*"  # the name that `from module import *` imports, as `ast` gives it
 class _ImportedName:
     """`from module import name as known`, on a line (from 1)."""
 
-    module: str
+    source_module: str
     name: str
     local_name: str
     line: int
@@ -47,7 +47,7 @@ def dotted_names_importing_constant(tree: SourceTree, path: str, name: str) -> t
     for imported in names:  # grows during the loop: an imported name can be imported again
         for file in files:
             for imported_name in file.imported_names:
-                if (imported_name.module, imported_name.name) not in (imported, (imported[0], _STAR)):
+                if (imported_name.source_module, imported_name.name) not in (imported, (imported[0], _STAR)):
                     continue
                 reason = _reason_import_prevents_setting(
                     imported_name, file, imported[1], exported.get(imported[0])
@@ -129,7 +129,11 @@ def _imports_in_body(body: Iterable[ast.stmt], path: str, *, in_class: bool) -> 
                 for alias in names:
                     local_name = alias.asname or alias.name
                     yield _ImportedName(
-                        module=source, name=alias.name, local_name=local_name, line=line, in_class=in_class
+                        source_module=source,
+                        name=alias.name,
+                        local_name=local_name,
+                        line=line,
+                        in_class=in_class,
                     )
             case ast.ClassDef(body=inner):
                 yield from _imports_in_body(inner, path, in_class=True)

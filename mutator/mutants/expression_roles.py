@@ -28,22 +28,24 @@ def source_of(node: ast.AST) -> str:
 
 def expressions_in_functions(tree: ast.Module) -> Iterator[ExpressionInFunction]:
     """Yield function name, expression and roles for each expression in a function's body."""
-    yield from _expressions_in_scope(tree.body, (), inside=False)
+    yield from _expressions_in_scope(tree.body, (), is_in_function=False)
 
 
 def _expressions_in_scope(
-    body: Iterable[ast.stmt], scope: tuple[str, ...], *, inside: bool
+    body: Iterable[ast.stmt], scope: tuple[str, ...], *, is_in_function: bool
 ) -> Iterator[ExpressionInFunction]:
     for statement in body:
         if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             in_function = not isinstance(statement, ast.ClassDef)
-            yield from _expressions_in_scope(statement.body, (*scope, statement.name), inside=in_function)
+            yield from _expressions_in_scope(
+                statement.body, (*scope, statement.name), is_in_function=in_function
+            )
             continue
-        if inside:
+        if is_in_function:
             name = ".".join(scope)
             yield from ((name, node, roles) for node, roles in _expressions_in_statement(statement))
         for block in blocks_of(statement):
-            yield from _expressions_in_scope(block, scope, inside=inside)
+            yield from _expressions_in_scope(block, scope, is_in_function=is_in_function)
 
 
 def blocks_of(statement: ast.stmt) -> Iterator[list[ast.stmt]]:

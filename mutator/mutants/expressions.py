@@ -44,11 +44,13 @@ class Expression:
     end: _LineColumn
     roles: tuple[AnchorRole, ...]
     one_line_source: str  # source on one line, in parentheses if an adjacent operator could split it
-    is_bare: bool  # an unparenthesized tuple or a `:=`; parentheses around it are not part of it
+    is_bare_tuple_or_walrus: (
+        bool  # an unparenthesized tuple or a `:=`; parentheses around it are not part of it
+    )
     node: ast.expr
 
     @property
-    def text(self) -> str:
+    def anchor_name(self) -> str:
         """The expression's name in anchors, independent of spacing and quotes."""
         return self.roles[-1][1]
 
@@ -91,7 +93,9 @@ def list_expressions(
             )
             roles = (*roles, (AnchorKind.VALUE, text, None))
             expressions.append(
-                _build_expression(lines, encoding, (function, node, roles), start, end, bare=bare)
+                _build_expression(
+                    lines, encoding, (function, node, roles), start, end, is_bare_tuple_or_walrus=bare
+                )
             )
     # an outer expression precedes those inside it, so that `nth` counts in reading order
     return _grouped_by_function(
@@ -108,13 +112,13 @@ def _build_expression(
     start: _LineColumn,
     end: _LineColumn,
     *,
-    bare: bool,
+    is_bare_tuple_or_walrus: bool,
 ) -> Expression:
     function, node, roles = expression
     one_line = start[0] == end[0]
     written = lines[start[0]][start[1] : end[1]] if one_line else roles[-1][1]
     alone = isinstance(node, _UNSPLITTABLE_NODES) or (
-        isinstance(node, ast.Tuple | ast.NamedExpr) and not (bare and one_line)
+        isinstance(node, ast.Tuple | ast.NamedExpr) and not (is_bare_tuple_or_walrus and one_line)
     )
     return Expression(
         function=function,
@@ -122,7 +126,7 @@ def _build_expression(
         end=(end[0], len(lines[end[0]][: end[1]].encode(encoding))),
         roles=roles,
         one_line_source=written if alone else f"({written})",
-        is_bare=bare,
+        is_bare_tuple_or_walrus=is_bare_tuple_or_walrus,
         node=node,
     )
 

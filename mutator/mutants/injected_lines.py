@@ -64,7 +64,7 @@ class Tag:
 
     id: str  # an injection's id, IMPORT_TAG or OBSERVE_TAG; several ids are joined with `+`
     guarded_line_count: int  # number of lines that a guard indents
-    code: bytes  # the line without the tag
+    line_without_tag: bytes  # the line without the tag
     replaced_line: bytes | None = None  # the target's line that this line replaces
 
     @property
@@ -75,7 +75,7 @@ class Tag:
     @property
     def is_guard(self) -> bool:
         """Whether the line opens a block that the probe's answer guards."""
-        return _GUARD_PATTERN.match(self.code) is not None
+        return _GUARD_PATTERN.match(self.line_without_tag) is not None
 
     @property
     def ids(self) -> list[str]:
@@ -84,16 +84,16 @@ class Tag:
     @property
     def is_else_of_guard(self) -> bool:
         """Whether the line is the `else:` under which a guard keeps the target's statements."""
-        return self.guarded_line_count > 0 and self.code.strip() == b"else:"
+        return self.guarded_line_count > 0 and self.line_without_tag.strip() == b"else:"
 
     @property
     def changed_value_ids(self) -> list[str]:
         """The injections about which a changed line asks the probe."""
-        return [match["id"].decode() for match in _CHANGED_VALUE_PATTERN.finditer(self.code)]
+        return [match["id"].decode() for match in _CHANGED_VALUE_PATTERN.finditer(self.line_without_tag)]
 
     @property
-    def is_value_setting(self) -> bool:
-        return _CONSTANT_OR_DEFAULT_SETTING_PATTERN.match(self.code) is not None
+    def is_constant_or_default_setting(self) -> bool:
+        return _CONSTANT_OR_DEFAULT_SETTING_PATTERN.match(self.line_without_tag) is not None
 
 
 def changed_value_positions(source: bytes) -> Iterator[tuple[str, int, int, int]]:
@@ -121,7 +121,12 @@ def tag_of(line: bytes) -> Tag | None:
     if match is None:
         return None
     code = line[: match.start()]
-    return Tag(id=match[1].decode(), guarded_line_count=int(match[2] or 0), code=code, replaced_line=match[3])
+    return Tag(
+        id=match[1].decode(),
+        guarded_line_count=int(match[2] or 0),
+        line_without_tag=code,
+        replaced_line=match[3],
+    )
 
 
 def tagged_line(code: str, tag: str, guarded_line_count: int = 0) -> str:

@@ -68,7 +68,7 @@ def injection_edit(
     file: ParsedFile,
     models: FaultModels,
     injection: Injection,
-    name: str,
+    tag: str,
     tree: SourceTree | None = None,
 ) -> LineEdit | ExpressionEdit:
     """Return the edit of one injection in its file, tagged with `name`.
@@ -78,23 +78,25 @@ def injection_edit(
     """
     model = models.get(injection.model)
     if injection.location.anchor.kind in VALUE_ANCHORS:
-        return _expression_edit(file, model, injection, name)
+        return _expression_edit(file, model, injection, tag)
     if injection.location.anchor.kind in FIXED_ANCHORS:
-        return _constant_or_default_edit(file, model, injection, name, tree)
+        return _constant_or_default_edit(file, model, injection, tag, tree)
     anchor = file.resolve_statement(injection.location)
-    variables = _checked_variable_params(file, anchor.names_in_function, anchor.first_line, model, injection)
+    variables = _checked_variable_params(
+        file, anchor.names_used_in_function, anchor.first_line, model, injection
+    )
     texts: dict[str, str] = {}
     if model.needs is TemplateNeed.CALL:
         raise _model_misfit_error(file, model, anchor.first_line)
     if model.needs is not None:
         anchor, texts = one_line_texts(file, anchor, model.needs)
-    _check_instance_condition(file, anchor.names_in_function, anchor.first_line, injection)
+    _check_instance_condition(file, anchor.names_used_in_function, anchor.first_line, injection)
     code = _snippet_limited_to_instances(
-        render_snippet(model, dict(injection.params), name, texts), injection, name, model
+        render_snippet(model, dict(injection.params), tag, texts), injection, tag, model
     )
     make_edit = guard_edit if model.kind is SnippetKind.GUARD else insertion_edit
-    edit = make_edit(file, anchor, code, name)
-    key = (variables, reuse_key(file, [edit], [name]))
+    edit = make_edit(file, anchor, code, tag)
+    key = (variables, reuse_key(file, [edit], [tag]))
     if key not in file.verified_edits:
         _check_rebinds_no_used_name(
             file, anchor, model, code, variables.union(*map(_bound_names, texts.values()))
@@ -104,17 +106,17 @@ def injection_edit(
     return edit
 
 
-def _expression_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ExpressionEdit:
+def _expression_edit(file: ParsedFile, model: FaultModel, injection: Injection, tag: str) -> ExpressionEdit:
     expression = file.resolve_expression(injection.location)
     params, parts = dict(injection.params), template_parts(expression)
     if model.needs is TemplateNeed.CALL and not parts["called"]:
         raise _model_misfit_error(file, model, expression.start[0])
-    changed = render_changed_value(model, params, name, expression.one_line_source, parts)
-    names = file.names_in_function_at(injection.location)
+    changed = render_changed_value(model, params, tag, expression.one_line_source, parts)
+    names = file.names_used_in_function_at(injection.location)
     _checked_variable_params(file, names, expression.start[0], model, injection)
     _check_instance_condition(file, names, expression.start[0], injection)
     _check_binds_no_new_name(file, model, expression, changed)
-    return expression_edit(file, expression, changed, name, activation_condition(name, injection))
+    return expression_edit(file, expression, changed, tag, activation_condition(tag, injection))
 
 
 def _check_binds_no_new_name(
@@ -156,7 +158,7 @@ def _model_misfit_error(file: ParsedFile, model: FaultModel, line: int) -> Mutat
 
 
 def _constant_or_default_edit(
-    file: ParsedFile, model: FaultModel, injection: Injection, name: str, tree: SourceTree | None
+    file: ParsedFile, model: FaultModel, injection: Injection, tag: str, tree: SourceTree | None
 ) -> LineEdit:
     value, params = file.resolve_constant_or_default(injection.location), dict(injection.params)
     if model.needs is TemplateNeed.CALL or model.expression_parts:
@@ -170,15 +172,15 @@ def _constant_or_default_edit(
                 expected="no variable, because a constant or default is set outside functions",
                 remedy=f"leave `{param.name}` out, or anchor in a function",
             )
-    changed = render_changed_value(model, params, name, ORIGINAL_VALUE_NAME, NO_TEMPLATE_PARTS)
+    changed = render_changed_value(model, params, tag, ORIGINAL_VALUE_NAME, NO_TEMPLATE_PARTS)
     if value.kind is AnchorKind.CONSTANT:
         of_module = "." not in value.name
         imported = dotted_names_importing_constant(tree, file.path, value.name) if tree and of_module else ()
-        code = constant_setting_line(name, value.dotted_path, changed, imported)
+        code = constant_setting_line(tag, value.dotted_path, changed, imported)
     else:
         function, _, parameter = value.dotted_path.rpartition(".")
-        code = default_setting_line(name, function, parameter, changed)
-    return constant_or_default_edit(file, value, code, name)
+        code = default_setting_line(tag, function, parameter, changed)
+    return constant_or_default_edit(file, value, code, tag)
 
 
 def _checked_variable_params(
@@ -217,10 +219,10 @@ def _check_instance_condition(
 
 
 def _snippet_limited_to_instances(
-    code: tuple[str, ...], injection: Injection, name: str, model: FaultModel
+    code: tuple[str, ...], injection: Injection, tag: str, model: FaultModel
 ) -> tuple[str, ...]:
     """Add to the snippet a check for the instance or executions that the injection selects, if any."""
-    check, condition = active_check_source(name), activation_condition(name, injection)
+    check, condition = active_check_source(tag), activation_condition(tag, injection)
     if condition == check:
         return code
     limited_lines = {f"if {check}:": f"if {condition}:", f"if not {check}:": f"if not ({condition}):"}
@@ -244,7 +246,7 @@ def _check_rebinds_no_used_name(
     block = [*code, "    pass"] if model.kind is SnippetKind.GUARD else code
     clashes = (
         {normalize_identifier(name) for name in _bound_names("\n".join(block))} - variables
-    ) & anchor.names_in_function
+    ) & anchor.names_used_in_function
     if clashes:
         raise MutatorError(
             f"the injected lines set '{min(clashes)}', a name that the function uses itself",
@@ -279,7 +281,7 @@ def _check_keeps_name_scopes(file: ParsedFile, anchor: ResolvedAnchor, edit: Lin
         return  # the mutant does not compile, which building reports
     if moved:
         raise MutatorError(
-            f"the lines would make '{moved.name}' {moved.scope_after} in {moved.holder}, where it is "
+            f"the lines would make '{moved.name}' {moved.scope_after} in {moved.function_or_class}, where it is "
             f"{moved.scope_before}",
             where=file.full_path,
             line=anchor.first_line + 1,

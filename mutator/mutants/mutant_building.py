@@ -89,12 +89,12 @@ def _build_with(
     sets = any(injection.location.anchor.kind in FIXED_ANCHORS for injection in injections)
     probe = _build_probe(manifest, models, mutant_id, trigger, hold, ids, sets)
     text = probe.text
-    splicer.check_probe(text, (mutant_id, *ids), models.folder / PROBE_CODE)
+    splicer.check_probe_compiles(text, (mutant_id, *ids), models.folder / PROBE_CODE)
     files = {probe_file: text.encode()}
     patches = {probe_file: render_new_file(probe_file, text)}
     for path, file_edits in edits.items():
         file = parsed_file(manifest.tree, path)
-        injection_edit = splicer.checked_change(
+        injection_edit = splicer.splice_and_compile(
             file, [probe_import_edit(file, manifest.package), *file_edits], ids
         )
         files[path], patches[path] = injection_edit.data, injection_edit.patch
@@ -172,10 +172,12 @@ def _check_compiles(data: bytes, where: Path) -> None:
 class _Splicer:
     """Splices and compiles every file. `ids` are the ids in the injected lines."""
 
-    def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
+    def check_probe_compiles(self, text: str, ids: Sequence[str], where: Path) -> None:
         _check_compiles(text.encode(), where)
 
-    def checked_change(self, file: ParsedFile, edits: Sequence[LineEdit], ids: Sequence[str]) -> ChangedFile:
+    def splice_and_compile(
+        self, file: ParsedFile, edits: Sequence[LineEdit], ids: Sequence[str]
+    ) -> ChangedFile:
         change = self.splice(file, edits)
         _check_compiles(change.data, file.full_path)
         return change
@@ -198,22 +200,24 @@ class _ReusingSplicer(_Splicer):
     def __init__(self, tree: SourceTree) -> None:
         self._tree = tree
 
-    def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
+    def check_probe_compiles(self, text: str, ids: Sequence[str], where: Path) -> None:
         if not compiles(normalize_numbers_and_ids(text, ids).encode()):
-            super().check_probe(text, ids, where)
+            super().check_probe_compiles(text, ids, where)
 
-    def checked_change(self, file: ParsedFile, edits: Sequence[LineEdit], ids: Sequence[str]) -> ChangedFile:
+    def splice_and_compile(
+        self, file: ParsedFile, edits: Sequence[LineEdit], ids: Sequence[str]
+    ) -> ChangedFile:
         cache = reuse_cache(self._tree, file.path)
         key = reuse_key(file, edits, ids)
         if key in cache:
             cached = cache[key]
             if isinstance(cached, ChangedFile):  # only on reuse: most changes of values are used once
                 cached = cache[key] = ReusableChangedFile.from_changed_file(cached)
-            return cached.with_lines(inserted_lines(edits))
+            return cached.with_inserted_lines(inserted_lines(edits))
         if certainly_compiles_for_key(file, edits, key):
             cache[key] = change = self.splice(file, edits)
             return change
-        change = super().checked_change(file, edits, ids)
+        change = super().splice_and_compile(file, edits, ids)
         reusable = ReusableChangedFile.from_changed_file(change)
         if compiles_for_every_mutant(file, reusable, key):
             cache[key] = reusable

@@ -17,7 +17,7 @@ class RescopedName:
     """A name whose meaning has changed in a function or class."""
 
     name: str
-    holder: str
+    function_or_class: str
     scope_before: str
     scope_after: str
 
@@ -83,7 +83,10 @@ def _rescoped_between(
         name, home = symbol.get_name(), _scope_kind(symbol)
         if homes.get(name, "unknown") != home:
             yield RescopedName(
-                name=name, holder=before.get_name(), scope_before=home, scope_after=homes.get(name, "unknown")
+                name=name,
+                function_or_class=before.get_name(),
+                scope_before=home,
+                scope_after=homes.get(name, "unknown"),
             )
     unchanged = [child for child in after.get_children() if child.get_lineno() not in inserted_lines]
     for child_before, child_after in zip(before.get_children(), unchanged, strict=False):

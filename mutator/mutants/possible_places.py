@@ -61,14 +61,14 @@ class _PlaceLister:
     def places_in_function(self, name: str) -> Iterator[ListedPlace]:
         functions = self.file.functions_by_name[name]
         for i, function in enumerate(functions):
-            if function.entry_lines is not None:
+            if function.entry_and_indent_lines is not None:
                 yield from self.statement_places(
                     name, AnchorKind.ENTRY, "", i + 1 if len(functions) > 1 else None
                 )
         for verb, kinds in _ANCHOR_KINDS_BY_VERB.items():
             anchorable = (s for f in functions for s in f.statements if not s.unanchorable_reason)
             statements = sorted(
-                anchorable, key=lambda s: s.block_first_line is not None
+                anchorable, key=lambda s: s.headed_block_first_line is not None
             )  # in the order of `nth`
             totals, numbers = (Counter[str]() for _ in range(2))
             totals.update(n for s in statements for n in s.names_for(verb))
@@ -105,7 +105,7 @@ class _PlaceLister:
         if model.kind is SnippetKind.VALUE and model.expression_parts:
             return False
         if model.kind is SnippetKind.GUARD and (
-            anchor.first_line == anchor.end_line or not anchor.is_alone or anchor.is_after
+            anchor.first_line == anchor.end_line or not anchor.is_alone or anchor.inserts_after
         ):
             return False
         if model.needs is not None:

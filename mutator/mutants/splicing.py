@@ -29,8 +29,8 @@ from mutator.mutants.injected_lines import (
 class EditRank(IntEnum):
     """The order of edits at one line index."""
 
-    AFTER_PREVIOUS = 0  # lines inserted after the previous line
-    AFTER_WHOLE = 1  # lines inserted after a whole statement that ends on the previous line
+    AFTER_PREVIOUS_LINE = 0  # lines inserted after the previous line
+    AFTER_WHOLE_STATEMENT = 1  # lines inserted after a whole statement that ends on the previous line
     BEFORE = 2  # lines inserted before the line itself
     GUARD = 3  # a guard around the line
     INSTEAD = 4  # a replacement of the line
@@ -46,7 +46,7 @@ class LineEdit:
     line_index: int
     rank: EditRank
     lines: tuple[bytes, ...]
-    indented_count: int = 0
+    indented_line_count: int = 0
     indent_unit: bytes = b""
 
 
@@ -59,8 +59,8 @@ class ExpressionEdit:
 
     start: tuple[int, int]
     end: tuple[int, int]
-    before: bytes
-    after: bytes
+    inserted_before: bytes
+    inserted_after: bytes
     changed: str
     tag: str
 
@@ -77,8 +77,8 @@ def insertion_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str]
     """Return the edit that inserts `code` (4 spaces per indentation level) at `anchor`, each line tagged."""
     lines = _tagged_lines(file, anchor, code, tag)
     index, rank = (
-        (anchor.end_line, EditRank.AFTER_PREVIOUS)
-        if anchor.is_after
+        (anchor.end_line, EditRank.AFTER_PREVIOUS_LINE)
+        if anchor.inserts_after
         else (anchor.first_line, EditRank.BEFORE)
     )
     return LineEdit(line_index=index, rank=rank, lines=lines)
@@ -86,7 +86,7 @@ def insertion_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str]
 
 def guard_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], tag: str) -> LineEdit:
     """Return the edit that wraps the statement at `anchor` in `code`, whose last line opens a block."""
-    if anchor.first_line == anchor.end_line or not anchor.is_alone or anchor.is_after:
+    if anchor.first_line == anchor.end_line or not anchor.is_alone or anchor.inserts_after:
         raise MutatorError(
             "a guard needs a statement that is alone on its lines",
             where=file.full_path,
@@ -99,14 +99,14 @@ def guard_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], ta
         line_index=anchor.first_line,
         rank=EditRank.GUARD,
         lines=lines,
-        indented_count=anchor.indentable_count,
+        indented_line_count=anchor.indentable_count,
         indent_unit=_indent_unit_of(file, anchor.indent),
     )
 
 
 def constant_or_default_edit(file: ParsedFile, value: ConstantOrDefault, code: str, tag: str) -> LineEdit:
     line = value.indent + _encode(file, tagged_line(code, tag), value.first_line) + file.newline
-    return LineEdit(line_index=value.insertion_line, rank=EditRank.AFTER_WHOLE, lines=(line,))
+    return LineEdit(line_index=value.insertion_line, rank=EditRank.AFTER_WHOLE_STATEMENT, lines=(line,))
 
 
 def expression_edit(
@@ -116,16 +116,16 @@ def expression_edit(
 
     `changed` is source on one line. `condition` replaces the default call that asks the probe.
     """
-    opened, closed = ("(", "))") if expression.is_bare else ("", ")")
+    opened, closed = ("(", "))") if expression.is_bare_tuple_or_walrus else ("", ")")
     return ExpressionEdit(
         start=expression.start,
         end=expression.end,
-        before=_encode(
+        inserted_before=_encode(
             file,
             changed_value_prefix(condition or active_check_source(tag), changed) + opened,
             expression.start[0],
         ),
-        after=closed.encode(),
+        inserted_after=closed.encode(),
         changed=changed,
         tag=tag,
     )
@@ -146,8 +146,8 @@ def as_line_edits(file: ParsedFile, edits: Iterable[LineEdit | ExpressionEdit]) 
             )
     texts_by_line: dict[int, list[tuple[int, bytes, str]]] = defaultdict(list)
     for edit in values:
-        texts_by_line[edit.start[0]].append((edit.start[1], edit.before, edit.tag))
-        texts_by_line[edit.end[0]].append((edit.end[1], edit.after, edit.tag))
+        texts_by_line[edit.start[0]].append((edit.start[1], edit.inserted_before, edit.tag))
+        texts_by_line[edit.end[0]].append((edit.end[1], edit.inserted_after, edit.tag))
     lines = [_line_replacement_edit(file, index, texts) for index, texts in texts_by_line.items()]
     return [*(edit for edit in edits if isinstance(edit, LineEdit)), *lines]
 
@@ -218,7 +218,7 @@ def sort_edits(edits: Iterable[LineEdit]) -> list[LineEdit]:
 
 
 def _indentation_depth(edit: LineEdit) -> int:
-    return len(_indentation_of(edit.lines[0])) if edit.rank is EditRank.AFTER_WHOLE else 0
+    return len(_indentation_of(edit.lines[0])) if edit.rank is EditRank.AFTER_WHOLE_STATEMENT else 0
 
 
 def apply_edits(file: ParsedFile, edits: Iterable[LineEdit]) -> tuple[PatchPiece, ...]:
@@ -242,8 +242,8 @@ def apply_edits(file: ParsedFile, edits: Iterable[LineEdit]) -> tuple[PatchPiece
         if edit.rank is EditRank.INSTEAD:
             pieces.append(PatchPiece(sign="-", lines=file.lines[edit.line_index : edit.line_index + 1]))
             next_line += 1
-        if edit.indented_count:
-            next_line += edit.indented_count
+        if edit.indented_line_count:
+            next_line += edit.indented_line_count
             wrapped = file.lines[edit.line_index : next_line]
             pieces.append(PatchPiece(sign="-", lines=wrapped))
             added += _indent_lines(wrapped, edit.indent_unit)

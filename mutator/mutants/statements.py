@@ -34,17 +34,17 @@ class Statement:
     returned_names: tuple[str, ...] = ()
     is_first_in_line: bool = True
     is_last_in_line: bool = True
-    is_one_line_suite: bool = False
+    is_in_one_line_suite: bool = False
     has_multiline_string: bool = False
     unanchorable_reason: str | None = None  # why nothing can be anchored at this construct
-    block_first_line: int | None = None  # for a binding in the head of a block: the block's first line
+    headed_block_first_line: int | None = None  # for a binding in the head of a block: the block's first line
 
     def names_for(self, verb: str) -> tuple[str, ...]:
         return {"assign": self.assigned_names, "call": self.called_names, "return": self.returned_names}[verb]
 
     @property
     def is_alone(self) -> bool:
-        return self.is_first_in_line and self.is_last_in_line and not self.is_one_line_suite
+        return self.is_first_in_line and self.is_last_in_line and not self.is_in_one_line_suite
 
     @property
     def is_return(self) -> bool:
@@ -63,7 +63,7 @@ class Function:
     position: NodePosition
     statements: tuple[Statement, ...]
     used_names: frozenset[str]
-    entry_lines: tuple[int, int] | None
+    entry_and_indent_lines: tuple[int, int] | None
 
 
 def collect_functions(
@@ -122,7 +122,7 @@ class _FunctionCollector(cst.CSTVisitor):
             position=function_position(original_node, self.positions),
             statements=tuple(sorted(statements, key=lambda s: s.first_line)),
             used_names=self.names_by_function.get((line, self.scope_names[-1]), frozenset()),
-            entry_lines=_entry_and_indent_lines(original_node, self.positions),
+            entry_and_indent_lines=_entry_and_indent_lines(original_node, self.positions),
         )
         self.functions.setdefault(".".join(self.scope_names), []).append(function)
         self.scope_names.pop()
@@ -179,7 +179,7 @@ class _FunctionCollector(cst.CSTVisitor):
                     returned_names=returns,
                     is_first_in_line=i == 0,
                     is_last_in_line=i == len(node.body) - 1,
-                    is_one_line_suite=one_line_suite,
+                    is_in_one_line_suite=one_line_suite,
                     has_multiline_string=_has_multiline_string(small, self.positions),
                 )
             )
@@ -202,7 +202,7 @@ class _FunctionCollector(cst.CSTVisitor):
                 first_line=line,
                 end_line=opens,
                 assigned_names=tuple(_unique_stable_names(names)),
-                block_first_line=opens,
+                headed_block_first_line=opens,
             )
         )
 

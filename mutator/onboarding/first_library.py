@@ -58,7 +58,8 @@ def write_first_library(survey: SourceSurvey, folder: Path) -> None:
 
 def _describe_no_controller(survey: SourceSurvey) -> str:
     problems = [
-        f"{place} cannot be read: {problem}" for place, problem in survey.unreadable[:MOST_LISTED_CANDIDATES]
+        f"{place} cannot be read: {problem}"
+        for place, problem in survey.unreadable_files[:MOST_LISTED_CANDIDATES]
     ]
     if survey.modules:
         problems.insert(0, f"no function in {counted(len(survey.modules), 'file')} looks like a step")
@@ -98,7 +99,7 @@ def _template_variables(survey: SourceSurvey, folder: Path) -> dict[str, Any]:
         "package": only_package if not only_package.endswith(".py") else "",
         "packages": survey.packages,
         "count": counted(len(survey.modules), "Python file"),
-        "unread": survey.unreadable[:MOST_LISTED_CANDIDATES],
+        "unread": survey.unreadable_files[:MOST_LISTED_CANDIDATES],
         "mark": TODO_MARK,
         "candidates": candidates,
         **_step_variables(candidates[0] if candidates else None),

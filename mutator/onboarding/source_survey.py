@@ -42,7 +42,9 @@ class SourceSurvey:
     root: Path  # the folder for `sys.path`
     packages: tuple[str, ...]  # import packages and flat modules (`drive.py`)
     modules: tuple[SourceModule, ...]  # the files that were read
-    unreadable: tuple[tuple[str, str], ...] = ()  # `path:line` and reason of each file that cannot be read
+    unreadable_files: tuple[
+        tuple[str, str], ...
+    ] = ()  # `path:line` and reason of each file that cannot be read
     installed_package: str | None = None
     requirement: str | None = None  # requirement for the installed distribution
 
@@ -150,4 +152,4 @@ def _survey_packages(root: Path, packages: tuple[str, ...], *, any_links: bool =
             except (SyntaxError, ValueError, RecursionError, MemoryError, OSError) as err:
                 line = getattr(err, "lineno", None) or 1
                 unread.append((f"{relative}:{line}", getattr(err, "msg", None) or str(err)))
-    return SourceSurvey(root=root, packages=packages, modules=tuple(modules), unreadable=tuple(unread))
+    return SourceSurvey(root=root, packages=packages, modules=tuple(modules), unreadable_files=tuple(unread))

@@ -15,7 +15,7 @@ class DistinctMutations:
     """Mutations with distinct code, and the numbers of those left out."""
 
     mutations: tuple[Mutation, ...]
-    equal_count: int  # same code as the original
+    equal_to_original_count: int  # same code as the original
     duplicate_count: int  # same code as an earlier mutation
     invalid_count: int  # does not compile
 
@@ -42,7 +42,7 @@ def drop_equal_code(file: ParsedFile, mutations: Iterable[Mutation]) -> Distinct
             distinct_mutations.append(mutation)
     return DistinctMutations(
         mutations=tuple(distinct_mutations),
-        equal_count=equals,
+        equal_to_original_count=equals,
         duplicate_count=duplicates,
         invalid_count=invalids,
     )

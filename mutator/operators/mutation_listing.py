@@ -38,10 +38,10 @@ def _expression_mutations(
     file: ParsedFile, facts: StatementFacts, function: str, models: FaultModels, operators: _OperatorByName
 ) -> Iterator[Mutation]:
     expressions = file.expressions_by_function.get(function, ())
-    totals = Counter(e.text for e in expressions)
+    totals = Counter(e.anchor_name for e in expressions)
     numbers: Counter[str] = Counter()
     for expression in expressions:
-        text = expression.text
+        text = expression.anchor_name
         numbers[text] += 1
         nth = numbers[text] if totals[text] > 1 else None
         anchor = Anchor(kind=AnchorKind.VALUE, name=text, nth=nth)
@@ -82,7 +82,7 @@ def _omission_mutations(
 ) -> Iterator[Mutation]:
     every = ((f.def_line + 1, s) for f in file.functions_by_name.get(function, ()) for s in f.statements)
     anchorable = [
-        (line, s) for line, s in every if s.unanchorable_reason is None and s.block_first_line is None
+        (line, s) for line, s in every if s.unanchorable_reason is None and s.headed_block_first_line is None
     ]
     numbers: Counter[tuple[str, str]] = Counter()
     for line, statement in anchorable:

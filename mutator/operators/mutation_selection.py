@@ -28,7 +28,7 @@ class SelectedMutations:
 
     mutations: tuple[Mutation, ...] = ()
     unexecuted_count: int = 0  # no golden run executes the line
-    equal_count: int = 0  # same code as the original
+    equal_to_original_count: int = 0  # same code as the original
     duplicate_count: int = 0  # same code as an earlier mutation
     invalid_count: int = 0  # does not compile
 
@@ -37,7 +37,7 @@ class SelectedMutations:
         """A summary of the numbers for the user."""
         left_out = {
             "in lines that no golden run executes": self.unexecuted_count,
-            "with the code of the original": self.equal_count,
+            "with the code of the original": self.equal_to_original_count,
             "with the code of another": self.duplicate_count,
             "that do not compile": self.invalid_count,
         }
@@ -90,7 +90,7 @@ def _select_in_file(
     return SelectedMutations(
         mutations=distinct_mutations.mutations,
         unexecuted_count=len(mutations) - len(executed_mutations),
-        equal_count=distinct_mutations.equal_count,
+        equal_to_original_count=distinct_mutations.equal_to_original_count,
         duplicate_count=distinct_mutations.duplicate_count,
         invalid_count=distinct_mutations.invalid_count,
     )
@@ -100,7 +100,7 @@ def _merge(first: SelectedMutations, second: SelectedMutations) -> SelectedMutat
     return SelectedMutations(
         mutations=first.mutations + second.mutations,
         unexecuted_count=first.unexecuted_count + second.unexecuted_count,
-        equal_count=first.equal_count + second.equal_count,
+        equal_to_original_count=first.equal_to_original_count + second.equal_to_original_count,
         duplicate_count=first.duplicate_count + second.duplicate_count,
         invalid_count=first.invalid_count + second.invalid_count,
     )

@@ -64,7 +64,7 @@ def judge_failure(
     if not execution.was_fault_active:
         return Status.HARNESS_ERROR, f"{detail}, before the fault was active"
     if cause and cause.tag and not any(name in raising_ids for name in cause.injection_ids):
-        code = cause.tag.code.decode("utf-8", "replace").strip()
+        code = cause.tag.line_without_tag.decode("utf-8", "replace").strip()
         return Status.INVALID_MUTANT, f"{cause.place}: the injected `{code}` ended the run: {detail}"
     return status, detail
 

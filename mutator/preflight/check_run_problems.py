@@ -29,7 +29,7 @@ class CheckRun:
     alerts: tuple[tuple[str, float], ...] = ()
     has_triggered: bool = False
     cpu_s: float = 0.0
-    modules: tuple[str, ...] = ()
+    third_party_modules: tuple[str, ...] = ()
 
 
 def read_check_run(manifest: TargetManifest, execution: JobResult) -> CheckRun:
@@ -50,7 +50,7 @@ def read_check_run(manifest: TargetManifest, execution: JobResult) -> CheckRun:
         hazards=judged.hazards,
         has_triggered=was_triggered(execution.probe_report),
         cpu_s=execution.cpu_s,
-        modules=execution.third_party_modules,
+        third_party_modules=execution.third_party_modules,
     )
 
 

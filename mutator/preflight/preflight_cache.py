@@ -17,14 +17,14 @@ def cached_checks_path(key: str) -> Path:
     return path_below(shared_cache.checks_folder(), digest([key, platform.node()]))
 
 
-def store_passed_checks(entry: Path, run: Path, file: str, observation_folder: Path) -> None:
+def store_passed_checks(entry: Path, run: Path, checks_file: str, observation_folder: Path) -> None:
     """Store a run folder's golden runs, check results (`file`) and observations in `entry`, if the cache is
     writable.
     """
 
     def fill(entry_folder: Path) -> None:
         shutil.copytree(run / "golden", entry_folder / "golden")
-        shutil.copy(path_below(run, file), path_below(entry_folder, file))
+        shutil.copy(path_below(run, checks_file), path_below(entry_folder, checks_file))
         if (observation_folder / OBSERVATIONS_FOLDER).is_dir():
             shutil.copytree(observation_folder / OBSERVATIONS_FOLDER, entry_folder / OBSERVATIONS_FOLDER)
 

@@ -224,7 +224,7 @@ class _PreflightChecks:
 
     def _loaded_packages(self, runs: CheckRunByName) -> list[str]:
         """Return the packages that the golden runs loaded, without the target and the standard library."""
-        loaded = {module for key in self.golden_runs for module in runs[GOLDEN, key].modules}
+        loaded = {module for key in self.golden_runs for module in runs[GOLDEN, key].third_party_modules}
         target_modules = {path.split("/")[0].removesuffix(".py") for path in self.manifest.tree.files}
         return list(run_environment.packages_of_modules(loaded - target_modules))
 

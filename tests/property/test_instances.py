@@ -76,7 +76,7 @@ def limited(random_: random.Random, file: ParsedFile, location: FaultLocation) -
         model="stuck" if value else "omission",
         params=(("value", 3.0),) if value else (),
     )
-    names = sorted(file.names_in_function_at(location))
+    names = sorted(file.names_used_in_function_at(location))
     if names and random_.random() < 0.8:
         text = random_.choice(SHAPES).format(random_.choice(names), random_.choice(names))
         made = replace(made, where=canonical_instance_condition(text))

@@ -84,7 +84,7 @@ def others(draw: st.DrawFn) -> Fault:
     if model.kind is SnippetKind.GUARD:
         kind = AnchorKind(location.anchor.kind.replace("after_", "before_"))
         location = replace(location, anchor=replace(location.anchor, kind=kind))
-    names = sorted(parsed_file(manifest.tree, location.path).names_in_function_at(location))
+    names = sorted(parsed_file(manifest.tree, location.path).names_used_in_function_at(location))
     given = [p for p in model.params if not (p.optional and draw(st.booleans()))]
     params = tuple((p.name, draw(values(p, names))) for p in given)
     return replace(fault, injections=(Injection(location=location, model=model.name, params=params),))

@@ -126,11 +126,11 @@ def _replacement_of_lines(
     lines, new_lines, copied_to = file.lines[first:last], list[bytes](), 0
     for edit in sort_edits(edits):
         at = edit.line_index - first
-        replaced_to = at + (1 if edit.rank is EditRank.INSTEAD else edit.indented_count)
+        replaced_to = at + (1 if edit.rank is EditRank.INSTEAD else edit.indented_line_count)
         new_lines += [
             *lines[copied_to:at],
             *edit.lines,
-            *(edit.indent_unit + line for line in lines[at : at + edit.indented_count]),
+            *(edit.indent_unit + line for line in lines[at : at + edit.indented_line_count]),
         ]
         copied_to = replaced_to
     new_lines += lines[copied_to:]

@@ -60,7 +60,7 @@ def test_a_reusable_change_equals_the_spliced_one(text: str, guard: bool) -> Non
     other, made, lines, _ = change(text, code.format("abcdefab", 1e-300), "abcdefab", guard)
     assert compiles
     assert reusable == other
-    assert reusable.with_lines(lines) == made
+    assert reusable.with_inserted_lines(lines) == made
 
 
 @pytest.mark.parametrize("text", TEXTS)
@@ -85,7 +85,7 @@ def test_a_change_of_a_value_and_inserted_lines_can_be_reused_together(text: str
 
     (reusable, *_), (other, made, lines) = changed("00000001", "3.25"), changed("abcdefab", "1e-300")
     assert reusable == other
-    assert reusable.with_lines(lines) == made
+    assert reusable.with_inserted_lines(lines) == made
 
 
 def test_a_change_that_compiles_only_with_some_values_is_not_reused() -> None:

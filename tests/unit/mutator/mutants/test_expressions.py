@@ -185,7 +185,7 @@ def test_a_huge_number_has_no_anchor() -> None:
     assert 'return (0 if _fi.active("a0") else a)' in changed(
         source, (location("return_value", "a", function="f"), "0")
     )
-    assert [one.text for one in parsed(source).expressions_by_function["f"]] == ["a"]
+    assert [one.anchor_name for one in parsed(source).expressions_by_function["f"]] == ["a"]
 
 
 def test_two_injections_into_one_expression_are_refused() -> None:
@@ -198,7 +198,7 @@ def test_functions_with_the_same_name_have_separate_variables() -> None:
     source = "class A:\n    def x(self): return self.a\n    def x(self, value): return value + 1\n"
     file = parse_file("m.py", source.encode(), Path())
     first, second = (location("return_value", "", nth=nth, function="A.x") for nth in (1, 2))
-    assert (file.names_in_function_at(first), file.names_in_function_at(second)) == (
+    assert (file.names_used_in_function_at(first), file.names_used_in_function_at(second)) == (
         {"self"},
         {"self", "value"},
     )
@@ -219,7 +219,10 @@ def test_files_in_other_encodings_are_changed_at_the_right_column() -> None:
 def test_an_f_string_is_changed_as_a_whole() -> None:
     source = b'def f(x):\n    return g(f"{x:.2f} m", f"{x}" "b")\n'
     found = parse_file("m.py", source, Path()).expressions_by_function["f"]
-    assert [one.text for one in found if one.text.startswith("f")] == ["f'{x:.2f} m'", "f'{x}b'"]
+    assert [one.anchor_name for one in found if one.anchor_name.startswith("f")] == [
+        "f'{x:.2f} m'",
+        "f'{x}b'",
+    ]
 
 
 def test_a_named_expression_as_a_condition_has_an_anchor() -> None:

@@ -27,7 +27,7 @@ def test_injected_lines_are_recognized_by_their_tags(clone: Workspace) -> None:
             assert tag is not None
             assert (tag.id, tag.guarded_line_count, tag.is_of_fault) == (name, guarded, of_fault)
             assert tag.is_guard == ("if " in line)
-            assert tag.code.decode() == line.partition("  #")[0]
+            assert tag.line_without_tag.decode() == line.partition("  #")[0]
         assert injected_lines.find_instrumented_line(f"x = 1\n{line}\n".encode()) == 1
         assert injected_lines.adds_fault(f"+{line}") is of_fault
         assert list(injected_lines.tagged_addition_spans(f"+{line}\n", 0, 999)) == [(1, len(line) + 1)]

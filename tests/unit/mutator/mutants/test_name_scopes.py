@@ -75,6 +75,6 @@ def test_an_inserted_binding_can_change_the_scope_of_a_name(
     made = source.replace("#", inserted)
     found = next(rescoped_names(source.replace("#", "pass").encode(), made.encode(), {place}), None)
     expected = moved and RescopedName(
-        name=moved[0], holder=moved[1], scope_before=moved[2], scope_after=moved[3]
+        name=moved[0], function_or_class=moved[1], scope_before=moved[2], scope_after=moved[3]
     )
     assert found == expected

@@ -65,8 +65,8 @@ def test_an_unreadable_file_is_listed_with_its_position(tree: Tree) -> None:
     (folder / "binary.py").write_bytes(b"\0\xff")
     found = survey_source(str(folder))
     assert [module.path for module in found.modules] == ["good.py"]
-    assert [place for place, _ in found.unreadable] == ["bad.py:2", "binary.py:1"]
-    assert all(why for _, why in found.unreadable)
+    assert [place for place, _ in found.unreadable_files] == ["bad.py:2", "binary.py:1"]
+    assert all(why for _, why in found.unreadable_files)
 
 
 def test_the_survey_imports_nothing(tree: Tree) -> None:
@@ -129,4 +129,4 @@ def test_a_link_out_of_the_tree_is_not_read(tree: Tree, tmp_path: Path) -> None:
     (folder / "linked.py").symlink_to(tmp_path / "mine.py")
     found = survey_source(str(folder))
     assert [module.path for module in found.modules] == ["own.py"]
-    assert found.unreadable == (("linked.py:1", "a link that leads out of its folder"),)
+    assert found.unreadable_files == (("linked.py:1", "a link that leads out of its folder"),)
