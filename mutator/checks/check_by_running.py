@@ -63,8 +63,8 @@ def findings_from_running(workspace: Workspace, target: str, scenarios: Sequence
 class _GoldenRuns:
     """The runs of a scenario.
 
-    `first` runs the pristine target, and `watched` the counting mutant with another hash seed. `again` runs
-    the pristine target with that seed; if no third run is needed, it is `watched`.
+    `first` runs the pristine target, and `watched_counting` the counting mutant with another hash seed.
+    `again` runs the pristine target with that seed; if no third run is needed, it is `watched_counting`.
     """
 
     first: JobResult
@@ -175,14 +175,18 @@ class _RunningCheck:
             remedy = "fix the target, the scenario or the manifest: no campaign can start"
             return Finding(name=name, level=CheckState.FAIL, found=problem, remedy=remedy)
         same = self._check_run(self._execute(self._pristine_job("same", scenario, self.usual_changes)))
-        return self._nondeterminism_finding(name, golden, by_hash=same.output_digest == first.output_digest)
+        return self._nondeterminism_finding(
+            name, golden, depends_on_hash_seed=same.output_digest == first.output_digest
+        )
 
-    def _nondeterminism_finding(self, name: str, golden: _GoldenRuns, *, by_hash: bool) -> Finding:
+    def _nondeterminism_finding(
+        self, name: str, golden: _GoldenRuns, *, depends_on_hash_seed: bool
+    ) -> Finding:
         where = describe_first_difference(self.manifest, golden.first.out, golden.again.out)
         places, remedy = nondeterminism_causes.likely_causes(
-            self.manifest, self._notes_with_target_lines(golden), depends_on_hash_seed=by_hash
+            self.manifest, self._notes_with_target_lines(golden), depends_on_hash_seed=depends_on_hash_seed
         )
-        which = ", but only if their hash seeds differ" if by_hash else ""
+        which = ", but only if their hash seeds differ" if depends_on_hash_seed else ""
         likely = f"; likely {'cause' if len(places) == 1 else 'causes'}:" if places else ""
         return Finding(
             name=name,

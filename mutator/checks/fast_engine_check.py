@@ -14,7 +14,7 @@ from mutator.workspace import Workspace
 FINDING_NAME = "fast engines"
 _FALLBACK_NOTE = "campaigns then run on the reference engine"
 _DRIVE_CHECK_NOTE = "`mutator check --drive` names the lines that start threads in Python"
-_MOST_LISTED_REASONS = 3  # reasons
+_MOST_LISTED = 3  # reasons
 
 
 def import_and_fork_finding(manifest: TargetManifest) -> Finding:
@@ -54,8 +54,8 @@ def unloadable_variants_finding(workspace: Workspace, manifest: TargetManifest) 
         message = f"{counted(count, 'variant')} can be forked"
         return Finding(name="faults for fast engines", level=CheckState.OK, found=message)
     listed_reasons = "; ".join(
-        f"{', '.join(names[:_MOST_LISTED_REASONS])}{' and more' if len(names) > _MOST_LISTED_REASONS else ''}: {why}"
-        for why, names in list(reasons.items())[:_MOST_LISTED_REASONS]
+        f"{', '.join(names[:_MOST_LISTED])}{' and more' if len(names) > _MOST_LISTED else ''}: {why}"
+        for why, names in list(reasons.items())[:_MOST_LISTED]
     )
     unforkable_count = sum(map(len, reasons.values()))
     return Finding(

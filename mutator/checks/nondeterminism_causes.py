@@ -28,8 +28,8 @@ def likely_causes(
 ) -> tuple[list[FindingPlace], str]:
     """Return the most suspicious lines, likeliest first, and the remedies.
 
-    `by_hash` means that runs agree with equal PYTHONHASHSEED and differ otherwise, which points to set order
-    or hashes. `watched` has the notes of a watched run.
+    `depends_on_hash_seed` means that runs agree with equal PYTHONHASHSEED and differ otherwise, which points
+    to set order or hashes. `watch_report` has the notes of a watched run.
     """
     notes = watch_report.get("noted", [])
     hashes = [note for note in notes if note["kind"] == HASH]

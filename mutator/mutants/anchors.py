@@ -283,7 +283,7 @@ def _ambiguous_or_missing_error(
 ) -> MutatorError:
     """Return the error about an ambiguous or missing anchor.
 
-    `pairs` are all matches of the name, `hits` those that are whole statements or heads of blocks.
+    `pairs` are all matches of the name, `matches` those that are whole statements or heads of blocks.
     """
     anchor = location.anchor
     verb = anchor.kind.partition("_")[2]

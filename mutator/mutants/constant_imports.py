@@ -17,7 +17,7 @@ _STAR = "*"  # the name that `from module import *` imports, as `ast` gives it
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _ImportedName:
-    """`from module import name as known`, on a line (from 1)."""
+    """`from module import name as local_name`, on a line (from 1)."""
 
     source_module: str
     name: str

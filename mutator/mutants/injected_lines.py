@@ -62,7 +62,7 @@ _PROBE_SETTING_PATTERN = re.compile(
 class Tag:
     """The tag at the end of an injected line."""
 
-    id: str  # an injection's id, IMPORT_TAG or OBSERVE_TAG; several ids are joined with `+`
+    id: str  # an injection's id, PROBE_IMPORT_TAG or OBSERVATION_TAG; several ids are joined with `+`
     guarded_line_count: int  # number of lines that a guard indents
     line_without_tag: bytes  # the line without the tag
     replaced_line: bytes | None = None  # the target's line that this line replaces

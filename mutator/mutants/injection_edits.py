@@ -71,7 +71,7 @@ def injection_edit(
     tag: str,
     tree: SourceTree | None = None,
 ) -> LineEdit | ExpressionEdit:
-    """Return the edit of one injection in its file, tagged with `name`.
+    """Return the edit of one injection in its file, tagged with `tag`.
 
     `tree` has the files that might import a constant. MutatorError for a missing anchor, a name unknown in
     the function, and lines that would change what the target's names mean while the fault is inactive.
@@ -281,8 +281,8 @@ def _check_keeps_name_scopes(file: ParsedFile, anchor: ResolvedAnchor, edit: Lin
         return  # the mutant does not compile, which building reports
     if moved:
         raise MutatorError(
-            f"the lines would make '{moved.name}' {moved.scope_after} in {moved.function_or_class}, where it is "
-            f"{moved.scope_before}",
+            f"the lines would make '{moved.name}' {moved.scope_after} in {moved.function_or_class}, "
+            f"where it is {moved.scope_before}",
             where=file.full_path,
             line=anchor.first_line + 1,
             expected="a variable that the function sets itself, or declares `global` or `nonlocal`",

@@ -30,7 +30,7 @@ def used_names_by_function(data: bytes) -> UsedNamesByFunction:
 def _used_names_by_function_in(
     table: SymbolTable, private_prefix: str
 ) -> Iterator[tuple[tuple[int, str], frozenset[str]]]:
-    """Like `names_by_function`; `private_prefix` is the compiler's for private names (`__x`) in a class."""
+    """Like `used_names_by_function`; `private_prefix` is what the compiler adds to `__x` in a class."""
     if table.get_type() == "class":
         name = table.get_name().lstrip("_")
         private_prefix = f"_{name}__" if name else ""
@@ -70,7 +70,7 @@ def normalize_identifier(name: str) -> str:
 def rescoped_names(before: bytes, after: bytes, inserted_lines: Container[int]) -> Iterator[RescopedName]:
     """Yield the names whose meaning changes with the inserted lines.
 
-    `inserted` are the numbers of these lines in `after`, from 1. SyntaxError if `after` is not valid.
+    `inserted_lines` are the numbers of these lines in `after`, from 1. SyntaxError if `after` is not valid.
     """
     return _rescoped_between(_cached_symbol_table(before), _symbol_table(after), inserted_lines)
 

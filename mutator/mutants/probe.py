@@ -172,8 +172,8 @@ def probe_attributes_after(
 ) -> tuple[str, dict[str, object]]:
     """Return the name of the object in which a probe keeps its observations, and that object's attributes.
 
-    The first of `observed` observations was at time `began` (s), the last at `t`. A probe that replaces
-    another probe gets these attributes.
+    The first of `observation_count` observations was at time `began` (s), the last at `t`. A probe that
+    replaces another probe gets these attributes.
     """
     return "_run", {"observed": observation_count, "began": began, "t": t} if observation_count else {}
 

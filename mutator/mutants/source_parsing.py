@@ -71,7 +71,8 @@ def _check_tree_size(tree: ast.Module, where: Path) -> None:
                 f"too large to be changed: {excess}",
                 where=where,
                 line=getattr(node, "lineno", None) if links > MOST_CHAIN_LINKS else None,
-                expected=f"at most {MOST_SYNTAX_NODES:,} nodes in its syntax tree, and chains of {MOST_CHAIN_LINKS}",
+                expected=f"at most {MOST_SYNTAX_NODES:,} nodes in its syntax tree, "
+                f"and chains of {MOST_CHAIN_LINKS}",
                 remedy="split the file, or inject into another one",
             )
 

@@ -38,7 +38,7 @@ class EditRank(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineEdit:
-    """Lines to insert before line `line_index`; the `indented_count` lines that follow get `indent_unit`.
+    """Lines to insert before line `line_index`; `indented_line_count` lines that follow get `indent_unit`.
 
     An edit of rank INSTEAD replaces line `line_index`.
     """
@@ -222,7 +222,7 @@ def _indentation_depth(edit: LineEdit) -> int:
 
 
 def apply_edits(file: ParsedFile, edits: Iterable[LineEdit]) -> tuple[PatchPiece, ...]:
-    """Return the edited file as pieces, for `join_pieces`; MutatorError if two guards wrap one statement."""
+    """Return the edited file as pieces for `mutated_bytes`; MutatorError if two guards wrap a statement."""
     pieces: list[PatchPiece] = []
     next_line = 0
     for edit in sort_edits(edits):

@@ -55,8 +55,8 @@ class Statement:
 class Function:
     """A function. Its statements do not include those of nested functions and classes.
 
-    `entry_lines` has the index of the line before which to insert, and of the line whose indentation to use;
-    None if nothing can be inserted.
+    `entry_and_indent_lines` has the index of the line before which to insert, and of the line whose
+    indentation to use; None if nothing can be inserted.
     """
 
     def_line: int

@@ -12,9 +12,9 @@ _CONTEXT_CHARACTERS = 20  # unchanged characters kept before and after the chang
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mutation:
-    """One change to a function: the source text `was` becomes `now`.
+    """One change to a function: the source text `source_before` becomes `source_after`.
 
-    `place` is the changed expression or the omitted statement.
+    `mutated_part` is the changed expression or the omitted statement.
     """
 
     operator: str

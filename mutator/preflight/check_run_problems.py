@@ -18,8 +18,9 @@ from mutator.targets.manifest import TargetManifest
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckRun:
-    """What the checks need from a run. `digest` covers all outputs; `modules` are the third-party top-level
-    modules that it imported.
+    """What the checks need from a run.
+
+    `output_digest` covers all outputs; `third_party_modules` are the top-level modules that the run imported.
     """
 
     problem: str

@@ -18,8 +18,9 @@ def cached_checks_path(key: str) -> Path:
 
 
 def store_passed_checks(entry: Path, run: Path, checks_file: str, observation_folder: Path) -> None:
-    """Store a run folder's golden runs, check results (`file`) and observations in `entry`, if the cache is
-    writable.
+    """Store a run folder's golden runs, check results (`checks_file`) and observations in `entry`.
+
+    Nothing is stored if the cache is not writable.
     """
 
     def fill(entry_folder: Path) -> None:

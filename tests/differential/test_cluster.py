@@ -199,9 +199,9 @@ _UNLIKE = """\
 import sys
 if any("cluster.piece_process" in word for word in sys.orig_argv):
     from dataclasses import replace
-    from mutator.preflight import preflight_rules
-    real = preflight_rules.read_check_run
-    preflight_rules.read_check_run = lambda *given: replace(real(*given), output_digest="f" * 64)
+    from mutator.preflight import check_run_problems
+    real = check_run_problems.read_check_run
+    check_run_problems.read_check_run = lambda *given: replace(real(*given), output_digest="f" * 64)
 """
 _OTHER = "import mutator._common.version as version\nversion.VERSION = '0.0.1'\n"
 

@@ -79,7 +79,7 @@ READS = b"def f(a):\n    b = T(1, abs(a) + max(a, 1))\n    return b\ncall(f, 2)\
     [
         (anchors, "parse_with_libcst", SHIFTED),
         (statements, "line_after_statements", CONTINUED),
-        (injection_edits, "_check_scopes", READS),
+        (injection_edits, "_check_keeps_name_scopes", READS),
         (splicing, "_indent_unit_of", READS),
     ],
 )
@@ -90,11 +90,11 @@ def test_a_broken_splicer_is_found(
     broken = {
         "parse_with_libcst": without_check_of_bytes,
         "line_after_statements": lambda node, positions: positions[node].end.line,
-        "_check_scopes": lambda *given: None,
+        "_check_keeps_name_scopes": lambda *given: None,
         "_indent_unit_of": lambda *given: b"",
     }
     monkeypatch.setattr(place, name, broken[name])
-    monkeypatch.setattr(anchors, "_check_position", lambda *given: None)
+    monkeypatch.setattr(anchors, "_check_position_matches_ast", lambda *given: None)
     assert proved([("", source)], behaviour, 20).wrong
 
 

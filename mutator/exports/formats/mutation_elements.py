@@ -95,7 +95,7 @@ def _replacement_of(manifest: TargetManifest, models: FaultModels, fault: Fault)
     file, model = parsed_file(manifest.tree, first.location.path), models.get(first.model)
     edit, span = edits_of(manifest, models, [first])[0].edit, file.line_span(first.location)
     if isinstance(edit, ExpressionEdit):
-        # `parenthesized` adds parentheses if an adjacent operator could bind more tightly
+        # `parenthesized_if_splittable` adds parentheses if an adjacent operator could bind more tightly
         return _replacement_at(file, edit.start, edit.end, parenthesized_if_splittable(edit.changed))
     if fault.module == OPERATORS_MODULE and model.kind is SnippetKind.GUARD:  # the mutant omits the statement
         line, last = file.lines[span[0]], file.lines[span[1] - 1].rstrip(b"\r\n")

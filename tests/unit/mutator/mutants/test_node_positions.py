@@ -55,7 +55,7 @@ def test_a_statement_that_the_parsers_place_on_different_lines_is_refused(
 ) -> None:
     """The test makes `ast` find the anchored statement one line further down."""
     later = ast_node_positions(ast.parse("\ndef f(x):\n    x = 1\n    return x\n"))
-    monkeypatch.setattr("mutator.mutants.anchors.positions_by_ast", lambda tree: later)
+    monkeypatch.setattr("mutator.mutants.anchors.ast_node_positions", lambda tree: later)
     file = parsed("def f(x):\n    x = 1\n    return x\n")
     name = "" if kind is AnchorKind.ENTRY else "x"
     location = FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name=name))

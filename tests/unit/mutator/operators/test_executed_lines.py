@@ -48,7 +48,9 @@ def test_executed_lines_are_cached(
     drive = GoldenRunInputs(scenario=toycar.scenario("A"), changes=(), seed=7)
     runs: list[str] = []
     measured = executed_lines._run_and_note_lines
-    monkeypatch.setattr(executed_lines, "_measure", lambda *given: (runs.append("run"), measured(*given))[1])
+    monkeypatch.setattr(
+        executed_lines, "_run_and_note_lines", lambda *given: (runs.append("run"), measured(*given))[1]
+    )
     [first] = measure_executed_lines(manifest, [drive], LIMITS)
     assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 1
     [entry] = shared_cache.lines_folder().iterdir()
