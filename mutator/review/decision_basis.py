@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from mutator._common.hashing import content_id
 from mutator.model import FaultLocation
-from mutator.mutants.file_patches import adds_file, file_patches
+from mutator.mutants.file_patches import adds_file, split_into_file_patches
 from mutator.mutants.injected_lines import adds_fault
 from mutator.review.entries import BasisDigests
 from mutator.review.patch_shapes import HOLE_CHARACTER, without_values
@@ -68,7 +68,7 @@ def function_sources(tree: SourceTree, locations: Iterable[FaultLocation]) -> di
 def fault_hunks(patch: str) -> str:
     """Return the hunks of a patch that contain lines of a fault."""
     pieces = []
-    for section in file_patches(patch):
+    for section in split_into_file_patches(patch):
         if not adds_file(section):
             head, *hunks = re.split(r"^(?=@@ )", section, flags=re.MULTILINE)
             fault_hunks_only = [hunk for hunk in hunks if adds_fault(hunk)]

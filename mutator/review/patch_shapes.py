@@ -13,7 +13,7 @@ from itertools import chain
 
 from mutator._common.hashing import content_id
 from mutator.model import Fault, FaultLocation, Hold, Injection, Trigger, Value
-from mutator.mutants.file_patches import adds_file, file_patches
+from mutator.mutants.file_patches import adds_file, split_into_file_patches
 from mutator.mutants.injected_lines import INJECTION_ID_PATTERN, probe_setting_spans, tagged_addition_spans
 from mutator.operators.operator_lookup import operator_name_of
 from mutator.triggers.conditions import TIME, names_in
@@ -211,7 +211,7 @@ def _value_spans(patch: str) -> Iterator[ValueSpan]:
     if HOLE_CHARACTER in patch:  # no holes, because it is not Python source
         return
     begin = 0
-    for section in file_patches(patch):
+    for section in split_into_file_patches(patch):
         end = begin + len(section)
         if adds_file(section):
             yield from probe_setting_spans(patch, begin, end)
