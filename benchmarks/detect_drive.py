@@ -26,8 +26,8 @@ from selfdrive.messages import CameraView  # noqa: E402
 from selfdrive.sim import effects  # noqa: E402
 from selfdrive.sim.compile_helpers import COMPILED_FOLDER  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
-from selfdrive.visiond.coded_detector import CodedDetector  # noqa: E402
-from selfdrive.visiond.compiled_coded import build_coded_detector  # noqa: E402
+from selfdrive.visiond.authors_code_detector import AuthorsCodeDetector  # noqa: E402
+from selfdrive.visiond.compiled_authors_code import build_authors_code_detector  # noqa: E402
 from selfdrive.visiond.compiled_robust import build_robust_detector  # noqa: E402
 from selfdrive.visiond.robust_detector import RobustDetector  # noqa: E402
 
@@ -58,7 +58,9 @@ def drive(marks: str, weather: str | None, amount: float) -> list[np.ndarray]:
     ]
 
 
-def times(detector: RobustDetector | CodedDetector, pictures: list[np.ndarray], repeat: int) -> list[float]:
+def times(
+    detector: RobustDetector | AuthorsCodeDetector, pictures: list[np.ndarray], repeat: int
+) -> list[float]:
     """Return the CPU time (ms) of each detection. Only the first has no previous frame."""
     found = []
     for k in range(repeat):
@@ -89,7 +91,7 @@ def main() -> int:
     cases = [
         ("robust", build_robust_detector, marks, *case) for marks in ("solid", "dashed") for case in ROBUST
     ]
-    cases += [("as_coded", build_coded_detector, "solid", *case) for case in CODED]
+    cases += [("as_coded", build_authors_code_detector, "solid", *case) for case in CODED]
     for kind, build, marks, weather, amount, goal in cases:
         detector = build(CameraModel())
         found = times(detector, drive(marks, weather, amount), options.repeat)

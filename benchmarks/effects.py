@@ -22,7 +22,7 @@ sys.path.insert(0, str(ROOT / "target"))
 from selfdrive.common import compiled  # noqa: E402
 from selfdrive.common.camera_model import CameraModel  # noqa: E402
 from selfdrive.sim.compile_helpers import COMPILED_FOLDER  # noqa: E402
-from selfdrive.sim.effects.levels import LEVEL_AMOUNTS  # noqa: E402
+from selfdrive.sim.effects.levels import AMOUNTS_BY_EFFECT  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 
 GOAL = 3.0  # ms a frame
@@ -52,7 +52,7 @@ def main() -> int:
     picture = RoadRenderer(camera, "solid", 0).render_grey(10.0)
     slow = []
     print(f"{'effect':<16}{'amount':>8}{'made in':>12}{'median':>12}{'fastest':>12}{'of the goal':>13}  in")
-    for kind, amounts in LEVEL_AMOUNTS.items():
+    for kind, amounts in AMOUNTS_BY_EFFECT.items():
         if given.effects and kind.__name__ not in given.effects:
             continue
         for amount in (amounts[0], amounts[-1]):

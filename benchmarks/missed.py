@@ -22,7 +22,7 @@ from selfdrive.sim.effects.effect import Effect, Moment  # noqa: E402
 from selfdrive.sim.picture import Picture  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 from selfdrive.visiond.robust_detector import RobustDetector  # noqa: E402
-from selfdrive.visiond_lab.evaluate import TUSIMPLE_MODEL, UDACITY_MODEL  # noqa: E402
+from selfdrive.visiond_lab.evaluate_on_real_frames import TUSIMPLE_MODEL, UDACITY_MODEL  # noqa: E402
 from selfdrive.visiond_lab.random_looks import random_look  # noqa: E402
 
 CAMERAS = CameraModel(), UDACITY_MODEL, TUSIMPLE_MODEL

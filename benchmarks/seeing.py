@@ -29,16 +29,16 @@ from selfdrive.common.camera_model import CameraModel  # noqa: E402
 from selfdrive.messages import CameraView  # noqa: E402
 from selfdrive.sim import effects, simulator  # noqa: E402
 from selfdrive.sim.effects.effect import Effect, Moment  # noqa: E402
-from selfdrive.sim.effects.levels import LEVEL_AMOUNTS  # noqa: E402
-from selfdrive.sim.moved_picture import CodedShiftMover  # noqa: E402
+from selfdrive.sim.effects.levels import AMOUNTS_BY_EFFECT  # noqa: E402
+from selfdrive.sim.moved_picture import AuthorsCodeShiftMover  # noqa: E402
 from selfdrive.sim.picture import Picture  # noqa: E402
 from selfdrive.sim.picture_camera import PictureCamera  # noqa: E402
 from selfdrive.sim.picture_options import PictureOptions  # noqa: E402
 from selfdrive.sim.reference_plant import ReferencePlant  # noqa: E402
-from selfdrive.sim.scenario import REFERENCE_PLANT, load_scenario, on_plant  # noqa: E402
+from selfdrive.sim.scenario import REFERENCE_PLANT, load_scenario, with_plant  # noqa: E402
 from selfdrive.sim.truth import GroundTruth  # noqa: E402
-from selfdrive.visiond import coded_detector  # noqa: E402
-from selfdrive.visiond.coded_detector import CodedDetector  # noqa: E402
+from selfdrive.visiond import authors_code_detector  # noqa: E402
+from selfdrive.visiond.authors_code_detector import AuthorsCodeDetector  # noqa: E402
 from selfdrive.visiond.detector import (  # noqa: E402
     LANE_WIDTH,
     LaneLines,
@@ -92,7 +92,7 @@ class Row(NamedTuple):
 
     name: str
     parts: frozenset[str]
-    threshold: float = coded_detector.MIN_LOG_ODDS
+    threshold: float = authors_code_detector.MIN_LOG_ODDS
 
 
 class Case(NamedTuple):
@@ -141,7 +141,7 @@ class FaultyCamera(PictureCamera):
         self._case, self._parts = case, case.row.parts
         self._active, self.reached = False, frozenset[str]()
         if MOVE in self._parts:
-            self._move = CodedShiftMover()
+            self._move = AuthorsCodeShiftMover()
 
     def look(self, truth: GroundTruth) -> CameraView:
         self._update(truth)
@@ -175,7 +175,7 @@ class FaultyCamera(PictureCamera):
 def drawing(name: str, level: int, coded: bool, number: int, camera: CameraModel) -> Effect:
     """Return the effect at a level of 1 to 10, drawn with one of its seeds."""
     kind = KINDS[name][coded]
-    amounts = LEVEL_AMOUNTS[kind]
+    amounts = AMOUNTS_BY_EFFECT[kind]
     return kind(amounts[-(-level * len(amounts) // 10) - 1], 1 + number, camera)
 
 
@@ -185,10 +185,10 @@ class MixedDetector:
     def __init__(self, row: Row, camera: CameraModel) -> None:
         self._parts = row.parts
         coded = CLUSTERS in row.parts
-        self._detector = CodedDetector(camera, row.threshold) if coded else PaperDetector(camera)
-        inward = coded_detector.INWARD_PIXELS
+        self._detector = AuthorsCodeDetector(camera, row.threshold) if coded else PaperDetector(camera)
+        inward = authors_code_detector.INWARD_PIXELS
         self._nowhere = [
-            coded_detector.lateral_position(coded_detector.MISSING_LINE_COLUMN + side)
+            authors_code_detector.lateral_position(authors_code_detector.MISSING_LINE_COLUMN + side)
             for side in (inward, -inward)
         ]
         self._last = [RoadLine(y=side * LANE_WIDTH) for side in (0.5, -0.5)]
@@ -221,7 +221,7 @@ def drive(case: Case) -> tuple[Case, Ending]:
     simulator.PLANT_CLASSES[REFERENCE_PLANT] = ReferencePlant if labels else TrueLabels
     scenario = load_scenario(ROOT / "fault_library" / "scenarios" / f"{case.scenario}.yaml")
     run = simulator.Simulator()
-    run.reset(on_plant(scenario, REFERENCE_PLANT), 1, PictureOptions(cache=Path(os.environ[FRAMES])))
+    run.reset(with_plant(scenario, REFERENCE_PLANT), 1, PictureOptions(cache=Path(os.environ[FRAMES])))
     assert isinstance(run._camera, PictureCamera)
     run._camera = camera = FaultyCamera(run._camera, case)
     detector = MixedDetector(case.row, camera.model)

@@ -17,12 +17,12 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim import camera_and_detector
 from selfdrive.sim.effects.effect import Moment
-from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
-from selfdrive.sim.moved_picture import CodedShiftMover, HomographyMover, ShiftMover
+from selfdrive.sim.effects.levels import AMOUNTS_BY_EFFECT
+from selfdrive.sim.moved_picture import AuthorsCodeShiftMover, HomographyMover, ShiftMover
 from selfdrive.sim.picture import Picture
 from selfdrive.sim.picture_options import (
-    CODED_DETECTOR,
-    CODED_TRANSLATION,
+    AUTHORS_CODE_DETECTOR,
+    AUTHORS_CODE_TRANSLATION,
     DASHED_MARKS,
     DETECTORS,
     PictureOptions,
@@ -30,7 +30,7 @@ from selfdrive.sim.picture_options import (
 from selfdrive.sim.road_look import LinePaint, RoadLook
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import simulate
-from selfdrive.sim.scenario import PLANTS, load_scenario, on_plant
+from selfdrive.sim.scenario import PLANTS, load_scenario, with_plant
 from selfdrive.sim.trace_file import npz_pieces
 
 SCENARIOS = Path(__file__).parents[2] / "fault_library" / "scenarios"
@@ -57,7 +57,7 @@ def digests() -> Iterator[tuple[str, str]]:
     for detector in DETECTORS:
         pictures = PictureOptions(detector=detector, marks=DASHED_MARKS)
         yield f"S1 through {detector}", trace(SCENARIOS / "S1.yaml", "standard", pictures)
-    coded = PictureOptions(detector=CODED_DETECTOR, translation=CODED_TRANSLATION)
+    coded = PictureOptions(detector=AUTHORS_CODE_DETECTOR, translation=AUTHORS_CODE_TRANSLATION)
     yield "S1 on the reference plant, as coded", trace(SCENARIOS / "S1.yaml", "reference", coded)
 
 
@@ -69,7 +69,7 @@ def roads() -> dict[str, np.ndarray]:
     }
     solid = found["solid"]
     frame = Picture(("frame",), solid.shape, lambda region: solid[region.part])
-    for mover in (HomographyMover(model), ShiftMover(model), CodedShiftMover()):
+    for mover in (HomographyMover(model), ShiftMover(model), AuthorsCodeShiftMover()):
         found[type(mover).__name__] = mover.seen(frame, 0.7, -0.015).pixels()
     return found
 
@@ -80,7 +80,7 @@ def seen(detector: str, level: int) -> Iterator[tuple[str, str]]:
     model = CameraModel()
     road = RoadRenderer(model, WORN, seed=3)
     frames = [road.render_grey(m.position, 0.3, 0.01) for m in MOMENTS]
-    for effect, amounts in LEVEL_AMOUNTS.items():
+    for effect, amounts in AMOUNTS_BY_EFFECT.items():
         made = effect(amounts[min(level, len(amounts) - 1)], 3, model)
         shown = [made.apply(frame, moment) for frame, moment in zip(frames, MOMENTS, strict=True)]
         eyes = camera_and_detector.build_detector(detector, model)
@@ -96,7 +96,7 @@ def view(picture: np.ndarray) -> CameraView:
 
 
 def trace(path: Path, plant: str, pictures: PictureOptions | None) -> str:
-    scenario = on_plant(load_scenario(path), plant)
+    scenario = with_plant(load_scenario(path), plant)
     if pictures:
         scenario = replace(scenario, steps=1500)
     return sha256(b"".join(npz_pieces(simulate(scenario, 0, pictures).trace))).hexdigest()

@@ -15,8 +15,8 @@ class ExpectedMessage(NamedTuple):
     """A message to listen for: signals to read, rate in Hz, values before the first frame."""
 
     signals: tuple[str, ...]
-    rate: float
-    initial: tuple[float, ...] | None = None  # zeros when None
+    rate_hz: float
+    initial_values: tuple[float, ...] | None = None  # zeros when None
 
 
 class _MessageState:
@@ -47,7 +47,7 @@ class _MessageState:
         self.body_mask = sum(field.mask << field.shift for field in self.fields)
         self.body = -1  # the bits of `fields` in the last valid payload
         self.read: dict[bytes, int] = {}  # valid payloads with these bits, and their counters
-        self.timeout = MOST_MISSED_PERIODS / expected.rate + 1e-6  # 1e-6 s for the rounding of t
+        self.timeout = MOST_MISSED_PERIODS / expected.rate_hz + 1e-6  # 1e-6 s for the rounding of t
         self.newest = float("-inf")  # s, time of the last valid frame
         self.counter: int | None = None  # expected in the next frame
         self.bad_counters = 0
@@ -64,7 +64,7 @@ class _MessageState:
             self.bad_counters += 1
         return self.bad_counters < MAX_BAD_COUNTERS
 
-    def store_body(self, data: bytes, word: int) -> bool:
+    def store_signal_bits(self, data: bytes, word: int) -> bool:
         body = word & self.body_mask
         new = body != self.body
         if new:
@@ -86,7 +86,7 @@ class CanParser:
         self, messages: Mapping[str, MessageLayout], expected: Mapping[str, ExpectedMessage], bus: int
     ) -> None:
         self.values: dict[str, tuple[float, ...]] = {
-            name: e.initial or (0,) * len(e.signals) for name, e in expected.items()
+            name: e.initial_values or (0,) * len(e.signals) for name, e in expected.items()
         }
         self.updated: list[str] = []
         self.valid = False
@@ -109,7 +109,7 @@ class CanParser:
                 word = int.from_bytes(data, "big")
                 if not state.accept_payload(data, word):
                     continue
-                if state.store_body(data, word):
+                if state.store_signal_bits(data, word):
                     self.values[state.name] = decode_payload(state.fields, word)
             state.newest = t
             updated.append(state.name)

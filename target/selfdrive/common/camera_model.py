@@ -45,7 +45,7 @@ class CameraModel:
         """Width on the road (m) of a pixel in `row`, which must be below the horizon."""
         return self.depth(row) / self.fx
 
-    def spread(self, width: float = 3.7) -> float:
+    def lines_divergence(self, width: float = 3.7) -> float:
         """Pixels per row by which two lines of the road, `width` m apart, diverge."""
         return self.fx * width * cos(self.pitch) / (self.fy * self.height)
 

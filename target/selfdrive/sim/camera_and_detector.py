@@ -11,7 +11,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
 from selfdrive.sim.camera import GeometryCamera
-from selfdrive.sim.picture_options import CODED_DETECTOR, PAPER_DETECTOR, PictureOptions
+from selfdrive.sim.picture_options import AUTHORS_CODE_DETECTOR, PAPER_DETECTOR, PictureOptions
 from selfdrive.sim.road import Road
 from selfdrive.sim.truth import GroundTruth
 from selfdrive.visiond.detector import IdealDetector, LaneDetector
@@ -25,7 +25,7 @@ class RoadCamera(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraAndDetector:
-    """Camera and detector of one run; `description` is for its record.
+    """Camera and detector of one run; `for_record` describes them in its record, None without pictures.
 
     `model` is the camera's geometry, for drawing the view if there are no pictures.
     """
@@ -75,10 +75,10 @@ def build_detector(name: str, model: CameraModel):
         from selfdrive.visiond.compiled_paper import build_paper_detector
 
         return build_paper_detector(model)
-    if name == CODED_DETECTOR:
-        from selfdrive.visiond.compiled_coded import build_coded_detector
+    if name == AUTHORS_CODE_DETECTOR:
+        from selfdrive.visiond.compiled_authors_code import build_authors_code_detector
 
-        return build_coded_detector(model)
+        return build_authors_code_detector(model)
     from selfdrive.visiond.compiled_robust import build_robust_detector
 
     return build_robust_detector(model)

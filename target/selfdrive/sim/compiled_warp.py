@@ -12,7 +12,7 @@ from selfdrive.sim.picture import Region
 from selfdrive.sim.warp import VECTOR_COLUMNS, warp
 
 C_SOURCE = Path(__file__).with_name("warp.c")
-PROBE_REGION = Region(0, 48, 0, 512)
+COMPARED_PROBE_REGION = Region(0, 48, 0, 512)
 
 WarpFunction = Callable[[np.ndarray, np.ndarray, Region], np.ndarray]
 
@@ -20,7 +20,7 @@ WarpFunction = Callable[[np.ndarray, np.ndarray, Region], np.ndarray]
 def build_warp() -> tuple[WarpFunction, str]:
     """Return a function like `warp`, in C if possible, and the digest of its compiled code, if any."""
     library = compiled.library(C_SOURCE)
-    if library is None or not is_bit_identical(library):
+    if library is None or not has_identical_warp(library):
         return warp, ""
     return CompiledWarp(library), library.digest.hex()
 
@@ -50,10 +50,11 @@ class CompiledWarp:
 
 
 @cache
-def is_bit_identical(library: compiled.Library) -> bool:
+def has_identical_warp(library: compiled.Library) -> bool:
     """Whether compiled code gives the installed OpenCV's bits; versions without fused sums differ."""
     noise = (np.arange(48 * 8192) * 40503 % 65521 % 256).astype(np.uint8).reshape(48, 8192)
     matrix = np.array([(1.7, 31.3, 3007.3), (1.3e-3, 0.93, 0.4), (3.1e-5, 1.7e-4, 1.1)])
     return np.array_equal(
-        CompiledWarp(library)(noise, matrix, PROBE_REGION), warp(noise, matrix, PROBE_REGION)
+        CompiledWarp(library)(noise, matrix, COMPARED_PROBE_REGION),
+        warp(noise, matrix, COMPARED_PROBE_REGION),
     )

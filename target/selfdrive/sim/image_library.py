@@ -27,7 +27,7 @@ from selfdrive.sim.road_renderer import RoadRenderer
 RENDERED_FRAMES, RENDERED_PERIODS = 600, 66  # of the rendered road, which repeats seamlessly after 805.2 m
 # m between frames: 1.342, for 20 frames per second at 60 mph
 RENDERED_SPACING = RENDERED_PERIODS * DASH_PERIOD / RENDERED_FRAMES
-CHECK_BYTES = 8  # bytes; the file ends with a check per frame, then a digest of these and the header
+FRAME_CHECK_BYTES = 8  # bytes; the file ends with a check per frame, then a digest of these and the header
 DIGEST_BYTES = sha256().digest_size
 
 FrameIterator = Iterator[np.ndarray]
@@ -67,7 +67,7 @@ class CheckedFrames:
         self, frames: np.ndarray, checks: bytes = b"", mend: "Callable[[], CheckedFrames] | None" = None
     ) -> None:
         self._frames, self._checks, self._remake = frames, checks, mend
-        self._weights = _check_weights(frames.shape) if checks else None
+        self._weights = _check_sum_weights(frames.shape) if checks else None
         self._verified = np.full(len(frames), not checks)
 
     @property
@@ -83,7 +83,7 @@ class CheckedFrames:
         return self._frames[number]
 
     def _verify(self, number: int) -> None:
-        expected = self._checks[number * CHECK_BYTES : (number + 1) * CHECK_BYTES]
+        expected = self._checks[number * FRAME_CHECK_BYTES : (number + 1) * FRAME_CHECK_BYTES]
         if _frame_check(self._frames[number], self._weights) == expected:
             self._verified[number] = True
         else:
@@ -176,7 +176,7 @@ def _write_cache_file(path: Path, shape: tuple[int, int, int], frames: FrameIter
         part = Path(file.name)
         try:
             file.write(_npy_header(shape))
-            checks, weights = b"", _check_weights(shape)
+            checks, weights = b"", _check_sum_weights(shape)
             for frame in frames:
                 file.write(frame.tobytes())
                 checks += _frame_check(frame, weights)
@@ -198,7 +198,7 @@ def _map_cache_file(path: Path, shape: tuple[int, int, int]) -> tuple[np.ndarray
             begins = file.read(len(header))
             file.seek(end)
             checks, seal, more = (
-                file.read(shape[0] * CHECK_BYTES),
+                file.read(shape[0] * FRAME_CHECK_BYTES),
                 file.read(DIGEST_BYTES),
                 file.read(1),
             )
@@ -219,8 +219,8 @@ def _checks_digest(shape: tuple[int, int, int], checks: bytes) -> bytes:
     return sha256(_npy_header(shape) + checks).digest()
 
 
-def _check_weights(shape: tuple[int, int, int]) -> np.ndarray:
-    words = -(-shape[1] * shape[2] // CHECK_BYTES)
+def _check_sum_weights(shape: tuple[int, int, int]) -> np.ndarray:
+    words = -(-shape[1] * shape[2] // FRAME_CHECK_BYTES)
     return np.random.default_rng(0).integers(0, 2**64, words, np.uint64) | np.uint64(1)
 
 
@@ -230,13 +230,13 @@ def _frame_check(frame: np.ndarray, weights: np.ndarray) -> bytes:
     It always detects a single changed word, and misses several changed words with a probability of 2^-32.
     """
     data = frame.reshape(-1)
-    if data.size % CHECK_BYTES:
-        data = np.concatenate((data, np.zeros(-data.size % CHECK_BYTES, np.uint8)))
+    if data.size % FRAME_CHECK_BYTES:
+        data = np.concatenate((data, np.zeros(-data.size % FRAME_CHECK_BYTES, np.uint8)))
     words = data.view(np.uint64)
     mixed = words >> np.uint64(32)
     mixed ^= words
     mixed *= weights
-    return int(mixed.sum()).to_bytes(CHECK_BYTES, "little")
+    return int(mixed.sum()).to_bytes(FRAME_CHECK_BYTES, "little")
 
 
 def _pixel_count(shape: tuple[int, int, int]) -> int:

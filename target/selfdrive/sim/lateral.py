@@ -17,10 +17,10 @@ from selfdrive.common.car import CarParams
 from selfdrive.common.interp import clip
 from selfdrive.common.realtime import DT_CTRL
 
-FULL_TORQUE = 10.0  # N m at the steering wheel, for a command of 1
+FULL_STEERING_TORQUE = 10.0  # N m at the steering wheel, for a command of 1
 COLUMN_INERTIA = 0.1  # kg m^2, wheel, column and motor
 COLUMN_DAMPING = 20.0  # N m s/rad
-TRAIL = 0.053  # m, caster and pneumatic trail
+TYRE_TRAIL = 0.053  # m, caster and pneumatic trail
 MOST_STEER_ANGLE = 8.7  # rad, mechanical stop
 MIN_TYRE_SPEED = 0.1  # m/s; tyres take no side force below this
 MIN_SHARE_OF_BEND_RADIUS = 0.1  # of a bend's radius; at its centre, `along` is undefined
@@ -75,7 +75,7 @@ class LateralDynamics:
 
     def _turn_wheel(self, torque: float, speed: float) -> None:
         ratio = self._car.steer_ratio
-        drive = FULL_TORQUE * torque - TRAIL * self._front_force(speed) / ratio
+        drive = FULL_STEERING_TORQUE * torque - TYRE_TRAIL * self._front_force(speed) / ratio
         momentum = COLUMN_INERTIA * self.steer_rate + DT_CTRL * drive
         self.steer_rate = momentum / (COLUMN_INERTIA + DT_CTRL * COLUMN_DAMPING)
         angle = self.steer_angle + DT_CTRL * self.steer_rate

@@ -17,7 +17,7 @@ from selfdrive.sim.compare.trace_comparison import compare_trace
 from selfdrive.sim.compare.trace_csv import ReferenceTrace, load_reference_trace
 from selfdrive.sim.replay import TOLERANCES_PATH, list_reference_names
 from selfdrive.sim.run import EXIT_INVALID_INPUT
-from selfdrive.sim.scenario import PLANTS, STANDARD_PLANT, Scenario, on_plant
+from selfdrive.sim.scenario import PLANTS, STANDARD_PLANT, Scenario, with_plant
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -62,7 +62,7 @@ def _load_scenarios(options: argparse.Namespace, referenced_names: list[str]) ->
     for name in names:
         scenario = finished_runs.load_scenario_of_run(name, options.scenarios)
         try:
-            scenarios[name] = on_plant(scenario, options.plant)
+            scenarios[name] = with_plant(scenario, options.plant)
         except ConfigError as error:
             if options.names:
                 raise

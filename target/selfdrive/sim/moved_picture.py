@@ -19,8 +19,8 @@ from selfdrive.sim.road_renderer import car_to_road, first_road_row, pan_pixels,
 OFFSET_STEP = 0.004  # m
 HEADING_STEP = 0.00025  # rad
 SHIFT_DISTANCE = 10.0  # m ahead, where shifting the whole frame is exact
-CODED_METRES_PER_PIXEL = 0.03895  # from the code of the paper's authors
-MOST_CODED_SHIFT = 1.0  # m; largest shift of the picture
+AUTHORS_METRES_PER_PIXEL = 0.03895  # from the code of the paper's authors
+MOST_AUTHORS_CODE_SHIFT = 1.0  # m; largest shift of the picture
 
 
 class HomographyMover:
@@ -73,7 +73,7 @@ class ShiftMover:
         return _shift_frame(frame, round(away * self._pixels_per_metre))
 
 
-class CodedShiftMover:
+class AuthorsCodeShiftMover:
     """Moves whole frames sideways as the paper's authors coded it: the scale is that of a different row than
     the one where their detector reads lines, so the detector sees 64 % of the offset."""
 
@@ -81,7 +81,10 @@ class CodedShiftMover:
 
     def seen(self, frame: Picture, offset: float, heading: float) -> Picture:
         return _shift_frame(
-            frame, round(min(max(offset, -MOST_CODED_SHIFT), MOST_CODED_SHIFT) / CODED_METRES_PER_PIXEL)
+            frame,
+            round(
+                min(max(offset, -MOST_AUTHORS_CODE_SHIFT), MOST_AUTHORS_CODE_SHIFT) / AUTHORS_METRES_PER_PIXEL
+            ),
         )
 
 

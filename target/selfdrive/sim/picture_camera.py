@@ -4,7 +4,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim.camera import GeometryCamera
 from selfdrive.sim.image_library import FrameLibrary
-from selfdrive.sim.moved_picture import CodedShiftMover, HomographyMover, ShiftMover
+from selfdrive.sim.moved_picture import AuthorsCodeShiftMover, HomographyMover, ShiftMover
 from selfdrive.sim.picture_options import GROUND_TRANSLATION, SHIFT_TRANSLATION
 from selfdrive.sim.truth import GroundTruth
 
@@ -12,7 +12,8 @@ from selfdrive.sim.truth import GroundTruth
 class PictureCamera:
     """Takes the view's geometry from `geometry` and its picture from `library`, moved to the car's position.
 
-    `calculated_by` identifies the compiled code that moves frames, if any. `translation` is as in `Pictures`.
+    `calculated_by` identifies the compiled code that moves frames, if any. `translation` is that of
+    `PictureOptions`.
     """
 
     def __init__(self, geometry: GeometryCamera, library: FrameLibrary, translation: str) -> None:
@@ -28,7 +29,9 @@ class PictureCamera:
         return view._replace(picture=picture)
 
 
-def _build_mover(translation: str, model: CameraModel) -> HomographyMover | ShiftMover | CodedShiftMover:
+def _build_mover(
+    translation: str, model: CameraModel
+) -> HomographyMover | ShiftMover | AuthorsCodeShiftMover:
     if translation == GROUND_TRANSLATION:
         return HomographyMover(model)
-    return ShiftMover(model) if translation == SHIFT_TRANSLATION else CodedShiftMover()
+    return ShiftMover(model) if translation == SHIFT_TRANSLATION else AuthorsCodeShiftMover()

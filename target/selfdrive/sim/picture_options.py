@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-DETECTORS = PAPER_DETECTOR, ROBUST_DETECTOR, CODED_DETECTOR = "paper", "robust", "as_coded"
+DETECTORS = PAPER_DETECTOR, ROBUST_DETECTOR, AUTHORS_CODE_DETECTOR = "paper", "robust", "as_coded"
 MARKS = SOLID_MARKS, DASHED_MARKS = "solid", "dashed"
-TRANSLATIONS = GROUND_TRANSLATION, SHIFT_TRANSLATION, CODED_TRANSLATION = "ground", "shift", "as_coded"
+TRANSLATIONS = GROUND_TRANSLATION, SHIFT_TRANSLATION, AUTHORS_CODE_TRANSLATION = "ground", "shift", "as_coded"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,12 +10,12 @@ from selfdrive.sim.truth import GroundTruth
 LONGITUDINAL_MASS = 1700.0  # kg, for the longitudinal motion
 GRAVITY = 9.81  # m/s^2
 ROLLING_RESISTANCE = 0.01  # force as a share of the weight
-DRAG = 0.5 * 1.225 * 0.3  # N s^2/m^2
+DRAG_COEFFICIENT = 0.5 * 1.225 * 0.3  # N s^2/m^2
 PEAK_FORCE = 3.0 * LONGITUDINAL_MASS  # N
 PEAK_POWER = 100_000.0  # W
-GAS_SLOPE = 3.33  # a pedal of 0.3 already gives the peak force
+FORCE_SHARE_PER_GAS = 3.33  # a pedal of 0.3 already gives the peak force
 BRAKE_FORCE = 10.0 * LONGITUDINAL_MASS  # N
-BRAKE_SLOPE = 0.3  # full brake decelerates by 3 m/s^2
+FORCE_SHARE_PER_BRAKE = 0.3  # full brake decelerates by 3 m/s^2
 BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s; above this, power, not force, limits acceleration
 CREEP_BP = (0.0, 1.5)  # m/s
 CREEP_V = (1.0, 0.0)  # m/s^2 from an idling automatic gearbox
@@ -23,9 +23,9 @@ CREEP_V = (1.0, 0.0)  # m/s^2 from an idling automatic gearbox
 
 def longitudinal_acceleration(speed: float, gas: float, brake: float, grade: float) -> float:
     """Return the longitudinal acceleration (m/s^2); pedals in 0..1, `grade` in m/s^2, uphill positive."""
-    force = gas * GAS_SLOPE * (PEAK_FORCE if speed < BASE_SPEED else PEAK_POWER / speed)
-    force -= brake * BRAKE_FORCE * BRAKE_SLOPE
-    force -= ROLLING_RESISTANCE * LONGITUDINAL_MASS * GRAVITY + DRAG * speed * speed
+    force = gas * FORCE_SHARE_PER_GAS * (PEAK_FORCE if speed < BASE_SPEED else PEAK_POWER / speed)
+    force -= brake * BRAKE_FORCE * FORCE_SHARE_PER_BRAKE
+    force -= ROLLING_RESISTANCE * LONGITUDINAL_MASS * GRAVITY + DRAG_COEFFICIENT * speed * speed
     force += (interp(speed, CREEP_BP, CREEP_V) - grade) * LONGITUDINAL_MASS
     return force / LONGITUDINAL_MASS
 

@@ -4,16 +4,16 @@ from math import isfinite, sin
 
 from selfdrive.can.dbc import load_dbc
 from selfdrive.can.packer import MessagePacker
-from selfdrive.car.honda.values import RADAR_BUS, RADAR_DBC, RADAR_GOOD
+from selfdrive.car.honda.values import RADAR_BUS, RADAR_DBC, RADAR_STATE_GOOD
 from selfdrive.common.interp import clip
 from selfdrive.messages import CanFrame
 from selfdrive.sim.road import Road
 from selfdrive.sim.truth import GroundTruth
 
-DISTANCE_COUNTS = 16.0  # per m
-SPEED_COUNTS = 32.0  # per m/s
-LATERAL_COUNTS = 16.0  # per m
-WIDEST = 31.0  # m to a side, the range of the lateral field
+DISTANCE_COUNTS_PER_M = 16.0  # per m
+SPEED_COUNTS_PER_MPS = 32.0  # per m/s
+LATERAL_COUNTS_PER_M = 16.0  # per m
+MOST_LATERAL_DISTANCE = 31.0  # m to a side, the range of the lateral field
 
 
 class RadarSensor:
@@ -41,16 +41,18 @@ class RadarSensor:
 
     def _pack(self, d_rel: float, v_rel: float, y_rel: float) -> tuple[CanFrame, ...]:
         counts = {
-            "LONG_DIST": _counts(d_rel, DISTANCE_COUNTS),
-            "REL_SPEED": _counts(v_rel, SPEED_COUNTS),
-            "LAT_DIST": _counts(clip(-y_rel, -WIDEST, WIDEST), LATERAL_COUNTS),
+            "LONG_DIST": _counts(d_rel, DISTANCE_COUNTS_PER_M),
+            "REL_SPEED": _counts(v_rel, SPEED_COUNTS_PER_MPS),
+            "LAT_DIST": _counts(
+                clip(-y_rel, -MOST_LATERAL_DISTANCE, MOST_LATERAL_DISTANCE), LATERAL_COUNTS_PER_M
+            ),
         }
         word = 0
         for name, raw in counts.items():
             field = self._track.fields[name]
             word |= (raw & field.mask) << field.shift
         track = CanFrame(self._track.address, word.to_bytes(self._track.size, "big"), RADAR_BUS)
-        return self._state.pack((RADAR_GOOD,)), track
+        return self._state.pack((RADAR_STATE_GOOD,)), track
 
 
 def _counts(value: float, per_unit: float) -> int:

@@ -9,9 +9,9 @@ from selfdrive.common.realtime import DT_CTRL
 from selfdrive.sim.plant import Plant
 from selfdrive.sim.truth import GroundTruth
 
-FULL_TORQUE_RATE = 0.1  # deg/s of the steering wheel, for a torque of 1
+FULL_TORQUE_ANGLE_RATE = 0.1  # deg/s of the steering wheel, for a torque of 1
 ANGLE_PER_OFFSET = 0.1067  # deg of the steering wheel per m of lateral motion
-OFFSET_CYCLE = 5  # steps; only the first moves the car laterally
+OFFSET_CYCLE_STEPS = 5  # steps; only the first moves the car laterally
 FIRST_HEADWAY = 30.0  # s
 
 
@@ -29,11 +29,11 @@ class CrudeLateral:
 
     def step(self, torque: float, speed: float, curvature: float) -> float:
         """Advance 10 ms with `torque` (left positive, 1 is full); return the speed along the road (m/s)."""
-        change = DT_CTRL * FULL_TORQUE_RATE * torque
+        change = DT_CTRL * FULL_TORQUE_ANGLE_RATE * torque
         self._angle += change
         self.steer_angle = self._angle * DEG_TO_RAD
         self.steer_rate = change * DEG_TO_RAD / DT_CTRL
-        if self._step % OFFSET_CYCLE == 0:
+        if self._step % OFFSET_CYCLE_STEPS == 0:
             self.offset += change / ANGLE_PER_OFFSET
         self._step += 1
         return speed

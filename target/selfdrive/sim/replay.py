@@ -16,7 +16,7 @@ from selfdrive.sim.compare.tolerances import load_tolerances
 from selfdrive.sim.compare.trace_comparison import compare_trace
 from selfdrive.sim.compare.trace_csv import load_reference_trace, save_reference_trace
 from selfdrive.sim.run import EXIT_INVALID_INPUT
-from selfdrive.sim.scenario import PLANTS, REFERENCE_PLANT, on_plant
+from selfdrive.sim.scenario import PLANTS, REFERENCE_PLANT, with_plant
 
 EXIT_BEYOND_TOLERANCE = 1
 
@@ -78,7 +78,8 @@ def _load_or_simulate_runs(
         yield from (finished_runs.load_run(options.runs / name, options.plant) for name in names)
         return
     scenarios = [
-        on_plant(finished_runs.load_scenario_of_run(name, options.scenarios), options.plant) for name in names
+        with_plant(finished_runs.load_scenario_of_run(name, options.scenarios), options.plant)
+        for name in names
     ]
     yield from map(finished_runs.simulate_run, names, scenarios)
 

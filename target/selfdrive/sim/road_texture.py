@@ -16,11 +16,11 @@ from selfdrive.sim.road_look import DASH_PERIOD, LinePaint, RoadLook
 STRIP_HALF_WIDTH = 12.0  # m from the lane centre to the strip's edge
 ROWS_PER_PERIOD, COLUMNS = 400, 2400  # texels of 3 cm along the road and 1 cm across
 ROW_LENGTH, COLUMN_WIDTH = DASH_PERIOD / ROWS_PER_PERIOD, 2.0 * STRIP_HALF_WIDTH / COLUMNS  # m
-TILE_PERIODS = 3  # after which the finest texture, which cameras cannot resolve, repeats
+FINE_TEXTURE_REPEAT_PERIODS = 3  # after which the finest texture, which cameras cannot resolve, repeats
 TRACK_OFFSET, TRACK_WIDTH = 0.8, 0.35  # m: wheel tracks in a lane
 KERB_WIDTH = 0.25  # m
 FLAKE_ROWS, FLAKE_COLUMNS = 3, 3  # typical size of a flake
-VERGE_GRAIN = 3.0  # coarseness relative to the road
+VERGE_GRAIN_RATIO = 3.0  # coarseness relative to the road
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +55,7 @@ class RoadStrip:
 
 def paint_strip(look: RoadLook, periods: int, rng: np.random.Generator) -> RoadStrip:
     texels = _paint_ground(look, periods, rng)
-    _add_flaws(texels, look, rng)
+    _add_patches_and_cracks(texels, look, rng)
     for line_y, paint in road_lines(look):
         if paint is not None:
             _paint_line(texels, line_y, paint, look, rng)
@@ -94,9 +94,11 @@ def _cross_profile(look: RoadLook) -> np.ndarray:
 
 
 def _paint_ground(look: RoadLook, periods: int, rng: np.random.Generator) -> np.ndarray:
-    tile_periods = min(TILE_PERIODS, periods)
+    tile_periods = min(FINE_TEXTURE_REPEAT_PERIODS, periods)
     fine = rng.standard_normal((tile_periods * ROWS_PER_PERIOD, COLUMNS), dtype=np.float32)
-    coarser = np.where(np.abs(_column_positions()) > _verge_start(look), VERGE_GRAIN, 1.0).astype(np.float32)
+    coarser = np.where(np.abs(_column_positions()) > _verge_start(look), VERGE_GRAIN_RATIO, 1.0).astype(
+        np.float32
+    )
     fine = _cross_profile(look) + 2.0 * look.grain * coarser * cv2.blur(
         fine, (2, 2), borderType=cv2.BORDER_REFLECT
     )
@@ -109,7 +111,7 @@ def _paint_ground(look: RoadLook, periods: int, rng: np.random.Generator) -> np.
     return texels
 
 
-def _add_flaws(texels: np.ndarray, look: RoadLook, rng: np.random.Generator) -> None:
+def _add_patches_and_cracks(texels: np.ndarray, look: RoadLook, rng: np.random.Generator) -> None:
     rows, length = len(texels), len(texels) * ROW_LENGTH
     paved = 1.5 * look.lane_width
     for _ in range(rng.poisson(look.patches_per_100_m * length / 100.0)):

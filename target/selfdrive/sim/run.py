@@ -24,7 +24,7 @@ from selfdrive.sim.picture_options import (
     TRANSLATIONS,
     PictureOptions,
 )
-from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, on_plant
+from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, with_plant
 from selfdrive.sim.simulator import SimulationResult, Simulator
 from selfdrive.sim.trace_file import npz_pieces
 
@@ -77,7 +77,7 @@ def _open_run(options: argparse.Namespace) -> SteppedRun:
     if options.no_lead:
         scenario = replace(scenario, lead=None)
     if options.plant:
-        scenario = on_plant(scenario, options.plant)
+        scenario = with_plant(scenario, options.plant)
     if options.max_steps is not None:
         scenario = replace(scenario, steps=min(scenario.steps, options.max_steps))
     compiled.use_libraries_in(None if options.forget else options.compiled)

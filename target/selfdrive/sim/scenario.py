@@ -20,7 +20,7 @@ BUTTON_CODES = {
 }
 SPEED_UNITS = {"mps": 1.0, "kph": KPH_TO_MS, "mph": MPH_TO_MS}
 
-_EXPECTED_AND_REMEDY = (
+_EXPECTED_AND_REMEDY_OF_PLANT = (
     "a straight road and a start in mid-lane for the reference plant",
     "use the standard plant",
 )
@@ -134,14 +134,14 @@ def parse_scenario(text: str, where: str, digest: str) -> Scenario:
     if "plant" not in root:
         return scenario
     plant = root.text("plant", PLANTS)
-    root.check("plant", _is_possible_on(scenario, plant), *_EXPECTED_AND_REMEDY)
+    root.check("plant", _is_possible_on(scenario, plant), *_EXPECTED_AND_REMEDY_OF_PLANT)
     return replace(scenario, plant=plant)
 
 
-def on_plant(scenario: Scenario, plant: str) -> Scenario:
+def with_plant(scenario: Scenario, plant: str) -> Scenario:
     """Return the scenario on the named plant. Raises ConfigError if the plant does not support its road."""
     if not _is_possible_on(scenario, plant):
-        expected, remedy = _EXPECTED_AND_REMEDY
+        expected, remedy = _EXPECTED_AND_REMEDY_OF_PLANT
         raise ConfigError(f"{scenario.name} on the plant {plant!r}", expected=expected, remedy=remedy)
     return replace(scenario, plant=plant)
 

@@ -2,7 +2,7 @@
 
 from selfdrive.can.dbc import load_dbc
 from selfdrive.can.packer import MessagePacker
-from selfdrive.car.honda.values import CAR_BUS, CAR_DBC, GEAR_CODES
+from selfdrive.car.honda.values import CAR_BUS, CAR_DBC, GEAR_CODE_BY_NAME
 from selfdrive.common.conversions import MS_TO_KPH, RAD_TO_DEG
 from selfdrive.messages import CanFrame
 from selfdrive.sim.truth import GroundTruth
@@ -16,7 +16,7 @@ _CONSTANT_SIGNALS = {
         "POWERTRAIN_DATA": {"PEDAL_GAS": 0, "BRAKE_SWITCH": 0, "BRAKE_PRESSED": 0},
     },
     2: {
-        "GEARBOX": {"GEAR_SHIFTER": GEAR_CODES["drive"]},
+        "GEARBOX": {"GEAR_SHIFTER": GEAR_CODE_BY_NAME["drive"]},
         "VSA_STATUS": {"ESP_DISABLED": 0, "BRAKE_HOLD_ACTIVE": 0},
     },
     10: {

@@ -1,4 +1,4 @@
-/* Stands for: coded_detector.py, ../common/array_math.py, sums.h.
+/* Stands for: authors_code_detector.py, ../common/array_math.py, sums.h.
  * Edges in windows, their clusters, and the columns of the two lines next to the middle: the same numbers as in
  * Python to the bit. Edges and clusters are integers; everything else uses the same operations in the same order,
  * and numpy's order of sums. */

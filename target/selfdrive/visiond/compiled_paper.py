@@ -10,7 +10,7 @@ from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.visiond import compiled_windows
-from selfdrive.visiond.compiled_sums import has_identical_sums
+from selfdrive.visiond.compiled_sums_check import has_identical_sums
 from selfdrive.visiond.compiled_windows import MarkWindowFinder
 from selfdrive.visiond.detector import LaneLines, RoadLine
 from selfdrive.visiond.hog import WINDOW_STRIDE
@@ -19,7 +19,7 @@ from selfdrive.visiond.paper_detector import CLUSTER_REACH, MIN_LOG_ODDS, PaperD
 from selfdrive.visiond.road_region import RoadRegion
 
 C_SOURCE = Path(__file__).with_name("mark_lines.c")
-EXACT_BELOW = 2**24  # smaller integers, and sums of them, are exact in single precision
+FLOATS_EXACT_BELOW = 2**24  # smaller integers, and sums of them, are exact in single precision
 NO_NUMBER = 2**31 - 1  # larger than any, so that the minimum over neighbours ignores it
 
 
@@ -94,7 +94,7 @@ class CompiledPaperDetector(PaperDetector):
             return super().detect(view)
         address, sums = part.ctypes.data, self._arrays["sums"]
         self._take_gradients(self._at, address)
-        if sums.max() >= EXACT_BELOW:
+        if sums.max() >= FLOATS_EXACT_BELOW:
             return super().detect(view)
         mean = (sums * np.float32(1.0 / WINDOW_STRIDE**2)).astype(np.float32)
         self._arrays["limits"][...] = steepness_limits(mean)

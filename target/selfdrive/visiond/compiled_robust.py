@@ -11,16 +11,16 @@ from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.visiond.band_filter import (
     CERTAINTY_PER_RESPONSE,
-    EDGE_COLUMNS,
     MOST_POINTS,
-    TEXTURE_AREA,
+    SKIPPED_BORDER_COLUMNS,
+    TEXTURE_WINDOW,
     find_crests,
 )
-from selfdrive.visiond.compiled_sums import has_identical_sums
+from selfdrive.visiond.compiled_sums_check import has_identical_sums
 from selfdrive.visiond.compiled_view import CompiledRoadView
 from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.robust_detector import RobustDetector
-from selfdrive.visiond.voting import BIN_WIDTH, MOST_LATERAL, ExpectedPose, LanePose, find_pose
+from selfdrive.visiond.voting import MOST_LINE_OFFSET, VOTE_BIN_WIDTH, ExpectedPose, LanePose, find_pose
 
 MOST_CANDIDATES = 512  # for the lines' meeting point; MOST in the C file
 ROWS_AT_ONCE = 8  # rows that the C file sums at once
@@ -57,7 +57,7 @@ class CompiledCrests:
     def __init__(self, library: compiled.Library, shape: tuple[int, int]) -> None:
         self._crests = library.code.crests
         self._crests.argtypes, self._crests.restype = [ctypes.c_void_p], ctypes.c_long
-        self._shape, inner = shape, shape[1] - 2 * EDGE_COLUMNS
+        self._shape, inner = shape, shape[1] - 2 * SKIPPED_BORDER_COLUMNS
         points = shape[0], inner
         self._arrays = {
             "eroded": np.empty(shape, np.uint8),
@@ -66,7 +66,7 @@ class CompiledCrests:
             "rough": np.empty(points, np.float32),
             "sums": np.empty((shape[0] + ROWS_AT_ONCE, inner)),
             "column": np.empty(inner),
-            "padded": np.zeros((ROWS_AT_ONCE, inner + TEXTURE_AREA[0])),
+            "padded": np.zeros((ROWS_AT_ONCE, inner + TEXTURE_WINDOW[0])),
             "sure": np.empty(inner, np.float32),
             "at": np.empty(shape[0] * inner + 1, np.int64),
             "weight": np.empty(shape[0] * inner + 1, np.float32),
@@ -133,10 +133,12 @@ class CompiledVote:
         self._arrays |= {
             "room": np.empty((18, MOST_POINTS)),
             "found": np.empty((5, MOST_POINTS)),
-            "supports": np.empty((MOST_CANDIDATES, round(2 * MOST_LATERAL / BIN_WIDTH))),
+            "supports": np.empty((MOST_CANDIDATES, round(2 * MOST_LINE_OFFSET / VOTE_BIN_WIDTH))),
         }
         places = {name: array.ctypes.data for name, array in self._arrays.items()}
-        self._map = _MapStructure(rows=self._shape[0], columns=self._shape[1], edge=EDGE_COLUMNS, **places)
+        self._map = _MapStructure(
+            rows=self._shape[0], columns=self._shape[1], edge=SKIPPED_BORDER_COLUMNS, **places
+        )
         self._belief, self._pose = (ctypes.c_double * 8)(), (ctypes.c_double * 6)()
 
     def __call__(
@@ -160,8 +162,14 @@ def has_identical_votes(library: compiled.Library, model: CameraModel) -> bool:
     view = RoadView(model)
     number = np.arange(400)
     road = (np.arange(len(view.drop) * len(view.y)) % 251).astype(np.uint8).reshape(len(view.drop), -1)
-    row, column = number * 7 % len(view.drop), number * number * 13 % (len(view.y) - 2 * EDGE_COLUMNS)
-    points = row * (len(view.y) - 2 * EDGE_COLUMNS) + column, np.sqrt(number / 400).astype(np.float32)
+    row, column = (
+        number * 7 % len(view.drop),
+        number * number * 13 % (len(view.y) - 2 * SKIPPED_BORDER_COLUMNS),
+    )
+    points = (
+        row * (len(view.y) - 2 * SKIPPED_BORDER_COLUMNS) + column,
+        np.sqrt(number / 400).astype(np.float32),
+    )
     beliefs = ExpectedPose(), ExpectedPose(meeting_left=(3.3, 7.1), width=(3.4, 0.02), meeting_dip=(0.7, 1.5))
     compiled_vote = CompiledVote(library, view)
     return all(

@@ -12,7 +12,7 @@ from selfdrive.visiond.lane_net import FEATURE_STEPS, HIDDEN_NODES, WEIGHT_STEPS
 
 C_SOURCE = Path(__file__).with_name("mark_windows.c")
 MOST_WEIGHT_STEPS = 2**13  # largest number of weight steps per unit in the coarse score
-PADDED_FEATURES = 1776  # number of a window's features, padded to whole vectors
+PADDED_FEATURE_COUNT = 1776  # number of a window's features, padded to whole vectors
 
 
 class _NetStructure(ctypes.Structure):
@@ -31,7 +31,7 @@ class MarkWindowFinder:
 
     def __init__(self, size: tuple[int, int], threshold: float, library: compiled.Library) -> None:
         net, (rows, width) = LaneNet.load(), size
-        coarse = np.zeros((HIDDEN_NODES, PADDED_FEATURES), np.int16)
+        coarse = np.zeros((HIDDEN_NODES, PADDED_FEATURE_COUNT), np.int16)
         coarse_steps = _coarse_steps(net)
         coarse[:, :WINDOW_FEATURES] = np.rint(net.hidden_steps.T * (coarse_steps / WEIGHT_STEPS))
         down, across = rows // CELL_PIXELS, width // CELL_PIXELS

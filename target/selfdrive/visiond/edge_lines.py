@@ -10,16 +10,16 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.visiond.detector import RoadLine
 from selfdrive.visiond.road_region import RoadRegion
 
-MIN_PIXELS = 24  # in a cluster, or a line, that is used
-MIN_SPREAD = 3.0  # standard deviation of its rows
+MIN_LINE_PIXELS = 24  # in a cluster, or a line, that is used
+MIN_ROW_SPREAD = 3.0  # standard deviation of its rows
 MAX_SLOPE = 0.15  # lines that diverge more from the car's heading do not bound its lane
 NEAREST_LINE_DISTANCE = 8.0  # m ahead, where the nearest line is determined
-CROWD_WIDTH = 0.8  # m; of lines this close to each other, the one with more edges is used
+RIVAL_LINES_DISTANCE = 0.8  # m; of lines this close to each other, the one with more edges is used
 MOST_TRIED_CLUSTERS = 8  # clusters examined on each side, from the nearest
-FIT_REACHES = 0.3, 0.2  # m; distance of edges that belong to a line, in each round of fitting
-MIN_EDGE_SHARE = 0.12  # smallest share of a mark's edges that lead into the paint, and out of it
-MARK_WIDTHS = 0.03, 0.45  # m between both kinds of edges, for one or two strips of paint
-MOST_EDGE_DEVIATION = 0.05  # m, standard deviation of the edges on one side of a strip of paint
+FIT_ROUND_REACHES = 0.3, 0.2  # m; distance of edges that belong to a line, in each round of fitting
+MIN_SHARE_OF_EITHER_EDGE = 0.12  # smallest share of a mark's edges that lead into the paint, and out of it
+MARK_WIDTH_RANGE = 0.03, 0.45  # m between both kinds of edges, for one or two strips of paint
+MOST_PAINT_EDGE_SPREAD = 0.05  # m, standard deviation of the edges on one side of a strip of paint
 CERTAIN_PIXELS = 80.0  # edge pixels of a line with full certainty
 HALF_CERTAIN_SPREAD = 0.25  # m: root mean square distance of a line's edges at which its probability is half
 
@@ -60,10 +60,10 @@ class EdgeLines:
             return None, None
         if not clustered.all():
             at, rising, labels = at[clustered], rising[clustered], labels[clustered]
-        points = self._points(at, rising)
+        points = self._edge_points(at, rising)
         size, spread, a, b = _fit_clusters(points.row, points.column, labels)
         y, slope = self._model.line_on_road(a, b)
-        usable = (size >= MIN_PIXELS) & (spread >= MIN_SPREAD) & (np.abs(slope) <= MAX_SLOPE)
+        usable = (size >= MIN_LINE_PIXELS) & (spread >= MIN_ROW_SPREAD) & (np.abs(slope) <= MAX_SLOPE)
         sides = []
         for side in (1.0, -1.0):
             away = np.where(usable, side * (y + NEAREST_LINE_DISTANCE * slope), -1.0)
@@ -73,7 +73,7 @@ class EdgeLines:
             sides.append(self._nearest_line(clusters, points))
         return sides[0], sides[1]
 
-    def _points(self, at: np.ndarray, rising: np.ndarray) -> EdgePoints:
+    def _edge_points(self, at: np.ndarray, rising: np.ndarray) -> EdgePoints:
         region = self._region
         row = at // region.shape[1]
         column = at - row * region.shape[1]
@@ -88,7 +88,7 @@ class EdgeLines:
         best, first, most_pixels, best_distance = None, 0.0, 0, 0.0
         for distance, a, b in clusters:
             if best is not None and (
-                distance > first + CROWD_WIDTH or distance < best_distance + FIT_REACHES[0]
+                distance > first + RIVAL_LINES_DISTANCE or distance < best_distance + FIT_ROUND_REACHES[0]
             ):
                 continue
             line, pixels = self._fit_mark(a, b, points)
@@ -100,15 +100,15 @@ class EdgeLines:
     def _fit_mark(self, a: float, b: float, points: EdgePoints) -> tuple[RoadLine | None, int]:
         """The line through all edges near column = a * row + b, and their number; (None, 0) if not a mark."""
         near = points
-        for reach in FIT_REACHES:
+        for reach in FIT_ROUND_REACHES:
             away = np.abs(_distances_from_line(near, a, b))
             near = near.take((away <= reach).nonzero()[0])
-            if near.row.size < MIN_PIXELS:
+            if near.row.size < MIN_LINE_PIXELS:
                 return None, 0
             spread, a, b = _fit_line(near.row, near.column)
         y, slope = self._model.line_on_road(a, b)
         away = _distances_from_line(near, a, b)
-        if spread < MIN_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, near.rising):
+        if spread < MIN_ROW_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, near.rising):
             return None, 0
         doubt = dot(away, away) / away.size / HALF_CERTAIN_SPREAD**2
         prob = min(1.0, near.row.size / CERTAIN_PIXELS) / (1.0 + doubt)
@@ -130,10 +130,10 @@ def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
     the other edges must be as sharp as paint.
     """
     brighter, darker = away[rising], away[~rising]
-    least = MIN_EDGE_SHARE * away.size
+    least = MIN_SHARE_OF_EITHER_EDGE * away.size
     if min(brighter.size, darker.size) < least:
         return False
-    if _is_paint(brighter, darker):
+    if _is_strip_of_paint(brighter, darker):
         return True
     pairs = (
         (brighter, darker[darker > np.median(brighter)]),  # a seam left of the paint
@@ -141,15 +141,15 @@ def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
     )
     return any(
         min(up.size, down.size) >= least
-        and max(up.std(), down.std()) <= MOST_EDGE_DEVIATION
-        and _is_paint(up, down)
+        and max(up.std(), down.std()) <= MOST_PAINT_EDGE_SPREAD
+        and _is_strip_of_paint(up, down)
         for up, down in pairs
     )
 
 
-def _is_paint(brighter: np.ndarray, darker: np.ndarray) -> bool:
+def _is_strip_of_paint(brighter: np.ndarray, darker: np.ndarray) -> bool:
     width = float(darker.sum()) / darker.size - float(brighter.sum()) / brighter.size
-    return MARK_WIDTHS[0] <= width <= MARK_WIDTHS[1]
+    return MARK_WIDTH_RANGE[0] <= width <= MARK_WIDTH_RANGE[1]
 
 
 def _fit_line(row: np.ndarray, column: np.ndarray) -> tuple[float, float, float]:

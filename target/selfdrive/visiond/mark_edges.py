@@ -6,7 +6,7 @@ import numpy as np
 from selfdrive.visiond.hog import WINDOW_STRIDE
 
 STEEPNESS_RATIO = 1.6  # steepness of an edge, relative to the root mean square of its surroundings
-MIN_STEEPNESS = 40.0  # of the Sobel sum, whose weights add up to 4; anything less is grain
+MIN_EDGE_STEEPNESS = 40.0  # of the Sobel sum, whose weights add up to 4; anything less is grain
 
 
 def tiles_with_mark(marked: np.ndarray, need: int) -> np.ndarray:
@@ -52,4 +52,4 @@ def find_steep_edges(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def steepness_limits(power: np.ndarray) -> np.ndarray:
     """Each tile's squared gradient above which edges are steep; `power` has the tiles' means."""
-    return np.maximum(STEEPNESS_RATIO**2 * cv2.blur(power, (3, 3)), MIN_STEEPNESS**2)
+    return np.maximum(STEEPNESS_RATIO**2 * cv2.blur(power, (3, 3)), MIN_EDGE_STEEPNESS**2)

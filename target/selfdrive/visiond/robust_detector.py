@@ -101,7 +101,7 @@ class RobustDetector:
 
     def _line_at(self, y: float, prob: float) -> RoadLine:
         model, pose = self._model, self._pose
-        a = -y * model.spread(1.0)
+        a = -y * model.lines_divergence(1.0)
         b = model.cx - pose.meeting_left - a * (model.horizon - pose.meeting_dip)
         at_camera, slope = model.line_on_road(a, b)
         return RoadLine(y=at_camera, slope=slope, prob=prob)

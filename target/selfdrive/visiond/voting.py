@@ -16,17 +16,19 @@ from selfdrive.common.array_math import each, natural_log, product
 from selfdrive.visiond.band_filter import MarkPoints, mark_points_at
 from selfdrive.visiond.road_view import RoadView
 
-BIN_WIDTH = 0.1  # m, for votes
-MOST_LATERAL = 4.0  # m, largest lateral position of lines
+VOTE_BIN_WIDTH = 0.1  # m, for votes
+MOST_LINE_OFFSET = 4.0  # m, largest lateral position of lines
 LEFT_STEP, DIP_STEP = 4.0, 6.0  # px between candidates
-CHANCE_SHARE = 0.005  # share of a line's rows with points by chance, on the cleanest road
+CHANCE_POINTS_SHARE = 0.005  # share of a line's rows with points by chance, on the cleanest road
 # averages the bins of y around a line
 SURROUNDINGS_KERNEL = np.array([[1] * 8 + [0] * 5 + [1] * 8], np.float32) / 16
-CHANCE_DISTANCE = 0.8  # m from a line, within which points by chance are counted
-FIT_REACHES = (0.30, 0.20, 0.15, 0.15)  # m from a line, where points are used in each round of the fit
+CHANCE_POINTS_DISTANCE = 0.8  # m from a line, within which points by chance are counted
+FIT_ROUND_REACHES = (0.30, 0.20, 0.15, 0.15)  # m from a line, where points are used in each round of the fit
 DEPENDENT_POINTS = 10.0  # this many neighbouring points count as one, because they are not independent
-FAINT_SHARE = 0.02  # share of rows that makes a line probable if there are no other points; a dash is 0.05
-POINT_BLUR = 0.5, 0.05  # px and m by which a point can miss its mark
+FAINT_LINE_SHARE = (
+    0.02  # share of rows that makes a line probable if there are no other points; a dash is 0.05
+)
+POINT_POSITION_ERRORS = 0.5, 0.05  # px and m by which a point can miss its mark
 
 
 class LanePose(NamedTuple):
@@ -70,7 +72,9 @@ class VotingPoints:
         self.drop = view.drop[points.row]
         self.metre = scale / self.drop
         self.weight = points.weight * view.share[points.row]
-        self.precision = self.weight / (DEPENDENT_POINTS * (POINT_BLUR[0] + POINT_BLUR[1] * scale) ** 2)
+        self.precision = self.weight / (
+            DEPENDENT_POINTS * (POINT_POSITION_ERRORS[0] + POINT_POSITION_ERRORS[1] * scale) ** 2
+        )
         self.rows = max(rows, 1.0)
 
 
@@ -95,7 +99,7 @@ def elect_candidate(voters: VotingPoints, belief: ExpectedPose) -> LanePose:
     votes = _votes(voters, meeting_left, meeting_dip)
     around = cv2.filter2D(votes, -1, SURROUNDINGS_KERNEL, borderType=cv2.BORDER_REFLECT)
     support = natural_log(
-        np.float32(1.0) + np.maximum(votes - around, 0.0) / (around + np.float32(CHANCE_SHARE))
+        np.float32(1.0) + np.maximum(votes - around, 0.0) / (around + np.float32(CHANCE_POINTS_SHARE))
     )
     support -= (
         0.25
@@ -104,10 +108,10 @@ def elect_candidate(voters: VotingPoints, belief: ExpectedPose) -> LanePose:
             + _unlikeliness(meeting_dip, *belief.meeting_dip)
         )
     )[:, None]
-    y = MOST_LATERAL - BIN_WIDTH * (np.arange(votes.shape[1]) + 0.5)
+    y = MOST_LINE_OFFSET - VOTE_BIN_WIDTH * (np.arange(votes.shape[1]) + 0.5)
     best, best_place = -np.inf, (0, 0, 0)
-    for width in _candidates(*belief.width, BIN_WIDTH):
-        lane = round(float(width) / BIN_WIDTH)
+    for width in _candidates(*belief.width, VOTE_BIN_WIDTH):
+        lane = round(float(width) / VOTE_BIN_WIDTH)
         pairs = support[:, :-lane] + support[:, lane:]
         middle = 0.5 * (y[:-lane] + y[lane:])
         pairs -= 0.5 * (_unlikeliness(middle, *belief.middle) + _unlikeliness(width, *belief.width))
@@ -131,9 +135,9 @@ def _unlikeliness(value: np.ndarray, mean: float, sigma: float) -> np.ndarray:
 
 def _votes(voters: VotingPoints, meeting_left: np.ndarray, meeting_dip: np.ndarray) -> np.ndarray:
     """Share of rows with a point, by candidate and by y; each point is counted in about three bins of y."""
-    bins, outside = round(2 * MOST_LATERAL / BIN_WIDTH), 1
+    bins, outside = round(2 * MOST_LINE_OFFSET / VOTE_BIN_WIDTH), 1
     y = (voters.offset - meeting_left[:, None]) / (voters.metre * (voters.drop + meeting_dip[:, None]))
-    column = ((MOST_LATERAL - y) * np.float32(1.0 / BIN_WIDTH) + outside).astype(np.int32)
+    column = ((MOST_LINE_OFFSET - y) * np.float32(1.0 / VOTE_BIN_WIDTH) + outside).astype(np.int32)
     np.clip(column, 0, bins + outside, out=column)
     column += (np.arange(len(meeting_left), dtype=np.int32) * (bins + 2 * outside))[:, None]
     votes = np.bincount(
@@ -148,13 +152,13 @@ def _votes(voters: VotingPoints, meeting_left: np.ndarray, meeting_dip: np.ndarr
 class FitResult(NamedTuple):
     """The result of the fit, `state` (4), and the values of its last step before the state moved.
 
-    `metre` is px per m at each of n points; `error` (px) and `count` (weight) are by line and point (2, n).
+    `pixels_per_metre` is by point (n); `pixel_errors` and `counted_weights` are by line and point (2, n).
     """
 
     state: np.ndarray
-    metre: np.ndarray
-    error: np.ndarray
-    count: np.ndarray
+    pixels_per_metre: np.ndarray
+    pixel_errors: np.ndarray
+    counted_weights: np.ndarray
 
 
 def fit_state(
@@ -168,7 +172,7 @@ def fit_state(
     terms = np.zeros((5, 2, n))  # negative derivatives of the error for each unknown, and the error
     terms[0] = 1.0
     prior = product(expected.T, expected)
-    for near in FIT_REACHES:
+    for near in FIT_ROUND_REACHES:
         metre = voters.metre * (voters.drop + state[1])
         y = state[2:, None]
         error = voters.offset - state[0] - y * metre
@@ -189,12 +193,12 @@ def fit_pose(pose: LanePose, voters: VotingPoints, belief: ExpectedPose) -> Lane
     means, sigmas = np.array([belief.meeting_left, belief.meeting_dip, belief.middle, belief.width]).T
     expected = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0.5, 0.5), (0, 0, 1, -1)]) / sigmas[:, None]
     state, metre, error, count = fit_state(np.array(pose[:4]), voters, expected, means / sigmas)
-    near = FIT_REACHES[-1]
+    near = FIT_ROUND_REACHES[-1]
     off = np.abs(error / metre)
-    beside = (((off > near) & (off < CHANCE_DISTANCE)) * voters.weight).sum(axis=1) / voters.rows
-    chance = beside * (4.0 / 3.0 * near / (2.0 * (CHANCE_DISTANCE - near)))
+    beside = (((off > near) & (off < CHANCE_POINTS_DISTANCE)) * voters.weight).sum(axis=1) / voters.rows
+    chance = beside * (4.0 / 3.0 * near / (2.0 * (CHANCE_POINTS_DISTANCE - near)))
     excess = np.maximum((count * voters.weight).sum(axis=1) / voters.rows - chance, 0.0)
-    prob = 1.0 - each(exp, -excess / (FAINT_SHARE + chance))
+    prob = 1.0 - each(exp, -excess / (FAINT_LINE_SHARE + chance))
     return LanePose(*state.tolist(), *prob.tolist())
 
 

@@ -1,9 +1,9 @@
 """Measures how well detectors find real lanes in bad weather.
 
 `python -m selfdrive.visiond_lab.evaluate_under_effects FRAMES TRUTH` takes the same input as
-`selfdrive.visiond_lab.evaluate`. Each frame is changed by each level of each effect, once per seed. The
-result is the number of pictures in which a detector misses a line; these counts are not independent, because
-a frame always shows the same road.
+`selfdrive.visiond_lab.evaluate_on_real_frames`. Each frame is changed by each level of each effect, once per
+seed. The result is the number of pictures in which a detector misses a line; these counts are not
+independent, because a frame always shows the same road.
 """
 
 import argparse
@@ -19,10 +19,10 @@ import numpy as np
 from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.effects.effect import Effect, Moment
 from selfdrive.sim.effects.effects_page import draw_level_panel
-from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
+from selfdrive.sim.effects.levels import AMOUNTS_BY_EFFECT
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
-from selfdrive.visiond_lab.evaluate import (
+from selfdrive.visiond_lab.evaluate_on_real_frames import (
     EXIT_INVALID_INPUT,
     PAPER,
     ROBUST,
@@ -54,7 +54,7 @@ def count_missed_lines(
     models = {frame.model for frame in frames}
     detectors_by_model = {model: [build_lane_detector(name, model) for name in DETECTORS] for model in models}
     for kind in kinds:
-        for level, amount in enumerate(LEVEL_AMOUNTS[kind], 1):
+        for level, amount in enumerate(AMOUNTS_BY_EFFECT[kind], 1):
             missed, pictures = np.zeros(len(DETECTORS), int), 0
             for frame, picture in _affected_pictures(frames, kind, amount, seeds):
                 has_found = [
@@ -90,7 +90,7 @@ def _affected_pictures(
 
 def draw_level_strip(frame: LabelledFrame, kind: type[Effect]) -> np.ndarray:
     panels = []
-    for level, amount in enumerate(LEVEL_AMOUNTS[kind], 1):
+    for level, amount in enumerate(AMOUNTS_BY_EFFECT[kind], 1):
         affected = kind(amount, 1, frame.model).apply(frame.grey, EFFECT_MOMENT)
         panels.append(draw_level_panel(affected, level, amount, kind.UNIT))
     panels += [np.zeros_like(panels[0])] * (-len(panels) % PANELS_PER_ROW)
@@ -101,7 +101,7 @@ def draw_level_strip(frame: LabelledFrame, kind: type[Effect]) -> np.ndarray:
 def main(arguments: Sequence[str] | None = None) -> int:
     options = _parse_arguments(arguments)
     cv2.setNumThreads(1)
-    kinds = [kind for kind in LEVEL_AMOUNTS if not options.effect or kind.__name__ in options.effect]
+    kinds = [kind for kind in AMOUNTS_BY_EFFECT if not options.effect or kind.__name__ in options.effect]
     try:
         frames = load_labelled_frames(options.frames, options.truth)
         if options.strips:
@@ -151,7 +151,7 @@ def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("frames", type=Path, metavar="FRAMES", help="folder of frames")
     parser.add_argument("truth", type=Path, metavar="TRUTH", help="JSON file with the true lines")
-    names = [kind.__name__ for kind in LEVEL_AMOUNTS]
+    names = [kind.__name__ for kind in AMOUNTS_BY_EFFECT]
     parser.add_argument(
         "--effect", action="append", choices=names, help="only these effects; can be given several times"
     )

@@ -9,10 +9,14 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.lead_picture import draw_car
 from selfdrive.sim.road_look import LinePaint, RoadLook
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond_lab.picture_flaws import RoadsideFlaws, bend_images, simulate_camera
 from selfdrive.visiond_lab.random_looks import random_camera, random_look
+from selfdrive.visiond_lab.real_picture_features import (
+    RandomVergesAndBands,
+    bend_road_in_images,
+    degrade_like_bad_camera,
+)
 
-SCENE_PERIODS = 4  # of 12.2 m, length of a scene's road
+DASH_PERIODS_PER_SCENE = 4  # of 12.2 m, length of a scene's road
 VIEWS_PER_SCENE = 6  # pictures of each scene
 
 
@@ -28,16 +32,16 @@ class TrainingView:
 def generate_views(scenes: int, rng: np.random.Generator) -> Iterator[TrainingView]:
     for _ in range(scenes):
         look, model, seed = random_look(rng), random_camera(rng), int(rng.integers(2**31))
-        road = RoadRenderer(model, look, seed, periods=SCENE_PERIODS)
-        marks = RoadRenderer(model, _only_paint(look), seed, periods=SCENE_PERIODS)
+        road = RoadRenderer(model, look, seed, periods=DASH_PERIODS_PER_SCENE)
+        marks = RoadRenderer(model, _only_paint(look), seed, periods=DASH_PERIODS_PER_SCENE)
         hidden = _pixels_behind_cars(look, model)
-        ground = RoadsideFlaws(model, look.lane_width, rng)
+        ground = RandomVergesAndBands(model, look.lane_width, rng)
         for _ in range(VIEWS_PER_SCENE):
             pose = rng.uniform(0.0, 50.0), rng.normal(0.0, 0.45), rng.normal(0.0, 0.02)
             paint = np.where(hidden, np.uint8(0), marks.render_grey(*pose))
             picture, paint = ground.apply(road.render_grey(*pose), paint, offset=pose[1], heading=pose[2])
-            picture, paint = bend_images(model, (picture, paint), rng)
-            yield TrainingView(model=model, picture=simulate_camera(picture, rng), paint=paint)
+            picture, paint = bend_road_in_images(model, (picture, paint), rng)
+            yield TrainingView(model=model, picture=degrade_like_bad_camera(picture, rng), paint=paint)
 
 
 def _pixels_behind_cars(look: RoadLook, model: CameraModel) -> np.ndarray:

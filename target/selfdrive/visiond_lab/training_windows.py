@@ -11,7 +11,7 @@ MOST_WINDOWS_PER_LABEL = 12  # largest number of windows per picture with a mark
 MIN_MARK_PAINT = 40.0  # pixels of paint in a mark; windows between NO_PAINT and this are not used
 MIN_MARK_CONTRAST = 6.0  # grey levels between paint and surroundings; windows with less are not used
 MOST_PAINT_WITHOUT_MARK = 2.0  # pixels
-RING_KERNEL = np.ones((7, 7), np.uint8)  # neighbourhood for comparison with paint
+SURROUNDINGS_KERNEL = np.ones((7, 7), np.uint8)  # neighbourhood for comparison with paint
 
 
 def draw_labelled_windows(scenes: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -51,7 +51,7 @@ def _sampling_weights(view: TrainingView, region: RoadRegion) -> tuple[np.ndarra
     """
     picture = view.picture[region.part].astype(np.float32)
     paint = (view.paint[region.part] > 127).view(np.uint8)
-    ring = (cv2.dilate(paint, RING_KERNEL) - paint).astype(np.float32)
+    ring = (cv2.dilate(paint, SURROUNDINGS_KERNEL) - paint).astype(np.float32)
     paint = paint.astype(np.float32)
     amount, around = _sum_windows(paint), _sum_windows(ring)
     inside, outside = _sum_windows(picture * paint), _sum_windows(picture * ring)

@@ -3,7 +3,7 @@
 from math import isfinite
 
 from selfdrive.car.honda.hondacan import CommandPacker
-from selfdrive.car.honda.values import BRAKE_COUNTS, PEDAL_COUNTS, PEDAL_REST, STEER_COUNTS
+from selfdrive.car.honda.values import BRAKE_COUNTS, PEDAL_COUNTS, PEDAL_REST_COUNTS, STEER_COUNTS
 from selfdrive.common.conversions import MS_TO_KPH
 from selfdrive.common.interp import clip
 from selfdrive.common.realtime import DT_CTRL
@@ -11,11 +11,11 @@ from selfdrive.messages import CanFrame, CarControl, CarState
 
 BRAKE_ON = 0.02  # a demand of at least this much starts braking
 BRAKE_OFF = 0.005  # below this, braking ends
-BRAKE_GAP = 0.01  # smaller changes of the demand are ignored
-BRAKE_RISE = 1.0 * DT_CTRL  # per cycle; the brake can drop immediately
+BRAKE_HYSTERESIS_GAP = 0.01  # smaller changes of the demand are ignored
+MOST_BRAKE_RISE_PER_STEP = 1.0 * DT_CTRL  # per cycle; the brake can drop immediately
 
-PEDALS_EVERY = 2  # cycles
-DISPLAY_EVERY = 10  # cycles
+STEPS_PER_PEDAL_FRAMES = 2  # cycles
+STEPS_PER_DISPLAY_FRAMES = 10  # cycles
 
 
 class BrakeHysteresis:
@@ -31,10 +31,10 @@ class BrakeHysteresis:
         self._braking = brake > 0.0
         if not self._braking:
             self._steady = 0.0
-        elif brake > self._steady + BRAKE_GAP:
-            self._steady = brake - BRAKE_GAP
-        elif brake < self._steady - BRAKE_GAP:
-            self._steady = brake + BRAKE_GAP
+        elif brake > self._steady + BRAKE_HYSTERESIS_GAP:
+            self._steady = brake - BRAKE_HYSTERESIS_GAP
+        elif brake < self._steady - BRAKE_HYSTERESIS_GAP:
+            self._steady = brake + BRAKE_HYSTERESIS_GAP
         return self._steady
 
 
@@ -50,23 +50,23 @@ class CarController:
         """Return the frames of control cycle `frame`. A NaN demand is sent as zero."""
         demand = control.actuators
         enabled = control.enabled
-        gas = _finite(demand.gas) if enabled else 0.0
-        steer = _finite(demand.steer) if enabled else 0.0
-        brake = self._hysteresis.update(_finite(demand.brake) if enabled else 0.0)
-        self._brake = min(brake, self._brake + BRAKE_RISE)
+        gas = _finite_or_zero(demand.gas) if enabled else 0.0
+        steer = _finite_or_zero(demand.steer) if enabled else 0.0
+        brake = self._hysteresis.update(_finite_or_zero(demand.brake) if enabled else 0.0)
+        self._brake = min(brake, self._brake + MOST_BRAKE_RISE_PER_STEP)
 
         active = enabled and not car.steer_not_allowed
         torque = int(clip(-steer, -1.0, 1.0) * STEER_COUNTS) if active else 0
         frames = [self._can.steering(torque, active, frame)]
-        if frame % PEDALS_EVERY == 0:
-            frames += self._pedals(control, car, gas, frame // PEDALS_EVERY)
-        if frame % DISPLAY_EVERY == 0:
-            frames += self._display(control, frame // DISPLAY_EVERY)
+        if frame % STEPS_PER_PEDAL_FRAMES == 0:
+            frames += self._pedals(control, car, gas, frame // STEPS_PER_PEDAL_FRAMES)
+        if frame % STEPS_PER_DISPLAY_FRAMES == 0:
+            frames += self._display(control, frame // STEPS_PER_DISPLAY_FRAMES)
         return frames
 
     def _pedals(self, control: CarControl, car: CarState, gas: float, counter: int) -> list[CanFrame]:
         brake_counts = int(clip(self._brake * BRAKE_COUNTS, 0, BRAKE_COUNTS - 1))
-        gas_counts = int(min(gas, 1.0) * PEDAL_COUNTS) + PEDAL_REST if gas > 0.0 else 0
+        gas_counts = int(min(gas, 1.0) * PEDAL_COUNTS) + PEDAL_REST_COUNTS if gas > 0.0 else 0
         cancel = control.cancel_cruise or (car.cruise_enabled and not control.enabled)
         fcw = control.visual_alert == "fcw"
         chime = control.audible_alert != "none"
@@ -86,5 +86,5 @@ class CarController:
         ]
 
 
-def _finite(value: float) -> float:
+def _finite_or_zero(value: float) -> float:
     return value if isfinite(value) else 0.0

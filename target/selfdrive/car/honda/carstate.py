@@ -8,10 +8,10 @@ from selfdrive.car.honda.values import (
     CAR_BUS,
     CAR_DBC,
     CAR_MESSAGES,
-    GEARS,
+    GEAR_NAME_BY_CODE,
     STEER_OVERRIDE_TORQUE,
     STEER_STATUS_NORMAL,
-    STEER_STATUS_PASSING,
+    STEER_STATUSES_WITHOUT_FAULT,
     CruiseButton,
 )
 from selfdrive.common.conversions import DEG_TO_RAD, KPH_TO_MS
@@ -20,7 +20,7 @@ from selfdrive.common.kalman import SteadyKalman
 from selfdrive.common.realtime import DT_CTRL
 from selfdrive.messages import ButtonEvent, CanFrame, CarState
 
-SPEED_GAINS = (0.12287673, 0.29666309)  # of the speed estimate's Kalman filter at 100 Hz
+SPEED_KALMAN_GAINS = (0.12287673, 0.29666309)  # of the speed estimate's Kalman filter at 100 Hz
 
 # The wheel sensors are too coarse at walking pace; the gearbox is used there.
 _BLEND_BP = (1.0, 6.0)  # m/s
@@ -42,7 +42,7 @@ class CarStateReader:
 
     def __init__(self) -> None:
         self._parser = CanParser(load_dbc(CAR_DBC), CAR_MESSAGES, CAR_BUS)
-        self._speed = SteadyKalman(0.0, 0.0, dt=DT_CTRL, gains=SPEED_GAINS)
+        self._speed = SteadyKalman(0.0, 0.0, dt=DT_CTRL, gains=SPEED_KALMAN_GAINS)
         self._cruise_button = CruiseButton.NONE
         self._cruise_setting = 0
         self._brake_switch = False
@@ -74,7 +74,7 @@ class CarStateReader:
         state.steering_torque, status = values["STEER_STATUS"]
         state.steering_pressed = abs(state.steering_torque) > STEER_OVERRIDE_TORQUE
         state.steer_not_allowed = status != STEER_STATUS_NORMAL
-        state.steer_error = status not in STEER_STATUS_PASSING
+        state.steer_error = status not in STEER_STATUSES_WITHOUT_FAULT
 
     def _read_driver(self, state: CarState) -> None:
         values = self._parser.values
@@ -86,7 +86,7 @@ class CarStateReader:
         self._brake_switch = bool(brake_switch)
         state.cruise_enabled = bool(cruise_enabled)
         state.cruise_speed = values["CRUISE"][0] * KPH_TO_MS
-        state.gear = GEARS.get(values["GEARBOX"][0], "unknown")
+        state.gear = GEAR_NAME_BY_CODE.get(values["GEARBOX"][0], "unknown")
         button, setting = values["SCM_BUTTONS"]
         if (button, setting) != (self._cruise_button, self._cruise_setting):
             state.buttons = tuple(self._button_events(button, setting))

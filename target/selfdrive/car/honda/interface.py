@@ -23,7 +23,7 @@ from selfdrive.messages import CanFrame, CarControl, CarState
 CAN_ERROR_CYCLES = 5  # consecutive invalid cycles before can_error is raised
 
 # The event that each condition of CarState raises.
-_CONDITIONS = (
+_EVENT_OF_CONDITION = (
     ("steer_error", Event("steer_unavailable", (NO_ENTRY, IMMEDIATE_DISABLE, PERMANENT))),
     ("steer_not_allowed", Event("steer_temp_unavailable", (NO_ENTRY, WARNING))),
     ("brake_error", Event("brake_unavailable", (NO_ENTRY, IMMEDIATE_DISABLE, PERMANENT))),
@@ -33,7 +33,7 @@ _CONDITIONS = (
     ("brake_hold", Event("brake_hold", (NO_ENTRY, USER_DISABLE))),
     ("park_brake", Event("park_brake", (NO_ENTRY, USER_DISABLE))),
 )
-_conditions_of = attrgetter(*(name for name, _ in _CONDITIONS))
+_condition_values = attrgetter(*(name for name, _ in _EVENT_OF_CONDITION))
 _CAN_ERROR = Event("can_error", (NO_ENTRY, IMMEDIATE_DISABLE))
 _WRONG_GEAR = Event("wrong_gear", (NO_ENTRY, SOFT_DISABLE))
 _REVERSE_GEAR = Event("reverse_gear", (NO_ENTRY, IMMEDIATE_DISABLE))
@@ -95,8 +95,8 @@ class CarInterface:
 
     def _events(self, car: CarState, previous: CarState) -> list[Event]:
         events = []
-        if any(_conditions_of(car)):
-            events = [event for name, event in _CONDITIONS if getattr(car, name)]
+        if any(_condition_values(car)):
+            events = [event for name, event in _EVENT_OF_CONDITION if getattr(car, name)]
         if self._invalid_cycles >= CAN_ERROR_CYCLES:
             events.append(_CAN_ERROR)
         if car.gear != "drive":

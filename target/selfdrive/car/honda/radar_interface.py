@@ -8,12 +8,12 @@ from selfdrive.car.honda.values import (
     NO_TRACK_DISTANCE,
     RADAR_BUS,
     RADAR_DBC,
-    RADAR_GOOD,
     RADAR_MESSAGES,
+    RADAR_STATE_GOOD,
 )
 from selfdrive.messages import CanFrame, RadarData, RadarPoint
 
-_LAST_OF_CYCLE = "TRACK_15"
+_LAST_MESSAGE_OF_CYCLE = "TRACK_15"
 
 
 class RadarInterface:
@@ -31,17 +31,17 @@ class RadarInterface:
         """
         parser = self._parser
         parser.update(frames, t)
-        if _LAST_OF_CYCLE not in parser.updated:
+        if _LAST_MESSAGE_OF_CYCLE not in parser.updated:
             return None
         errors = []
         if not parser.valid:
             errors.append("comm_issue")
-        if parser.values["RADAR_DIAGNOSTIC"][0] != RADAR_GOOD:
+        if parser.values["RADAR_DIAGNOSTIC"][0] != RADAR_STATE_GOOD:
             errors.append("fault")
         return RadarData(t, self._points(), tuple(errors))
 
     def _points(self) -> tuple[RadarPoint, ...]:
-        distance, lateral, speed = self._parser.values[_LAST_OF_CYCLE]
+        distance, lateral, speed = self._parser.values[_LAST_MESSAGE_OF_CYCLE]
         if distance >= NO_TRACK_DISTANCE:
             self._tracking = False
             return ()

@@ -20,21 +20,21 @@ class CruiseButton:
     RES_ACCEL = 4
 
 
-GEARS = {1: "park", 2: "reverse", 4: "neutral", 8: "drive", 16: "sport", 32: "low"}
-GEAR_CODES = {name: code for code, name in GEARS.items()}
+GEAR_NAME_BY_CODE = {1: "park", 2: "reverse", 4: "neutral", 8: "drive", 16: "sport", 32: "low"}
+GEAR_CODE_BY_NAME = {name: code for code, name in GEAR_NAME_BY_CODE.items()}
 
 STEER_STATUS_NORMAL = 0
 STEER_STATUS_FAULT = 5  # assumed until the EPS reports otherwise
-STEER_STATUS_PASSING = (0, 2, 3, 4, 6)  # the EPS might temporarily refuse torque, but is not broken
+STEER_STATUSES_WITHOUT_FAULT = (0, 2, 3, 4, 6)  # the EPS might temporarily refuse torque, but is not broken
 
-RADAR_GOOD = 0x79  # the radar's state in normal operation
+RADAR_STATE_GOOD = 0x79  # the radar's state in normal operation
 NO_TRACK_DISTANCE = 255.0  # m; at this distance or more, there is no track
 
 STEER_COUNTS = 0x1000  # sent for a demand of 1
 STEER_FULL_COUNTS = 0xF00  # full torque for the EPS
 BRAKE_COUNTS = 256  # full brake
 PEDAL_COUNTS = 1004  # of the pedal interceptor for a demand of 1
-PEDAL_REST = 328  # counts of a released pedal, added to every demand
+PEDAL_REST_COUNTS = 328  # counts of a released pedal, added to every demand
 STEER_OVERRIDE_TORQUE = 1200  # counts; above this, the driver's hands are on the wheel
 
 # The messages that the controller reads. Some, such as STEER_STATUS, start in their unsafe state.

@@ -49,7 +49,7 @@ def build_precipitation_parts(camera: CameraModel) -> tuple[PrecipitationParts, 
     library = compiled.library(C_SOURCE)
     # NumPy's scalars, unlike Python's, change arrays to double precision.
     numbers = all(type(number) in (int, float) for number in astuple(camera))
-    if library is None or not numbers or not is_bit_identical(library):
+    if library is None or not numbers or not has_identical_parts(library):
         return PYTHON_PARTS, ""
     return _compiled_parts(library), library.digest.hex()
 
@@ -179,7 +179,7 @@ def _with_contiguous_rows(picture: np.ndarray) -> np.ndarray:
 
 
 @cache
-def is_bit_identical(library: compiled.Library) -> bool:
+def has_identical_parts(library: compiled.Library) -> bool:
     """Whether compiled code gives the installed OpenCV's bits; versions without fused sums differ."""
     number = np.arange(120)
     places = np.stack([number * 37 % 92 - 2.0, number * 53 % 68 - 2.0]).astype(np.float32)

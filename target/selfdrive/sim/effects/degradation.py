@@ -11,8 +11,8 @@ from selfdrive.common.camera_model import CameraModel
 MEASURED_FROM, MEASURED_TO = 5.0, 30.0  # m, measured part of the road
 ROAD_BESIDE_LINE = 0.35  # m from a line's middle to bare road
 LANE_INSIDE_MARGIN = 0.5  # m; anything nearer to a line is not part of the lane's inside
-MIN_EDGE_SHARE = 0.5  # an edge with at least this share of a mark's edge is as strong as a mark's
-MIN_NOTICED_LEVELS = 8.0  # grey levels
+MIN_SHARE_OF_MARK_EDGE = 0.5  # an edge with at least this share of a mark's edge is as strong as a mark's
+MIN_NOTICED_PIXEL_CHANGE = 8.0  # grey levels, the least difference of a covered pixel
 MIN_EDGE_SOBEL = 32.0  # Sobel value of a step of 8 grey levels; anything less is no edge
 
 
@@ -49,14 +49,14 @@ class DegradationGauge:
         return Degradation(
             psnr=float("inf") if same else float(peak_signal_noise_ratio(clean, affected, data_range=255)),
             mark_contrast=contrast,
-            false_edges=float((edges > max(MIN_EDGE_SHARE * mark_edge, MIN_EDGE_SOBEL)).mean()),
+            false_edges=float((edges > max(MIN_SHARE_OF_MARK_EDGE * mark_edge, MIN_EDGE_SOBEL)).mean()),
         )
 
     def covered_share(self, affected: np.ndarray) -> float:
         """Share of the lane's inside where a uniform grey picture, `affected` by an effect, noticeably
         differs from the median. Valid up to about one half."""
         levels = affected[self._rows][self._inside].astype(float)
-        return float((np.abs(levels - np.median(levels)) >= MIN_NOTICED_LEVELS).mean())
+        return float((np.abs(levels - np.median(levels)) >= MIN_NOTICED_PIXEL_CHANGE).mean())
 
     def _measure_mark_contrast(self, picture: np.ndarray) -> float:
         differences = []

@@ -18,9 +18,9 @@ from selfdrive.messages import CameraView
 from selfdrive.sim.effects import PaperFog, PaperOcclusion, PaperRain, PaperSnow, weather_of_levels
 from selfdrive.sim.effects.degradation import Degradation, DegradationGauge
 from selfdrive.sim.effects.effect import Effect, Moment
-from selfdrive.sim.effects.levels import CODED_AMOUNTS, PAPER_AMOUNTS, PHYSICAL_AMOUNTS
+from selfdrive.sim.effects.levels import AUTHORS_CODE_AMOUNTS, PAPER_AMOUNTS, PHYSICAL_AMOUNTS
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond.coded_detector import CodedDetector
+from selfdrive.visiond.authors_code_detector import AuthorsCodeDetector
 from selfdrive.visiond.detector import LaneDetector, LaneLines
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
@@ -31,7 +31,7 @@ PICTURE_STEP, CAR_SPEED = 0.05, 26.82  # s, m/s
 DETECTOR_STYLES: dict[str, tuple[type, tuple[int, int, int], int]] = {  # with colour (BGR) and width (px)
     "paper": (PaperDetector, (60, 60, 255), 7),
     "robust": (RobustDetector, (255, 200, 0), 2),
-    "as_coded": (CodedDetector, (80, 220, 80), 1),
+    "as_coded": (AuthorsCodeDetector, (80, 220, 80), 1),
 }
 CHECK_DISTANCE, MOST_LINE_ERROR = 10.0, 0.3  # m: a line is found if it is at most this far off
 PANEL_SIZE, TITLE_HEIGHT = (320, 240), 20  # px
@@ -106,7 +106,7 @@ PRESETS = (
     ),
     (
         "The paper's effects as coded",
-        CODED_AMOUNTS,
+        AUTHORS_CODE_AMOUNTS,
         "These effects follow the code of the paper's authors and are redrawn in every picture. Contrast, "
         "brightness and blur are the same as above.",
     ),
@@ -122,7 +122,7 @@ class LevelRow(NamedTuple):
     amount: float
     degradation: Degradation
     covered_share: float
-    found_shares: tuple[float, ...]  # share of pictures, per detector
+    shares_with_both_lines: tuple[float, ...]  # share of pictures, per detector
     picture: np.ndarray  # the last one, in colour, with lines
 
 
@@ -221,7 +221,7 @@ def level_table(rows: list[LevelRow], unit: str, real: list[dict[str, str]]) -> 
     for level, row in enumerate(rows, 1):
         psnr, contrast, false_edges = row.degradation
         cells = [f"{level}", f"{row.amount:g}", f"{psnr:.1f}", f"{contrast:.0f}", f"{false_edges:.1%}"]
-        cells += [f"{row.covered_share:.0%}", *(f"{share:.0%}" for share in row.found_shares)]
+        cells += [f"{row.covered_share:.0%}", *(f"{share:.0%}" for share in row.shares_with_both_lines)]
         if real:
             counted = real[level - 1]
             cells += [f"{counted[head]} of {counted['pictures']}" for head in missed]

@@ -7,8 +7,8 @@ from selfdrive.sim.effects.effect import Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
 MUD_LEVEL = 45.0  # grey level of mud against light
-CLODS = 24.0, 8.0, 3.0  # px, clod sizes in a picture 640 wide
-EDGE = 2.5  # px, blur of the mud's edge, which is out of focus
+CLOD_SIZES = 24.0, 8.0, 3.0  # px, clod sizes in a picture 640 wide
+MUD_EDGE_BLUR = 2.5  # px, blur of the mud's edge, which is out of focus
 BLOB_LEVEL = 20.0
 BLOB_RADII = 5.0, 50.0  # px
 BLOB_BLUR = 7.0  # px
@@ -58,7 +58,7 @@ class LensMud(_OnLens):
     def _prepare(self, random: np.random.Generator) -> None:
         rows, columns = self.camera.rows, self.camera.width
         field = np.zeros((rows, columns), dtype=np.float32)
-        for size in CLODS:
+        for size in CLOD_SIZES:
             sigma = size * columns / 640.0
             noise = random.standard_normal((rows, columns), dtype=np.float32)
             # Blurring white noise reduces its deviation by this factor, so that each size has its own weight.
@@ -70,4 +70,4 @@ class LensMud(_OnLens):
     def _covered(self, field: np.ndarray) -> np.ndarray:
         threshold = np.quantile(field, 1.0 - self.amount)
         mud = (field > threshold).astype(np.float32)
-        return cv2.GaussianBlur(mud, (0, 0), EDGE)
+        return cv2.GaussianBlur(mud, (0, 0), MUD_EDGE_BLUR)

@@ -15,7 +15,7 @@ PAPER_AMOUNTS: dict[type[Effect], tuple[float, ...]] = {
     effects.GaussianBlur: (3, 5, 7),
     effects.MedianBlur: (3, 5),
 }
-CODED_AMOUNTS: dict[type[Effect], tuple[float, ...]] = {
+AUTHORS_CODE_AMOUNTS: dict[type[Effect], tuple[float, ...]] = {
     effects.CodedRain: TEN_LEVELS,
     effects.CodedFog: TEN_LEVELS,
     effects.CodedSnow: TEN_LEVELS,
@@ -29,4 +29,4 @@ PHYSICAL_AMOUNTS: dict[type[Effect], tuple[float, ...]] = {
     effects.SunGlare: (0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1, 1.5, 2, 3),
     effects.LowLight: (1000, 300, 100, 50, 20, 10, 5, 3, 2, 1),
 }
-LEVEL_AMOUNTS = PAPER_AMOUNTS | CODED_AMOUNTS | PHYSICAL_AMOUNTS
+AMOUNTS_BY_EFFECT = PAPER_AMOUNTS | AUTHORS_CODE_AMOUNTS | PHYSICAL_AMOUNTS

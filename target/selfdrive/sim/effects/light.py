@@ -11,18 +11,18 @@ from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
 WHITE_REFLECTANCE = 0.32  # reflectance shown as white in daylight; asphalt of 0.12 has level 95
-SUN_HEIGHT = radians(6.0), radians(12.0)  # drawn from this range
-SUN_SIDE = radians(8.0)  # at most, to either side
+SUN_HEIGHT_RANGE = radians(6.0), radians(12.0)  # drawn from this range
+MOST_SUN_SIDE_ANGLE = radians(8.0)  # at most, to either side
 SUN_RADIUS = radians(0.27)  # as seen from the earth
-ASPHALT_SLOPES = 0.25  # rms slope of surface facets
+ASPHALT_SLOPE_RMS = 0.25  # rms slope of surface facets
 NORMAL_REFLECTANCE = 0.04  # reflectance at normal incidence, for a refractive index of 1.5
 MIRRORING_SHARE = 0.004  # share of a dry road's surface that mirrors; similar to the CIE's road table R3
 
 ELECTRONS_PER_LUX = 14.0  # freed in a pixel by white light of 1 lux in the longest exposure (10 ms)
 FULL_WELL_ELECTRONS = 10000.0  # the most that a pixel holds, white in good light
 MOST_GAIN = 64.0  # 36 dB
-READ_NOISE = 5.0  # electrons
-QUANTILE_COUNT = 256  # of a pixel's noise, as many as grey levels
+READ_NOISE_ELECTRONS = 5.0  # electrons
+NOISE_QUANTILE_COUNT = 256  # of a pixel's noise, as many as grey levels
 
 
 class SunGlare(Effect):
@@ -36,8 +36,8 @@ class SunGlare(Effect):
     UNIT, LEAST, MOST, MOVING = "times a clear eye", 0.0, 10.0, False
 
     def _prepare(self, random: np.random.Generator) -> None:
-        height = random.uniform(*SUN_HEIGHT)
-        side = random.uniform(-SUN_SIDE, SUN_SIDE)
+        height = random.uniform(*SUN_HEIGHT_RANGE)
+        side = random.uniform(-MOST_SUN_SIDE_ANGLE, MOST_SUN_SIDE_ANGLE)
         sun = np.array([sin(side) * cos(height), -sin(height), cos(side) * cos(height)])
         rays = pixel_rays(self.camera)
         beam = 127500.0 * exp(-0.21 / sin(height))  # lux, across the beam
@@ -73,8 +73,8 @@ def mirrored_sun_luminance(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
     half /= vector_lengths(half)
     across = np.clip((half * sun).sum(axis=-1), 0.0, 1.0)
     upright = np.maximum(-half[..., 1], 1e-3)
-    slope = (1.0 / upright**2 - 1.0) / ASPHALT_SLOPES**2
-    facets = each(exp, -slope) / (pi * ASPHALT_SLOPES**2 * (upright * upright) ** 2)
+    slope = (1.0 / upright**2 - 1.0) / ASPHALT_SLOPE_RMS**2
+    facets = each(exp, -slope) / (pi * ASPHALT_SLOPE_RMS**2 * (upright * upright) ** 2)
     mirror = NORMAL_REFLECTANCE + (1.0 - NORMAL_REFLECTANCE) * (1.0 - across) * ((1.0 - across) ** 2) ** 2
     # Rough surfaces shadow themselves at grazing angles of view or light.
     shadow = np.minimum(1.0, 2.0 * upright * np.minimum(down, -sun[1]) / np.maximum(across, 1e-3))
@@ -98,7 +98,7 @@ class LowLight(Effect):
         ).ravel()
         rows, columns = self.camera.rows, self.camera.width
         self._noise_quantiles = random.integers(
-            0, QUANTILE_COUNT, size=(2 * rows, 2 * columns), dtype=np.uint16
+            0, NOISE_QUANTILE_COUNT, size=(2 * rows, 2 * columns), dtype=np.uint16
         )
 
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
@@ -106,7 +106,7 @@ class LowLight(Effect):
         rows, columns = picture.shape
         noise_row, noise_column = random.integers(0, (rows, columns))
         index = picture[region.part].astype(np.intp)
-        index *= QUANTILE_COUNT
+        index *= NOISE_QUANTILE_COUNT
         index += self._noise_quantiles[
             noise_row + region.top : noise_row + region.bottom,
             noise_column + region.left : noise_column + region.right,
@@ -122,11 +122,11 @@ def _noisy_levels(electrons: float, electrons_of_white: float) -> np.ndarray:
     steps = each(log, max(electrons, 1e-9) / np.maximum(numbers[1:], 1))
     chance = np.concatenate([[0.0], np.cumsum(steps)])
     chance = each(exp, chance - chance.max())
-    reach = int(6.0 * READ_NOISE)
-    reading = each(exp, -0.5 * (np.arange(-reach, reach + 1) / READ_NOISE) ** 2)
+    reach = int(6.0 * READ_NOISE_ELECTRONS)
+    reading = each(exp, -0.5 * (np.arange(-reach, reach + 1) / READ_NOISE_ELECTRONS) ** 2)
     summed = np.cumsum(_convolve(chance, reading))
     counts = np.arange(summed.size) + 0.5 + numbers[0] - reach
-    share = (np.arange(QUANTILE_COUNT) + 0.5) / QUANTILE_COUNT
+    share = (np.arange(NOISE_QUANTILE_COUNT) + 0.5) / NOISE_QUANTILE_COUNT
     values = np.interp(share, summed / summed[-1], counts)
     return np.clip(np.rint(WHITE * values / electrons_of_white), 0, WHITE).astype(np.uint8)
 

@@ -18,7 +18,7 @@ from selfdrive.sim.picture import Region
 
 NEAREST_DISTANCE = 0.25  # m; anything closer is out of focus
 FAINTEST_SHARE = 0.03  # share of a pixel's light; streaks that take less are invisible
-SOFT_WIDTHS = 1.5, 3.0  # px; wider particles are drawn at half, or a quarter, of the resolution
+COARSER_GRID_WIDTHS = 1.5, 3.0  # px; wider particles are drawn at half, or a quarter, of the resolution
 POINT_SPACING = 1.3  # px between the points of a streak
 GRID_MARGIN = 2  # px around a grid
 
@@ -26,9 +26,9 @@ GRID_MARGIN = 2  # px around a grid
 class AirBox(NamedTuple):
     """n particles in a box of air."""
 
-    reach: float  # m, depth
-    size: np.ndarray  # (n,) m, diameters
-    speed: np.ndarray  # (n,) m/s, fall speeds
+    depth: float  # m
+    diameters: np.ndarray  # (n,) m
+    fall_speeds: np.ndarray  # (n,) m/s
 
 
 class Streaks(NamedTuple):
@@ -42,11 +42,11 @@ class Streaks(NamedTuple):
 class Particles:
     def __init__(self, random: np.random.Generator, camera: CameraModel, boxes: list[AirBox]) -> None:
         self._camera = camera
-        self._reaches = np.array([box.reach for box in boxes])
-        self._counts = [box.size.size for box in boxes]
+        self._reaches = np.array([box.depth for box in boxes])
+        self._counts = [box.diameters.size for box in boxes]
         self._reach = np.repeat(self._reaches, self._counts).astype(np.float32)
-        self._size = np.concatenate([box.size for box in boxes]).astype(np.float32)
-        self._speed = np.concatenate([box.speed for box in boxes]).astype(np.float32)
+        self._size = np.concatenate([box.diameters for box in boxes]).astype(np.float32)
+        self._speed = np.concatenate([box.fall_speeds for box in boxes]).astype(np.float32)
         first = random.uniform(size=(self._size.size, 3)).astype(np.float32)
         across, self._down, self._ahead = first.T.copy()
         self._across = across * camera.width - camera.cx  # px at the far end
@@ -132,7 +132,7 @@ class ParticleCover:
         ]
 
     def _draw(self, streaks: Streaks, grid_windows: tuple[Region, ...]) -> None:
-        grid = np.searchsorted((*SOFT_WIDTHS, inf), streaks.width)
+        grid = np.searchsorted((*COARSER_GRID_WIDTHS, inf), streaks.width)
         scale = np.float32([1.0, 2.0, 4.0])[grid]
         # Pixel k of a coarse grid has its centre at scale * k + (scale - 1) / 2 of the full one.
         corner = self._corners[:, grid] + GRID_MARGIN - 0.5

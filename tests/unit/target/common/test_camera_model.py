@@ -17,7 +17,7 @@ ahead, sideways, turned = st.floats(3.0, 300.0), st.floats(-20.0, 20.0), st.floa
 def test_the_default_is_the_published_calibration():
     """The horizon is row 170.7, as in the Caltech frames. Lines 3.7 m apart diverge by 1.48 px per row."""
     assert pytest.approx(170.7, abs=0.05) == CALTECH.horizon
-    assert CALTECH.spread() == pytest.approx(1.48, abs=0.005)
+    assert CALTECH.lines_divergence() == pytest.approx(1.48, abs=0.005)
     assert CALTECH.pitch == pytest.approx(radians(14.0))
 
 

@@ -1,13 +1,13 @@
 """Kalman filters. The speed estimate is compared with values measured on openpilot."""
 
 import pytest
-from selfdrive.car.honda.carstate import SPEED_GAINS
+from selfdrive.car.honda.carstate import SPEED_KALMAN_GAINS
 from selfdrive.common.kalman import DistanceFilter, SteadyKalman
 
 
 def test_the_first_speed_estimates_agree_with_openpilot() -> None:
     """For a measured speed of 26.797 m/s, the third and fourth estimates equal openpilot's."""
-    speed = SteadyKalman(0.0, 0.0, dt=0.01, gains=SPEED_GAINS)
+    speed = SteadyKalman(0.0, 0.0, dt=0.01, gains=SPEED_KALMAN_GAINS)
     values = []
     for _ in range(4):
         speed.update(26.797)

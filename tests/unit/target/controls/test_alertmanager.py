@@ -80,7 +80,7 @@ def test_an_unknown_alert_is_an_error() -> None:
 
 
 EVENTS = [
-    *(event for _, event in interface._CONDITIONS),
+    *(event for _, event in interface._EVENT_OF_CONDITION),
     *(
         e
         for module in (interface, controlsd, plannerd)

@@ -25,10 +25,10 @@ from selfdrive.sim.effects import (
 from selfdrive.sim.effects.compiled_gaussian import CompiledGaussian, build_gaussian
 from selfdrive.sim.effects.effect import Moment
 from selfdrive.sim.effects.gaussian import Gaussian
-from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
+from selfdrive.sim.effects.levels import AMOUNTS_BY_EFFECT
 from selfdrive.sim.picture import Picture, Region
 from selfdrive.sim.picture_camera import PictureCamera
-from selfdrive.sim.picture_options import CODED_DETECTOR, PAPER_DETECTOR, PictureOptions
+from selfdrive.sim.picture_options import AUTHORS_CODE_DETECTOR, PAPER_DETECTOR, PictureOptions
 from selfdrive.sim.run import simulate, write_run
 from selfdrive.sim.scenario import load_scenario
 
@@ -104,7 +104,7 @@ def pictures(random, shape):
 @pytest.mark.parametrize("kind", COMPILED)
 def test_compiled_effects_have_the_same_bits(both, kind, size):
     camera, random = CAMERAS[size], np.random.default_rng(7)
-    amounts = LEVEL_AMOUNTS[kind]
+    amounts = AMOUNTS_BY_EFFECT[kind]
     for seed, amount in enumerate({amounts[0], amounts[len(amounts) // 2], amounts[-1]}):
         plain, fast = both(kind, amount, 123456789 * seed, camera)
         for picture in pictures(random, (camera.rows, camera.width)):
@@ -126,7 +126,7 @@ def test_results_do_not_depend_on_wide_vector_instructions(folder, tmp_path, cam
     noise = np.random.default_rng(2).integers(0, 256, (camera.rows, camera.width), np.uint8)
     for libraries in (folder, compile_effects(tmp_path, "-DIS_FAST=0")):
         compiled.use_libraries_in(libraries)
-        drawn.append(kind(LEVEL_AMOUNTS[kind][-1], 1, camera))
+        drawn.append(kind(AMOUNTS_BY_EFFECT[kind][-1], 1, camera))
     compiled.use_libraries_in(None)
     if any(effect._key[-1] == "" for effect in drawn):
         pytest.skip("OpenCV computes different bits from the C code")
@@ -197,7 +197,7 @@ def test_the_library_is_not_used_if_opencv_computes_other_bits(folder, monkeypat
         "PYTHON_PARTS",
         plain._replace(veil_picture=lambda *of: air.veil_picture(*of) // 2),
     )
-    caches = compiled_gaussian.agrees, compiled_precipitation.is_bit_identical
+    caches = compiled_gaussian.agrees, compiled_precipitation.has_identical_parts
     for kept in caches:
         kept.cache_clear()
     assert type(build_gaussian(1.5)) is gaussian.Gaussian
@@ -225,12 +225,12 @@ def test_runs_in_weather_have_the_same_bytes(folder, tmp_path, monkeypatch, kind
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [effects.CodedRain, effects.CodedSnow])
 def test_runs_in_weather_as_coded_have_the_same_bytes(folder, tmp_path, monkeypatch, kind):
-    same_runs(folder, tmp_path, monkeypatch, kind, CODED_DETECTOR)
+    same_runs(folder, tmp_path, monkeypatch, kind, AUTHORS_CODE_DETECTOR)
 
 
 def same_runs(folder, tmp_path, monkeypatch, kind, detector):
     look, scenario = PictureCamera.look, load_scenario(SCENARIO)
-    amount = LEVEL_AMOUNTS[kind][4]
+    amount = AMOUNTS_BY_EFFECT[kind][4]
 
     def driven(libraries):
         compiled.use_libraries_in(libraries)

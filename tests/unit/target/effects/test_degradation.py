@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from selfdrive.sim.effects import effects_page
 from selfdrive.sim.effects.degradation import DegradationGauge
-from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
+from selfdrive.sim.effects.levels import AMOUNTS_BY_EFFECT
 
 REFERENCE = Path(__file__).parents[4] / "docs" / "reference"
 
@@ -58,7 +58,7 @@ def test_pixels_are_covered_if_an_even_grey_changes_by_8_levels(gauge, road):
 
 def test_the_page_has_every_effect_and_level():
     text = (REFERENCE / "image-effects.md").read_text(encoding="utf-8")
-    for effect, amounts in LEVEL_AMOUNTS.items():
+    for effect, amounts in AMOUNTS_BY_EFFECT.items():
         part = re.search(rf"^### {effect.__name__}$(.*?)(?=^##|\Z)", text, re.MULTILINE | re.DOTALL)
         assert part and (REFERENCE / "image-effects" / f"{effect.__name__}.jpg").is_file()
         found = re.findall(r"^\| \d+ \| (\S+) \|", part[1], re.MULTILINE)

@@ -9,10 +9,10 @@ import pytest
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim import effects
-from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
+from selfdrive.sim.effects.levels import AMOUNTS_BY_EFFECT
 from selfdrive.sim.picture import Picture, Region
 
-ALL = sorted(LEVEL_AMOUNTS, key=lambda effect: effect.__name__)
+ALL = sorted(AMOUNTS_BY_EFFECT, key=lambda effect: effect.__name__)
 MOVING = [
     effects.PaperRain,
     effects.PaperFog,
@@ -33,7 +33,7 @@ every = pytest.mark.parametrize("effect", ALL)
 
 
 def fresh(effect, camera, seed=3):
-    return effect(LEVEL_AMOUNTS[effect][-1], seed, camera)
+    return effect(AMOUNTS_BY_EFFECT[effect][-1], seed, camera)
 
 
 strongest = cache(fresh)  # for tests that can share an effect
@@ -41,7 +41,7 @@ strongest = cache(fresh)  # for tests that can share an effect
 
 def test_every_exported_effect_has_levels():
     """Pages and benchmarks use the levels."""
-    assert {effect.__name__ for effect in LEVEL_AMOUNTS} == set(effects.__all__)
+    assert {effect.__name__ for effect in AMOUNTS_BY_EFFECT} == set(effects.__all__)
 
 
 @every
@@ -95,7 +95,7 @@ def regions(shape, random):
 def test_a_region_has_the_same_bits_as_in_the_whole_image(effect, model, moment):
     random = np.random.default_rng(7)
     noise = random.integers(0, 256, (model.rows, model.width), np.uint8)
-    for amount in (LEVEL_AMOUNTS[effect][0], LEVEL_AMOUNTS[effect][-1]):
+    for amount in (AMOUNTS_BY_EFFECT[effect][0], AMOUNTS_BY_EFFECT[effect][-1]):
         made, before = effect(amount, 3, model), effects.GaussianBlur(5, 3, model)
         for number in (0, 17):
             once = Picture(("noise",), noise.shape, lambda region: noise[region.part])
@@ -173,7 +173,7 @@ def test_kernel_sizes_must_be_odd(effect, camera):
 @pytest.mark.parametrize("seed", [-1, 1.5])
 def test_wrong_seeds_are_refused(effect, camera, seed):
     with pytest.raises(ConfigError, match="seed"):
-        effect(LEVEL_AMOUNTS[effect][0], seed, camera)
+        effect(AMOUNTS_BY_EFFECT[effect][0], seed, camera)
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ def test_pictures_of_another_camera_are_refused(camera, moment, picture):
 
 @every
 def test_severity_grows_with_the_level(effect, camera, moment, road):
-    amounts = LEVEL_AMOUNTS[effect]
+    amounts = AMOUNTS_BY_EFFECT[effect]
     chosen = sorted({0, len(amounts) // 2, len(amounts) - 1})
     errors = []
     for number in chosen:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from selfdrive.sim.run import simulate
-from selfdrive.sim.scenario import PLANTS, load_scenario, on_plant
+from selfdrive.sim.scenario import PLANTS, load_scenario, with_plant
 
 # First time with an HWT of 2 s, min HWT, min distance, max brake, max gas, speeds (m/s) at 5, 10, ... s.
 # S5 omits values below 6 m/s, where openpilot's simulator sent the speed in the wrong unit.
@@ -32,7 +32,7 @@ def test_longitudinal_control_agrees_with_openpilot(fault_free, name):
 @pytest.mark.parametrize("name", ["O17", "O18", "O19", "O20"])
 def test_the_driver_is_warned_two_seconds_before_contact(scenarios, name, plant):
     """openpilot warns at the same time."""
-    result = simulate(on_plant(load_scenario(scenarios / f"{name}.yaml"), plant), 0)
+    result = simulate(with_plant(load_scenario(scenarios / f"{name}.yaml"), plant), 0)
     contact = result.record["hazards"]["H1"]
     warned = [alert["t"] for alert in result.record["alerts"] if alert["name"] == "fcw"]
     assert contact - warned[0] == pytest.approx(2.0, abs=0.1)

@@ -10,8 +10,8 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim import compile_helpers
 from selfdrive.sim.run import main
 from selfdrive.visiond import compiled_windows
-from selfdrive.visiond.coded_detector import CodedDetector
-from selfdrive.visiond.compiled_coded import CompiledCodedDetector, build_coded_detector
+from selfdrive.visiond.authors_code_detector import AuthorsCodeDetector
+from selfdrive.visiond.compiled_authors_code import CompiledAuthorsCodeDetector, build_authors_code_detector
 from selfdrive.visiond.compiled_windows import C_SOURCE
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -51,9 +51,9 @@ def test_a_library_is_found_only_for_the_code_that_it_replaces(helpers, monkeypa
     for name in (C_SOURCE.name, *compiled.stands_for(C_SOURCE.read_bytes())):
         shutil.copy(C_SOURCE.with_name(name), tmp_path)
     monkeypatch.setattr(compiled_windows, "C_SOURCE", tmp_path / C_SOURCE.name)
-    assert type(build_coded_detector(MODEL)) is CompiledCodedDetector
+    assert type(build_authors_code_detector(MODEL)) is CompiledAuthorsCodeDetector
     (tmp_path / edited).write_text((tmp_path / edited).read_text() + "\n")
-    assert type(build_coded_detector(MODEL)) is CodedDetector
+    assert type(build_authors_code_detector(MODEL)) is AuthorsCodeDetector
     compiled.use_libraries_in(None)
     assert compiled.library(C_SOURCE) is None
 
@@ -64,7 +64,7 @@ def test_a_truncated_library_is_not_used(helpers, keep):
     (helpers / NAME).write_bytes((helpers / NAME).read_bytes()[:keep])
     compiled.use_libraries_in(helpers)
     assert compiled.library(C_SOURCE) is None
-    assert type(build_coded_detector(MODEL)) is CodedDetector
+    assert type(build_authors_code_detector(MODEL)) is AuthorsCodeDetector
 
 
 @needs_compiler
@@ -74,7 +74,7 @@ def test_a_library_with_a_changed_byte_is_not_used(helpers):
     data[len(data) // 2] ^= 1
     (helpers / NAME).write_bytes(data)
     compiled.use_libraries_in(helpers)
-    assert type(build_coded_detector(MODEL)) is CodedDetector
+    assert type(build_authors_code_detector(MODEL)) is AuthorsCodeDetector
 
 
 @pytest.mark.parametrize("folder", ["none", "x" * 300, "empty"])

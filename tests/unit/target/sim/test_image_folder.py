@@ -210,7 +210,7 @@ def test_the_calibrations_in_the_docs_are_valid(tmp_path, text):
     model = ImageFolder(tmp_path).model
     assert model.width == 640
     assert 0.2 * model.rows < model.horizon < 0.7 * model.rows
-    assert 1.4 < model.spread() < 3.2
+    assert 1.4 < model.lines_divergence() < 3.2
 
 
 def test_the_docs_show_a_calibration_for_each_known_data_set():

@@ -12,7 +12,7 @@ from selfdrive.sim.image_library import RENDERED_SPACING, FrameLibrary
 from selfdrive.sim.moved_picture import HEADING_STEP, OFFSET_STEP, SHIFT_DISTANCE
 from selfdrive.sim.picture_camera import PictureCamera
 from selfdrive.sim.picture_options import (
-    CODED_TRANSLATION,
+    AUTHORS_CODE_TRANSLATION,
     GROUND_TRANSLATION,
     SHIFT_TRANSLATION,
     PictureOptions,
@@ -116,7 +116,7 @@ def test_a_shift_moves_the_frame_as_a_whole(offset, heading, truth):
 @pytest.mark.parametrize("offset", [0.5, -0.9, 3.0])
 def test_as_coded_the_frame_shifts_by_a_fixed_scale(truth, offset):
     """The whole image shifts by a pixel for each 0.03895 m, up to 1 m. The car's heading has no effect."""
-    looking, renderer = camera(CALTECH, CODED_TRANSLATION)
+    looking, renderer = camera(CALTECH, AUTHORS_CODE_TRANSLATION)
     picture = looking.look(truth(lateral_offset=offset, heading=0.02)).picture
     shift = round(min(max(offset, -1.0), 1.0) / 0.03895)
     columns = np.clip(np.arange(CALTECH.width) - shift, 0, CALTECH.width - 1)
@@ -144,7 +144,7 @@ def test_a_road_with_curvature_is_refused():
         build_camera_and_detector(PictureOptions(), Road(None, ((0.0, 100.0), (0.0, 0.001))), 0)
 
 
-@pytest.mark.parametrize("translation", [GROUND_TRANSLATION, SHIFT_TRANSLATION, CODED_TRANSLATION])
+@pytest.mark.parametrize("translation", [GROUND_TRANSLATION, SHIFT_TRANSLATION, AUTHORS_CODE_TRANSLATION])
 @CAMERAS
 def test_a_region_equals_that_of_the_whole_frame(model, translation, truth):
     looking, _ = camera(model, translation, frames=1)

@@ -12,7 +12,7 @@ from selfdrive.messages import Actuators
 from selfdrive.sim.plant import Plant
 from selfdrive.sim.reference_plant import CrudeLateral, ReferencePlant
 from selfdrive.sim.run import main
-from selfdrive.sim.scenario import load_scenario, on_plant, parse_scenario
+from selfdrive.sim.scenario import load_scenario, parse_scenario, with_plant
 from selfdrive.sim.sensors import CarSensors
 from selfdrive.sim.simulator import Simulator
 from selfdrive.sim.truth import GroundTruth
@@ -27,7 +27,7 @@ def car():
 
 @pytest.fixture
 def s1(scenarios):
-    return on_plant(load_scenario(scenarios / "S1.yaml"), "reference")
+    return with_plant(load_scenario(scenarios / "S1.yaml"), "reference")
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -126,8 +126,8 @@ def test_a_scenario_can_select_the_plant(scenarios):
     assert parse_scenario(TEXT, "a.yaml", "").plant == "reference"
     plain = load_scenario(scenarios / "S1.yaml")
     assert plain.plant == "standard"
-    assert on_plant(plain, "reference").plant == "reference"
-    assert on_plant(parse_scenario(TEXT, "a.yaml", ""), "standard").plant == "standard"
+    assert with_plant(plain, "reference").plant == "reference"
+    assert with_plant(parse_scenario(TEXT, "a.yaml", ""), "standard").plant == "standard"
 
 
 @pytest.mark.parametrize(

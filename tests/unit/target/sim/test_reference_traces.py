@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from selfdrive.sim.run import simulate
-from selfdrive.sim.scenario import load_scenario, on_plant
+from selfdrive.sim.scenario import load_scenario, with_plant
 from selfdrive.sim.simulator import Simulator
 
 REPO = Path(__file__).parents[4]
@@ -49,7 +49,7 @@ def run_once():
     """Run a scenario on the reference plant once. `X_nolead` is X without its lead."""
 
     def run(name):
-        scenario = on_plant(load_scenario(SCENARIOS / f"{name.removesuffix('_nolead')}.yaml"), "reference")
+        scenario = with_plant(load_scenario(SCENARIOS / f"{name.removesuffix('_nolead')}.yaml"), "reference")
         return simulate(replace(scenario, lead=None) if name.endswith("_nolead") else scenario, 0)
 
     return cache(run)
@@ -127,7 +127,7 @@ def faulty(scenario, disturb):
 
 @pytest.fixture
 def s1(scenarios):
-    return on_plant(load_scenario(scenarios / "S1.yaml"), "reference")
+    return with_plant(load_scenario(scenarios / "S1.yaml"), "reference")
 
 
 def angle_off(degrees):

@@ -18,8 +18,8 @@ from selfdrive.sim.image_library import RENDERED_SPACING
 from selfdrive.sim.picture import Picture
 from selfdrive.sim.picture_camera import PictureCamera
 from selfdrive.sim.picture_options import (
-    CODED_DETECTOR,
-    CODED_TRANSLATION,
+    AUTHORS_CODE_DETECTOR,
+    AUTHORS_CODE_TRANSLATION,
     GROUND_TRANSLATION,
     PAPER_DETECTOR,
     ROBUST_DETECTOR,
@@ -28,7 +28,7 @@ from selfdrive.sim.picture_options import (
 )
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import main, simulate, write_run
-from selfdrive.sim.scenario import REFERENCE_PLANT, STANDARD_PLANT, load_scenario, on_plant
+from selfdrive.sim.scenario import REFERENCE_PLANT, STANDARD_PLANT, load_scenario, with_plant
 from selfdrive.visiond.detector import LaneLines, RoadLine, path_between
 
 CALIBRATION = f"""\
@@ -112,7 +112,7 @@ def test_a_car_that_sees_only_frames_returns_to_the_middle(
     assert result.record["pictures"]["translation"] == translation
 
 
-@pytest.mark.parametrize("detector", [PAPER_DETECTOR, ROBUST_DETECTOR, CODED_DETECTOR])
+@pytest.mark.parametrize("detector", [PAPER_DETECTOR, ROBUST_DETECTOR, AUTHORS_CODE_DETECTOR])
 def test_the_detection_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_path, detector):
     monkeypatch.setattr(detection_memory, "BUCKET_COUNT", 512)
     clean, look = PictureCamera.look, []
@@ -228,7 +228,7 @@ def test_all_scenarios_run_without_alerts_on_the_rendered_road(
     ("plant", "translation", "alerting", "aside"),
     [
         (STANDARD_PLANT, GROUND_TRANSLATION, set(), 0.2),
-        (REFERENCE_PLANT, CODED_TRANSLATION, {"S2", "S4"}, 0.6),
+        (REFERENCE_PLANT, AUTHORS_CODE_TRANSLATION, {"S2", "S4"}, 0.6),
     ],
 )
 def test_fault_free_runs_with_the_detector_as_coded_have_no_hazard(
@@ -236,10 +236,10 @@ def test_fault_free_runs_with_the_detector_as_coded_have_no_hazard(
 ):
     """On the reference plant, two of the runs raise *steer saturated*."""
     cache = tmp_path_factory.getbasetemp() / "pictures"
-    pictures = PictureOptions(detector=CODED_DETECTOR, translation=translation, cache=cache)
+    pictures = PictureOptions(detector=AUTHORS_CODE_DETECTOR, translation=translation, cache=cache)
     found = set()
     for name in ("S1", "S2", "S3", "S4", "S5"):
-        result = simulate(on_plant(load_scenario(scenarios / f"{name}.yaml"), plant), 0, pictures)
+        result = simulate(with_plant(load_scenario(scenarios / f"{name}.yaml"), plant), 0, pictures)
         assert set(result.record["hazards"].values()) == {None}
         assert np.abs(result.trace["lateral_offset"]).max() < aside
         if "steer_saturated" in {alert["name"] for alert in result.record["alerts"]}:

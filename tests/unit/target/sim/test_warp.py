@@ -10,7 +10,7 @@ from selfdrive.common import compiled
 from selfdrive.common.array_math import product
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim import compile_helpers, compiled_warp
-from selfdrive.sim.compiled_warp import CompiledWarp, build_warp, is_bit_identical
+from selfdrive.sim.compiled_warp import CompiledWarp, build_warp, has_identical_warp
 from selfdrive.sim.picture import Region, whole
 from selfdrive.sim.road_renderer import car_to_road, picture_to_car
 from selfdrive.sim.warp import warp
@@ -60,7 +60,7 @@ def test_a_region_equals_that_of_opencvs_whole_image():
 
 @needs_compiler
 def test_compiled_warps_have_the_same_bits(library):
-    if not is_bit_identical(library):
+    if not has_identical_warp(library):
         pytest.skip("OpenCV computes different bits from the C code")
     random, fast = np.random.default_rng(2), CompiledWarp(library)
     for matrix in moves(random):
@@ -91,7 +91,7 @@ def test_results_do_not_depend_on_wide_vector_instructions(library, tmp_path, op
 @needs_compiler
 @pytest.mark.parametrize("shape", [(50, 100), (64, 64), (3, 65), (1, 200), (2, 64)])
 def test_pictures_of_any_size_are_warped(library, shape):
-    if not is_bit_identical(library):
+    if not has_identical_warp(library):
         pytest.skip("OpenCV computes different bits from the C code")
     random, fast = np.random.default_rng(3), CompiledWarp(library)
     for _ in range(20):
@@ -114,9 +114,9 @@ def test_the_library_is_not_used_if_opencv_computes_other_bits(library, monkeypa
         return warp(source, matrix * (1.0 + 1e-7), region)
 
     monkeypatch.setattr(compiled_warp, "warp", rounds_otherwise)
-    is_bit_identical.cache_clear()
+    has_identical_warp.cache_clear()
     assert build_warp() == (rounds_otherwise, "")
-    is_bit_identical.cache_clear()
+    has_identical_warp.cache_clear()
 
 
 @needs_compiler

@@ -11,12 +11,12 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim import compile_helpers
 from selfdrive.sim.effects.effect import Moment
-from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
+from selfdrive.sim.effects.levels import AMOUNTS_BY_EFFECT
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond import compiled_robust, compiled_view, compiled_windows
-from selfdrive.visiond.band_filter import EDGE_COLUMNS, MOST_POINTS
-from selfdrive.visiond.coded_detector import CodedDetector
-from selfdrive.visiond.compiled_coded import CompiledCodedDetector, build_coded_detector
+from selfdrive.visiond.authors_code_detector import AuthorsCodeDetector
+from selfdrive.visiond.band_filter import MOST_POINTS, SKIPPED_BORDER_COLUMNS
+from selfdrive.visiond.compiled_authors_code import CompiledAuthorsCodeDetector, build_authors_code_detector
 from selfdrive.visiond.compiled_paper import CompiledPaperDetector, build_paper_detector
 from selfdrive.visiond.compiled_robust import C_SOURCES, CompiledVote, build_robust_detector
 from selfdrive.visiond.compiled_view import CompiledRoadView
@@ -34,7 +34,7 @@ SMALL = CameraModel.from_view(width=512, rows=400, horizon=150.0, focal=400.0, h
 VOTING = C_SOURCES[1]
 DETECTORS = {
     "paper": (PaperDetector, build_paper_detector, CompiledPaperDetector),
-    "as_coded": (CodedDetector, build_coded_detector, CompiledCodedDetector),
+    "as_coded": (AuthorsCodeDetector, build_authors_code_detector, CompiledAuthorsCodeDetector),
     "robust": (RobustDetector, build_robust_detector, RobustDetector),
 }
 
@@ -70,7 +70,7 @@ def pictures():
     chance, found = np.random.default_rng(3), []
     roads = [RoadRenderer(MODEL, marks, 1, periods=3) for marks in ("solid", "dashed")]
     changes = [None] * 8 + [
-        kind(amount, 1, MODEL) for kind, each in LEVEL_AMOUNTS.items() for amount in (each[0], each[-1])
+        kind(amount, 1, MODEL) for kind, each in AMOUNTS_BY_EFFECT.items() for amount in (each[0], each[-1])
     ]
     for k, effect in enumerate(changes):
         picture = roads[k % 2].render_grey(9.0 * k, 1.5 * sin(k), 0.03 * sin(1.7 * k))
@@ -164,7 +164,7 @@ def test_votes_are_the_same(seed):
     view = RoadView(MODEL)
     road = chance.integers(0, 2, (len(view.drop), len(view.y)), np.uint8)
     road[chance.random(len(view.drop)) < chance.choice([0.0, 0.5, 1.0])] = 7
-    numbers = len(view.drop) * (len(view.y) - 2 * EDGE_COLUMNS)
+    numbers = len(view.drop) * (len(view.y) - 2 * SKIPPED_BORDER_COLUMNS)
     count = chance.choice([seed % 10, chance.integers(0, 900), MOST_POINTS])
     at = np.sort(chance.choice(numbers, count, replace=False))
     weight = chance.uniform(0.0, 1.0, len(at)).astype(np.float32)

@@ -19,7 +19,7 @@ def test_a_line_along_the_road_is_vertical_in_the_map(name, y):
     model = CAMERAS[name]
     a, b = model.line_in_picture(y, 0.0)
     v, u = np.mgrid[: model.rows, : model.width]
-    half = 0.1 * model.spread(1.0) * (v - model.horizon)
+    half = 0.1 * model.lines_divergence(1.0) * (v - model.horizon)
     picture = np.where(np.abs(u - (a * v + b)) <= half, 255, 40).astype(np.uint8)
     view = RoadView(model)
     road = view.map_picture(picture)

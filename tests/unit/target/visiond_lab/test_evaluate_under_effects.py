@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 import pytest
 from selfdrive.sim.effects.effects_page import PANEL_SIZE, TITLE_HEIGHT
-from selfdrive.sim.effects.levels import LEVEL_AMOUNTS
+from selfdrive.sim.effects.levels import AMOUNTS_BY_EFFECT
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond_lab.evaluate import EXIT_INVALID_INPUT, SOURCE_BY_KEY, UDACITY_MODEL
+from selfdrive.visiond_lab.evaluate_on_real_frames import EXIT_INVALID_INPUT, SOURCE_BY_KEY, UDACITY_MODEL
 from selfdrive.visiond_lab.evaluate_under_effects import CSV_HEADER, PANELS_PER_ROW, main
 
 
@@ -47,11 +47,11 @@ def test_more_lines_are_missed_in_heavier_rain(frames, tmp_path):
 
 
 def test_strips_show_all_levels(frames, tmp_path):
-    kinds = {kind.__name__: kind for kind in LEVEL_AMOUNTS}
+    kinds = {kind.__name__: kind for kind in AMOUNTS_BY_EFFECT}
     for name in ("PaperRain", "GaussianBlur"):
         assert main([*frames, "--effect", name, "--strips", str(tmp_path)]) == 0
         strip = cv2.imread(str(tmp_path / f"{name}_p1_one.png"), cv2.IMREAD_GRAYSCALE)
-        rows = -(-len(LEVEL_AMOUNTS[kinds[name]]) // PANELS_PER_ROW)
+        rows = -(-len(AMOUNTS_BY_EFFECT[kinds[name]]) // PANELS_PER_ROW)
         assert strip.shape == (rows * (PANEL_SIZE[1] + TITLE_HEIGHT), PANELS_PER_ROW * PANEL_SIZE[0])
 
 

@@ -1,9 +1,10 @@
-"""Measures how well a detector finds real lanes: `python -m selfdrive.visiond_lab.evaluate FRAMES TRUTH`.
+"""Measures how well a detector finds real lanes.
 
-TRUTH is a JSON file: {"lines": {KEY: {"L": [a, b], "R": [a, b]}}} with x = a * row + b, or, if only the
-lines' centres in row 278 are known, {KEY: {"gt": [xl, xr]}}. Coordinates are in the canonical frame: 640 x
-480, the frame scaled to 640 and moved vertically until its vanishing row is 200. The first word of a key
-(`p1` in `p1_solidWhiteCurve`) names the camera, unless FRAMES has a camera.yaml.
+Run it as `python -m selfdrive.visiond_lab.evaluate_on_real_frames FRAMES TRUTH`. TRUTH is a JSON file:
+{"lines": {KEY: {"L": [a, b], "R": [a, b]}}} with x = a * row + b, or, if only the lines' centres in row 278
+are known, {KEY: {"gt": [xl, xr]}}. Coordinates are in the canonical frame: 640 x 480, the frame scaled to 640
+and moved vertically until its vanishing row is 200. The first word of a key (`p1` in `p1_solidWhiteCurve`)
+names the camera, unless FRAMES has a camera.yaml.
 """
 
 import argparse
@@ -27,7 +28,7 @@ from selfdrive.visiond.robust_detector import RobustDetector
 
 EXIT_INVALID_INPUT = 2
 CANONICAL_WIDTH, CANONICAL_ROWS, CANONICAL_HORIZON = 640, 480, 200  # of the canonical frame
-COMPARED_ROW = 278  # where lines are compared
+LINES_COMPARED_ROW = 278  # where lines are compared
 SPACING_TOLERANCE = 0.3 / 3.7  # of the lines' true spacing
 IMAGE_SUFFIXES = (".jpg", ".png", ".jpeg")
 ROBUST, PAPER, BOTH = "robust", "paper", "both"
@@ -143,7 +144,7 @@ def detect_lines(detector: LaneDetector, frame: LabelledFrame, picture: np.ndarr
     errors = []
     for line, true in ((lines.left, frame.left_column), (lines.right, frame.right_column)):
         a, b = frame.model.line_in_picture(line.y, line.slope)
-        errors.append(a * COMPARED_ROW + b - true if line.prob > 0.0 else None)
+        errors.append(a * LINES_COMPARED_ROW + b - true if line.prob > 0.0 else None)
     return DetectionResult(frame=frame, lines=lines, left_error=errors[0], right_error=errors[1])
 
 
@@ -151,9 +152,11 @@ def build_lane_detector(name: str, model: CameraModel) -> PaperDetector | Robust
     return PaperDetector(model) if name == PAPER else RobustDetector(model)
 
 
-def render_report(detector: str, findings: list[DetectionResult]) -> str:
-    rows = [f"{detector}: errors in row {COMPARED_ROW} (px), limit {SPACING_TOLERANCE:.4f} of the spacing"]
-    for finding in findings:
+def render_report(detector: str, results: list[DetectionResult]) -> str:
+    rows = [
+        f"{detector}: errors in row {LINES_COMPARED_ROW} (px), limit {SPACING_TOLERANCE:.4f} of the spacing"
+    ]
+    for finding in results:
         frame = finding.frame
         errors = "  ".join(
             f"{side} {'not found' if error is None else f'{error:+9.1f}':>9}"
@@ -163,20 +166,20 @@ def render_report(detector: str, findings: list[DetectionResult]) -> str:
         rows.append(
             f"  {frame.key:32} {errors}  limit {limit:5.1f}  {'ok' if finding.has_both_lines else 'MISSED'}"
         )
-    good = sum(finding.has_both_lines for finding in findings)
-    rows.append(f"{detector}: both lines found in {good} of {len(findings)} = {good / len(findings):.1%}")
+    good = sum(finding.has_both_lines for finding in results)
+    rows.append(f"{detector}: both lines found in {good} of {len(results)} = {good / len(results):.1%}")
     return "\n".join(rows)
 
 
-def draw_overlay(finding: DetectionResult) -> np.ndarray:
-    canvas, frame = finding.frame.colour.copy(), finding.frame
-    for line in (finding.lines.left, finding.lines.right):
+def draw_overlay(result: DetectionResult) -> np.ndarray:
+    canvas, frame = result.frame.colour.copy(), result.frame
+    for line in (result.lines.left, result.lines.right):
         if line.prob > 0.0:
             a, b = frame.model.line_in_picture(line.y, line.slope)
             ends = [(round(a * row + b), row) for row in (CANONICAL_HORIZON + 15, CANONICAL_ROWS - 1)]
             cv2.line(canvas, *ends, DETECTED_COLOUR, 1, cv2.LINE_AA)
     for column in (frame.left_column, frame.right_column):
-        cv2.circle(canvas, (round(column), COMPARED_ROW), 4, TRUE_COLOUR, 1, cv2.LINE_AA)
+        cv2.circle(canvas, (round(column), LINES_COMPARED_ROW), 4, TRUE_COLOUR, 1, cv2.LINE_AA)
     return canvas
 
 
@@ -231,7 +234,7 @@ def _load_truth(path: Path) -> dict:
 def _true_columns(key: str, entry: dict, truth: Path) -> tuple[float, float]:
     try:
         if entry.get("L") and entry.get("R"):
-            left, right = (entry[side][0] * COMPARED_ROW + entry[side][1] for side in "LR")
+            left, right = (entry[side][0] * LINES_COMPARED_ROW + entry[side][1] for side in "LR")
         else:
             centres = entry["gt"]
             left, right = (centres[side] for side in ("LR" if isinstance(centres, dict) else (0, 1)))
@@ -267,8 +270,8 @@ def _image_of_key(key: str, images: list[Path], folder: Path) -> Path:
     )
 
 
-def _write_overlays(folder: Path, detector: str, findings: list[DetectionResult]) -> None:
-    for finding in findings:
+def _write_overlays(folder: Path, detector: str, results: list[DetectionResult]) -> None:
+    for finding in results:
         path = folder / f"{detector}_{finding.frame.key}.png"
         with writing(path, expected="a writable folder", remedy="choose another --overlays"):
             folder.mkdir(parents=True, exist_ok=True)
@@ -277,7 +280,7 @@ def _write_overlays(folder: Path, detector: str, findings: list[DetectionResult]
 
 def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="selfdrive.visiond_lab.evaluate",
+        prog="selfdrive.visiond_lab.evaluate_on_real_frames",
         description="Compare detected lanes of real frames with the truth.",
     )
     parser.add_argument("frames", type=Path, metavar="FRAMES", help="folder of frames")

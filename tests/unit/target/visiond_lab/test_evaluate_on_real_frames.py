@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond_lab.evaluate import (
+from selfdrive.visiond_lab.evaluate_on_real_frames import (
     SOURCE_BY_KEY,
     TUSIMPLE_MODEL,
     UDACITY_MODEL,

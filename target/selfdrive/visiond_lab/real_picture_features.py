@@ -1,4 +1,4 @@
-"""Adds features of real pictures that rendered roads lack: verges, long shadows, bends, bad cameras."""
+"""Makes rendered pictures look more real: adds verges, long shadows, bends and the faults of bad cameras."""
 
 from collections.abc import Iterable
 
@@ -11,7 +11,7 @@ MIN_BEND_RADIUS = 250.0  # m, radius of a curve
 ROWS_BELOW_HORIZON = 4.0  # rows below it, where the road is assumed to end
 
 
-class RoadsideFlaws:
+class RandomVergesAndBands:
     """A verge that can begin directly at the lane, and darker or lighter bands along the road.
 
     Bands are shadows of barriers, strips of newer asphalt, gutters.
@@ -26,8 +26,8 @@ class RoadsideFlaws:
         half = 0.5 * lane_width
         self._verges = [half + rng.gamma(2.0, 1.6) + 0.2 if rng.random() < 0.6 else 50.0 for _ in range(2)]
         self._verge_tone = rng.uniform(35.0, 200.0)
-        self._verge_texture = self._texture(rng)
-        self._bands = [_draw_band(rng) for _ in range(int(rng.integers(0, 5)))]
+        self._verge_texture = self._draw_verge_texture(rng)
+        self._bands = [_draw_band_values(rng) for _ in range(int(rng.integers(0, 5)))]
 
     def apply(
         self, picture: np.ndarray, paint: np.ndarray, offset: float, heading: float
@@ -43,13 +43,13 @@ class RoadsideFlaws:
         tones = np.where(grown, self._verge_texture, tones)
         return np.clip(tones, 0.0, 255.0).astype(np.uint8), np.where(grown, np.uint8(0), paint)
 
-    def _texture(self, rng: np.random.Generator) -> np.ndarray:
+    def _draw_verge_texture(self, rng: np.random.Generator) -> np.ndarray:
         fine = rng.standard_normal(self._lateral.shape, dtype=np.float32)
         fine = cv2.GaussianBlur(fine, (0, 0), rng.uniform(0.6, 2.5), sigmaY=rng.uniform(0.6, 2.5))
         return self._verge_tone + fine * (rng.uniform(2.0, 40.0) / max(float(fine.std()), 1e-6))
 
 
-def bend_images(
+def bend_road_in_images(
     model: CameraModel, images: Iterable[np.ndarray], rng: np.random.Generator
 ) -> list[np.ndarray]:
     bend = rng.uniform(-1.0, 1.0) ** 3 / MIN_BEND_RADIUS
@@ -62,7 +62,7 @@ def bend_images(
     ]
 
 
-def simulate_camera(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def degrade_like_bad_camera(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Simulate a camera and file format: soft, noisy, compressed, with different contrast."""
     if rng.random() < 0.6:
         picture = cv2.GaussianBlur(picture, (0, 0), rng.uniform(0.3, 1.6))
@@ -76,6 +76,6 @@ def simulate_camera(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray
     return picture
 
 
-def _draw_band(rng: np.random.Generator) -> tuple[float, float, float, float]:
+def _draw_band_values(rng: np.random.Generator) -> tuple[float, float, float, float]:
     """A band's start (m left of the lane centre), width (m), factor on tones, and soft edge (m)."""
     return rng.uniform(-8.0, 6.0), rng.gamma(1.5, 1.5) + 0.3, rng.uniform(0.45, 1.3), rng.uniform(0.02, 0.4)

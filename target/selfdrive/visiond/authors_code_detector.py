@@ -23,23 +23,26 @@ from selfdrive.visiond.lane_net import LaneNet
 
 PICTURE_WIDTH, PICTURE_ROWS = 640, 480  # px, the size of pictures for all positions below
 FIRST_ROW, FIRST_COLUMN = 235, 90  # of the windows
-WINDOWS = 6, 29  # down, across
+WINDOW_COUNTS = 6, 29  # down, across
 # px of the part of the picture that they cover
-PART_SIZE = tuple((count - 1) * WINDOW_STRIDE + WINDOW_PIXELS for count in WINDOWS)
-PART = slice(FIRST_ROW, FIRST_ROW + PART_SIZE[0]), slice(FIRST_COLUMN, FIRST_COLUMN + PART_SIZE[1])
+WINDOWS_PART_SIZE = tuple((count - 1) * WINDOW_STRIDE + WINDOW_PIXELS for count in WINDOW_COUNTS)
+WINDOWS_PART = (
+    slice(FIRST_ROW, FIRST_ROW + WINDOWS_PART_SIZE[0]),
+    slice(FIRST_COLUMN, FIRST_COLUMN + WINDOWS_PART_SIZE[1]),
+)
 MIN_LOG_ODDS = 4.0  # lowest log odds of a window with a mark; see visiond_lab.calibrate_as_coded
-MIN_STEEPNESS = 4.0  # an edge's squared gradient, as a multiple of the window's mean
-MIN_EDGES = 25  # px, in a window that is used
+MIN_EDGE_STEEPNESS = 4.0  # an edge's squared gradient, as a multiple of the window's mean
+MIN_WINDOW_EDGES = 25  # px, in a window that is used
 POINTS_IN_RADIUS = 5  # points within the clusters' radius if all were evenly spread
 MIN_CLUSTER_POINTS = 30  # of a cluster
 MIDDLE_COLUMN = 320  # column that separates left and right lines
-READ_ROW = 278  # where lines are read
+LINE_READ_ROW = 278  # where lines are read
 INWARD_PIXELS = 3  # px by which a line is read closer to the middle
-METRES_PER_PIXEL = 0.024856  # in READ_ROW, from the code of the paper's authors
+METRES_PER_PIXEL = 0.024856  # in LINE_READ_ROW, from the code of the paper's authors
 MISSING_LINE_COLUMN = 0  # column of a line without a cluster
 
 
-class CodedDetector:
+class AuthorsCodeDetector:
     """Examines pictures of 640 x 480 pixels and remembers where it last saw the lines.
 
     Its lines and path have probability 1 and are parallel to the car. `calculated_by` identifies the compiled
@@ -56,13 +59,13 @@ class CodedDetector:
                 expected=f"{PICTURE_WIDTH} x {PICTURE_ROWS} for the detector as coded",
                 remedy="choose another --detector",
             )
-        self._hog = Hog(*PART_SIZE)
+        self._hog = Hog(*WINDOWS_PART_SIZE)
         self._net, self._threshold = LaneNet.load(), threshold
         self.state: tuple[float, ...] = (0.5 * LANE_WIDTH, -0.5 * LANE_WIDTH)  # y (m) of left and right line
 
     def detect(self, view: CameraView) -> LaneLines:
         """Return the lines in `view.picture`; without any edge, the last ones."""
-        part = np.ascontiguousarray(view.picture[PART])
+        part = np.ascontiguousarray(view.picture[WINDOWS_PART])
         points = self._edge_points(part)
         return self._remember(_columns_of_lines(points) if points.size else None)
 
@@ -77,13 +80,13 @@ class CodedDetector:
         """(row, column) in the picture of edges in windows with a mark; an edge in several windows is
         repeated."""
         edges = edges_in_windows(part)
-        candidates = np.flatnonzero(edges.sum(axis=(1, 2)) >= MIN_EDGES)
+        candidates = np.flatnonzero(edges.sum(axis=(1, 2)) >= MIN_WINDOW_EDGES)
         if not candidates.size:
             return np.empty((0, 2), np.intp)
-        features = detection_windows(self._hog.blocks(part))[np.divmod(candidates, WINDOWS[1])]
+        features = detection_windows(self._hog.blocks(part))[np.divmod(candidates, WINDOW_COUNTS[1])]
         with_mark = candidates[self._net.log_odds(features.reshape(-1, WINDOW_FEATURES)) > self._threshold]
         window, row, column = edges[with_mark].nonzero()
-        down, across = np.divmod(with_mark[window], WINDOWS[1])
+        down, across = np.divmod(with_mark[window], WINDOW_COUNTS[1])
         return np.column_stack(
             (FIRST_ROW + WINDOW_STRIDE * down + row, FIRST_COLUMN + WINDOW_STRIDE * across + column)
         )
@@ -101,7 +104,7 @@ def edges_in_windows(part: np.ndarray) -> np.ndarray:
     tiles = power.reshape(down, WINDOW_STRIDE, across, WINDOW_STRIDE).sum(axis=(1, 3))
     sums = tiles[:-1, :-1] + tiles[1:, :-1] + tiles[:-1, 1:] + tiles[1:, 1:]
     # Powers are integers, so comparing with the limit's integer part is enough.
-    limits = np.floor(MIN_STEEPNESS / WINDOW_PIXELS**2 * sums).astype(np.int32)
+    limits = np.floor(MIN_EDGE_STEEPNESS / WINDOW_PIXELS**2 * sums).astype(np.int32)
     of_windows = np.lib.stride_tricks.sliding_window_view(crest, (WINDOW_PIXELS, WINDOW_PIXELS))[
         ::WINDOW_STRIDE, ::WINDOW_STRIDE
     ]
@@ -147,9 +150,9 @@ def _column_at_read_row(pixels: np.ndarray, counts: np.ndarray) -> float:
     down = row - mean_row
     power = dot(weight * down, down)
     slope = dot(weight * down, column) / power if power else 0.0
-    return mean_column + slope * (READ_ROW - mean_row)
+    return mean_column + slope * (LINE_READ_ROW - mean_row)
 
 
 def lateral_position(column: float) -> float:
-    """Lateral position (m, left positive) of the road in this column of row READ_ROW."""
+    """Lateral position (m, left positive) of the road in this column of row LINE_READ_ROW."""
     return (MIDDLE_COLUMN - column) * METRES_PER_PIXEL

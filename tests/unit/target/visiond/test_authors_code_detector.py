@@ -6,14 +6,14 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond import coded_detector as coded
-from selfdrive.visiond.coded_detector import CodedDetector, edges_in_windows, lateral_position
+from selfdrive.visiond import authors_code_detector as coded
+from selfdrive.visiond.authors_code_detector import AuthorsCodeDetector, edges_in_windows, lateral_position
 from selfdrive.visiond.detector import LaneLines
 
 CALTECH = CameraModel()
 
 
-def seen(detector: CodedDetector, picture: np.ndarray) -> LaneLines:
+def seen(detector: AuthorsCodeDetector, picture: np.ndarray) -> LaneLines:
     """Return the lines detected in `picture`. The view's other fields are dummies."""
     return detector.detect(
         CameraView(left_lane_y=9.0, right_lane_y=9.0, path_y=9.0, bend=(), lead_d_rel=50.0, picture=picture)
@@ -30,7 +30,7 @@ def test_lines_are_read_in_one_row(road: RoadRenderer, offset: float) -> None:
     """Each line is read at row 278, shifted 3 px towards the middle, and converted to metres by a fixed
     scale.
     """
-    found = seen(CodedDetector(CALTECH), road.render_grey(4.0, offset))
+    found = seen(AuthorsCodeDetector(CALTECH), road.render_grey(4.0, offset))
     for line, true, inward in zip(found[:2], road.true_lines(offset), (3, -3), strict=True):
         a, b = CALTECH.line_in_picture(*true)
         assert line.y == pytest.approx(lateral_position(a * 278 + b + inward), abs=0.05)
@@ -42,7 +42,7 @@ def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> 
     for half, expected in ((slice(320, None), (None, 8.03)), (slice(None, 320), (7.88, None))):
         picture = road.render_grey(4.0).copy()
         picture[:, half] = 97
-        found = seen(CodedDetector(CALTECH), picture)
+        found = seen(AuthorsCodeDetector(CALTECH), picture)
         for line, y in zip(found[:2], expected, strict=True):
             assert line.prob == 1.0
             if y is not None:
@@ -51,18 +51,18 @@ def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> 
 
 def test_both_lines_can_be_missing(road: RoadRenderer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(coded, "MIN_CLUSTER_POINTS", 10**6)
-    found = seen(CodedDetector(CALTECH), road.render_grey(4.0))
+    found = seen(AuthorsCodeDetector(CALTECH), road.render_grey(4.0))
     assert [line.y for line in found[:2]] == pytest.approx([7.88, 8.03], abs=0.005)
     assert [line.prob for line in found[:2]] == [1.0, 1.0]
 
 
 @pytest.mark.parametrize(("edges", "looked_at"), [(24, False), (25, True)])
 def test_a_window_needs_25_edges(edges: int, looked_at: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    crests = np.zeros((np.prod(coded.WINDOWS), 32, 32), bool)
+    crests = np.zeros((np.prod(coded.WINDOW_COUNTS), 32, 32), bool)
     crests[40].reshape(-1)[:edges] = True
     monkeypatch.setattr(coded, "edges_in_windows", lambda part: crests)
-    detector = CodedDetector(CALTECH, threshold=-np.inf)
-    points = detector._edge_points(np.zeros(coded.PART_SIZE, np.uint8))
+    detector = AuthorsCodeDetector(CALTECH, threshold=-np.inf)
+    points = detector._edge_points(np.zeros(coded.WINDOWS_PART_SIZE, np.uint8))
     assert len(points) == (edges if looked_at else 0)
     if looked_at:  # window 40 is the twelfth of the second row
         assert points.min(axis=0).tolist() == [235 + 16, 90 + 11 * 16]
@@ -77,15 +77,15 @@ def test_a_cluster_needs_30_points(points: int, column: int) -> None:
 
 
 def test_without_edges_the_lines_keep_their_positions(road: RoadRenderer) -> None:
-    detector = CodedDetector(CALTECH)
+    detector = AuthorsCodeDetector(CALTECH)
     before = seen(detector, road.render_grey(4.0, 0.3))
     assert seen(detector, np.full((480, 640), 97, np.uint8)) == before
-    blind = CodedDetector(CALTECH)
+    blind = AuthorsCodeDetector(CALTECH)
     assert seen(blind, np.zeros((480, 640), np.uint8)).left.y == 1.85
 
 
 def test_the_detectors_only_memory_is_its_state(road: RoadRenderer) -> None:
-    one, other = CodedDetector(CALTECH), CodedDetector(CALTECH)
+    one, other = AuthorsCodeDetector(CALTECH), AuthorsCodeDetector(CALTECH)
     seen(one, road.render_grey(4.0, 0.3))
     other.state = one.state
     nothing = np.zeros((480, 640), np.uint8)
@@ -94,13 +94,13 @@ def test_the_detectors_only_memory_is_its_state(road: RoadRenderer) -> None:
 
 def test_steepness_is_relative_to_the_window() -> None:
     random = np.random.default_rng(1)
-    faint = random.integers(0, 10, coded.PART_SIZE).astype(np.uint8)
+    faint = random.integers(0, 10, coded.WINDOWS_PART_SIZE).astype(np.uint8)
     assert edges_in_windows(faint).any()
     assert np.array_equal(edges_in_windows(faint), edges_in_windows(10 * faint))
 
 
 def test_edges_are_brightness_steps_between_rows() -> None:
-    level, upright = np.zeros((2, *coded.PART_SIZE), np.uint8)
+    level, upright = np.zeros((2, *coded.WINDOWS_PART_SIZE), np.uint8)
     level[40:], upright[:, 40:] = 100, 100
     assert edges_in_windows(level).any()
     assert not edges_in_windows(upright).any()
@@ -118,4 +118,6 @@ def test_a_chain_of_pixels_joins_two_clusters() -> None:
 def test_frames_of_another_size_are_refused() -> None:
     """The detector's pixel positions are fixed."""
     with pytest.raises(ConfigError, match=r"pictures of 1280 x 720.*expected 640 x 480"):
-        CodedDetector(CameraModel.from_view(width=1280, rows=720, horizon=238.0, focal=1000.0, height=1.5))
+        AuthorsCodeDetector(
+            CameraModel.from_view(width=1280, rows=720, horizon=238.0, focal=1000.0, height=1.5)
+        )

@@ -1,4 +1,4 @@
-"""Finds the threshold of the detector as coded: `python -m selfdrive.visiond_lab.calibrate_as_coded`.
+"""Finds the threshold of the detector as coded: `python -m selfdrive.visiond_lab.calibrate_authors_code`.
 
 Considers thresholds that mistake at most MOST_MISTAKEN_SHARE of the windows inside the lane for marks. Of
 those that misplace a line by more than MOST_LINE_ERROR in the fewest pictures, the middle one is printed. All
@@ -14,7 +14,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim.road_look import SOLID
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond import coded_detector as coded
+from selfdrive.visiond import authors_code_detector as coded
 from selfdrive.visiond.hog import WINDOW_FEATURES, WINDOW_PIXELS, WINDOW_STRIDE, Hog, detection_windows
 from selfdrive.visiond.lane_net import LaneNet
 
@@ -43,12 +43,12 @@ def evaluate_thresholds() -> list[tuple[float, float, float]]:
 
 def _scores_inside_lane(road: RoadRenderer, picture: np.ndarray, offset: float) -> np.ndarray:
     model = road.model
-    part = np.ascontiguousarray(picture[coded.PART])
+    part = np.ascontiguousarray(picture[coded.WINDOWS_PART])
     scores = LaneNet.load().log_odds(
         detection_windows(Hog(*part.shape).blocks(part)).reshape(-1, WINDOW_FEATURES)
     )
-    inside = np.zeros(coded.WINDOWS, bool)
-    for down, across in np.ndindex(*coded.WINDOWS):
+    inside = np.zeros(coded.WINDOW_COUNTS, bool)
+    for down, across in np.ndindex(*coded.WINDOW_COUNTS):
         top, first = coded.FIRST_ROW + WINDOW_STRIDE * down, coded.FIRST_COLUMN + WINDOW_STRIDE * across
         rows = np.array([top, top + WINDOW_PIXELS])
         margin = MIN_DISTANCE_FROM_LINE / np.array([model.metres_per_pixel(row) for row in rows])
@@ -64,12 +64,12 @@ def _scores_inside_lane(road: RoadRenderer, picture: np.ndarray, offset: float) 
 def _misplaced_share(
     road: RoadRenderer, threshold: float, pictures: Sequence[np.ndarray], offsets: Sequence[float]
 ) -> float:
-    detector, off = coded.CodedDetector(road.model, threshold), 0
+    detector, off = coded.AuthorsCodeDetector(road.model, threshold), 0
     for picture, offset in zip(pictures, offsets, strict=True):
         ideal_view = {"left_lane_y": 0.0, "right_lane_y": 0.0, "path_y": 0.0, "bend": (), "lead_d_rel": 0.0}
         detected = detector.detect(CameraView(**ideal_view, picture=picture))
         true_columns = [
-            a * coded.READ_ROW + b
+            a * coded.LINE_READ_ROW + b
             for a, b in (road.model.line_in_picture(*x) for x in road.true_lines(offset))
         ]
         true_positions = (
