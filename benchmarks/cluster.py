@@ -30,7 +30,8 @@ from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
 from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.run_provenance import append_stretch
-from mutator.execution.cluster import cluster_distributor, crew, worker_tasks
+from mutator.execution.cluster import cluster_distributor, worker_tasks
+from mutator.execution.cluster import worker_roster
 from mutator.execution.cluster import result_intake as intakes
 from mutator.execution.cluster.bundle import Bundle
 from mutator.execution.cluster.cluster_choice import parse_cluster_choice
@@ -171,7 +172,7 @@ def intake() -> None:
             workers_note="",
         )
         Bundle.pack_for_run = classmethod(lambda cls, *given: cls(b"", ""))  # type: ignore[assignment, method-assign]
-        crew.Crew.reason_to_refuse = lambda self, facts: ""  # type: ignore[method-assign]
+        worker_roster.Crew.reason_to_refuse = lambda self, facts: ""  # type: ignore[method-assign]
         times: list[float] = []
         take = intakes.ResultIntake.append_result
 

@@ -202,7 +202,7 @@ IMPORTERS = Door(
 DISTRIBUTORS = Door(
     addition="distributor",
     group="mutator.distributors",
-    type_path="mutator.execution.distribution:DistributorKind",
+    type_path="mutator.execution.distributor_choice:DistributorKind",
     shipped_package="mutator.execution.distributors",
     argument="cluster",
 )

@@ -15,7 +15,7 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from mutator.engines.target_processes import run_environment
+from mutator.engines.process_endings import run_environment
 from mutator.store.work_stretches import Blas
 from mutator.targets.process_environment import THREAD_VARIABLES
 

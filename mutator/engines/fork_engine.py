@@ -36,7 +36,7 @@ from mutator.engines.fork_server_client import (
 )
 from mutator.engines.job_folder import OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.engines.target_processes import (
+from mutator.engines.process_endings import (
     GUARD_PATIENCE_S,
     ProcessEnding,
     judge_run,

@@ -20,10 +20,10 @@ from typing import Any
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.file_change_detection import UnchangedFiles
 from mutator._common.files import remove_folder
-from mutator.engines import bytecode
+from mutator.engines import pyc_files
 from mutator.engines.job_tree import JobTree
 from mutator.engines.sandbox import Sandbox
-from mutator.engines.target_processes import exception_in_report, run_environment, wait_for_guard
+from mutator.engines.process_endings import exception_in_report, run_environment, wait_for_guard
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import ForkServerLost, NotForkable
 from mutator.targets.manifest import TargetManifest
@@ -143,7 +143,7 @@ class ForkServer:
         self._parent_pid = parent_pid
         self._waiting_processes: list[WaitingProcess] = []
         self._process_group = 0  # the server's process group, once known
-        bytecode.write_files(manifest.tree.files, self.tree_folder)
+        pyc_files.write_files(manifest.tree.files, self.tree_folder)
         self._tree = JobTree(self.tree_folder, manifest.tree.files, {})
         start = {
             "tree": str(self.tree_folder),

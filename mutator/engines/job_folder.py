@@ -19,7 +19,7 @@ from typing import Any
 
 from mutator._common.confined_files import move_plain_files, open_folder, read_below
 from mutator._common.files import remove_anything_at
-from mutator.engines.target_processes import parse_report, read_log_tail
+from mutator.engines.process_endings import parse_report, read_log_tail
 from mutator.errors import Outside
 
 OUTPUT_FOLDER = "output"  # the name of the folder with the output's plain files

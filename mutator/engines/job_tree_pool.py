@@ -13,7 +13,7 @@ from itertools import count
 from pathlib import Path
 
 from mutator._common.files import is_disk_full_error, remove_anything_at, remove_folder
-from mutator.engines import bytecode
+from mutator.engines import pyc_files
 from mutator.engines.job_tree import JobTree
 from mutator.targets.source_tree import SourceTree
 
@@ -23,7 +23,7 @@ class JobTreePool:
 
     def __init__(self, tree: SourceTree, work_folder: Path) -> None:
         self._source_files = tree.files
-        self._files_with_bytecode = bytecode.files_with_bytecode(tree)
+        self._files_with_bytecode = pyc_files.files_with_bytecode(tree)
         self._work_folder = work_folder
         self._unused_trees: list[JobTree] = []  # threads share it, which `pop` and `append` allow
         self._tree_numbers = count()
@@ -36,9 +36,9 @@ class JobTreePool:
         folder.parent.mkdir(parents=True, exist_ok=True)
         pristine = self._source_files if new else self._files_with_bytecode
         if new or not self._reuse_tree(folder, changed_files):
-            bytecode.write_files(pristine, folder)
-            bytecode.replace_files(changed_files, folder)
-        stale = set(map(bytecode.bytecode_path, changed_files))
+            pyc_files.write_files(pristine, folder)
+            pyc_files.replace_files(changed_files, folder)
+        stale = set(map(pyc_files.bytecode_path, changed_files))
         files = {name: data for name, data in pristine.items() if name not in stale}
         return JobTree(folder, {**files, **changed_files}, changed_files)
 
@@ -47,9 +47,9 @@ class JobTreePool:
         if tree.added_paths():
             return
         with suppress(OSError):
-            bytecode.remove_files(tree.changed_files, tree.folder)
-            changed_names = {*tree.changed_files, *map(bytecode.bytecode_path, tree.changed_files)}
-            bytecode.write_files(
+            pyc_files.remove_files(tree.changed_files, tree.folder)
+            changed_names = {*tree.changed_files, *map(pyc_files.bytecode_path, tree.changed_files)}
+            pyc_files.write_files(
                 {
                     name: self._files_with_bytecode[name]
                     for name in changed_names & self._files_with_bytecode.keys()
@@ -68,7 +68,7 @@ class JobTreePool:
         while self._unused_trees:
             try:
                 if self._unused_trees.pop().move_to(folder):
-                    bytecode.replace_files(changed_files, folder)
+                    pyc_files.replace_files(changed_files, folder)
                     return True
             except OSError as err:
                 if is_disk_full_error(err):

@@ -26,7 +26,7 @@ from mutator.engines.engine_jobs import (
 from mutator.engines.job_folder import OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
 from mutator.engines.job_tree_pool import JobTreePool
 from mutator.engines.sandbox import Sandbox
-from mutator.engines.target_processes import (
+from mutator.engines.process_endings import (
     GUARD_LOST,
     GUARD_PATIENCE_S,
     ProcessEnding,

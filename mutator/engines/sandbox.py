@@ -17,7 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from mutator._common.files import remove_anything_at
-from mutator.engines.target_processes import run_environment
+from mutator.engines.process_endings import run_environment
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 

@@ -7,7 +7,7 @@ import warnings
 from pathlib import Path
 
 from mutator.errors import MutatorWarning
-from mutator.execution.distribution import Distributor, packages_of_distributor
+from mutator.execution.distributor_choice import Distributor, packages_of_distributor
 from mutator.execution.local_distributor import LocalDistributor
 from mutator.execution.progress_reporting import reporting_progress
 from mutator.execution.session import ProgressCallback, Summary, open_session

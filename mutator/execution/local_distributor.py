@@ -8,7 +8,7 @@ from importlib import metadata
 
 import pytest
 
-from mutator.execution.pytest_session import CampaignController
+from mutator.execution.xdist_controller import CampaignController
 from mutator.execution.session import Session
 
 _PLUGIN_MODULE = "mutator.execution.pytest_plugin"

@@ -61,13 +61,13 @@ def pytest_configure(config: pytest.Config) -> None:
     if out is None:
         raise pytest.UsageError("--campaign needs --campaign-out DIR, the folder for its results")
     if hasattr(config, "workerinput"):
-        from mutator.execution.pytest_worker import WorkerPlugin
+        from mutator.execution.xdist_worker import WorkerPlugin
 
         config.pluginmanager.register(WorkerPlugin(config, config.workerinput))
         return
     from mutator.errors import MutatorError
-    from mutator.execution.distribution import choose_distributor, packages_of_distributor
-    from mutator.execution.pytest_session import register_controller
+    from mutator.execution.distributor_choice import choose_distributor, packages_of_distributor
+    from mutator.execution.xdist_controller import register_controller
 
     cluster, insecure = config.getoption("campaign_cluster"), config.getoption("insecure_network")
     if cluster and getattr(config.option, "numprocesses", None):

@@ -1,6 +1,6 @@
 """A session: one command holds the lock of a run folder and takes the run from plan to results.
 
-`distribution` decides which processes do the work.
+`distributor_choice` decides which processes do the work.
 """
 
 import os

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from mutator.campaigns.chunks import PendingChunk
-from mutator.execution.pytest_session import CampaignController, register_controller
+from mutator.execution.xdist_controller import CampaignController, register_controller
 from mutator.execution.written_files import WrittenFiles
 from mutator.workspace import Workspace
 

@@ -5,7 +5,7 @@ import sys
 
 PROCESSES = (
     "mutator.execution.pytest_plugin",
-    "mutator.execution.pytest_worker",
+    "mutator.execution.xdist_worker",
     "mutator.execution.cluster.piece_process",
     "mutator.serve.job_guard",
     "mutator.engines.in_target.fork_server",

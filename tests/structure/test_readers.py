@@ -11,7 +11,7 @@ ALLOWED = {
     "_common/shipped_files.py: read_bytes": "installed with the harness, or unpacked from that",
     "_common/shipped_files.py: read_text": "installed with the harness",
     "campaigns/run_environment.py: read_text": "the kernel's file",
-    "execution/stopped_workers.py: read_text": "the kernel's file",
+    "execution/suspended_workers.py: read_text": "the kernel's file",
     "execution/cluster/piece_process.py: read": "a file of its parent",
     "glue.py: read_text": "runs in the target's process",
     "results/table_reader.py: read": "checks the number of cells before",

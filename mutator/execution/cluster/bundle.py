@@ -23,7 +23,7 @@ from mutator._common.hashing import as_json_types
 from mutator._common.version import VERSION
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError, Outside
-from mutator.execution.cluster.parcel import pack_parcel, unpack_parcel
+from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.execution.cluster.unpacked_bundle import BUNDLE_SCHEMA, META_FILE, UnpackedBundle
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import TEMPLATE_FOLDER_GLOBS

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from mutator.execution.cluster.parcel import pack_parcel, unpack_parcel
+from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.model import Experiment
 from mutator.store.plan_lines import parse_experiment, parse_fault
 

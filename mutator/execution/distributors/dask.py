@@ -4,7 +4,7 @@ from pkgutil import resolve_name
 
 from mutator.execution.cluster.cluster_choice import parse_cluster_choice
 from mutator.execution.cluster.dask_connections import requiring_extra
-from mutator.execution.distribution import Distributor, DistributorKind
+from mutator.execution.distributor_choice import Distributor, DistributorKind
 
 _DISTRIBUTOR_CLASS = "mutator.execution.cluster.cluster_distributor:ClusterDistributor"
 

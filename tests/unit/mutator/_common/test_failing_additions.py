@@ -9,7 +9,7 @@ import mutator
 from mutator._common.doors import DOORS, EXPORTS, OPERATORS, STUDIES
 from mutator.cli.app import main
 from mutator.errors import EXIT_WRONG_INPUT, BadAddition, Shortage
-from mutator.execution.distribution import choose_distributor
+from mutator.execution.distributor_choice import choose_distributor
 from mutator.report import report_builder
 from mutator.workspace import Workspace
 
@@ -17,7 +17,7 @@ from ..report.made_run import make_run
 
 CLONE = Path(__file__).parents[4]
 SOURCE = """\
-from mutator.execution.distribution import DistributorKind
+from mutator.execution.distributor_choice import DistributorKind
 from mutator.exports import Export
 from mutator.operators import Operator
 from mutator.report.reported_run import PublishedWork

@@ -13,7 +13,7 @@ from mutator.campaigns.git_clone import find_clone_state
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.run_provenance import accepted_version_differences, begin_stretch
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
-from mutator.execution.distribution import choose_distributor, packages_of_distributor
+from mutator.execution.distributor_choice import choose_distributor, packages_of_distributor
 from mutator.store.check_results import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.work_stretches import CloneState

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines import bytecode
+from mutator.engines import pyc_files
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import DiskFull, MutatorError
@@ -251,7 +251,7 @@ def test_stale_bytecode_is_not_run(run: Run, manifest: TargetManifest) -> None:
     body = "from toycar.world import STEP\nraise ValueError(STEP)"
     execution = run({"toycar/world.py": changed, **entry(body)})
     assert execution.detail.startswith("ValueError: 0.06")
-    cached = bytecode.files_with_bytecode(manifest.tree)[bytecode.bytecode_path("toycar/world.py")]
+    cached = pyc_files.files_with_bytecode(manifest.tree)[pyc_files.bytecode_path("toycar/world.py")]
     assert int.from_bytes(cached[4:8], "little") == 0b11, "expected a check by hash"
 
 

@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import pytest
 
-from mutator.execution.pytest_session import CampaignController
+from mutator.execution.xdist_controller import CampaignController
 from mutator.execution.written_files import WrittenFiles
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter

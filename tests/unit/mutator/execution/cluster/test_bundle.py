@@ -11,7 +11,7 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.bundle import Bundle, load_run_inputs, unpack_bundle
-from mutator.execution.cluster.parcel import pack_parcel, unpack_parcel
+from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.session import open_session
 from mutator.store.plan_choices import Choices

@@ -3,7 +3,7 @@
 import pytest
 
 from mutator._common.version import VERSION
-from mutator.execution.cluster.crew import Crew, describe_worker
+from mutator.execution.cluster.worker_roster import Crew, describe_worker
 from mutator.store.work_stretches import Stretch
 
 FACTS = {

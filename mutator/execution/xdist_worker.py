@@ -15,7 +15,7 @@ from mutator._common.resource_shortages import find_shortage
 from mutator.campaigns.chunks import PendingChunk
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage
-from mutator.execution.stopped_workers import on_stop
+from mutator.execution.suspended_workers import on_stop
 from mutator.execution.worker import Worker, WorkerAssignment, bind_to_parent
 from mutator.execution.written_files import FileDigests
 from mutator.preflight.equivalence_check import SampledExperiment

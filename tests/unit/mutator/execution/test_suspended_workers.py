@@ -4,11 +4,11 @@ import signal
 import subprocess
 import sys
 
-from mutator.execution.stopped_workers import WorkerContinuer
+from mutator.execution.suspended_workers import WorkerContinuer
 
 CHILD = """
 import os, signal
-from mutator.execution.stopped_workers import on_stop
+from mutator.execution.suspended_workers import on_stop
 on_stop(lambda: print("stopped", flush=True))
 print("ready", flush=True)
 input()

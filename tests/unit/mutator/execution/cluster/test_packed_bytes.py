@@ -6,7 +6,7 @@ from hashlib import sha256
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.execution.cluster.parcel import pack_parcel, unpack_parcel
+from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.execution.cluster.pieces import PieceEnding, PieceResult
 
 

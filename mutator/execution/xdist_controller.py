@@ -1,4 +1,4 @@
-"""Campaigns as pytest sessions: the controller, whose xdist workers have `pytest_worker`."""
+"""Campaigns as pytest sessions: the controller, whose xdist workers have `xdist_worker`."""
 
 import os
 import shlex
@@ -16,7 +16,7 @@ from mutator._common.resource_shortages import find_shortage
 from mutator.errors import HarnessErrors, MutatorError
 from mutator.execution.progress_reporting import reporting_progress
 from mutator.execution.progress_text import ProgressLines
-from mutator.execution.pytest_worker import (
+from mutator.execution.xdist_worker import (
     INPUT_KEY,
     PROBLEM_KEY,
     WRITTEN_KEY,
@@ -25,7 +25,7 @@ from mutator.execution.pytest_worker import (
     collect_items,
 )
 from mutator.execution.session import ProgressCallback, Session, Summary, open_session
-from mutator.execution.stopped_workers import WorkerContinuer
+from mutator.execution.suspended_workers import WorkerContinuer
 from mutator.execution.worker import WorkerAssignment, python_dying_with
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace

@@ -6,7 +6,7 @@ import pytest
 
 import mutator
 from mutator.errors import MutatorError
-from mutator.execution.distribution import choose_distributor, packages_of_distributor
+from mutator.execution.distributor_choice import choose_distributor, packages_of_distributor
 from mutator.execution.local_distributor import LocalDistributor
 from mutator.workspace import Workspace
 
