@@ -30,8 +30,7 @@ from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
 from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.run_provenance import append_stretch
-from mutator.execution.cluster import cluster_distributor, worker_tasks
-from mutator.execution.cluster import worker_roster
+from mutator.execution.cluster import cluster_distributor, worker_roster, worker_tasks
 from mutator.execution.cluster import result_intake as intakes
 from mutator.execution.cluster.bundle import Bundle
 from mutator.execution.cluster.cluster_choice import parse_cluster_choice
@@ -142,7 +141,7 @@ def run_piece(run: str, data: bytes) -> bytes:
         number=piece.number,
         ending=PieceEnding.FINISHED,
         seconds=0.0005 * len(piece.plan_lines),
-        forked=True,
+        needs_proof=True,
         records=tuple(line.replace(b"@", name.encode()) for name in piece.plan_lines),
         timings=tuple(timing.replace(b"@", name.encode()) for name in piece.plan_lines),
         patches=pack_patches((name, patch) for name in piece.plan_lines),
@@ -172,7 +171,7 @@ def intake() -> None:
             workers_note="",
         )
         Bundle.pack_for_run = classmethod(lambda cls, *given: cls(b"", ""))  # type: ignore[assignment, method-assign]
-        worker_roster.Crew.reason_to_refuse = lambda self, facts: ""  # type: ignore[method-assign]
+        worker_roster.WorkerRoster.reason_to_refuse = lambda self, facts: ""  # type: ignore[method-assign]
         times: list[float] = []
         take = intakes.ResultIntake.append_result
 

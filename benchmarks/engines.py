@@ -24,7 +24,7 @@ from mutator.campaigns.plan import Plan, build_plan  # noqa: E402
 from mutator.engines.engine_jobs import Engine, Job  # noqa: E402
 from mutator.engines.fork_engine import ForkEngine  # noqa: E402
 from mutator.engines.reference_engine import ReferenceEngine  # noqa: E402
-from mutator.execution.experiment_runner import ExperimentRunner, FinishedExperiment, LoadedGoldens  # noqa: E402
+from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.outcomes import golden_comparison  # noqa: E402
@@ -79,7 +79,7 @@ class Bench:
                 name=one.key,
                 scenario=self.workspace.scenario(one.scenario),
                 seed=self.plan.seed,
-                changes=one.changes,
+                scenario_changes=one.changes,
             )
             execution = engine.execute(job, engine.work_folder / job.name)
             execution.out.rename(self.folder / "golden" / one.key)
@@ -109,7 +109,7 @@ class Bench:
         measured.cpu_s = _cpu() - before
         return measured, first_s
 
-    def _take(self, measured: Measured, finished: FinishedExperiment) -> None:
+    def _take(self, measured: Measured, finished: RecordedExperiment) -> None:
         measured.records[finished.experiment.id] = finished.record
         measured.how[str(finished.mode)] += 1
         measured.why[finished.fallback_reason] += 1

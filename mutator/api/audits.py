@@ -17,7 +17,7 @@ from mutator.audit.seal import Seals, seals_of, unsealed_facts
 from mutator.audit.signatures import sign as write_signature
 from mutator.audit.signatures import verified_signer
 from mutator.errors import CheckFailed, MutatorError
-from mutator.execution.spot_check import draw_experiments, rerun_and_compare
+from mutator.execution.spot_check import draw_experiment_ids, rerun_and_compare
 from mutator.report.report_audit import audit_report
 from mutator.store.run_folder import RunFolder
 from mutator.store.work_stretches import describe_stretches, package_versions
@@ -210,7 +210,7 @@ def _rerun_check(
     if workspace is None:
         raise MutatorError("no library found", argument="rerun", expected="the library of the run")
     try:
-        ids = draw_experiments(folder, count)
+        ids = draw_experiment_ids(folder, count)
     except MutatorError as err:
         return AuditCheck(what=check_name, count=0, differences=(err,))
     facts["drawn at random"] = ", ".join(ids)

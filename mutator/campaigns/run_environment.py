@@ -15,7 +15,7 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from mutator.engines.process_endings import run_environment
+from mutator.engines.process_endings import environment_variables_of_run
 from mutator.store.work_stretches import Blas
 from mutator.targets.process_environment import THREAD_VARIABLES
 
@@ -63,7 +63,7 @@ def loaded_blas() -> tuple[Blas, ...]:
         process = subprocess.run(
             [sys.executable, "-P", "-s", "-c", _BLAS_SCRIPT],
             cwd=folder,
-            env=run_environment(0, Path(folder)),
+            env=environment_variables_of_run(0, Path(folder)),
             capture_output=True,
             check=False,
         )

@@ -139,7 +139,7 @@ class _RunningCheck:
 
     def _pristine_job(self, kind: str, scenario: str, changes: tuple[str, ...]) -> Job:
         file = self.workspace.scenario(scenario)
-        return Job(name=f"{kind}-{scenario}", scenario=file, seed=self.seed, changes=changes)
+        return Job(name=f"{kind}-{scenario}", scenario=file, seed=self.seed, scenario_changes=changes)
 
     def _counting_job(self, scenario: str, changes: tuple[str, ...]) -> Job:
         mutant = self.reach_tracker.counting_mutant
@@ -153,7 +153,7 @@ class _RunningCheck:
         )
 
     def _execute(self, job: Job) -> JobResult:
-        folder = path_below(self.engine.work_folder, f"{job.name}-{'-'.join(job.changes)}")
+        folder = path_below(self.engine.work_folder, f"{job.name}-{'-'.join(job.scenario_changes)}")
         return self.engine.execute(job, folder)
 
     def _check_run(self, execution: JobResult) -> CheckRun:
@@ -274,7 +274,7 @@ class _RunningCheck:
         work.mkdir()
         engine = ForkEngine(self.manifest, work, self.engine.limits, null_mutant=null)
         try:
-            return engine.find_forking_obstacle(
+            return engine.find_obstacle_in_golden_run(
                 replace(
                     self._pristine_job("fork", scenario, self.usual_changes), golden_folder=golden.first.out
                 )

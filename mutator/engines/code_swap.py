@@ -40,17 +40,19 @@ class CodeSwap:
     """Everything that turns a loaded pristine program into the mutant.
 
     The two parts of `probe_code` run in order. `imported_modules` are those that injected lines import.
-    `value_setters` has, for each module, the code of its lines that set values in the probe. These modules
+    `probe_value_setters` has, for each module, the code of its lines that set values in the probe. These modules
     must already be loaded, because loading a module runs those lines with the module's own constants.
     """
 
     functions: tuple[FunctionSwap, ...]
-    value_setters: tuple[tuple[str, CodeType], ...]
+    probe_value_setters: tuple[tuple[str, CodeType], ...]
     probe_code: tuple[CodeType, CodeType]
     imported_modules: tuple[str, ...]
 
 
-def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], probe: Probe, tree: str) -> CodeSwap:
+def plan_swap(
+    manifest: TargetManifest, mutated_files: Mapping[str, bytes], probe: Probe, tree_folder: str
+) -> CodeSwap:
     """Return what turns the pristine program, loaded from the folder `tree`, into the mutant with `files`.
 
     Raises NotSwappable if the result could differ from that mutant in a fresh interpreter.
@@ -59,19 +61,21 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], probe: Probe
     settings: list[tuple[str, CodeType]] = []
     imports: dict[str, None] = {}
     probe_file = probe_path(manifest.package)
-    for path, data in files.items():
+    for path, data in mutated_files.items():
         if path == probe_file:
             continue
         if matches_any_glob(path, manifest.self_read_globs):
             raise NotSwappable(f"{path} is read by the run itself")
         if path not in manifest.tree.files:
             raise NotSwappable(f"{path} is a new file")
-        swaps, imported = _swaps_and_imports_of_file(path, manifest.tree.files[path], data, f"{tree}/{path}")
+        swaps, imported = _swaps_and_imports_of_file(
+            path, manifest.tree.files[path], data, f"{tree_folder}/{path}"
+        )
         functions += swaps
-        settings += _value_setters_of_file(path, data, f"{tree}/{path}")
+        settings += _probe_value_setters_of_file(path, data, f"{tree_folder}/{path}")
         imports |= dict.fromkeys(imported)
     mutant_part, shared_part = probe.settings_and_code
-    name = f"{tree}/{probe_file}"
+    name = f"{tree_folder}/{probe_file}"
     # cached, because compiling the shared part takes ten times as long
     code = (
         compile(mutant_part, name, "exec", dont_inherit=True),
@@ -79,7 +83,7 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], probe: Probe
     )
     return CodeSwap(
         functions=tuple(functions),
-        value_setters=tuple(settings),
+        probe_value_setters=tuple(settings),
         probe_code=code,
         imported_modules=tuple(imports),
     )
@@ -91,10 +95,10 @@ def _swaps_and_imports_of_file(
 ) -> tuple[tuple[FunctionSwap, ...], tuple[str, ...]]:
     if unsplice(mutated) != pristine:
         raise NotSwappable(f"{path} differs by more than inserted lines")
-    imports = _guarded_imports(path, mutated.splitlines())
+    imports = _imports_of_injected_lines(path, mutated.splitlines())
     old, new = (
         _compile_cached(pristine, filename),
-        _compile_cached(_select_lines(mutated, value_setters=False), filename),
+        _compile_cached(_keep_lines(mutated, value_setters=False), filename),
     )
     functions = [
         FunctionSwap(module=module_name(path), name_path=names, old_code=before, new_code=after)
@@ -103,14 +107,14 @@ def _swaps_and_imports_of_file(
     return tuple(functions), imports
 
 
-def _value_setters_of_file(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeType]]:
+def _probe_value_setters_of_file(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeType]]:
     if not has_constant_or_default_settings(mutated):
         return []
-    lines = _select_lines(mutated, value_setters=True)
+    lines = _keep_lines(mutated, value_setters=True)
     return [(module_name(path), _compile_cached(lines, filename))] if lines.strip() else []
 
 
-def _select_lines(mutated: bytes, *, value_setters: bool) -> bytes:
+def _keep_lines(mutated: bytes, *, value_setters: bool) -> bytes:
     """Keep only a file's lines that set values in the probe, or only the others; line numbers stay."""
     if not value_setters and not has_constant_or_default_settings(mutated):
         return mutated
@@ -132,7 +136,7 @@ def _compile_cached(data: bytes, filename: str) -> CodeType:
     return compile(data, filename, "exec", dont_inherit=True)
 
 
-def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
+def _imports_of_injected_lines(path: str, lines: list[bytes]) -> tuple[str, ...]:
     """Return the modules that injected lines import. NotSwappable if a block does not ask the probe first."""
     imports: list[str] = []
     before, margin = "", 0

@@ -20,11 +20,11 @@ class RunMode(StrEnum):
     REFERENCE = "reference"
     WARM = "warm"
     FORK = "fork"
-    GOLDEN = "golden"  # the trigger never held, so no run was needed
+    GOLDEN_REUSED = "golden"  # the trigger never held, so no run was needed
 
 
 # modes that need the equivalence check
-MODES_TO_PROVE = frozenset({RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN.value})
+MODES_TO_PROVE = frozenset({RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN_REUSED.value})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +34,7 @@ class Job:
     name: str
     scenario: Path
     seed: int
-    changes: tuple[str, ...] = ()
+    scenario_changes: tuple[str, ...] = ()
     changed_files: Mapping[str, bytes] = field(default_factory=dict)
     mutant_id: str | None = None  # the id that the probe must report; None for a tree without a probe
     probe: Probe | None = None  # the probe in `changed_files`; engines that fork need it
@@ -86,7 +86,7 @@ class RaisedException:
 class JobResult:
     """The result of a job. `out` holds the target's trace and record if `status` is OK.
 
-    * `status`: how the run ended; `outcomes.blame` decides what caused it
+    * `status`: how the run ended; `outcomes.failure_cause` decides what caused it
     * `was_fault_active`: whether an injection was active
     * `log_tail`: the tail of what the run printed
     * `fallback_reason`: why another engine executed the job

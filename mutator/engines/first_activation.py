@@ -57,10 +57,14 @@ def find_fork_point(probe: Probe, observations: GoldenObservations) -> ForkPoint
 
 
 @lru_cache(maxsize=64)  # cached, because faults share triggers (contexts of the hazard analysis)
-def _cached_fork_point(armed_t: float, condition: str, observations: GoldenObservations) -> ForkPoint | None:
+def _cached_fork_point(
+    armed_time_s: float, condition: str, observations: GoldenObservations
+) -> ForkPoint | None:
     if not observations.values:
         return None
-    active_observations = np.flatnonzero(activity_at_observations((armed_t, condition), observations.columns))
+    active_observations = np.flatnonzero(
+        activity_at_observations((armed_time_s, condition), observations.columns)
+    )
     if not active_observations.size:
         return None
     step = observations.step_of_observation(int(active_observations[0]))
@@ -77,12 +81,12 @@ def _cached_fork_point(armed_t: float, condition: str, observations: GoldenObser
     )
 
 
-def activity_at_observations(decision: tuple[float, str], columns: np.ndarray) -> np.ndarray:
-    """Return for each observation whether a probe with this `Probe.decision` is active.
+def activity_at_observations(armed_condition: tuple[float, str], columns: np.ndarray) -> np.ndarray:
+    """Return for each observation whether a probe with this `Probe.armed_condition` is active.
 
     `columns` are the times (s) of all observations, then the observed values.
     """
-    armed_t, condition = decision
+    armed_t, condition = armed_condition
     (function,) = ast.parse(condition).body
     assert isinstance(function, ast.FunctionDef)
     names = [argument.arg for argument in function.args.args]

@@ -32,17 +32,17 @@ from mutator.engines.fork_server_client import (
     ForkServer,
     GoldenRunRequest,
     WaitingProcess,
-    raising_if_changed,
+    raising_if_server_input_changes,
 )
-from mutator.engines.job_folder import OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
-from mutator.engines.reference_engine import ReferenceEngine
+from mutator.engines.job_folder import PLAIN_OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
 from mutator.engines.process_endings import (
     GUARD_PATIENCE_S,
     ProcessEnding,
-    judge_run,
+    status_of_ending,
     was_disk_full,
     without_run_specifics,
 )
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import ForkServerLost, NotForkable, NotSwappable
 from mutator.model import Limits, Status
@@ -113,7 +113,7 @@ class ForkEngine:
             return self._run_on_reference_engine(job, without_run_specifics(str(why), folder))
         except ForkServerLost as why:
             self.close()
-            return harness_error_result(str(why), folder / OUTPUT_FOLDER, RunMode.FORK)
+            return harness_error_result(str(why), folder / PLAIN_OUTPUT_FOLDER, RunMode.FORK)
         except OSError as err:
             if not can_be_disturbance(err):
                 raise
@@ -127,7 +127,7 @@ class ForkEngine:
         remove_anything_at(another)
         return replace(self.reference.execute(job, another), fallback_reason=fallback_reason)
 
-    def find_forking_obstacle(self, job: Job) -> NotForkable | None:
+    def find_obstacle_in_golden_run(self, job: Job) -> NotForkable | None:
         """Return why a job's golden run cannot be forked up to its last step; None if it can."""
         assert job.golden_folder is not None
         try:
@@ -161,28 +161,28 @@ class ForkEngine:
             raise NotForkable("not an experiment")
         swap = self._plan_swap(job, job.changed_files, job.probe)
         if self._forks_before_first_step:
-            return self._run_from_first_step(job, folder, swap)
+            return self._fork_before_first_step(job, folder, swap)
         observations = self._golden_observations(job, job.golden_folder)
         if (
             job.stop_at_hazard and job.golden_has_terminal_hazard
         ):  # the run can stop before the fault is active, and so before a fork
-            return self._run_from_first_step(job, folder, swap)
+            return self._fork_before_first_step(job, folder, swap)
         fork_point = find_fork_point(job.probe, observations)
         if fork_point is None:
-            return _result_without_run(job, job.golden_folder)
+            return _golden_result_of_inactive_fault(job, job.golden_folder)
         return self._run_in_fork(
             self._process_before_step(job, fork_point.step, swap), job, folder, swap, fork_point
         )
 
     def _plan_swap(self, job: Job, files: Mapping[str, bytes], probe: Probe) -> CodeSwap:
-        return plan_swap(self._manifest, files, probe, str(self._running_server(job).tree_folder))
+        return plan_swap(self._manifest, files, probe, str(self._ensure_server(job).tree_folder))
 
-    def _run_from_first_step(self, job: Job, folder: Path, swap: CodeSwap) -> JobResult:
-        first = self._running_server(job).first_process
+    def _fork_before_first_step(self, job: Job, folder: Path, swap: CodeSwap) -> JobResult:
+        first = self._ensure_server(job).first_process
         first.load_modules(_modules_to_load(swap), self._patience_s)
         return self._run_in_fork(first, job, folder, swap, _BEFORE_FIRST_STEP)
 
-    def _running_server(self, job: Job) -> ForkServer:
+    def _ensure_server(self, job: Job) -> ForkServer:
         scenarios = Path(_resolved_path(job.scenario)).parent
         if self._server is None:
             self._server_count += 1
@@ -197,7 +197,7 @@ class ForkEngine:
         return self._server
 
     def _process_before_step(self, job: Job, step: int, swap: CodeSwap) -> WaitingProcess:
-        pool = self._running_server(job)
+        pool = self._ensure_server(job)
         key = _golden_key(job)
         golden = GoldenRunRequest(
             key=key, scenario=job.scenario, arguments=lambda: self._target_arguments(job, pool.scratch_folder)
@@ -209,7 +209,7 @@ class ForkEngine:
     def _target_arguments(self, job: Job, out: Path) -> list[str]:
         return list(
             self._manifest.run_arguments(
-                scenario=job.scenario.resolve(), seed=job.seed, out=out, changes=job.changes
+                scenario=job.scenario.resolve(), seed=job.seed, out=out, changes=job.scenario_changes
             )
         )
 
@@ -225,7 +225,7 @@ class ForkEngine:
         ensure_work_folder(self._work_folder)
         with JobFolder(folder) as home:
             ended = self._fork_and_wait(waiting, job, home, swap, fork_point, observe)
-            place = self.reference.folder_of_job(job) / OUTPUT_FOLDER
+            place = self.reference.folder_of_job(job) / PLAIN_OUTPUT_FOLDER
             return replace(self._result_of_fork(job, home, ended, place, observe), fork_step=fork_point.step)
 
     def _fork_and_wait(
@@ -251,7 +251,7 @@ class ForkEngine:
             "probe_name": probe_module(self._manifest.package),
             "probe": swap.probe_code,
             "functions": [(f.module, f.name_path, f.old_code, f.new_code) for f in swap.functions],
-            "settings": swap.value_setters,
+            "settings": swap.probe_value_setters,
             "probe_state": probe_attributes_after(
                 fork_point.observation_count, fork_point.earliest_time_s, fork_point.last_time_s
             ),
@@ -261,15 +261,15 @@ class ForkEngine:
         # the child must begin the run; a watched run has the arguments of the waiting processes
         if waiting.key is None:
             request["args"] = self._target_arguments(
-                job, self._running_server(job).scratch_folder if observe else home.output_folder
+                job, self._ensure_server(job).scratch_folder if observe else home.output_folder
             )
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
         # a sandbox's /tmp is beside the run's folder
         limited_folder = self._runs_folder if self._manifest.sandbox else home.path
         message = {"do": "mutant", "job": marshal.dumps(request), "home": str(limited_folder), **limits}
-        with nullcontext() if waiting.key else raising_if_changed(job.scenario):
+        with nullcontext() if waiting.key else raising_if_server_input_changes(job.scenario):
             reply, _ = waiting.send_request(message, self._patience_s)
-        self._running_server(job).clear_temporary_folders()
+        self._ensure_server(job).clear_sandbox_temporary_folders()
         if reply["threads"]:
             raise NotForkable(
                 describe_too_many_threads(reply["threads"]), remedy_for_threads(reply["threads"])
@@ -280,13 +280,13 @@ class ForkEngine:
         return ProcessEnding(**{name: reply[name] for name in ProcessEnding.__slots__})
 
     def _result_of_fork(
-        self, job: Job, home: JobFolder, ended: ProcessEnding, place: Path, observe: bool
+        self, job: Job, home: JobFolder, ended: ProcessEnding, output_destination: Path, observe: bool
     ) -> JobResult:
         home.unlock()
         report = home.read_report(threads=list)
         if report is not None:
             self._check_fork_report(job, report)
-        status, detail = judge_run(self._limits, ended, report)
+        status, detail = status_of_ending(self._limits, ended, report)
         if status is not Status.OK and was_disk_full(self._work_folder, report):
             raise disk_full_error(self._work_folder)
         if status is Status.CRASHED:
@@ -295,7 +295,7 @@ class ForkEngine:
         return JobResult(
             status=status,
             detail=detail,
-            out=home.move_output(place),
+            out=home.move_plain_output(output_destination),
             probe_report=report["probe"] if report else None,
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
@@ -344,7 +344,7 @@ class ForkEngine:
             null = replace(job, mutant_id=None, stop_at_hazard=False)
             self._process_before_step(job, 0, swap)  # NotForkable, with the reason, if the run cannot begin
             # Fork before the first step, because a later fork misses earlier observations.
-            first = self._running_server(job).first_process
+            first = self._ensure_server(job).first_process
             execution = self._run_in_fork(first, null, folder, swap, _BEFORE_FIRST_STEP, observe=True)
             if execution.status is Status.HARNESS_ERROR:
                 raise ForkServerLost(execution.detail)
@@ -391,7 +391,7 @@ def _modules_to_load(swap: CodeSwap) -> list[str]:
 
 
 def _golden_key(job: Job) -> _GoldenKey:
-    return (_resolved_path(job.scenario), job.seed, job.changes)
+    return (_resolved_path(job.scenario), job.seed, job.scenario_changes)
 
 
 @cache
@@ -399,7 +399,7 @@ def _resolved_path(scenario: Path) -> str:
     return str(scenario.resolve())
 
 
-def _result_without_run(job: Job, golden: Path) -> JobResult:
+def _golden_result_of_inactive_fault(job: Job, golden: Path) -> JobResult:
     return JobResult(
         status=Status.OK,
         detail="",
@@ -407,7 +407,7 @@ def _result_without_run(job: Job, golden: Path) -> JobResult:
         probe_report=untriggered_report(job.mutant_id),
         cpu_s=0.0,
         wall_s=0.0,
-        mode=RunMode.GOLDEN,
+        mode=RunMode.GOLDEN_REUSED,
     )
 
 

@@ -22,8 +22,8 @@ from mutator._common.file_change_detection import UnchangedFiles
 from mutator._common.files import remove_folder
 from mutator.engines import pyc_files
 from mutator.engines.job_tree import JobTree
+from mutator.engines.process_endings import environment_variables_of_run, exception_in_report, wait_for_guard
 from mutator.engines.sandbox import Sandbox
-from mutator.engines.process_endings import exception_in_report, run_environment, wait_for_guard
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import ForkServerLost, NotForkable
 from mutator.targets.manifest import TargetManifest
@@ -115,7 +115,7 @@ class WaitingProcess:
 
 
 @contextmanager
-def raising_if_changed(path: Path) -> Iterator[None]:
+def raising_if_server_input_changes(path: Path) -> Iterator[None]:
     """Raise ForkServerLost if a file is written to while the server uses it."""
     used = UnchangedFiles({str(path.resolve()): read_bounded(path)})
     yield
@@ -174,11 +174,11 @@ class ForkServer:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
-                env=run_environment(0, scratch_folder, manifest.env),
+                env=environment_variables_of_run(0, scratch_folder, manifest.env),
                 pass_fds=[server_socket.fileno()],
                 start_new_session=True,
             )
-        self.first_process = WaitingProcess(harness_socket, parent_pid, self._wake_processes)
+        self.first_process = WaitingProcess(harness_socket, parent_pid, self._continue_stopped_processes)
         try:
             self._receive_welcome()
         except BaseException:
@@ -195,15 +195,15 @@ class ForkServer:
                 f"once it is loaded, {describe_too_many_threads(others)}", remedy_for_threads(others)
             )
         self._process_group = welcome["group"]
-        if self._tree.first_changed() or self._start_file.first_changed():
+        if self._tree.first_changed_path() or self._start_file.first_changed():
             raise ForkServerLost("the tree of the fork server is not the pristine one")
         if self._sandbox:
-            self._sandbox.note_first_paths()
+            self._sandbox.note_initial_temporary_paths()
 
-    def clear_temporary_folders(self) -> None:
+    def clear_sandbox_temporary_folders(self) -> None:
         """Delete what a run has left in the temporary folders of the sandbox."""
         if self._sandbox:
-            self._sandbox.delete_new_paths()
+            self._sandbox.delete_new_temporary_paths()
 
     def process_before_step(
         self, step: int, golden: GoldenRunRequest, modules: Sequence[str], patience_s: float
@@ -214,7 +214,7 @@ class ForkServer:
         mine = [w for w in self._waiting_processes if w.key == golden.key and w.step <= step]
         if not mine:
             self.first_process.load_modules(modules, patience_s)
-            with raising_if_changed(golden.scenario):
+            with raising_if_server_input_changes(golden.scenario):
                 mine = [
                     self._branch_process(self.first_process, golden.key, 0, patience_s, golden.arguments())
                 ]
@@ -253,7 +253,7 @@ class ForkServer:
                 remedy_for_threads(branch_reply["threads"]),
             )
         branched = WaitingProcess(
-            socket.socket(fileno=handles[0]), self._parent_pid, self._wake_processes, key
+            socket.socket(fileno=handles[0]), self._parent_pid, self._continue_stopped_processes, key
         )
         branched.loaded_modules |= source.loaded_modules
         reply, _ = branched.receive_reply(patience_s)
@@ -266,7 +266,7 @@ class ForkServer:
         self._waiting_processes.append(branched)
         return branched
 
-    def _wake_processes(self) -> None:
+    def _continue_stopped_processes(self) -> None:
         """Continue the server's processes, which a mutant can stop. Mutants have other process groups."""
         self._process.send_signal(signal.SIGCONT)
         if self._process_group:

@@ -19,10 +19,10 @@ from typing import Any
 
 from mutator._common.confined_files import move_plain_files, open_folder, read_below
 from mutator._common.files import remove_anything_at
-from mutator.engines.process_endings import parse_report, read_log_tail
+from mutator.engines.process_endings import parse_run_report, read_log_tail
 from mutator.errors import Outside
 
-OUTPUT_FOLDER = "output"  # the name of the folder with the output's plain files
+PLAIN_OUTPUT_FOLDER = "output"  # the name of the folder with the output's plain files
 _OUT_FOLDER, _LOG_FILE, _REPORT_FILE, _INACTIVE_MARKER = "out", "log", "report.json", "inactive"
 
 
@@ -76,9 +76,9 @@ class JobFolder:
         return not all(_is_path_of_handle(path, handle) for path, handle in places)
 
     def read_report(self, **extra_fields: type) -> dict[str, Any] | None:
-        """Return the child's report; None if it is missing, incomplete or invalid (`parsed_report`)."""
+        """Return the child's report; None if it is missing, incomplete or invalid (`parse_run_report`)."""
         try:
-            return parse_report(read_below(self._path_by_handle, _REPORT_FILE), **extra_fields)
+            return parse_run_report(read_below(self._path_by_handle, _REPORT_FILE), **extra_fields)
         except (OSError, Outside, ValueError):
             return None
 
@@ -96,7 +96,7 @@ class JobFolder:
         """Make the folder readable again, which a run can lock."""
         os.fchmod(self._folder_handle, 0o700)
 
-    def move_output(self, destination: Path) -> Path:
+    def move_plain_output(self, destination: Path) -> Path:
         """Move the plain files of the output to the new folder `destination`; return it."""
         remove_anything_at(destination)
         destination.mkdir(parents=True)

@@ -33,9 +33,9 @@ class JobTree:
         }
         self._files = UnchangedFiles({f"{place}/{name}": data for name, data in files.items()})
 
-    def first_changed(self) -> str:
+    def first_changed_path(self) -> str:
         """Return a file that was changed, removed, or added where an import finds it; empty if none was."""
-        if path := self._files.first_changed() or self._first_moved_folder():
+        if path := self._files.first_changed() or self._first_replaced_folder():
             return path.removeprefix(f"{self.folder}/")
         imported = (
             name
@@ -56,9 +56,9 @@ class JobTree:
     def move_to(self, place: Path) -> bool:
         """Move the tree; return whether its folders are still the same, and no links in their place."""
         self.folder = self.folder.rename(place)
-        return not self._first_moved_folder()
+        return not self._first_replaced_folder()
 
-    def _first_moved_folder(self) -> str:
+    def _first_replaced_folder(self) -> str:
         for folder, number in self._inodes_by_folder.items():
             if not number or _inode_number(self.folder / folder) != number:
                 return f"{self.folder}/{folder}"

@@ -28,16 +28,18 @@ class JobTreePool:
         self._unused_trees: list[JobTree] = []  # threads share it, which `pop` and `append` allow
         self._tree_numbers = count()
 
-    def lay_out_tree(self, folder: Path, changed_files: Mapping[str, bytes], *, new: bool = False) -> JobTree:
+    def lay_out_tree(
+        self, folder: Path, changed_files: Mapping[str, bytes], *, fresh: bool = False
+    ) -> JobTree:
         """Make a tree in `folder`, with the `changed_files`.
 
-        With `new`, no earlier run has used it, and it has no bytecode that anybody could exchange.
+        With `fresh`, no earlier run has used it, and it has no bytecode that anybody could exchange.
         """
         folder.parent.mkdir(parents=True, exist_ok=True)
-        pristine = self._source_files if new else self._files_with_bytecode
-        if new or not self._reuse_tree(folder, changed_files):
+        pristine = self._source_files if fresh else self._files_with_bytecode
+        if fresh or not self._reuse_tree(folder, changed_files):
             pyc_files.write_files(pristine, folder)
-            pyc_files.replace_files(changed_files, folder)
+            pyc_files.replace_dropping_bytecode(changed_files, folder)
         stale = set(map(pyc_files.bytecode_path, changed_files))
         files = {name: data for name, data in pristine.items() if name not in stale}
         return JobTree(folder, {**files, **changed_files}, changed_files)
@@ -68,7 +70,7 @@ class JobTreePool:
         while self._unused_trees:
             try:
                 if self._unused_trees.pop().move_to(folder):
-                    pyc_files.replace_files(changed_files, folder)
+                    pyc_files.replace_dropping_bytecode(changed_files, folder)
                     return True
             except OSError as err:
                 if is_disk_full_error(err):

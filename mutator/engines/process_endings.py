@@ -1,4 +1,4 @@
-"""Start the processes that targets run in, and report how they ended."""
+"""Prepare the processes that targets run in, and judge how they ended."""
 
 import json
 import os
@@ -36,7 +36,7 @@ _OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP
 class ProcessEnding:
     """How a run's process ended: exit code (negative for a signal), CPU time and wall time.
 
-    `stopped` is why it was stopped: WALL or DISK of `process_guard`, LOST, or "".
+    `stopped` is why it was stopped: WALL or DISK of `process_guard`, GUARD_LOST, or "".
     """
 
     code: int
@@ -45,7 +45,7 @@ class ProcessEnding:
     stopped: str
 
 
-def check_limits(limits: Limits) -> None:
+def check_own_limits_suffice(limits: Limits) -> None:
     """Raise MutatorError if this process's own limits are lower than the campaign's.
 
     With lower limits, a run that finishes on other machines could be stopped here.
@@ -68,17 +68,19 @@ def check_limits(limits: Limits) -> None:
                 ) from None
 
 
-def judge_run(limits: Limits, ending: ProcessEnding, report: dict[str, Any] | None) -> tuple[Status, str]:
-    if stopped := _judge_stopped_run(limits, ending):
+def status_of_ending(
+    limits: Limits, ending: ProcessEnding, report: dict[str, Any] | None
+) -> tuple[Status, str]:
+    if stopped := _find_status_if_stopped(limits, ending):
         return stopped
     if report is not None:
-        return _judge_report(limits, report)
+        return _status_of_report(limits, report)
     if ending.code < 0:
         return Status.CRASHED, f"killed by {signal.Signals(-ending.code).name}"
     return Status.CRASHED, f"left with status {ending.code} without a report"
 
 
-def _judge_stopped_run(limits: Limits, ending: ProcessEnding) -> tuple[Status, str] | None:
+def _find_status_if_stopped(limits: Limits, ending: ProcessEnding) -> tuple[Status, str] | None:
     """Judge a run that a limit or an outside signal stopped, even after its report."""
     killed = signal.Signals(-ending.code) if ending.code < 0 else None
     if ending.stopped == GUARD_LOST:
@@ -95,7 +97,7 @@ def _judge_stopped_run(limits: Limits, ending: ProcessEnding) -> tuple[Status, s
     return None
 
 
-def _judge_report(limits: Limits, report: dict[str, Any]) -> tuple[Status, str]:
+def _status_of_report(limits: Limits, report: dict[str, Any]) -> tuple[Status, str]:
     if report["ended"] == "steps":
         return Status.TIMEOUT, f"limit of {limits.steps} simulation steps"
     if raised := exception_in_report(report):
@@ -115,7 +117,7 @@ def exception_in_report(report: dict[str, Any]) -> RaisedException | None:
     return RaisedException(kind=str(error["kind"]), message=str(error["message"]), stacks=stacks)
 
 
-def run_environment(
+def environment_variables_of_run(
     hash_seed: int, temporary_folder: Path, extra_variables: Mapping[str, str] | None = None
 ) -> dict[str, str]:
     """Return the environment of a run. Of the user's variables, it has only those that Python needs."""
@@ -143,7 +145,7 @@ def read_log_tail(folder: Path, name: str) -> str:
         return ""
 
 
-def parse_report(data: bytes, **extra_fields: type) -> dict[str, Any] | None:
+def parse_run_report(data: bytes, **extra_fields: type) -> dict[str, Any] | None:
     """Return the child's report; None if it is incomplete or invalid.
 
     Each field is checked, because a run can write anything to this file. `extra_fields` are those that

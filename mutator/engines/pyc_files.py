@@ -40,7 +40,7 @@ def write_files(files: Mapping[str, bytes], dest: Path) -> None:
         (dest / name).write_bytes(data)
 
 
-def replace_files(files: Mapping[str, bytes], tree: Path) -> None:
+def replace_dropping_bytecode(files: Mapping[str, bytes], tree: Path) -> None:
     """Replace files of a tree and delete their bytecode."""
     remove_files((*files, *map(bytecode_path, files)), tree)
     write_files(files, tree)

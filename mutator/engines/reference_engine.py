@@ -23,21 +23,21 @@ from mutator.engines.engine_jobs import (
     RunMode,
     harness_error_result,
 )
-from mutator.engines.job_folder import OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
+from mutator.engines.job_folder import PLAIN_OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
 from mutator.engines.job_tree_pool import JobTreePool
-from mutator.engines.sandbox import Sandbox
 from mutator.engines.process_endings import (
     GUARD_LOST,
     GUARD_PATIENCE_S,
     ProcessEnding,
-    check_limits,
+    check_own_limits_suffice,
+    environment_variables_of_run,
     exception_in_report,
-    judge_run,
-    run_environment,
+    status_of_ending,
     wait_for_guard,
     was_disk_full,
     without_run_specifics,
 )
+from mutator.engines.sandbox import Sandbox
 from mutator.model import Limits, Status
 from mutator.mutants.anchors import parsed_file
 from mutator.mutants.probe import probe_attributes_after, probe_module
@@ -66,7 +66,7 @@ class ReferenceEngine:
         *,
         independent: bool = False,
     ) -> None:
-        check_limits(limits)
+        check_own_limits_suffice(limits)
         self.manifest = manifest
         self.work_folder = work_folder.resolve()
         self._tree_pool = JobTreePool(manifest.tree, self.work_folder)
@@ -97,15 +97,15 @@ class ReferenceEngine:
         """
         with raising_disk_full(self.work_folder):
             try:
-                execution, disturbed = self._try_once(job, folder)
+                execution, was_disturbed = self._try_once(job, folder)
             except OSError as err:
                 if not can_be_disturbance(err):
                     raise
-                disturbed = True
-            if disturbed:
+                was_disturbed = True
+            if was_disturbed:
                 remove_anything_at(folder)
                 try:
-                    execution, _ = self._try_once(job, folder, new=True)
+                    execution, _ = self._try_once(job, folder, fresh_tree=True)
                 except OSError as err:
                     if not can_be_disturbance(err):
                         raise
@@ -113,43 +113,45 @@ class ReferenceEngine:
                     return harness_error_result(why, folder, RunMode.REFERENCE)
         return execution
 
-    def _try_once(self, job: Job, folder: Path, *, new: bool = False) -> tuple[JobResult, bool]:
+    def _try_once(self, job: Job, folder: Path, *, fresh_tree: bool = False) -> tuple[JobResult, bool]:
         """Run a job; return the result, and whether its input or folders were changed meanwhile.
 
-        With `new`, the job gets a tree of its own, without bytecode.
+        With `fresh_tree`, the job gets a tree of its own, without bytecode.
         """
         ensure_work_folder(self.work_folder)
         with JobFolder(folder) as home:
-            ended, changed = self._run_in_folder(job, home, new=new)
-            moved = home.was_moved()
-            return self._result_of_run(job, home, ended, changed), bool(changed) or moved
+            ended, changed_input = self._run_in_folder(job, home, fresh_tree=fresh_tree)
+            was_moved = home.was_moved()
+            return self._result_of_run(job, home, ended, changed_input), bool(changed_input) or was_moved
 
-    def _run_in_folder(self, job: Job, home: JobFolder, *, new: bool) -> tuple[ProcessEnding, str]:
+    def _run_in_folder(self, job: Job, home: JobFolder, *, fresh_tree: bool) -> tuple[ProcessEnding, str]:
         """Run a job; return how it ended, and a file of its input that was changed meanwhile (or nothing)."""
         folder = home.path
-        tree = self._tree_pool.lay_out_tree(folder / "tree", job.changed_files, new=new)
+        tree = self._tree_pool.lay_out_tree(folder / "tree", job.changed_files, fresh=fresh_tree)
         request = json.dumps(self._job_request(job, home)).encode()
         path = folder / "job.json"
         path.write_bytes(request)
         scenario = job.scenario.resolve()
         inputs = UnchangedFiles({str(path): request, str(scenario): read_bounded(scenario)})
         ended = self._run_guarded(job, path, home)
-        changed = tree.first_changed() or inputs.first_changed().removeprefix(f"{folder}/")
-        if not (changed or new):
+        changed_input = tree.first_changed_path() or inputs.first_changed().removeprefix(f"{folder}/")
+        if not (changed_input or fresh_tree):
             self._tree_pool.take_back_tree(tree)
-        return ended, changed
+        return ended, changed_input
 
-    def _result_of_run(self, job: Job, home: JobFolder, ended: ProcessEnding, changed: str) -> JobResult:
+    def _result_of_run(
+        self, job: Job, home: JobFolder, ended: ProcessEnding, changed_input: str
+    ) -> JobResult:
         home.unlock()
         report = home.read_report(files=dict, modules=list)
-        status, detail = self._judge_status(job, ended, report, changed)
+        status, detail = self._status_of_run(job, ended, report, changed_input)
         if status is not Status.OK and was_disk_full(self.work_folder, report):
             raise disk_full_error(self.work_folder)
         raised = exception_in_report(report) if report and status is Status.CRASHED else None
         return JobResult(
             status=status,
             detail=without_run_specifics(detail, home.path),
-            out=home.move_output(home.path / OUTPUT_FOLDER),
+            out=home.move_plain_output(home.path / PLAIN_OUTPUT_FOLDER),
             probe_report=report["probe"] if report else None,
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
@@ -167,7 +169,7 @@ class ReferenceEngine:
             scenario=job.scenario.resolve(),
             seed=job.seed,
             out=home.output_folder,
-            changes=job.changes,
+            changes=job.scenario_changes,
             independent=self._is_independent or self.manifest.reads_any(job.changed_files),
         )
         return {
@@ -225,7 +227,7 @@ class ReferenceEngine:
                     stdin=subprocess.DEVNULL,
                     stdout=log,
                     stderr=subprocess.STDOUT,
-                    env=run_environment(job.hash_seed, folder, self.manifest.env),
+                    env=environment_variables_of_run(job.hash_seed, folder, self.manifest.env),
                     pass_fds=[guard_socket.fileno()],
                     start_new_session=True,  # Ctrl-C at the terminal is for the command, not for the target
                 )
@@ -237,7 +239,7 @@ class ReferenceEngine:
                 harness_socket.close()
                 wait_for_guard(guard_process)
                 if sandbox:
-                    sandbox.delete_new_paths()
+                    sandbox.delete_new_temporary_paths()
                     sandbox.close()
         if not guard_report:
             seconds = time.monotonic() - began
@@ -258,20 +260,22 @@ class ReferenceEngine:
                     raise SystemExit("the process that started this one is gone") from None
         return b""
 
-    def _judge_status(
-        self, job: Job, ended: ProcessEnding, report: dict[str, Any] | None, changed: str
+    def _status_of_run(
+        self, job: Job, ended: ProcessEnding, report: dict[str, Any] | None, changed_input: str
     ) -> tuple[Status, str]:
-        if report is not None and (problem := self._problem_with_tree(job, report, changed)):
+        if report is not None and (problem := self._problem_with_tree(job, report, changed_input)):
             return Status.HARNESS_ERROR, problem
-        status, detail = judge_run(self.limits, ended, report)
-        if report is None and changed and status is Status.CRASHED:  # whoever changed it can have caused this
-            return Status.HARNESS_ERROR, _describe_change(changed)
+        status, detail = status_of_ending(self.limits, ended, report)
+        if (
+            report is None and changed_input and status is Status.CRASHED
+        ):  # whoever changed it can have caused this
+            return Status.HARNESS_ERROR, _describe_changed_input(changed_input)
         if report is None or (status is not Status.OK and report["probe"] is None):
             return status, detail
         problem = job.problem_of_probe_report(report["probe"])
         return (Status.HARNESS_ERROR, problem) if problem else (status, detail)
 
-    def _problem_with_tree(self, job: Job, report: dict[str, Any], changed: str) -> str:
+    def _problem_with_tree(self, job: Job, report: dict[str, Any], changed_input: str) -> str:
         """Return the problem with the tree that ran; empty if it was the job's."""
         if report["outside"]:
             return f"the target was also imported from {', '.join(report['outside'])}"
@@ -281,11 +285,11 @@ class ReferenceEngine:
         for path in sorted(expected.keys() | more):
             if report["files"].get(path) != expected.get(path):
                 return f"{path} in the tree that ran is not the one of this job"
-        return _describe_change(changed) if changed else ""
+        return _describe_changed_input(changed_input) if changed_input else ""
 
 
-def _describe_change(changed: str) -> str:
-    return f"{changed} was changed while it was in use"
+def _describe_changed_input(changed_input: str) -> str:
+    return f"{changed_input} was changed while it was in use"
 
 
 def _exception_without_run_specifics(raised: RaisedException, folder: Path) -> RaisedException:

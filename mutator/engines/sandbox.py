@@ -17,7 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from mutator._common.files import remove_anything_at
-from mutator.engines.process_endings import run_environment
+from mutator.engines.process_endings import environment_variables_of_run
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
@@ -101,11 +101,11 @@ class Sandbox:
         """Return the command that runs `words` in the sandbox."""
         return [*self._command_prefix, *words]
 
-    def note_first_paths(self) -> None:
+    def note_initial_temporary_paths(self) -> None:
         """Note what /tmp and /dev/shm contain before the first run. Folders can be mounted there."""
         self._first_paths = set(self._paths_in_temporary_folders())
 
-    def delete_new_paths(self) -> None:
+    def delete_new_temporary_paths(self) -> None:
         """Delete what a run left in /tmp and /dev/shm."""
         for path in set(self._paths_in_temporary_folders()) - self._first_paths:
             remove_anything_at(path)
@@ -122,7 +122,7 @@ class Sandbox:
 
 def check_sandbox_available() -> None:
     """Raise MutatorError if no sandbox can be made here."""
-    if problem := reason_not_available():
+    if problem := reason_sandbox_unavailable():
         raise MutatorError(
             f"no sandbox: {problem}",
             argument="sandbox",
@@ -132,7 +132,7 @@ def check_sandbox_available() -> None:
 
 
 @lru_cache(maxsize=1)
-def reason_not_available() -> str:
+def reason_sandbox_unavailable() -> str:
     """Return why no sandbox can be made here; empty if one can."""
     if shutil.which("bwrap") is None:
         return "`bwrap` is not installed (Debian, Ubuntu, Fedora: package bubblewrap)"
@@ -144,7 +144,7 @@ def reason_not_available() -> str:
             trial_run = subprocess.run(
                 command,
                 cwd=folder,
-                env=run_environment(0, Path(folder)),
+                env=environment_variables_of_run(0, Path(folder)),
                 capture_output=True,
                 text=True,
                 timeout=_TRIAL_TIMEOUT_S,
@@ -184,7 +184,7 @@ def _python_paths() -> tuple[Path, ...]:
         printed = subprocess.run(
             [sys.executable, "-P", "-s", "-c", _PRINT_PYTHON_FOLDERS],
             cwd=folder,
-            env=run_environment(0, Path(folder)),
+            env=environment_variables_of_run(0, Path(folder)),
             capture_output=True,
             check=True,
         )

@@ -36,7 +36,7 @@ _MOST_GOLDENS_IN_MEMORY = 32  # golden runs in memory: enough for the current se
 
 
 @dataclass(frozen=True, kw_only=True)
-class FinishedExperiment:
+class RecordedExperiment:
     """An experiment with its record.
 
     `output_folder` (of the target) is valid until the next result; None without a mutant or a run.
@@ -71,7 +71,7 @@ class LoadedGoldens:
         self._manifest = manifest
         self._several_seeds = several_seeds
         self._digests = digests  # what `output_digest_of` must return, by folder
-        self._files_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(self._read_files)
+        self._files_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(self._read_verified_files)
         self._trace_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
             lambda folder: self._load_unchanged(folder, load_manifest_channels)
         )
@@ -82,7 +82,7 @@ class LoadedGoldens:
             lambda folder: self._load_unchanged(folder, load_judged_run)[1]
         )
 
-    def read_files_of(self, experiment: Experiment) -> None:
+    def read_and_verify_files_of(self, experiment: Experiment) -> None:
         """Read the golden run's files before they are used. MutatorError if their digest is another."""
         self._files_of_folder(self.folder_of(experiment))
 
@@ -97,14 +97,14 @@ class LoadedGoldens:
         self.check_unchanged(folder)
         return loaded
 
-    def _read_files(self, folder: Path) -> UnchangedFiles:
+    def _read_verified_files(self, folder: Path) -> UnchangedFiles:
         paths = [path for name in self._manifest.output_files if (path := path_below(folder, name)).is_file()]
         files = UnchangedFiles({str(path): read_bounded(path) for path in paths})
         if self._digests is not None and output_digest_of(self._manifest, folder) != self._digests[folder]:
             raise _changed_file_error(folder)
         return files
 
-    def key_of(self, experiment: Experiment) -> str:
+    def golden_key_of(self, experiment: Experiment) -> str:
         return GoldenRun.for_experiment(experiment, several_seeds=self._several_seeds).key
 
     def trace_of(self, experiment: Experiment) -> Trace:
@@ -137,7 +137,7 @@ class ExperimentRunner:
         self.scenario_file = cache(scenario_file)
         self.with_series = with_series
 
-    def run(self, experiments: Iterable[Experiment]) -> Iterator[FinishedExperiment]:
+    def run(self, experiments: Iterable[Experiment]) -> Iterator[RecordedExperiment]:
         """Yield each experiment with its record.
 
         A mutant that cannot be built is not run. Experiments that share a run get the same record.
@@ -149,8 +149,8 @@ class ExperimentRunner:
                 record = replace(finished.record, experiment_id=other.id)
                 yield replace(finished, experiment=other, record=record, cpu_s=0.0, wall_s=0.0)
 
-    def _run_distinct(self, experiments: Iterable[Experiment]) -> Iterator[FinishedExperiment]:
-        refused: deque[FinishedExperiment] = deque()
+    def _run_distinct(self, experiments: Iterable[Experiment]) -> Iterator[RecordedExperiment]:
+        refused: deque[RecordedExperiment] = deque()
         started: dict[str, tuple[Experiment, Mutant]] = {}
 
         def jobs() -> Iterator[Job]:
@@ -160,7 +160,7 @@ class ExperimentRunner:
                 except MutatorError as err:
                     refused.append(self._finish_without_run(experiment, err))
                     continue
-                self.goldens.read_files_of(experiment)
+                self.goldens.read_and_verify_files_of(experiment)
                 started[experiment.id] = (experiment, built)
                 yield self._build_job(experiment, built)
 
@@ -176,7 +176,7 @@ class ExperimentRunner:
             name=experiment.id,
             scenario=self.scenario_file(experiment.scenario),
             seed=experiment.seed,
-            changes=experiment.changes,
+            scenario_changes=experiment.changes,
             changed_files=mutant.files,
             mutant_id=mutant.id,
             probe=mutant.probe,
@@ -186,15 +186,15 @@ class ExperimentRunner:
             golden_has_terminal_hazard=stop and self.goldens.has_terminal_hazard(experiment),
         )
 
-    def _finish_without_run(self, experiment: Experiment, err: MutatorError) -> FinishedExperiment:
+    def _finish_without_run(self, experiment: Experiment, err: MutatorError) -> RecordedExperiment:
         status = Status.INVALID_MUTANT if isinstance(err, InvalidMutant) else Status.HARNESS_ERROR
         place = f"{self.manifest.tree.relative_name(err.where)}: " if err.where else ""
-        return FinishedExperiment(
+        return RecordedExperiment(
             experiment=experiment,
             record=_record_of_mutant_without_outcome(experiment, status, place + err.got, None),
         )
 
-    def _finish_run(self, experiment: Experiment, mutant: Mutant, execution: JobResult) -> FinishedExperiment:
+    def _finish_run(self, experiment: Experiment, mutant: Mutant, execution: JobResult) -> RecordedExperiment:
         faulty = None
         try:
             record, faulty = self._build_record(experiment, mutant, execution)
@@ -203,7 +203,7 @@ class ExperimentRunner:
                 experiment, Status.HARNESS_ERROR, _describe_problem(err), mutant
             )
         self._check_input_unchanged(experiment, execution)
-        return FinishedExperiment(
+        return RecordedExperiment(
             experiment=experiment,
             record=record,
             mutant=mutant,
@@ -221,7 +221,7 @@ class ExperimentRunner:
         """Raise MutatorError if a run has written to what this experiment used, so its record would not
         count.
         """
-        if execution.mode is RunMode.GOLDEN:
+        if execution.mode is RunMode.GOLDEN_REUSED:
             self.goldens.check_unchanged(execution.out)
         scenario = self.scenario_file(experiment.scenario)
         if digest(read_bounded(scenario)) != experiment.scenario_digest:
@@ -232,7 +232,7 @@ class ExperimentRunner:
             return None
         sampler = self.goldens.sampler_of(experiment)
         return EncodedSeries(
-            golden_key=self.goldens.key_of(experiment),
+            golden_key=self.goldens.golden_key_of(experiment),
             golden_bytes=sampler.encoded_golden,
             faulty_bytes=encode_series(sampler.faulty_series(faulty, record), sampler.golden),
         )
@@ -256,10 +256,10 @@ class ExperimentRunner:
             return _record_of_mutant_without_outcome(
                 experiment, Status.CRASHED, _describe_problem(err), mutant, activation
             ), None
-        record = self._judge_run(experiment, mutant, execution, faulty, judged)
+        record = self._record_of_completed_run(experiment, mutant, execution, faulty, judged)
         return record, faulty if record.status is Status.OK else None
 
-    def _judge_run(
+    def _record_of_completed_run(
         self,
         experiment: Experiment,
         mutant: Mutant,

@@ -17,7 +17,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 
-def open_frozen_run(
+def open_or_freeze_run(
     workspace: Workspace, campaign: str | Path, out: Path, choices: Choices, *, reviewed: bool
 ) -> RunFolder:
     """Open the run folder `out`, which the caller owns, with a frozen plan of the campaign.

@@ -8,8 +8,8 @@ from importlib import metadata
 
 import pytest
 
-from mutator.execution.xdist_controller import CampaignController
 from mutator.execution.session import Session
+from mutator.execution.xdist_controller import CampaignController
 
 _PLUGIN_MODULE = "mutator.execution.pytest_plugin"
 
@@ -28,7 +28,7 @@ class LocalDistributor:
             *("-c", os.devnull, "--rootdir", str(folder), "-s", "-n", str(session.workers)),
         ]
         output = _SilentReporter()
-        with _without_variables("PYTEST_ADDOPTS", "PYTEST_PLUGINS"):
+        with _without_environment_variables("PYTEST_ADDOPTS", "PYTEST_PLUGINS"):
             code = pytest.main(arguments, plugins=[CampaignController(session), output])
         if code in (pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR) and not session.problem:
             # the error is at the end of what pytest prints
@@ -36,7 +36,7 @@ class LocalDistributor:
 
 
 @contextmanager
-def _without_variables(*names: str) -> Iterator[None]:
+def _without_environment_variables(*names: str) -> Iterator[None]:
     removed = {name: os.environ.pop(name) for name in names if name in os.environ}
     try:
         yield

@@ -52,7 +52,7 @@ class RunTraces:
         golden = self.folder.golden_folder_of(experiment)
         if not golden.is_dir():
             golden = stored / "golden"
-        if not (golden.is_dir() and self.is_stored(experiment_id)):
+        if not (golden.is_dir() and self.is_faulty_trace_stored(experiment_id)):
             single, same = rerun_experiment(self.workspace, self.folder.path, experiment_id)
             if not same:
                 raise MutatorError(f"the rerun of {experiment_id} differs from the campaign's record")
@@ -79,7 +79,7 @@ class RunTraces:
             )
         return traces_of_series(*series_pair, self.manifest.time_channel)
 
-    def is_stored(self, experiment_id: str) -> bool:
+    def is_faulty_trace_stored(self, experiment_id: str) -> bool:
         """Return whether a stored faulty trace matches the record."""
         faulty = self.folder.kept_traces_folder(experiment_id) / "faulty"
         if not path_below(faulty, self.manifest.trace_file).is_file():

@@ -31,7 +31,7 @@ from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import ensure_work_folder
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, DiskFull, MutatorError, MutatorWarning
 from mutator.execution.finished_run_cache import FinishedRunOutcome, find_finished_run, remember_finished_run
-from mutator.execution.frozen_plan import open_frozen_run
+from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record
 from mutator.preflight import equivalence_check
@@ -188,7 +188,7 @@ class Session:
     def inputs(self) -> RunInputs:
         return RunInputs.from_workspace(self.workspace, self.manifest, self.folder.scenarios)
 
-    def worker_input(self) -> dict[str, Any]:
+    def xdist_worker_input(self) -> dict[str, Any]:
         return {
             "parent": os.getpid(),
             "run": str(self.folder.path),
@@ -333,7 +333,7 @@ def open_session(
         if notify and not RunFolder.exists(out):
             notify(Progress(stage="plan"))
         try:
-            folder = open_frozen_run(workspace, campaign, out, choices, reviewed=reviewed)
+            folder = open_or_freeze_run(workspace, campaign, out, choices, reviewed=reviewed)
         except MutatorError:
             if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is worth keeping
                 shutil.rmtree(out, ignore_errors=True)

@@ -15,7 +15,7 @@ from mutator.campaigns.run_provenance import check_sources
 from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
-from mutator.execution.experiment_runner import ExperimentRunner, FinishedExperiment, LoadedGoldens
+from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
 from mutator.model import Experiment, Limits, Record, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.store import plan_file
@@ -141,7 +141,7 @@ def _run_golden_on_engine(
         name="golden",
         scenario=workspace.scenario(experiment.scenario),
         seed=experiment.seed,
-        changes=experiment.changes,
+        scenario_changes=experiment.changes,
     )
     execution = engine.execute(job, path_below(engine.work_folder, job.name))
     if execution.status is not Status.OK:
@@ -154,7 +154,7 @@ def _run_golden_on_engine(
     return destination
 
 
-def _storing_output(finished_runs: Iterator[FinishedExperiment], out: Path) -> Iterator[FinishedExperiment]:
+def _storing_output(finished_runs: Iterator[RecordedExperiment], out: Path) -> Iterator[RecordedExperiment]:
     for finished in finished_runs:
         output = finished.output_folder
         if output is None or not output.is_dir():  # a run can delete it

@@ -14,7 +14,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 
-def draw_experiments(folder: RunFolder, count: int) -> list[str]:
+def draw_experiment_ids(folder: RunFolder, count: int) -> list[str]:
     """Draw the ids of `count` experiments that have a result, or of all if there are fewer.
 
     The draw has no seed, so nobody can predict it.

@@ -10,7 +10,7 @@ from pathlib import Path
 from mutator.engines.in_target import process_guard
 
 _CHECK_INTERVAL_S = 1.0  # what a stopped worker loses at most
-_STOPPED_STATE = "T"  # in /proc/PID/stat
+_SUSPENDED_STATE = "T"  # in /proc/PID/stat
 
 
 class WorkerContinuer:
@@ -21,30 +21,30 @@ class WorkerContinuer:
 
     def __init__(self) -> None:
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._continue_stopped_children, daemon=True)
+        self._thread = threading.Thread(target=self._continue_suspended_children, daemon=True)
         self._thread.start()
 
     def end(self) -> None:
         self._ended.set()
         self._thread.join()
 
-    def _continue_stopped_children(self) -> None:
+    def _continue_suspended_children(self) -> None:
         while not self._ended.wait(_CHECK_INTERVAL_S):
-            for pid in _stopped_children():
+            for pid in _suspended_children():
                 with suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGUSR1)  # waits until the process continues
                     os.kill(pid, signal.SIGCONT)
 
 
-def on_stop(callback: Callable[[], None]) -> None:
+def on_resume(callback: Callable[[], None]) -> None:
     """Call `callback` when this process was stopped and another one's `WorkerContinuer` has continued it."""
     signal.signal(signal.SIGUSR1, lambda number, frame: callback())
 
 
-def _stopped_children() -> Iterator[int]:
+def _suspended_children() -> Iterator[int]:
     for pid in process_guard.child_pids(os.getpid()):
         with suppress(OSError):
             # after the name in parentheses, which can hold both spaces and parentheses
             state = Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()[0]
-            if state == _STOPPED_STATE:
+            if state == _SUSPENDED_STATE:
                 yield pid

@@ -20,8 +20,8 @@ from mutator.engines.in_target import process_guard
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.experiment_runner import (
     ExperimentRunner,
-    FinishedExperiment,
     LoadedGoldens,
+    RecordedExperiment,
     record_without_outcome,
 )
 from mutator.execution.written_files import FileDigests
@@ -55,7 +55,7 @@ class Worker:
     """Runs chunks of a run folder and appends their results. Reads the plan chunk by chunk."""
 
     def __init__(self, inputs: RunInputs, assignment: WorkerAssignment) -> None:
-        self.was_stopped = False  # a signal handler sets it
+        self.was_suspended = False  # a signal handler sets it
         self.folder = RunFolder.open(assignment.run_folder)
         check_sources(self.folder.path, self.folder.head.sources, inputs.digest_by_source())
         with raising_disk_full(self.folder.scratch_folder):
@@ -78,10 +78,10 @@ class Worker:
         experiments = plan_file.load_chunk(
             self.folder.path, self.folder.head.chunks[pending.chunk_index], self._faults
         )
-        self._delete_old_images(experiments[0].seed)
+        self._prune_cached_images(experiments[0].seed)
         errors = []
         for ended in self._runner.run([experiments[place] for place in pending.positions]):
-            finished = self._without_outcome_if_stopped(ended)
+            finished = self._without_outcome_if_suspended(ended)
             self._store_finished(finished)
             if finished.mode in MODES_TO_PROVE:
                 self._needs_proof = True
@@ -89,7 +89,7 @@ class Worker:
                 errors.append((finished.experiment.id, finished.record.detail))
         return errors
 
-    def _delete_old_images(self, seed: int) -> None:
+    def _prune_cached_images(self, seed: int) -> None:
         """Delete images of earlier seeds, which would fill the disk."""
         if len(self.folder.seeds) > 1 and seed != self._current_seed:
             shared_cache.prune_target(self._manifest.cache_name)
@@ -111,7 +111,7 @@ class Worker:
             self._planned_experiments = PlannedExperiments(self.folder.path)
         errors = []
         for ended in self._prover.run([self._planned_experiments[sample.id]]):
-            finished = self._without_outcome_if_stopped(ended)
+            finished = self._without_outcome_if_suspended(ended)
             self._writer.append_proof(finished.record)
             if finished.record.status is Status.HARNESS_ERROR:
                 errors.append((finished.experiment.id, finished.record.detail))
@@ -170,22 +170,22 @@ class Worker:
             independent=True,
         )
 
-    def _without_outcome_if_stopped(self, finished: FinishedExperiment) -> FinishedExperiment:
+    def _without_outcome_if_suspended(self, finished: RecordedExperiment) -> RecordedExperiment:
         """Return the experiment; one that ran when this worker was stopped has no outcome."""
-        if not self.was_stopped:
+        if not self.was_suspended:
             return finished
-        self.was_stopped = False
+        self.was_suspended = False
         record, why = finished.record, "its worker was stopped while it ran"
         bare = record_without_outcome(record.experiment_id, Status.HARNESS_ERROR, why)
         return replace(finished, record=replace(bare, tree=record.tree, patch=record.patch), series=None)
 
-    def _store_finished(self, finished: FinishedExperiment) -> None:
+    def _store_finished(self, finished: RecordedExperiment) -> None:
         patch = None if finished.mutant is None else finished.mutant.patch_bytes
         timing = timing_of(finished, self._assignment.worker_name)
         self._writer.append(finished.record, timing, patch, finished.series)
 
 
-def timing_of(finished: FinishedExperiment, worker: str) -> dict[str, Any]:
+def timing_of(finished: RecordedExperiment, worker: str) -> dict[str, Any]:
     return {
         "experiment_id": finished.experiment.id,
         "cpu_s": finished.cpu_s,
@@ -197,7 +197,7 @@ def timing_of(finished: FinishedExperiment, worker: str) -> dict[str, Any]:
     }
 
 
-def python_dying_with(parent_pid: int) -> list[str]:
+def python_command_dying_with(parent_pid: int) -> list[str]:
     """Return the beginning of a Python command line whose process dies with its parent, even while starting.
 
     It imports nothing from its working folder.

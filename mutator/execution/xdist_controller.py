@@ -16,6 +16,9 @@ from mutator._common.resource_shortages import find_shortage
 from mutator.errors import HarnessErrors, MutatorError
 from mutator.execution.progress_reporting import reporting_progress
 from mutator.execution.progress_text import ProgressLines
+from mutator.execution.session import ProgressCallback, Session, Summary, open_session
+from mutator.execution.suspended_workers import WorkerContinuer
+from mutator.execution.worker import WorkerAssignment, python_command_dying_with
 from mutator.execution.xdist_worker import (
     INPUT_KEY,
     PROBLEM_KEY,
@@ -24,9 +27,6 @@ from mutator.execution.xdist_worker import (
     LazyWorker,
     collect_items,
 )
-from mutator.execution.session import ProgressCallback, Session, Summary, open_session
-from mutator.execution.suspended_workers import WorkerContinuer
-from mutator.execution.worker import WorkerAssignment, python_dying_with
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
@@ -96,12 +96,12 @@ class CampaignController:
         self._worker_continuer = WorkerContinuer()
         for spec in specs:
             if spec.popen and not spec.python:
-                spec.python = shlex.join(python_dying_with(os.getpid()))
+                spec.python = shlex.join(python_command_dying_with(os.getpid()))
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_configure_node(self, node: Any) -> None:
         assert self.campaign_session is not None
-        worker_input = node.workerinput[INPUT_KEY] = self.campaign_session.worker_input()
+        worker_input = node.workerinput[INPUT_KEY] = self.campaign_session.xdist_worker_input()
         self.campaign_session.written.note_worker_began(worker_input["session"] + node.gateway.id)
 
     @pytest.hookimpl(optionalhook=True)

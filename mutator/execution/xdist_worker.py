@@ -15,7 +15,7 @@ from mutator._common.resource_shortages import find_shortage
 from mutator.campaigns.chunks import PendingChunk
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage
-from mutator.execution.suspended_workers import on_stop
+from mutator.execution.suspended_workers import on_resume
 from mutator.execution.worker import Worker, WorkerAssignment, bind_to_parent
 from mutator.execution.written_files import FileDigests
 from mutator.preflight.equivalence_check import SampledExperiment
@@ -50,7 +50,7 @@ class WorkItem(CampaignItem):
     def runtest(self) -> None:
         try:
             with raising_disk_full(self.config.rootpath):
-                worker, work = self.worker.get_worker(), self.work
+                worker, work = self.worker.ensure_worker(), self.work
                 errors = worker.run(work) if isinstance(work, PendingChunk) else worker.prove(work)
         except Exception as err:
             reported_error = err if isinstance(err, MutatorError) else find_shortage(err)
@@ -77,15 +77,15 @@ class LazyWorker:
         self._assignment = assignment
         self._worker: Worker | None = None
 
-    def get_worker(self) -> Worker:
+    def ensure_worker(self) -> Worker:
         if self._worker is None:
             self._worker = Worker(self._load_inputs(), self._assignment)
         return self._worker
 
-    def note_stop(self) -> None:
+    def note_suspension(self) -> None:
         """Note that this process was stopped and continued."""
         if self._worker is not None:
-            self._worker.was_stopped = True
+            self._worker.was_suspended = True
 
     def close(self) -> FileDigests:
         """Close the worker's files; return their digests."""
@@ -138,7 +138,7 @@ class WorkerPlugin:
             *(SampledExperiment(number, name) for number, name in campaign_input["proof"]),
         ]
         self._lazy_worker = LazyWorker(partial(RunInputs.from_bytes, campaign_input["inputs"]), assignment)
-        on_stop(self._lazy_worker.note_stop)
+        on_resume(self._lazy_worker.note_suspension)
 
     def pytest_collection(self, session: pytest.Session) -> bool:
         return collect_items(session, self._pending_work, self._lazy_worker)

@@ -56,7 +56,7 @@ def _run_and_note_lines(engine: ReferenceEngine, golden_run: GoldenRunInputs, fo
         name=folder.name,
         scenario=golden_run.scenario,
         seed=golden_run.seed,
-        changes=golden_run.changes,
+        scenario_changes=golden_run.changes,
         note_executed_lines=True,
     )
     execution = engine.execute(job, folder)

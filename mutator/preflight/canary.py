@@ -36,7 +36,7 @@ def build_canary_job(workspace: Workspace, manifest: TargetManifest, experiment:
         name=f"canary-{experiment.id}",
         scenario=workspace.scenario(experiment.scenario),
         seed=experiment.seed,
-        changes=experiment.changes,
+        scenario_changes=experiment.changes,
         changed_files=mutant.files,
         mutant_id=mutant.id,
         injection_ids=mutant.injection_ids,

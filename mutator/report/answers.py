@@ -205,7 +205,7 @@ def time_spent_answer(frame: pd.DataFrame, timings: pd.DataFrame) -> ReportAnswe
 
 def _describe_unsimulated(frame: pd.DataFrame, cpu: pd.Series, timings: pd.DataFrame) -> str:
     rest = frame["experiment_id"][~(cpu > 0)]
-    golden = timings[timings["engine"] == RunMode.GOLDEN.value]
+    golden = timings[timings["engine"] == RunMode.GOLDEN_REUSED.value]
     idle = int(rest.isin(golden["experiment_id"]).sum())
     reasons = {
         "the trigger never held, so the golden run's result was used": idle,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 MOST_REASONS = 20  # maximum number of listed reasons for using the reference engine, most frequent first
 _MODE_DESCRIPTIONS = {
     RunMode.FORK: "a fork of the golden run, just before the fault is first active",
-    RunMode.GOLDEN: "no run: the trigger never holds, so the golden run's result is used",
+    RunMode.GOLDEN_REUSED: "no run: the trigger never holds, so the golden run's result is used",
     RunMode.WARM: "a fork of the loaded program, from the start of the run",
     RunMode.REFERENCE: "a fresh interpreter (reference engine)",
     None: "no run: there is no mutant",

@@ -13,8 +13,8 @@ from pathlib import Path
 from mutator._common.confined_files import open_below, path_below
 from mutator._common.files import ScratchFolder, make_folder, writing_temporary_path
 from mutator.engines import pyc_files
+from mutator.engines.process_endings import environment_variables_of_run
 from mutator.engines.sandbox import Sandbox
-from mutator.engines.process_endings import run_environment
 from mutator.errors import MutatorError
 from mutator.execution.single_run import is_same_record, manifest_of_unchanged_target, run_golden, run_single
 from mutator.figures.run_plot import event_marks
@@ -137,7 +137,7 @@ def _write_shot(manifest: TargetManifest, folder: Path, film_paths: Mapping[str,
     tree = manifest.root
     if manifest.overlay is not None:
         tree = folder / "tree"
-        pyc_files.replace_files(manifest.tree.files, tree)
+        pyc_files.replace_dropping_bytecode(manifest.tree.files, tree)
     out, scratch_file = shot.path.absolute(), path_below(folder / "shown", shot.path.name)
     placeholders = {**film_paths, "out": str(scratch_file), "t": str(shot.t)}
     for place in (out, scratch_file):
@@ -152,7 +152,7 @@ def _write_shot(manifest: TargetManifest, folder: Path, film_paths: Mapping[str,
     process = subprocess.run(
         command,
         cwd=scratch_file.parent,
-        env={**run_environment(0, folder, manifest.env), "PYTHONPATH": str(tree)},
+        env={**environment_variables_of_run(0, folder, manifest.env), "PYTHONPATH": str(tree)},
         capture_output=True,
         text=True,
         check=False,

@@ -29,7 +29,7 @@ def write_missing_series_of_traces(folder: RunFolder, workspace: "Workspace") ->
     traces, series = RunTraces(workspace, folder), SeriesFolder(folder.path)
     for name in sorted(path.name for path in (folder.path / "traces").glob("*")):
         with suppress(MutatorError, KeyError):  # for example, the sources changed after the run
-            if not series.is_readable(name, traces.record(name)) and traces.is_stored(name):
+            if not series.is_readable(name, traces.record(name)) and traces.is_faulty_trace_stored(name):
                 write_sampled_series(
                     folder.path, traces.manifest, *traces.traces_of(name), traces.record(name)
                 )

@@ -233,7 +233,7 @@ def _images_of_run(
         name=folder.name,
         scenario=scenario,
         seed=0,
-        changes=first.changes,
+        scenario_changes=first.changes,
         changed_files=files,
         mutant_id=mutant.id,
     )

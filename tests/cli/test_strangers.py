@@ -98,9 +98,9 @@ def test_processes_that_dask_starts_get_a_safe_path(monkeypatch: pytest.MonkeyPa
 def no_bwrap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     (tmp_path / "bin").mkdir()
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
-    sandbox.reason_not_available.cache_clear()
+    sandbox.reason_sandbox_unavailable.cache_clear()
     yield
-    sandbox.reason_not_available.cache_clear()
+    sandbox.reason_sandbox_unavailable.cache_clear()
 
 
 TRY = ("try", "sensor/lane", "--scenario", "A", "--trigger", "1.0")
@@ -127,7 +127,7 @@ def test_doctor_says_whether_there_is_a_sandbox(cli: Cli, root: Path, no_bwrap: 
 
 @pytest.mark.slow
 @pytest.mark.skipif(
-    bool(sandbox.reason_not_available()), reason=f"no sandbox: {sandbox.reason_not_available()}"
+    bool(sandbox.reason_sandbox_unavailable()), reason=f"no sandbox: {sandbox.reason_sandbox_unavailable()}"
 )
 def test_every_way_to_run_in_a_sandbox_gives_the_results_of_one_without(cli: Cli, root: Path) -> None:
     """The target's code looks for this process. In a sandbox, it does not find it."""
@@ -198,7 +198,7 @@ def test_pytest_without_a_sandbox_runs_nothing(root: Path, tmp_path: Path) -> No
 
 @pytest.mark.slow
 @pytest.mark.skipif(
-    bool(sandbox.reason_not_available()), reason=f"no sandbox: {sandbox.reason_not_available()}"
+    bool(sandbox.reason_sandbox_unavailable()), reason=f"no sandbox: {sandbox.reason_sandbox_unavailable()}"
 )
 def test_pytest_runs_a_campaign_in_a_sandbox(root: Path, tmp_path: Path) -> None:
     calls = tmp_path / "calls"

@@ -197,7 +197,9 @@ def check_same(three: Engines, job: Job, how: RunMode | None = None) -> JobResul
             assert expected.probe_report is not None
             never = all(not told["count"] for told in expected.probe_report["injections"].values())
             assert (
-                never if execution.mode is RunMode.GOLDEN else execution.probe_report == expected.probe_report
+                never
+                if execution.mode is RunMode.GOLDEN_REUSED
+                else execution.probe_report == expected.probe_report
             )
             assert found == files
     if how is not None:
@@ -215,7 +217,7 @@ def test_a_fault_in_a_context_is_forked(three: Engines, model: str) -> None:
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("model", MODELS)
 def test_engines_agree_on_every_model_under_every_trigger(three: Engines, model: str, trigger: str) -> None:
-    how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
+    how = RunMode.GOLDEN_REUSED if trigger == "never" else RunMode.FORK
     for scenario in ("A", "B"):
         check_same(
             three,

@@ -31,7 +31,9 @@ def test_the_engines_give_the_same_records(tmp_path: Path, campaign: str, limit:
     reference = ReferenceEngine(manifest, tmp_path / "work", limits)
     outputs: dict[str, Path] = {}
     for one in plan.goldens():
-        job = Job(name=one.key, scenario=clone.scenario(one.scenario), seed=plan.seed, changes=one.changes)
+        job = Job(
+            name=one.key, scenario=clone.scenario(one.scenario), seed=plan.seed, scenario_changes=one.changes
+        )
         outputs[one.key] = reference.execute(job, tmp_path / one.key).out
     goldens = LoadedGoldens(manifest, lambda e: outputs[GoldenRun.for_experiment(e, several_seeds=False).key])
     found: dict[str, dict[str, Record]] = {}

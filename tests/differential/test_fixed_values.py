@@ -109,7 +109,7 @@ def test_engines_agree_on_a_mutant_that_sets_all_values(three: Engines) -> None:
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("place", PLACES)
 def test_engines_agree_on_each_value_under_every_trigger(three: Engines, place: str, trigger: str) -> None:
-    how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
+    how = RunMode.GOLDEN_REUSED if trigger == "never" else RunMode.FORK
     execution = check_same(three, three.job(fault(PLACES[place]), TRIGGERS[trigger]), how)
     assert execution.status is Status.OK
     _, files = three.run("fork", three.job(fault(PLACES[place]), TRIGGERS[trigger]))

@@ -63,5 +63,5 @@ def test_engines_agree_on_a_mutant_with_all_limits(three: Engines) -> None:
 def test_engines_agree_on_each_limit_under_every_trigger(
     three: Engines, injection: Injection, trigger: str
 ) -> None:
-    how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
+    how = RunMode.GOLDEN_REUSED if trigger == "never" else RunMode.FORK
     check_same(three, three.job(fault(injection), TRIGGERS[trigger]), how)

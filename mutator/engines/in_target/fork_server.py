@@ -48,7 +48,7 @@ def main(connection_fd: int, start_file: str) -> int:
 def serve_as_first_process(connection_fd: int, start_message: dict[str, Any]) -> None:
     os.chdir(start_message["home"])
     sys.path.insert(0, start_message["tree"])
-    sys.meta_path.insert(0, run_once.HarnessFinder)
+    sys.meta_path.insert(0, run_once.HarnessImportFinder)
     sys.argv = [start_message["module"]]
     server = ForkingProcess(start_message, socket.socket(fileno=connection_fd))
     try:
@@ -172,7 +172,7 @@ class ForkingProcess:
         """
         if others := thread_names.other_thread_names():
             return {"threads": others}
-        space_limit = process_guard.SpaceLimit(home, disk_mb)
+        space_limit = process_guard.DiskGrowthLimit(home, disk_mb)
         prepare_to_fork()
         ending = process_guard.fork_guarded(self.connection.fileno(), wall_s=wall_s, space_limit=space_limit)
         if ending is None:
@@ -198,7 +198,7 @@ class ForkingProcess:
         report["threads"] = thread_names.other_thread_names()
         Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
         if not report["threads"]:  # with other threads, the result is not used
-            end_like_interpreter()
+            run_exit_handlers_and_flush()
         os._exit(0)
 
     def use_temporary_folder(self, home: str) -> None:
@@ -226,7 +226,7 @@ class ForkingProcess:
         try:
             probe = mutant_installation.install_probe(job["probe_name"], job["probe"])
             mutant_installation.swap_code(job["functions"], probe)
-            mutant_installation.run_value_setters(job["settings"], probe)
+            mutant_installation.run_probe_value_setters(job["settings"], probe)
             probe.limit(job["steps"])
             run_once.delete_marker_on_activation(probe, job["inactive"])
             # give the probe the state that it would have if it had observed from the start
@@ -263,7 +263,7 @@ def prepare_to_fork() -> None:
     gc.freeze()
 
 
-def end_like_interpreter() -> None:
+def run_exit_handlers_and_flush() -> None:
     """Do what an interpreter does at exit, except freeing its memory, which takes longer than many runs.
 
     That is: end the threads of `threading`, call `atexit` handlers, and flush open files.

@@ -42,7 +42,7 @@ def swap_code(functions: Sequence[Sequence[Any]], probe: types.ModuleType) -> No
         function.__globals__[name] = probe
 
 
-def run_value_setters(value_setters: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
+def run_probe_value_setters(value_setters: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
     name = probe.__name__.rpartition(".")[2]
     for module, code in value_setters:
         if module not in sys.modules:
@@ -63,7 +63,7 @@ def find_live_function(module: str, name_path: Sequence[str], code: types.CodeTy
         if not isinstance(holder, type):
             raise SwapRefused(f"{where} is not found")
     named = vars(holder).get(_mangled_name(holder, name_path[-1]))
-    matches = {id(f): f for f in _functions_inside(named) if f.__code__ == code}
+    matches = {id(f): f for f in _functions_wrapped_in(named) if f.__code__ == code}
     if len(matches) != 1:
         raise SwapRefused(f"{where} is not found")
     (live,) = matches.values()
@@ -73,12 +73,12 @@ def find_live_function(module: str, name_path: Sequence[str], code: types.CodeTy
     return live
 
 
-def _functions_inside(named: Any) -> Iterator[types.FunctionType]:
+def _functions_wrapped_in(named: Any) -> Iterator[types.FunctionType]:
     if isinstance(named, types.FunctionType):
         yield named
     if named is not None and not isinstance(named, type):
         for name in _WRAPPING_ATTRIBUTES:
-            yield from _functions_inside(getattr(named, name, None))
+            yield from _functions_wrapped_in(getattr(named, name, None))
 
 
 def _mangled_name(holder: Any, name: str) -> str:

@@ -56,7 +56,7 @@ class NondeterminismWatcher:
             for timed_name in (name, f"{name}_ns"):
                 self._watch_function(time, timed_name, CLOCK, f"time.{timed_name}() reads the clock")
         for name in _CLOCK_FUNCTIONS_WITHOUT_TIME:
-            self._watch_function(time, name, CLOCK, f"time.{name}() reads the clock", _is_without_time)
+            self._watch_function(time, name, CLOCK, f"time.{name}() reads the clock", _has_no_time_argument)
         self._watch_function(os, "times", CLOCK, "os.times() reads the clock")
         self._watch_dates()
         self._watch_function(os, "urandom", DRAW, "os.urandom() draws from the system")
@@ -67,7 +67,7 @@ class NondeterminismWatcher:
             self._watch_function(secrets, name, DRAW, f"secrets.{name}() draws from the system")
         self._watch_function(os, "getpid", PROCESS, "os.getpid() differs in each run", direct=True)
         self._watch_function(
-            builtins, "hash", HASH, "hash() of text depends on PYTHONHASHSEED", _is_salted, direct=True
+            builtins, "hash", HASH, "hash() of text depends on PYTHONHASHSEED", _has_salted_hash, direct=True
         )
         self._watch_function(
             builtins, "id", PROCESS, "id() is an address, which differs in each run", direct=True
@@ -272,9 +272,9 @@ class _ReplacementClass(type):
         return issubclass(kind, cls.original_class)
 
 
-def _is_salted(value: object) -> bool:
+def _has_salted_hash(value: object) -> bool:
     return not isinstance(value, int | float)
 
 
-def _is_without_time(*args: Any, **_: Any) -> bool:
+def _has_no_time_argument(*args: Any, **_: Any) -> bool:
     return not any(isinstance(argument, int | float | tuple | time.struct_time) for argument in args)

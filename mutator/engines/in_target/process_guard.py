@@ -30,12 +30,12 @@ _SIGNALS_TO_RESTORE = signal.valid_signals() - {
     signal.SIGXFSZ,
 }
 _SPACE_CHECK_INTERVAL_S = 0.2  # interval between two checks of the space used
-_SPACE_CHECK_TIME_DIVISOR = 20  # the checks take at most 1/_LOOK_SHARE of the time
+_SPACE_CHECK_TIME_DIVISOR = 20  # the checks take at most 1/_SPACE_CHECK_TIME_DIVISOR of the time
 _BLOCK_BYTES = 512  # bytes; the unit of st_blocks
 _libc = ctypes.CDLL(None)
 
 
-class SpaceLimit:
+class DiskGrowthLimit:
     """A limit on how much the folder `home` can grow: `disk_mb` MiB.
 
     The folder is held open, because a run can rename it and put a link to a large one in its place.
@@ -57,7 +57,7 @@ def fork_guarded(
     caller_fd: int,
     *,
     wall_s: float = math.inf,
-    space_limit: SpaceLimit | None = None,
+    space_limit: DiskGrowthLimit | None = None,
     patience_s: float = 0.0,
 ) -> dict[str, Any] | None:
     """Fork. Return None in the child, which leads its own session and dies with its parent.
@@ -128,7 +128,7 @@ def _prctl(option: int, value: int) -> None:
     _libc.prctl(option, value, 0, 0, 0)
 
 
-def _wait_for_child(pid: int, caller_fd: int, deadline: float, space_limit: SpaceLimit | None) -> str:
+def _wait_for_child(pid: int, caller_fd: int, deadline: float, space_limit: DiskGrowthLimit | None) -> str:
     """Wait until the child ends, without reaping it, or must be stopped; return the reason to stop it."""
     handle, pause = os.pidfd_open(pid), _SPACE_CHECK_INTERVAL_S
     poll = select.poll()

@@ -41,7 +41,7 @@ def load_neighbour(name: str) -> Any:
 process_guard = load_neighbour("process_guard")
 
 
-class HarnessFinder:
+class HarnessImportFinder:
     """Import hook that finds `mutator`, which the target's glue imports, next to this file.
 
     Other installed versions are ignored.
@@ -60,7 +60,7 @@ class HarnessFinder:
 
 def main(job_file: str, connection_fd: int) -> int:
     job = json.loads(Path(job_file).read_text(encoding="utf-8"))
-    space_limit = process_guard.SpaceLimit(job["home"], job["disk_mb"])
+    space_limit = process_guard.DiskGrowthLimit(job["home"], job["disk_mb"])
     ending = process_guard.fork_guarded(connection_fd, wall_s=job["wall_s"], space_limit=space_limit)
     if ending is None:
         os.close(connection_fd)
@@ -77,7 +77,7 @@ def run_job(job: dict[str, Any]) -> None:
     limit_resources(job)
     os.chdir(job["out"])
     sys.path.insert(0, job["tree"])
-    sys.meta_path.insert(0, HarnessFinder)
+    sys.meta_path.insert(0, HarnessImportFinder)
     report: dict[str, Any] = {"schema": "child/1", "ended": "ok", "error": None, "disk_full": False}
     probe = None
     modules_before = set(sys.modules)
@@ -179,7 +179,7 @@ def describe_failure(err: BaseException, tree: str, probe_name: str | None) -> d
     kind = type(err)
     if probe_name and (kind.__module__, kind.__name__) == (probe_name, "StepLimit"):
         return {"ended": "steps"}
-    message = text_of(err.code if isinstance(err, SystemExit) else err)[:_MOST_MESSAGE_CHARACTERS]
+    message = safe_text_of(err.code if isinstance(err, SystemExit) else err)[:_MOST_MESSAGE_CHARACTERS]
     errors = exception_chain(err)
     error = {
         "kind": kind.__name__,
@@ -189,7 +189,7 @@ def describe_failure(err: BaseException, tree: str, probe_name: str | None) -> d
     return {"ended": "error", "error": error, "disk_full": any(map(is_full_disk_error, errors))}
 
 
-def text_of(value: object) -> str:
+def safe_text_of(value: object) -> str:
     """Convert an object to text, even if its own conversion fails."""
     try:
         return str(value)
@@ -200,7 +200,7 @@ def text_of(value: object) -> str:
 def is_full_disk_error(err: BaseException) -> bool:
     """Return whether an error reports a full disk or quota, even if a library raised it."""
     return getattr(err, "errno", None) in _NO_SPACE_ERRNOS or any(
-        os.strerror(n) in text_of(err) for n in _NO_SPACE_ERRNOS
+        os.strerror(n) in safe_text_of(err) for n in _NO_SPACE_ERRNOS
     )
 
 
@@ -225,7 +225,7 @@ def tree_stack(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
     while trace is not None:
         file = trace.tb_frame.f_code.co_filename
         if file.startswith(tree + os.sep):
-            frames.append((os.path.relpath(file, tree), trace.tb_lineno or 0, failing_column(trace)))
+            frames.append((os.path.relpath(file, tree), trace.tb_lineno or 0, failing_byte_column(trace)))
         trace = trace.tb_next
     innermost_by_line: dict[tuple[str, int], tuple[str, int, int]] = {}
     for frame in reversed(frames):
@@ -233,7 +233,7 @@ def tree_stack(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
     return list(innermost_by_line.values())
 
 
-def failing_column(trace: types.TracebackType) -> int:
+def failing_byte_column(trace: types.TracebackType) -> int:
     """Return the byte at which the failing or called expression starts in its line; -1 if unknown."""
     positions = trace.tb_frame.f_code.co_positions()
     # a code object has one position for each instruction of two bytes
@@ -268,7 +268,7 @@ def new_modules_outside_packages(modules_before: set[str], packages: Iterable[st
 
 def third_party_modules(modules_before: set[str], packages: Iterable[str]) -> list[str]:
     """Return the third-party top-level modules imported after `modules_before`, or mapped into memory."""
-    excluded = {*sys.stdlib_module_names, HarnessFinder.package_folder.name, *packages, *modules_before}
+    excluded = {*sys.stdlib_module_names, HarnessImportFinder.package_folder.name, *packages, *modules_before}
     return sorted(
         {
             name.partition(".")[0]

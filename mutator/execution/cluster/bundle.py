@@ -158,6 +158,6 @@ def load_run_inputs(bundle: UnpackedBundle) -> RunInputs:
         fault_models=load_fault_models(bundle.folder / "templates"),
         scenario_files={
             golden.scenario: bundle.scenario_path(golden.scenario)
-            for golden, _ in bundle.goldens_by_key.values()
+            for golden, _ in bundle.golden_and_digest_by_key.values()
         },
     )

@@ -96,35 +96,35 @@ class ClusterFile:
         cluster_class = _cluster_class(self.model.kind)
         self._check_options(cluster_class)
         problems: list[Exception] = []
-        with self._reporting_errors():
+        with self._converting_errors():
             options = self._cluster_arguments()
         if self.model.kind != KUBERNETES:
             options["job_cls"] = _job_class_noting_errors(cluster_class.job_cls, problems)
         with applying_scheduler_settings():
-            with self._reporting_errors():
+            with self._converting_errors():
                 cluster = cluster_class(asynchronous=True, n_workers=0, **options)
             try:
                 await self._start_cluster(cluster, insecure, problems)
             except BaseException:
                 with suppress(Exception):  # the cause is already known
                     await cluster.close()
-                _delete_key_files(cluster)
+                _delete_tls_key_files(cluster)
                 raise
             try:
                 async with connected_client(cluster, where=self.source.path) as client:
                     yield client
             finally:
                 await cluster.close()
-                _delete_key_files(cluster)
+                _delete_tls_key_files(cluster)
 
     async def _start_cluster(self, cluster: Any, insecure: bool, problems: list[Exception]) -> None:
         """Start the scheduler and submit the jobs. `problems` collects the errors of failed submissions."""
-        with self._reporting_errors():
+        with self._converting_errors():
             await cluster
         if not insecure and not is_closed_to_others(cluster.scheduler_address):
             raise open_network_error(cluster.scheduler_address, where=self.source.path)
         workers = self.model.workers
-        with self._reporting_errors():
+        with self._converting_errors():
             await cluster.scale(workers)
             await cluster
             if problems:
@@ -193,7 +193,7 @@ class ClusterFile:
         return options
 
     @contextmanager
-    def _reporting_errors(self) -> Iterator[None]:
+    def _converting_errors(self) -> Iterator[None]:
         """Turn the class's errors about options, and the queueing system's about jobs, into MutatorError."""
         try:
             yield
@@ -231,7 +231,7 @@ def _job_class_noting_errors(job_class: Any, problems: list[Exception]) -> type:
     return Noting
 
 
-def _delete_key_files(cluster: Any) -> None:
+def _delete_tls_key_files(cluster: Any) -> None:
     """Delete the files of `security: true`. Dask would delete them only on garbage collection."""
     for key in ("ca_file", "cert", "key"):
         if file := getattr(cluster, f"_job_{key}", None):

@@ -32,7 +32,7 @@ from mutator.errors import DiskFull, GoldenRunsDiffer, MutatorError, Shortage
 from mutator.execution.cluster.golden_cache import GoldenRunCache
 from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceKind, PieceResult
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
-from mutator.execution.experiment_runner import ExperimentRunner, FinishedExperiment, LoadedGoldens
+from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
 from mutator.execution.worker import timing_of
 from mutator.model import Experiment
 from mutator.preflight.check_run_problems import read_check_run
@@ -73,7 +73,7 @@ class PieceRunner:
             if (key := self._golden_of(same[0]).key) not in self._matching_goldens:
                 self._ensure_golden(key)
         runner = self._runner_of_kind(piece.kind)
-        finished: list[FinishedExperiment] = []
+        finished: list[RecordedExperiment] = []
         for ended in runner.run(experiments):
             finished.append(ended)
             report_finished(ended.experiment.id)
@@ -106,7 +106,7 @@ class PieceRunner:
                 several_seeds=bundle.meta["several_seeds"],
                 digests={
                     path_below(self._goldens_folder, key): golden_digest
-                    for key, (_, golden_digest) in bundle.goldens_by_key.items()
+                    for key, (_, golden_digest) in bundle.golden_and_digest_by_key.items()
                 },
             )
             with_series = kind is PieceKind.RUN and bundle.meta["series"]
@@ -117,7 +117,7 @@ class PieceRunner:
 
     def _ensure_golden(self, key: str) -> None:
         """Make a golden run or copy it from the cache; GoldenRunsDiffer if it differs from the campaign's."""
-        golden, expected_digest = self._bundle.goldens_by_key[key]
+        golden, expected_digest = self._bundle.golden_and_digest_by_key[key]
         folder = path_below(self._goldens_folder, key)
         self._goldens_folder.mkdir(exist_ok=True)
         if not self._golden_cache.copy_golden(golden, expected_digest, folder):
@@ -132,7 +132,7 @@ class PieceRunner:
             name=f"golden-{len(self._matching_goldens)}",
             scenario=bundle.scenario_path(golden.scenario),
             seed=bundle.meta["seed"] if golden.seed is None else golden.seed,
-            changes=golden.changes,
+            scenario_changes=golden.changes,
         )
         for _, execution in engine.run([job]):
             examined = read_check_run(self._manifest, execution)
@@ -150,7 +150,7 @@ class PieceRunner:
         return GoldenRun.for_experiment(experiment, several_seeds=self._bundle.meta["several_seeds"])
 
 
-def _build_result(finished: list[FinishedExperiment], worker_name: str, *, is_proof: bool) -> PieceResult:
+def _build_result(finished: list[RecordedExperiment], worker_name: str, *, is_proof: bool) -> PieceResult:
     records = tuple(canonical_json(record_as_json(ended.record)).encode() for ended in finished)
     if is_proof:
         return PieceResult(number=0, ending=PieceEnding.FINISHED, records=records)
@@ -161,12 +161,12 @@ def _build_result(finished: list[FinishedExperiment], worker_name: str, *, is_pr
     return PieceResult(
         number=0,
         ending=PieceEnding.FINISHED,
-        forked=any(ended.mode in MODES_TO_PROVE for ended in finished),
+        needs_proof=any(ended.mode in MODES_TO_PROVE for ended in finished),
         records=records,
         timings=tuple(canonical_json(timing_of(ended, worker_name)).encode() for ended in finished),
         patches=pack_patches(patches),
         series=b"".join(block_bytes(*series_block(experiment, ended)) for experiment, ended in series),
-        series_of=tuple(sorted({ended.golden_key for _, ended in series})),
+        series_goldens=tuple(sorted({ended.golden_key for _, ended in series})),
     )
 
 
@@ -177,7 +177,7 @@ def _run_catching_errors(
         with raising_disk_full(runner.folder):
             return runner.run_piece(piece, report_finished)
     except GoldenRunsDiffer as err:
-        return PieceResult(number=piece.number, ending=PieceEnding.GOLDEN_DIFFERS, text=str(err))
+        return PieceResult(number=piece.number, ending=PieceEnding.GOLDEN_DIFFERS, reason=str(err))
     except Exception as err:
         reported_error = err if isinstance(err, MutatorError) else find_shortage(err)
         lacks_resources = isinstance(reported_error, DiskFull | Shortage)
@@ -185,7 +185,7 @@ def _run_catching_errors(
         return PieceResult(
             number=piece.number,
             ending=PieceEnding.WORKER_UNFIT if lacks_resources else PieceEnding.HARNESS_FAILED,
-            text=text,
+            reason=text,
         )
 
 
@@ -205,7 +205,7 @@ def _refuse_first_piece(connection: Connection, err: Exception) -> None:
         piece = Piece.from_bytes(connection.recv_bytes())
         text = str(err if isinstance(err, MutatorError) else find_shortage(err) or repr(err))
         connection.send(
-            PieceResult(number=piece.number, ending=PieceEnding.WORKER_UNFIT, text=text).to_bytes()
+            PieceResult(number=piece.number, ending=PieceEnding.WORKER_UNFIT, reason=text).to_bytes()
         )
 
 

@@ -15,7 +15,7 @@ from mutator.campaigns.chunks import PendingChunk
 from mutator.execution.cluster.pieces import Piece, PieceKind
 from mutator.execution.cluster.work_by_golden import (
     GoldenRunGroup,
-    RunLines,
+    PlanLinesOfRun,
     fault_lines_of,
     golden_key_of,
     group_by_golden,
@@ -26,7 +26,7 @@ from mutator.store.plan_lines import id_on_line
 from mutator.store.run_folder import RunFolder
 
 MIN_PIECE_S, MOST_PIECE_S = 0.5, 8.0  # shortest and longest intended duration of a piece
-_PIECES_PER_SLOT = 4  # a piece is the remaining work divided by the number of workers and by this
+_REMAINING_PIECES_PER_SLOT = 4  # a piece is the remaining work divided by the number of workers and by this
 _RUNS_IN_FIRST_PIECE = 4  # runs in a piece before the first measurement
 _ASSUMED_RUN_S = 0.5  # duration of a run before the first measurement
 _LATE_FACTOR = 3.0  # a piece that takes this many times as long as expected is repeated by another worker
@@ -148,7 +148,7 @@ class PieceQueue:
             del self._pieces_in_progress[piece.number]
             self._put_back(out.piece)
 
-    def note_death(self, piece: Piece, worker: str, running_experiment: str = "") -> Piece | None:
+    def requeue_after_death(self, piece: Piece, worker: str, running_experiment: str = "") -> Piece | None:
         """Note that a worker or its process died during a piece, perhaps in `running_experiment`.
 
         The piece is put back for other workers, with `running_experiment` in a separate piece. After two
@@ -199,7 +199,7 @@ class PieceQueue:
             return None
         self._golden_by_worker[worker] = group.golden_key
         for place, piece in enumerate(group.returned_pieces):
-            if self._can_try(worker, piece):
+            if self._can_run_piece(worker, piece):
                 del group.returned_pieces[place]
                 return piece
         runs = list(islice(group.uncut_runs, self._runs_in_next_piece()))
@@ -211,7 +211,7 @@ class PieceQueue:
         if not self._finished_runs_by_kind[PieceKind.RUN]:
             return _RUNS_IN_FIRST_PIECE
         mean_s = self._mean_run_s(PieceKind.RUN)
-        share_s = self._waiting_count * mean_s / (_PIECES_PER_SLOT * self._slot_count)
+        share_s = self._waiting_count * mean_s / (_REMAINING_PIECES_PER_SLOT * self._slot_count)
         return (
             max(1, round(min(MOST_PIECE_S, max(MIN_PIECE_S, share_s)) / mean_s))
             if mean_s
@@ -233,10 +233,10 @@ class PieceQueue:
 
     def _has_work_for(self, group: GoldenRunGroup, worker: str) -> bool:
         return bool(group.uncut_experiment_count) or any(
-            self._can_try(worker, piece) for piece in group.returned_pieces
+            self._can_run_piece(worker, piece) for piece in group.returned_pieces
         )
 
-    def _can_try(self, worker: str, piece: Piece) -> bool:
+    def _can_run_piece(self, worker: str, piece: Piece) -> bool:
         """Return whether the piece has not killed the worker, or has killed every worker present."""
         return worker not in piece.killed_workers or self._slots_by_worker.keys() <= set(piece.killed_workers)
 
@@ -258,7 +258,7 @@ class PieceQueue:
         for place, piece in enumerate(self._proof_pieces):
             name = next(iter(piece.plan_lines))
             other = not (name in running or self._worker_by_sampled.get(name) == worker)
-            if (takes_own or other) and self._can_try(worker, piece):
+            if (takes_own or other) and self._can_run_piece(worker, piece):
                 return self._proof_pieces.pop(place)
         return None
 
@@ -269,7 +269,7 @@ class PieceQueue:
             for out in self._pieces_in_progress.values()
             if worker != out.worker
             and not out.repeating_workers
-            and self._can_try(worker, out.piece)
+            and self._can_run_piece(worker, out.piece)
             and now - out.start_s > max(_LATE_FACTOR * out.expected_s, _MIN_LATE_S)
         ]
         return max(late, key=lambda delay_and_piece: delay_and_piece[0])[1] if late else None
@@ -278,7 +278,7 @@ class PieceQueue:
         self,
         kind: PieceKind,
         golden: str,
-        lines: RunLines,
+        lines: PlanLinesOfRun,
         *,
         run_count: int = 1,
         killed_workers: tuple[str, ...] = (),
@@ -298,7 +298,7 @@ class PieceQueue:
         lines = {id_on_line(line): line}
         return self._build_piece(PieceKind.PROVE, golden_key_of(self._folder, line, self._fault_lines), lines)
 
-    def _build_part(self, piece: Piece, lines: RunLines, killed_workers: tuple[str, ...]) -> Piece:
+    def _build_part(self, piece: Piece, lines: PlanLinesOfRun, killed_workers: tuple[str, ...]) -> Piece:
         return self._build_piece(
             piece.kind, piece.golden_key, lines, run_count=len(lines), killed_workers=killed_workers
         )

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, ClassVar
 
 from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.model import Experiment
@@ -82,27 +82,35 @@ class Piece:
 class PieceResult:
     """The result of a piece.
 
-    If the piece is not done, `text` says why, and `at` is the experiment that was running.
+    If the piece is not done, `reason` says why, and `running_experiment` is the one that was running.
     `records` and `timings` are lines for the run folder, without checksums. `patches` and `series` are blocks
     for its block files.
     """
 
     number: int
     ending: PieceEnding
-    text: str = ""
-    at: str = ""
+    reason: str = ""
+    running_experiment: str = ""
     seconds: float = 0.0
-    forked: bool = False  # whether a record needs a proof
+    needs_proof: bool = False  # whether a record needs a proof
     records: tuple[bytes, ...] = ()
     timings: tuple[bytes, ...] = ()
     patches: bytes = b""
     series: bytes = b""
-    series_of: tuple[str, ...] = field(default=())  # golden runs to which `series` refers
+    series_goldens: tuple[str, ...] = field(default=())  # golden runs to which `series` refers
 
-    _HEAD_FIELDS = ("number", "ending", "text", "at", "seconds", "forked", "series_of")
+    _FIELD_BY_HEAD_KEY: ClassVar[dict[str, str]] = {
+        "number": "number",
+        "ending": "ending",
+        "text": "reason",
+        "at": "running_experiment",
+        "seconds": "seconds",
+        "forked": "needs_proof",
+        "series_of": "series_goldens",
+    }
 
     def to_bytes(self) -> bytes:
-        head = {name: getattr(self, name) for name in self._HEAD_FIELDS}
+        head = {key: getattr(self, name) for key, name in self._FIELD_BY_HEAD_KEY.items()}
         parts = {"head": json.dumps(head).encode(), "patches": self.patches, "series": self.series}
         return pack_parcel(
             parts | {"records": _join_lines(self.records), "timings": _join_lines(self.timings)}
@@ -113,8 +121,9 @@ class PieceResult:
         """Unpack a result; MutatorError if it is damaged."""
         parts = unpack_parcel(data)
         head: dict[str, Any] = json.loads(parts["head"])
+        head |= {"ending": PieceEnding(head["ending"]), "series_of": tuple(head["series_of"])}
         return cls(
-            **head | {"ending": PieceEnding(head["ending"]), "series_of": tuple(head["series_of"])},
+            **{cls._FIELD_BY_HEAD_KEY[key]: value for key, value in head.items()},
             patches=parts["patches"],
             series=parts["series"],
             records=tuple(parts["records"].splitlines()),

@@ -39,7 +39,7 @@ class ResultIntake:
         if piece.kind is PieceKind.PROVE:
             self._writer.extend_proof(result.records)
             return
-        goldens = {key: partial(self._golden_series, key) for key in result.series_of}
+        goldens = {key: partial(self._golden_series, key) for key in result.series_goldens}
         self._writer.extend_series(result.series, goldens)
         self._writer.extend_results(result.records, result.timings, result.patches)
 

@@ -23,7 +23,7 @@ class UnpackedBundle:
 
     @cached_property
     def meta(self) -> dict[str, Any]:
-        """The content of meta.json; MutatorError if it is not what `Bundle.of` writes."""
+        """The content of meta.json; MutatorError if it is not what `Bundle.pack_for_run` writes."""
         path = self.folder / META_FILE
         meta = read_json(path, BUNDLE_SCHEMA)
         try:
@@ -45,7 +45,7 @@ class UnpackedBundle:
         return path_below(self.folder / "scenarios", f"{name}.yaml")
 
     @cached_property
-    def goldens_by_key(self) -> dict[str, tuple[GoldenRun, str]]:
+    def golden_and_digest_by_key(self) -> dict[str, tuple[GoldenRun, str]]:
         """The golden runs with their digests, by name."""
         digests_by_golden = [
             (GoldenRun.from_stored(entry["golden"]), entry["digest"]) for entry in self.meta["goldens"]

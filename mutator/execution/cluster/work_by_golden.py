@@ -14,8 +14,8 @@ from mutator.store.run_folder import RunFolder
 
 _FIELDS_OF_SHARED_RUN = ("fault", "trigger", "seed")  # equal for experiments that share a run
 
-RunLines = dict[str, bytes]  # plan lines of the experiments that share one run, by experiment id
-FaultLines = Mapping[str, bytes]  # lines of the plan's faults by id
+PlanLinesOfRun = dict[str, bytes]  # plan lines of the experiments that share one run, by experiment id
+FaultLineById = Mapping[str, bytes]  # lines of the plan's faults by id
 
 
 @dataclass
@@ -23,7 +23,7 @@ class GoldenRunGroup:
     """The remaining experiments that have the same golden run."""
 
     golden_key: str
-    uncut_runs: Iterator[RunLines]
+    uncut_runs: Iterator[PlanLinesOfRun]
     uncut_experiment_count: int  # experiments not yet put into a piece
     returned_pieces: deque[Piece] = field(default_factory=deque)  # returned pieces
 
@@ -33,7 +33,7 @@ class GoldenRunGroup:
 
 
 def group_by_golden(
-    folder: RunFolder, pending: Sequence[PendingChunk], faults: FaultLines
+    folder: RunFolder, pending: Sequence[PendingChunk], faults: FaultLineById
 ) -> dict[str, GoldenRunGroup]:
     """Return the pending work by golden run. All experiments of a chunk have the same golden run."""
     chunks: dict[str, list[PendingChunk]] = {}
@@ -52,7 +52,7 @@ def group_by_golden(
     }
 
 
-def _list_runs(folder: RunFolder, pending: Sequence[PendingChunk]) -> Iterator[RunLines]:
+def _list_runs(folder: RunFolder, pending: Sequence[PendingChunk]) -> Iterator[PlanLinesOfRun]:
     for chunk_work in pending:
         lines = list(plan_file.read_chunk_lines(folder.path, folder.head.chunks[chunk_work.chunk_index]))
         for _, same in groupby((lines[place] for place in chunk_work.positions), key=_shared_run_key):
@@ -64,10 +64,10 @@ def _shared_run_key(line: bytes) -> list[Any]:
     return [data[name] for name in _FIELDS_OF_SHARED_RUN]
 
 
-def golden_key_of(folder: RunFolder, line: bytes, faults: FaultLines) -> str:
+def golden_key_of(folder: RunFolder, line: bytes, faults: FaultLineById) -> str:
     fault = parse_fault(faults[values_behind_id(line)["fault"]])
     return folder.golden_run_of(parse_experiment(line, {fault.id: fault})).key
 
 
-def fault_lines_of(lines: RunLines, faults: FaultLines) -> tuple[bytes, ...]:
+def fault_lines_of(lines: PlanLinesOfRun, faults: FaultLineById) -> tuple[bytes, ...]:
     return tuple(dict.fromkeys(faults[values_behind_id(line)["fault"]] for line in lines.values()))

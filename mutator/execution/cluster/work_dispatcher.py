@@ -18,18 +18,18 @@ from mutator._common.typed_json import from_json_types
 from mutator.errors import DiskFull, MutatorError, SchedulerGone, WorkerCutOff, WorkerRefused
 from mutator.execution.cluster import worker_tasks
 from mutator.execution.cluster.bundle import Bundle
-from mutator.execution.cluster.worker_roster import Crew, describe_worker
 from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceResult
 from mutator.execution.cluster.result_intake import ResultIntake
 from mutator.execution.cluster.worker_calls import await_answer, call_on_worker, submit_to_worker
+from mutator.execution.cluster.worker_roster import WorkerRoster, describe_worker
 from mutator.execution.session import Session
 from mutator.preflight import equivalence_check
 from mutator.store.work_stretches import Machine
 
 _WORKER_CHECK_INTERVAL_S = 0.5  # between two checks of the present workers
 _WORKERLESS_TIMEOUT_S = 60.0  # time without any worker after which the command gives up
-_PIECES_PER_SLOT = 2  # pieces per thread of a worker: one waits while the other runs
+_MOST_TASKS_PER_SLOT = 2  # pieces per thread of a worker: one waits while the other runs
 _MOST_FAILURES_IN_A_ROW = 3  # consecutive failures after which a worker gets no more work
 _IDLE_PAUSE_S = 0.1  # pause before an idle worker asks again
 _LEAVE_TIMEOUT_S = 5.0  # time for workers to drop the run
@@ -43,13 +43,13 @@ class _PresentWorker:
     name: str
     address: str
     slots: int
-    attendance: "Future[None] | None" = None  # the task `attend`
+    attendance: "Future[None] | None" = None  # the task `attend_run`
     serving_task: "asyncio.Task[None] | None" = None
     pieces_by_number: dict[int, Piece] = field(default_factory=dict)
     was_cut_off: bool = False  # the scheduler dropped its tasks, so it must be admitted again
     failures_in_a_row: int = 0  # since the worker's last finished piece
     last_failure: str = ""  # reason for the last failure
-    unwritten_facts: Mapping[str, Any] = field(default_factory=dict)  # empty once they are in run.json
+    unstored_machine_facts: Mapping[str, Any] = field(default_factory=dict)  # empty once they are in run.json
 
 
 class WorkDispatcher:
@@ -71,7 +71,7 @@ class WorkDispatcher:
         self._bundle = Bundle.pack_for_run(session.workspace, folder, session.engine)
         self._queue = PieceQueue(folder, session.pending, session.proof)
         self._intake = ResultIntake(folder, session.manifest, session.new_worker_name("cluster"))
-        self._crew = Crew(folder.stretches[-1], accept=session.accept_versions)
+        self._roster = WorkerRoster(folder.stretches[-1], accept=session.accept_versions)
         self._run_id = f"mutator-{uuid.uuid4().hex}"
         self._workers_by_key: dict[str, _PresentWorker] = {}
         self._queue_changed = asyncio.Event()  # set when idle workers might find work
@@ -130,7 +130,7 @@ class WorkDispatcher:
 
     def _describe_workers(self) -> str:
         link = self._client.dashboard_link
-        return self._crew.describe_workers() + (f"; {link}" if link else "")
+        return self._roster.describe_workers() + (f"; {link}" if link else "")
 
     async def _update_workers(self) -> None:
         try:
@@ -170,7 +170,7 @@ class WorkDispatcher:
                 lost = PieceResult(
                     number=piece.number,
                     ending=PieceEnding.PROCESS_DIED,
-                    text=f"worker {worker.name} was lost",
+                    reason=f"worker {worker.name} was lost",
                 )
                 await self._handle_death(piece, worker, lost)
             else:
@@ -183,7 +183,7 @@ class WorkDispatcher:
         ):
             self._without_workers_since = time.monotonic()
         elif len(self._workers_by_key) >= (self._expected_workers or 1):
-            reasons = "; ".join(dict.fromkeys(self._crew.refusal_reasons.values()))
+            reasons = "; ".join(dict.fromkeys(self._roster.refusal_reasons.values()))
             self._session.problem = f"no worker is left to do the work: {reasons}"
         elif (
             self._expected_workers is None
@@ -205,9 +205,9 @@ class WorkDispatcher:
         facts: Mapping[str, Any] = {}
         try:
             facts = await call_on_worker(
-                self._client, worker.address, worker_tasks.machine_facts, tuple(self._crew.packages)
+                self._client, worker.address, worker_tasks.machine_facts, tuple(self._roster.packages)
             )
-            if why := self._crew.reason_to_refuse(facts):
+            if why := self._roster.reason_to_refuse(facts):
                 raise WorkerRefused(why)
             data, digest = self._bundle.data, self._bundle.digest
             await call_on_worker(
@@ -222,9 +222,9 @@ class WorkDispatcher:
             worker.attendance = submit_to_worker(
                 self._client, worker.address, worker_tasks.attend_run, self._run_id
             )
-            self._crew.admit_worker(worker.name, facts)
+            self._roster.admit_worker(worker.name, facts)
             self._queue.add_worker(worker.name, worker.slots)
-            worker.unwritten_facts = facts
+            worker.unstored_machine_facts = facts
             await self._employ_while_attending(worker, worker.attendance)
         except WorkerRefused as why:
             for piece in worker.pieces_by_number.values():
@@ -232,10 +232,10 @@ class WorkDispatcher:
             worker.pieces_by_number.clear()
             worker.was_cut_off = isinstance(why, WorkerCutOff)
             if not worker.was_cut_off:
-                self._crew.refuse_worker(worker.name, str(why))
+                self._roster.refuse_worker(worker.name, str(why))
                 self._remark(f"worker {describe_worker(worker.name, facts)} gets no work: {why}")
         finally:
-            self._crew.remove_worker(worker.name)
+            self._roster.remove_worker(worker.name)
             self._queue.forget_worker(worker.name)
             self._queue_changed.set()
 
@@ -249,7 +249,7 @@ class WorkDispatcher:
         try:
             async with asyncio.TaskGroup() as group:
                 group.create_task(watch())
-                for _ in range(worker.slots * _PIECES_PER_SLOT):
+                for _ in range(worker.slots * _MOST_TASKS_PER_SLOT):
                     group.create_task(self._send_pieces(worker))
         except* WorkerRefused as errors:
             raise errors.exceptions[0] from None
@@ -278,38 +278,42 @@ class WorkDispatcher:
                 await self._store_result(piece, worker, result)
             self._queue_changed.set()
             return
-        worker.last_failure = result.text
+        worker.last_failure = result.reason
         if result.ending in (PieceEnding.PROCESS_DIED, PieceEnding.HARNESS_FAILED):
             await self._handle_death(piece, worker, result)
             return
         self._queue.give_back_piece(piece, worker.name)
         worker.failures_in_a_row += 1
         if result.ending is PieceEnding.GOLDEN_DIFFERS:
-            raise WorkerRefused(result.text)
+            raise WorkerRefused(result.reason)
 
     async def _store_result(self, piece: Piece, worker: _PresentWorker, result: PieceResult) -> None:
-        if worker.unwritten_facts:  # before its first results are written, run.json must name the worker
+        if (
+            worker.unstored_machine_facts
+        ):  # before its first results are written, run.json must name the worker
             self._session.note_machine(
-                from_json_types(Machine, {"worker": worker.name, **worker.unwritten_facts})
+                from_json_types(Machine, {"worker": worker.name, **worker.unstored_machine_facts})
             )
-            worker.unwritten_facts = {}
+            worker.unstored_machine_facts = {}
         for (
             other
         ) in self._workers_by_key.values():  # the piece ran here, so it did not cause the failures elsewhere
             other.failures_in_a_row += other.name in piece.killed_workers and other is not worker
-        self._is_proof_need_settled |= result.forked
-        self._crew.note_finished_piece(worker.name, len(piece.plan_lines))
+        self._is_proof_need_settled |= result.needs_proof
+        self._roster.note_finished_piece(worker.name, len(piece.plan_lines))
         await self._write_in_turn(self._intake.append_result, piece, result)
 
     async def _handle_death(self, piece: Piece, worker: _PresentWorker, result: PieceResult) -> None:
-        if (hopeless := self._queue.note_death(piece, worker.name, result.at)) is not None:
+        if (
+            hopeless := self._queue.requeue_after_death(piece, worker.name, result.running_experiment)
+        ) is not None:
             what = (
                 "takes down what runs it, and did so"
                 if result.ending is PieceEnding.PROCESS_DIED
                 else "failed"
             )
             await self._write_in_turn(
-                self._intake.append_harness_errors, hopeless, f"{what} twice: {result.text}"
+                self._intake.append_harness_errors, hopeless, f"{what} twice: {result.reason}"
             )
 
     async def _write_in_turn(
@@ -331,4 +335,4 @@ def _unpack_result(data: bytes, piece: Piece) -> PieceResult:
     try:
         return PieceResult.from_bytes(data)
     except MutatorError as err:
-        return PieceResult(number=piece.number, ending=PieceEnding.WORKER_UNFIT, text=str(err))
+        return PieceResult(number=piece.number, ending=PieceEnding.WORKER_UNFIT, reason=str(err))

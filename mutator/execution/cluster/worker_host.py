@@ -25,14 +25,14 @@ from mutator.errors import MutatorError, PieceNoLongerNeeded
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceResult
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
-from mutator.execution.worker import python_dying_with
+from mutator.execution.worker import python_command_dying_with
 
 _CHECK_INTERVAL_S = 0.25  # between two checks that the work is still wanted
 _LEAVE_TIMEOUT_S = 5.0  # to kill the processes and delete the folder
 _START_TIMEOUT_S = 60.0  # time for a process to begin its first piece
 _PIECE_PROCESS_MODULE = "mutator.execution.cluster.piece_process"
 
-WantedCheck = Callable[[], bool]
+PieceNeededCheck = Callable[[], bool]
 
 
 @dataclass
@@ -42,23 +42,26 @@ class _PieceProcess:
     process: subprocess.Popen[bytes]
     connection: Connection
 
-    def run_piece(self, data: bytes, piece: Piece, patience_s: float, is_wanted: WantedCheck) -> PieceResult:
-        """Run a piece. Raises PieceNotWanted if it is no longer wanted; the process is then unusable."""
+    def run_piece(
+        self, data: bytes, piece: Piece, patience_s: float, is_wanted: PieceNeededCheck
+    ) -> PieceResult:
+        """Run a piece. Raises PieceNoLongerNeeded if it is no longer wanted; the process is then unusable."""
         finished_ids: set[str] = set()
         try:
             result = self._receive_result(data, patience_s, is_wanted, finished_ids)
         except TimeoutError:
             text = f"a worker's process gave no sign of life for {patience_s:.0f} s"
-            result = PieceResult(number=piece.number, ending=PieceEnding.PROCESS_DIED, text=text)
+            result = PieceResult(number=piece.number, ending=PieceEnding.PROCESS_DIED, reason=text)
         except (EOFError, OSError):
             text = f"a worker's process {self._describe_end()}"
-            result = PieceResult(number=piece.number, ending=PieceEnding.PROCESS_DIED, text=text)
+            result = PieceResult(number=piece.number, ending=PieceEnding.PROCESS_DIED, reason=text)
         return replace(
-            result, at=next((name for name in piece.experiment_ids if name not in finished_ids), "")
+            result,
+            running_experiment=next((name for name in piece.experiment_ids if name not in finished_ids), ""),
         )
 
     def _receive_result(
-        self, data: bytes, patience_s: float, is_wanted: WantedCheck, finished_ids: set[str]
+        self, data: bytes, patience_s: float, is_wanted: PieceNeededCheck, finished_ids: set[str]
     ) -> PieceResult:
         """Return the result of a piece; add to `finished_ids`. TimeoutError after `patience_s`."""
         self.connection.send_bytes(data)
@@ -119,7 +122,7 @@ class WorkerHost:
             raise
         return cls(folder, worker_name, patience_s)
 
-    def start_processes_on_request(self, is_wanted: WantedCheck) -> None:
+    def start_processes_on_request(self, is_wanted: PieceNeededCheck) -> None:
         """Start processes on request until the host is no longer wanted, then end all of them."""
         try:
             while is_wanted() and not self._is_leaving:
@@ -143,14 +146,14 @@ class WorkerHost:
         self._is_leaving = True
         self._folder_deleted.wait(_LEAVE_TIMEOUT_S)
 
-    def run_piece(self, data: bytes, is_wanted: WantedCheck) -> PieceResult:
-        """Run a piece. Raises PieceNotWanted if it is no longer wanted, MutatorError if `data` is damaged."""
+    def run_piece(self, data: bytes, is_wanted: PieceNeededCheck) -> PieceResult:
+        """Run a piece. Raises PieceNoLongerNeeded if it is no longer wanted, MutatorError if `data` is damaged."""
         piece = Piece.from_bytes(data)
         try:
             child = self._borrow_process()
         except (OSError, MutatorError) as err:
             text = str(err if isinstance(err, MutatorError) else find_shortage(err) or err)
-            return PieceResult(number=piece.number, ending=PieceEnding.WORKER_UNFIT, text=text)
+            return PieceResult(number=piece.number, ending=PieceEnding.WORKER_UNFIT, reason=text)
         keep = False
         try:
             result = child.run_piece(data, piece, self.patience_s, is_wanted)
@@ -166,7 +169,7 @@ class WorkerHost:
                 child.kill()
 
     def _borrow_process(self) -> _PieceProcess:
-        """Return an idle process or a new one. Raises PieceNotWanted if the host has ended."""
+        """Return an idle process or a new one. Raises PieceNoLongerNeeded if the host has ended."""
         with self._lock:
             if self._idle_processes:
                 return self._idle_processes.pop()
@@ -199,7 +202,7 @@ class WorkerHost:
                     self.worker_name,
                 ]
                 process = subprocess.Popen(
-                    [*python_dying_with(os.getpid()), *words],
+                    [*python_command_dying_with(os.getpid()), *words],
                     pass_fds=descriptors,
                     cwd=self.folder,
                     stdin=subprocess.DEVNULL,

@@ -23,7 +23,7 @@ class _AdmittedWorker:
     )
 
 
-class Crew:
+class WorkerRoster:
     """The workers of a run, present and refused. `now` returns the time in seconds."""
 
     def __init__(self, stretch: Stretch, *, accept: bool, now: Callable[[], float] = time.monotonic) -> None:

@@ -20,7 +20,7 @@ from mutator._common.hashing import as_json_types
 from mutator._common.version import VERSION
 from mutator.campaigns import run_environment
 from mutator.errors import MutatorError
-from mutator.execution.cluster.worker_host import WantedCheck, WorkerHost
+from mutator.execution.cluster.worker_host import PieceNeededCheck, WorkerHost
 
 _BUNDLE_TIMEOUT_S = 60.0  # how long a piece waits for the bundle of its run
 
@@ -80,7 +80,7 @@ def run_piece(run: str, piece: bytes) -> bytes:
     return host.run_piece(piece, _current_task_check()).to_bytes()
 
 
-def _current_task_check() -> WantedCheck:
+def _current_task_check() -> PieceNeededCheck:
     """Make a function that returns whether this thread's task is wanted and the worker is not closing."""
     worker: Worker = get_worker()
     key = worker.get_current_task()

@@ -124,7 +124,7 @@ class ExperimentFileBuilder:
         faulty = path_below(trace_folder / "faulty", self._traces.manifest.trace_file)
         if not (golden.is_dir() or (trace_folder / "golden").is_dir()) or not faulty.is_file():
             return None
-        if not self._traces.is_stored(experiment_id):
+        if not self._traces.is_faulty_trace_stored(experiment_id):
             raise MutatorError(
                 f"the kept trace of {experiment_id} does not match its record",
                 where=faulty,

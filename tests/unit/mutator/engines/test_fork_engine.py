@@ -71,7 +71,7 @@ def test_libraries_that_the_golden_run_imports_late_are_loaded_before_the_fork(f
 
 def test_an_experiment_that_never_triggers_gets_the_files_of_the_golden_run(fork: Fork) -> None:
     execution = fork.run(fork.job(trigger_at_time(100.0)))
-    assert (execution.mode, execution.status, execution.cpu_s) == (RunMode.GOLDEN, Status.OK, 0.0)
+    assert (execution.mode, execution.status, execution.cpu_s) == (RunMode.GOLDEN_REUSED, Status.OK, 0.0)
     assert execution.out == fork.golden
 
 

@@ -6,7 +6,7 @@ import pytest
 
 import mutator
 from mutator.engines.engine_jobs import RunMode
-from mutator.engines.in_target.run_once import HarnessFinder
+from mutator.engines.in_target.run_once import HarnessImportFinder
 from mutator.model import Status
 from mutator.triggers.trigger_kinds import trigger_at_time
 
@@ -77,5 +77,5 @@ def test_a_run_imports_the_glue_of_the_harness_that_started_it(glued: Fork) -> N
 
 
 def test_the_import_hook_of_the_glue_finds_no_other_modules() -> None:
-    assert HarnessFinder.find_spec("tests") is None
-    assert HarnessFinder.find_spec("mutator.glue") is None
+    assert HarnessImportFinder.find_spec("tests") is None
+    assert HarnessImportFinder.find_spec("mutator.glue") is None

@@ -62,10 +62,10 @@ def test_a_change_is_noticed(
     base: JobTreePool, tmp_path: Path, change: Callable[[Path], None], name: str
 ) -> None:
     tree = base.lay_out_tree(tmp_path / "run" / "tree", CHANGED)
-    assert not tree.first_changed()
+    assert not tree.first_changed_path()
     (path,) = (tree.folder / "car").glob(name.format("*"))
     change(path)
-    assert tree.first_changed().startswith("car")
+    assert tree.first_changed_path().startswith("car")
 
 
 def test_a_file_that_an_import_finds_first_is_noticed(base: JobTreePool, tmp_path: Path) -> None:
@@ -78,7 +78,7 @@ def test_a_file_that_an_import_finds_first_is_noticed(base: JobTreePool, tmp_pat
         tree = base.lay_out_tree(tmp_path / "run" / "tree", CHANGED)
         (tree.folder / name).parent.mkdir(exist_ok=True)
         (tree.folder / name).write_bytes(b"")
-        assert tree.first_changed() == name
+        assert tree.first_changed_path() == name
         tree.folder.rename(tmp_path / str(len(list(tmp_path.iterdir()))))
 
 
@@ -92,7 +92,7 @@ def test_an_unchanged_tree_is_used_again_and_has_nothing_of_an_earlier_mutant(
     again = base.lay_out_tree(tmp_path / "b" / "tree", {})
     assert (again.folder / "car" / "wheel.py").stat().st_ino == number
     assert content(again) == content(base.lay_out_tree(tmp_path / "c" / "tree", {}))
-    new = content(base.lay_out_tree(tmp_path / "d" / "tree", {}, new=True))
+    new = content(base.lay_out_tree(tmp_path / "d" / "tree", {}, fresh=True))
     assert new == {name: data for name, data in content(again).items() if not name.endswith(".pyc")}
     assert content(again).keys() == first.keys() - {"car/_fi.py"} | {
         name for name in content(again) if "go.cpython" in name
@@ -105,7 +105,7 @@ def test_an_unchanged_tree_is_used_again_and_has_nothing_of_an_earlier_mutant(
 def test_a_tree_with_new_files_is_not_used_again(base: JobTreePool, tmp_path: Path) -> None:
     tree = base.lay_out_tree(tmp_path / "a" / "tree", CHANGED)
     (tree.folder / "car" / "left.json").touch()
-    assert not tree.first_changed()
+    assert not tree.first_changed_path()
     base.take_back_tree(tree)
     assert tree.folder.is_dir()
     assert "car/left.json" not in content(base.lay_out_tree(tmp_path / "b" / "tree", CHANGED))
@@ -128,6 +128,6 @@ def test_what_stands_in_the_place_of_an_unused_tree_is_not_used(
         change(unused / within)
     before = {path: path.read_bytes() for path in (tmp_path / "aside").rglob("*.py")}
     again = base.lay_out_tree(tmp_path / "b" / "tree", CHANGED)
-    assert not again.first_changed()
+    assert not again.first_changed_path()
     assert content(again) == right
     assert before == {path: path.read_bytes() for path in (tmp_path / "aside").rglob("*.py")}

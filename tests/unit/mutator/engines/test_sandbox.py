@@ -24,7 +24,7 @@ from ..fork_on_toy import Edit, Fork
 LIMITS = Limits(cpu_s=2, wall_s=60, memory_mb=1024, steps=500, disk_mb=8)
 Run = Callable[..., JobResult]
 needed = pytest.mark.skipif(
-    bool(sandbox.reason_not_available()), reason=f"no sandbox: {sandbox.reason_not_available()}"
+    bool(sandbox.reason_sandbox_unavailable()), reason=f"no sandbox: {sandbox.reason_sandbox_unavailable()}"
 )
 
 REACHING = """
@@ -173,13 +173,13 @@ def test_what_a_run_left_is_cleared_even_if_it_exchanged_folders_for_links(tmp_p
         folder.mkdir(parents=True)
     (mine / "kept").write_text("x")
     found = Sandbox(box, ())
-    found.note_first_paths()
+    found.note_initial_temporary_paths()
     (box / "tmp/left/inner").mkdir(parents=True)
     (box / "shm/left").write_text("x")
     (box / "tmp/link").symlink_to(mine)
     (box / "tmp").rename(box / "moved")
     (box / "tmp").symlink_to(mine)
-    found.delete_new_paths()
+    found.delete_new_temporary_paths()
     found.close()
     assert (mine / "kept").exists() and list((box / "shm").iterdir()) == []
     assert [path.name for path in (box / "moved").iterdir()] == ["mounted"]
@@ -237,9 +237,9 @@ def no_bwrap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder on PATH without `bwrap`."""
     (tmp_path / "bin").mkdir()
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
-    sandbox.reason_not_available.cache_clear()
+    sandbox.reason_sandbox_unavailable.cache_clear()
     yield tmp_path / "bin"
-    sandbox.reason_not_available.cache_clear()
+    sandbox.reason_sandbox_unavailable.cache_clear()
 
 
 def test_without_bubblewrap_a_sandbox_is_refused(no_bwrap: Path, toycar: Workspace) -> None:

@@ -15,7 +15,7 @@ from mutator.engines.engine_jobs import Engine, RunMode
 from mutator.engines.fork_engine import ForkEngine
 from mutator.engines.in_target.early_stop import compile_stop_condition
 from mutator.errors import MutatorError
-from mutator.execution.experiment_runner import ExperimentRunner, FinishedExperiment, LoadedGoldens
+from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.golden_comparison import trace_until
@@ -68,10 +68,10 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
     )
     goldens = LoadedGoldens(manifest, lambda experiment: fork.golden)
     runner = ExperimentRunner(manifest, fork.models, engine, goldens, fork.toy.scenario)
-    finished: FinishedExperiment
+    finished: RecordedExperiment
     (finished,) = runner.run([experiment])
     if engine is fork.engine and finished.record.status is Status.OK:
-        assert finished.mode in (RunMode.FORK, RunMode.GOLDEN), finished.fallback_reason
+        assert finished.mode in (RunMode.FORK, RunMode.GOLDEN_REUSED), finished.fallback_reason
     return finished.record
 
 

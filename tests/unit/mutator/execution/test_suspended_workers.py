@@ -8,8 +8,8 @@ from mutator.execution.suspended_workers import WorkerContinuer
 
 CHILD = """
 import os, signal
-from mutator.execution.suspended_workers import on_stop
-on_stop(lambda: print("stopped", flush=True))
+from mutator.execution.suspended_workers import on_resume
+on_resume(lambda: print("stopped", flush=True))
 print("ready", flush=True)
 input()
 """

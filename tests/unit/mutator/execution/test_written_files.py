@@ -62,7 +62,7 @@ def test_lines_of_workers_count_if_the_command_is_interrupted(run: Path) -> None
     """pytest then does not wait for the workers' reports."""
     write(run)
     written = WrittenFiles()
-    begun = SimpleNamespace(written=written, worker_input=lambda: {"session": "0001-"})
+    begun = SimpleNamespace(written=written, xdist_worker_input=lambda: {"session": "0001-"})
     node = SimpleNamespace(workerinput={}, gateway=SimpleNamespace(id="gw0"))
     CampaignController(cast("Any", begun)).pytest_configure_node(node)
     assert written.set_unreported_aside(run) == []

@@ -52,11 +52,11 @@ def test_a_result_is_read_back_unchanged() -> None:
         number=7,
         ending=PieceEnding.FINISHED,
         seconds=1.5,
-        forked=True,
+        needs_proof=True,
         records=(b'{"a":1}', b'{"b":"\xc3\xa4"}'),
         timings=(b"{}", b"{}"),
         patches=b"\x00\n\x01",
         series=b"\n\n",
-        series_of=("S1", "S1+alone@2"),
+        series_goldens=("S1", "S1+alone@2"),
     )
     assert PieceResult.from_bytes(result.to_bytes()) == result

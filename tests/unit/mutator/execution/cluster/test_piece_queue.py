@@ -147,7 +147,7 @@ def test_only_an_experiment_that_kills_workers_is_given_up(
             if deadly not in piece.plan_lines:
                 there.finish_piece(piece, worker, 0.1)
                 done.update(piece.experiment_ids)
-            elif (found := there.note_death(piece, worker)) is not None:
+            elif (found := there.requeue_after_death(piece, worker)) is not None:
                 given_up += found.plan_lines
     assert given_up == [deadly]
     assert sorted([*done.elements(), deadly]) == sorted(ids)
@@ -159,16 +159,16 @@ def test_an_experiment_is_given_up_after_it_kills_two_workers(
     there = board(folder, clock)
     piece = taken(there, "alpha")
     deadly = piece.experiment_ids[-1]
-    assert there.note_death(piece, "alpha", deadly) is None
+    assert there.requeue_after_death(piece, "alpha", deadly) is None
     apart = next(one for one in iter(lambda: taken(there, "beta"), None) if deadly in one.plan_lines)
     assert apart.experiment_ids == (deadly,)
-    assert there.note_death(apart, "beta", deadly) is not None
+    assert there.requeue_after_death(apart, "beta", deadly) is not None
 
 
 def test_only_the_last_worker_retries_a_piece_that_killed_it(folder: RunFolder, clock: Clock) -> None:
     there = board(folder, clock)
     deadly = taken(there, "alpha")
-    there.note_death(deadly, "alpha")
+    there.requeue_after_death(deadly, "alpha")
     while (piece := there.take_piece("alpha")) is not None:
         assert piece.number != deadly.number
         there.finish_piece(piece, "alpha", 0.1)
@@ -188,7 +188,7 @@ def test_a_worker_that_repeats_a_piece_continues_when_another_dies(folder: RunFo
             there.finish_piece(piece, "beta", 0.1)
         clock.now += 60.0
         assert taken(there, "beta") == late
-        assert there.note_death(late, first) is None
+        assert there.requeue_after_death(late, first) is None
         assert there.take_piece(first) is None
         assert there.finish_piece(late, "beta" if first == "alpha" else "alpha", 0.1)
         assert there.is_empty
@@ -225,7 +225,7 @@ def test_each_experiment_is_counted_once_for_any_order_of_events(
         if fate < 0.2:
             there.give_back_piece(piece, who)
         elif fate < 0.25 and not piece.killed_workers:
-            there.note_death(piece, who)
+            there.requeue_after_death(piece, who)
         elif there.finish_piece(piece, who, 0.3):
             done.update(piece.experiment_ids)
     assert done == Counter(ids)

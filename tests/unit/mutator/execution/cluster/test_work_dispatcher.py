@@ -22,10 +22,10 @@ from mutator.errors import MutatorWarning
 from mutator.execution.cluster import cluster_distributor
 from mutator.execution.cluster.bundle import Bundle
 from mutator.execution.cluster.cluster_distributor import ClusterDistributor
-from mutator.execution.cluster.worker_roster import Crew
 from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceResult
 from mutator.execution.cluster.result_intake import ResultIntake
 from mutator.execution.cluster.work_dispatcher import WorkDispatcher
+from mutator.execution.cluster.worker_roster import WorkerRoster
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record, Status
 from mutator.store import plan_file
@@ -59,7 +59,10 @@ def sick(ending: PieceEnding, deadly: str = "") -> Work:
         if deadly and deadly not in piece.plan_lines:
             return healthy(piece)
         return PieceResult(
-            number=piece.number, ending=ending, text="the reason", at=deadly or piece.experiment_ids[0]
+            number=piece.number,
+            ending=ending,
+            reason="the reason",
+            running_experiment=deadly or piece.experiment_ids[0],
         )
 
     return work
@@ -127,7 +130,7 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> Any:
     """A session in which every experiment is pending, and the versions of workers are not checked."""
     monkeypatch.setattr(Bundle, "pack_for_run", lambda *given: Bundle(b"", ""))
-    monkeypatch.setattr(Crew, "reason_to_refuse", lambda *given: "")
+    monkeypatch.setattr(WorkerRoster, "reason_to_refuse", lambda *given: "")
     folder = append_stretch(folder, Stretch(python="", packages={}, platform=""))
     return SimpleNamespace(
         workspace=toycar,

@@ -77,9 +77,15 @@ def test_all_pieces_run_in_one_process_that_ends_with_the_host(
         [child] = children(host)
         second = host.run_piece(piece.to_bytes(), lambda: True)
         assert children(host) == [child]
-    assert (first.ending, first.text, len(first.records)) == (PieceEnding.FINISHED, "", len(piece.plan_lines))
+    assert (first.ending, first.reason, len(first.records)) == (
+        PieceEnding.FINISHED,
+        "",
+        len(piece.plan_lines),
+    )
     assert second.records == first.records
-    assert first.forked and first.patches and first.series and first.series_of == (piece.golden_key,)
+    assert (
+        first.needs_proof and first.patches and first.series and first.series_goldens == (piece.golden_key,)
+    )
     assert children(host) == [] and not host.folder.exists()
 
 
@@ -91,8 +97,11 @@ def test_a_killed_process_is_reported_with_its_experiment(
         killer.start()
         result = host.run_piece(sent[1].to_bytes(), lambda: True)
         killer.join()
-        assert (result.ending, result.at) == (PieceEnding.PROCESS_DIED, sent[1].experiment_ids[0])
-        assert "killed by SIGKILL" in result.text
+        assert (result.ending, result.running_experiment) == (
+            PieceEnding.PROCESS_DIED,
+            sent[1].experiment_ids[0],
+        )
+        assert "killed by SIGKILL" in result.reason
         assert host.run_piece(sent[1].to_bytes(), lambda: True).ending is PieceEnding.FINISHED
 
 
@@ -109,7 +118,7 @@ def test_if_the_process_does_not_start_no_piece_is_blamed(
     with attended(host):
         result = host.run_piece(sent[1].to_bytes(), lambda: True)
     assert result.ending is PieceEnding.WORKER_UNFIT
-    assert "meta.json" in result.text
+    assert "meta.json" in result.reason
 
 
 def test_the_process_of_a_cancelled_piece_ends(host: WorkerHost, sent: tuple[Bundle, Piece]) -> None:
@@ -169,7 +178,7 @@ def test_a_cached_golden_run_must_match_the_campaign(
     bundle.unpack_bundle(sent[0].data, tmp_path / "site")
     site = UnpackedBundle(tmp_path / "site")
     manifest = load_run_inputs(site).manifest
-    golden, known = site.goldens_by_key[sent[1].golden_key]
+    golden, known = site.golden_and_digest_by_key[sent[1].golden_key]
     to = tmp_path / "golden"
     assert GoldenRunCache(site, manifest).copy_golden(golden, known, to) and to.is_dir()
     assert not GoldenRunCache(site, manifest).copy_golden(golden, "0" * 64, to) and not to.exists()

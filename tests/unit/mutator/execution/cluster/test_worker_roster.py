@@ -3,7 +3,7 @@
 import pytest
 
 from mutator._common.version import VERSION
-from mutator.execution.cluster.worker_roster import Crew, describe_worker
+from mutator.execution.cluster.worker_roster import WorkerRoster, describe_worker
 from mutator.store.work_stretches import Stretch
 
 FACTS = {
@@ -30,18 +30,18 @@ STRETCH = Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform
     ],
 )
 def test_a_worker_with_other_versions_is_refused(change: dict[str, object], objection: str) -> None:
-    assert Crew(STRETCH, accept=False).reason_to_refuse(FACTS | change) == objection
+    assert WorkerRoster(STRETCH, accept=False).reason_to_refuse(FACTS | change) == objection
 
 
 def test_other_versions_can_be_accepted() -> None:
-    crew = Crew(STRETCH, accept=True)
+    crew = WorkerRoster(STRETCH, accept=True)
     assert crew.reason_to_refuse(FACTS | {"packages": {"numpy": "1.0"}}) == ""
     assert crew.reason_to_refuse(FACTS | {"mutator": "0.0.1"})
 
 
 def test_the_rate_of_each_machine_is_reported() -> None:
     now = [0.0]
-    crew = Crew(STRETCH, accept=False, now=lambda: now[0])
+    crew = WorkerRoster(STRETCH, accept=False, now=lambda: now[0])
     for name, host in (("a", "alpha"), ("b", "alpha"), ("c", "beta")):
         crew.admit_worker(name, FACTS | {"host": host})
     for _ in range(3):
