@@ -97,7 +97,7 @@ class CheckRunner:
             common: dict[str, Any] = {
                 "scenario": self.workspace.scenario(key.scenario),
                 "seed": self.folder.head.seed if key.seed is None else key.seed,
-                "changes": key.changes,
+                "scenario_changes": key.changes,
             }
             name = key.key
             jobs[NULL_MUTANT, key] = Job(

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from mutator.campaigns.chunks import PendingChunk
-from mutator.execution.xdist_controller import CampaignController, register_controller
 from mutator.execution.written_files import WrittenFiles
+from mutator.execution.xdist_controller import CampaignController, register_controller
 from mutator.workspace import Workspace
 
 PLAIN = ("-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain")

@@ -1,8 +1,7 @@
 """A replacement for the probe in a tree that is run only to draw pictures. Standard library and numpy only.
 
-At the place of an image effect, every effect in PICTURE_REQUEST is applied to the same picture, with the variables of
-that place. The pictures before and after are written to the run's folder, and the run
-ends.
+At the place of an image effect, every effect in PICTURE_REQUEST is applied to the same picture, with the
+variables of that place. The pictures before and after are written to the run's folder, and the run ends.
 """
 
 import json

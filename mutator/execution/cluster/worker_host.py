@@ -147,7 +147,7 @@ class WorkerHost:
         self._folder_deleted.wait(_LEAVE_TIMEOUT_S)
 
     def run_piece(self, data: bytes, is_wanted: PieceNeededCheck) -> PieceResult:
-        """Run a piece. Raises PieceNoLongerNeeded if it is no longer wanted, MutatorError if `data` is damaged."""
+        """Run a piece. PieceNoLongerNeeded if it is no longer wanted, MutatorError if `data` is damaged."""
         piece = Piece.from_bytes(data)
         try:
             child = self._borrow_process()

@@ -6,8 +6,8 @@ from typing import Any, cast
 
 import pytest
 
-from mutator.execution.xdist_controller import CampaignController
 from mutator.execution.written_files import WrittenFiles
+from mutator.execution.xdist_controller import CampaignController
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter
 
