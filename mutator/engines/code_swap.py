@@ -40,8 +40,8 @@ class CodeSwap:
     """Everything that turns a loaded pristine program into the mutant.
 
     The two parts of `probe_code` run in order. `imported_modules` are those that injected lines import.
-    `probe_value_setters` has, for each module, the code of its lines that set values in the probe.
-    These modules must already be loaded, because loading a module runs those lines with the module's own constants.
+    `probe_value_setters` has, for each module, the code of its lines that set values in the probe. These
+    modules must already be loaded, because loading a module runs those lines with the module's own constants.
     """
 
     functions: tuple[FunctionSwap, ...]
