@@ -19,7 +19,7 @@ from mutator.outcomes.verdict_rules import (
 )
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.target_facts import ChannelFacts
+from mutator.targets.stored_target_facts import ChannelFacts
 
 if TYPE_CHECKING:
     import pandas as pd

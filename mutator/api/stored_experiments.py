@@ -22,7 +22,7 @@ from mutator.store.series_folder import SeriesFolder, rerun_command
 from mutator.store.work_stretches import Stretch
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.target_facts import ChannelFacts
+from mutator.targets.stored_target_facts import ChannelFacts
 from mutator.workspace import Workspace
 
 

@@ -18,7 +18,7 @@ from mutator.outcomes.golden_comparison import Trace, load_trace
 from mutator.outcomes.hazards_and_metrics import load_judged_run
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.target_facts import ChannelFacts, channel_facts
+from mutator.targets.stored_target_facts import ChannelFacts, channel_facts
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

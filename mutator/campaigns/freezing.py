@@ -30,7 +30,7 @@ from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD, SCHEMA, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.target_facts import TargetFacts, channel_facts, hazard_facts, metric_facts
+from mutator.targets.stored_target_facts import TargetFacts, channel_facts, hazard_facts, metric_facts
 from mutator.workspace import Workspace
 
 PLAN_CSV = "plan.csv"

@@ -29,7 +29,7 @@ from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
 from mutator.store.shards import Shard
-from mutator.targets.stop_code import stop_function_source
+from mutator.targets.stop_function import stop_function_source
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:

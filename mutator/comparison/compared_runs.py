@@ -13,7 +13,7 @@ from mutator.results.table_reader import frame_of_experiments
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.contact_severity import SeverityScale
-from mutator.targets.target_facts import T_END
+from mutator.targets.stored_target_facts import T_END
 
 
 class ExperimentKey(NamedTuple):

@@ -49,7 +49,7 @@ from mutator.model import Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import Probe, probe_attributes_after, probe_module, untriggered_report
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stop_code import stop_function_source
+from mutator.targets.stop_function import stop_function_source
 from mutator.triggers.trigger_kinds import always_trigger
 
 _GoldenKey = tuple[str, int, tuple[str, ...]]

@@ -14,7 +14,7 @@ from mutator.config import units
 from mutator.config.yaml_files import MOST_YAML_BYTES, StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
-from mutator.faults import probe_templates
+from mutator.faults import probe_template_parts
 from mutator.faults.fault_models import (
     TARGET_UNIT,
     TEMPLATE_FOLDER_GLOBS,
@@ -27,7 +27,7 @@ from mutator.faults.fault_models import (
     TemplateNeed,
 )
 from mutator.faults.injection_model import InjectionModel
-from mutator.faults.probe_templates import ProbeTemplates
+from mutator.faults.probe_template_parts import ProbeTemplates
 
 SCHEMA = "fault_model/1"
 _TEMPLATE_VARIABLES = (
@@ -113,7 +113,7 @@ def _load_all(folder: Path) -> FaultModels:
         models[model.name] = model
     if not models:
         raise MutatorError("no fault model", where=folder, expected="<model>.yaml next to <model>.py.j2")
-    code, settings = (_read_template(folder / name) for name in probe_templates.PROBE_TEMPLATE_FILES)
+    code, settings = (_read_template(folder / name) for name in probe_template_parts.PROBE_TEMPLATE_FILES)
     probe = ProbeTemplates.from_texts(folder, code, settings)
     texts = {
         name: [model.template, model.expression_template] if model.expression_template else model.template

@@ -12,7 +12,7 @@ from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.injection_specs import InjectionSpec
-from mutator.faults.probe_templates import ProbeTemplates
+from mutator.faults.probe_template_parts import ProbeTemplates
 
 TEMPLATE_FOLDER_GLOBS = ("*.yaml", "*.j2")  # what a templates folder consists of
 TARGET_UNIT = "target"

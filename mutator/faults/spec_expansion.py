@@ -10,7 +10,7 @@ from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import Draw, FaultSpec, Variant
-from mutator.faults.injected_imports import check_import
+from mutator.faults.import_checks import check_import
 from mutator.faults.injection_parameters import resolve_injection
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.model import Fault, Injection

@@ -9,7 +9,7 @@ from mutator._common.confined_files import path_below
 from mutator._common.hashing import content_id
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.faults.probe_templates import CODE_TEMPLATE_FILE as PROBE_CODE
+from mutator.faults.probe_template_parts import CODE_TEMPLATE_FILE as PROBE_CODE
 from mutator.model import FIXED_ANCHORS, Fault, Hold, Trigger
 from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.mutants.changed_file_reuse import (

@@ -14,7 +14,7 @@ from typing import Any
 from mutator._common.hashing import content_id
 from mutator.config.location_syntax import PROBE_NAME
 from mutator.errors import MutatorError
-from mutator.faults.probe_templates import ProbeTemplates, TemplatePart
+from mutator.faults.probe_template_parts import ProbeTemplates, TemplatePart
 from mutator.model import Activation, Hold, Injection, Trigger
 from mutator.mutants.template_rendering import render_template
 from mutator.targets.observed_values import Observation

@@ -12,7 +12,7 @@ from pathlib import Path
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import check_inside
 from mutator.errors import MutatorError, Outside
-from mutator.targets.roots import INSTALLED_PREFIX, find_installed
+from mutator.targets.target_roots import INSTALLED_PREFIX, find_installed
 from mutator.targets.source_tree import MOST_SOURCE_BYTES
 
 _MOST_FILES = 5000  # a controller has hundreds; more are a home folder or an environment, passed by mistake

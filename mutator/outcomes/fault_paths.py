@@ -26,7 +26,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, REMEDY
 from mutator.stpa.analysis_files import ComponentKind, ControlStructureModel
 from mutator.targets.channels import Role
-from mutator.targets.target_facts import ChannelFacts
+from mutator.targets.stored_target_facts import ChannelFacts
 
 
 class ComponentState(StrEnum):

@@ -13,7 +13,7 @@ from mutator.targets.contact_severity import DELTA_V_NAME
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.observed_values import units_and_meanings
-from mutator.targets.target_facts import metric_facts
+from mutator.targets.stored_target_facts import metric_facts
 from mutator.workspace import Workspace
 
 

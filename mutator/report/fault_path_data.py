@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mutator.model import Experiment, Record
 from mutator.outcomes.fault_paths import FaultPath, FaultPaths, LinkState, UntimedPath
 from mutator.store.run_folder import RunFolder
-from mutator.targets.target_facts import ChannelFacts
+from mutator.targets.stored_target_facts import ChannelFacts
 
 if TYPE_CHECKING:
     import numpy as np

@@ -18,7 +18,7 @@ from mutator.report.answer_parts import (
     filtered_list_fragment,
     share_bar,
 )
-from mutator.targets.target_facts import MetricFacts
+from mutator.targets.stored_target_facts import MetricFacts
 
 MOST_LISTED = 10  # maximum number of experiments listed as most dangerous
 MOST_LISTED_CONTACTS = 6  # maximum number with contact among them, if there are also hazards without contact

@@ -5,7 +5,7 @@ from typing import Any
 
 from mutator.model import Record
 from mutator.results.table_files import TableColumn
-from mutator.targets.target_facts import ChannelFacts
+from mutator.targets.stored_target_facts import ChannelFacts
 
 PROPAGATION_COLUMNS = (
     TableColumn("experiment_id", "text", "", "the experiment"),

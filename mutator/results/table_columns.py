@@ -21,7 +21,7 @@ from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, LAST_PLAN_COLUMNS, 
 from mutator.results.table_files import TableColumn
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.target_facts import T_END, MetricFacts
+from mutator.targets.stored_target_facts import T_END, MetricFacts
 
 if TYPE_CHECKING:
     import pandas as pd

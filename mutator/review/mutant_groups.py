@@ -14,7 +14,7 @@ from pathlib import Path
 from mutator._common.hashing import content_id
 from mutator.campaigns.plan import Plan
 from mutator.config.location_syntax import PROBE_NAME
-from mutator.faults import probe_templates
+from mutator.faults import probe_template_parts
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.spec_expansion import expand_spec
@@ -255,7 +255,7 @@ class _GroupBuilder:
         material = DecisionBasis(
             diff=distinct_diffs([patch]),
             functions=function_sources(self.manifest.tree, [location]),
-            templates={probe_templates.CODE_TEMPLATE_FILE: self.models.probe_templates.whole_text},
+            templates={probe_template_parts.CODE_TEMPLATE_FILE: self.models.probe_templates.whole_text},
             called_code={},
         )
         return Group(
@@ -274,7 +274,7 @@ class _GroupBuilder:
             basis_digests=material.digests,
             reviewed_text=render_reviewed_text(material.digests, {}, material.sections),
             source_files=(
-                *(self.models.folder / name for name in probe_templates.PROBE_TEMPLATE_FILES),
+                *(self.models.folder / name for name in probe_template_parts.PROBE_TEMPLATE_FILES),
                 self.manifest.path,
             ),
         )

@@ -10,7 +10,7 @@ from mutator.statistics.results_frame import select_common_columns
 from mutator.statistics.shares import share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 from mutator.targets.contact_severity import SEVERITY_CLASSES
-from mutator.targets.target_facts import MetricFacts
+from mutator.targets.stored_target_facts import MetricFacts
 
 HIGHER_IS_WORSE = "higher"
 TOTAL = "total"

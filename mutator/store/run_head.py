@@ -15,7 +15,7 @@ from mutator.model import Limits
 from mutator.store.plan_choices import Choices
 from mutator.store.plan_file import Chunk
 from mutator.store.work_stretches import Stretch
-from mutator.targets.target_facts import TargetFacts
+from mutator.targets.stored_target_facts import TargetFacts
 
 SCHEMA = "run/3"
 HEAD, CAMPAIGN_FILE = RUN_HEAD_FILE, "campaign.yaml"

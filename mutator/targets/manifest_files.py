@@ -18,7 +18,7 @@ from mutator.targets.observation_model import ObservationModel, build_observatio
 from mutator.targets.process_environment import check_environment
 from mutator.targets.relative_paths import clean_relative_path
 from mutator.targets.required_packages import parse_requirements
-from mutator.targets.roots import (
+from mutator.targets.target_roots import (
     INSTALLED_PREFIX,
     check_only_installed_package,
     checked_package_names,

@@ -11,7 +11,7 @@ import pytest
 from mutator.audit.record_audit import StoredRecord, verdict_problems
 from mutator.model import Activation, Outcome, Record, Status
 from mutator.targets.channels import Channel, Role
-from mutator.targets.target_facts import ChannelFacts
+from mutator.targets.stored_target_facts import ChannelFacts
 from tests.made_head import HEAD as MADE_UP
 
 CHANNELS = tuple(ChannelFacts(name, "-", Role.INTERNAL, "", "") for name in ("gas", "brake", "seen"))

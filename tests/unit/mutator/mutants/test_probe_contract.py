@@ -14,7 +14,7 @@ from mutator._common.hashing import digest
 from mutator.engines.first_activation import activity_at_observations
 from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
-from mutator.faults.probe_templates import CODE_TEMPLATE_FILE, SETTINGS_TEMPLATE_FILE
+from mutator.faults.probe_template_parts import CODE_TEMPLATE_FILE, SETTINGS_TEMPLATE_FILE
 from mutator.model import Activation, Hold, Trigger
 from mutator.mutants import probe as contract
 from mutator.mutants.injected_lines import probe_setting_spans

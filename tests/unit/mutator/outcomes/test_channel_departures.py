@@ -9,7 +9,7 @@ from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.golden_comparison import compare_traces
 from mutator.results.propagation_columns import PROPAGATION_COLUMNS, propagation_cells
 from mutator.targets.channels import Channel
-from mutator.targets.target_facts import ChannelFacts
+from mutator.targets.stored_target_facts import ChannelFacts
 
 T = np.arange(6) * 0.1
 ZEROS = np.zeros(6)

@@ -26,7 +26,7 @@ from mutator.model import (
 from mutator.outcomes.fault_paths import ComponentState, FaultPath, FaultPaths, LinkState, fault_paths_of
 from mutator.store.run_folder import RunFolder
 from mutator.stpa.analysis_files import ControlStructureModel
-from mutator.targets.target_facts import ChannelFacts
+from mutator.targets.stored_target_facts import ChannelFacts
 from tests.made_head import made_head
 
 # eyes -> finder -> speed -> pedals -> car, and gauge -> wheel -> rack -> car; the gauge also feeds `speed`

@@ -28,7 +28,7 @@ from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.store.checksummed_lines import line_file_bytes
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA
-from mutator.targets.target_facts import MetricFacts
+from mutator.targets.stored_target_facts import MetricFacts
 from tests.made_up_results import write_results
 
 from .made_run import HEAD, make_run

@@ -14,7 +14,7 @@ from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_columns import SEVERITY_COLUMN, TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.results.table_reader import Results
 from mutator.targets.contact_severity import SEVERITY_CLASSES
-from mutator.targets.target_facts import MetricFacts
+from mutator.targets.stored_target_facts import MetricFacts
 from tests.made_head import made_head
 from tests.made_up_results import write_results
 

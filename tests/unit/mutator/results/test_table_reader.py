@@ -39,7 +39,7 @@ from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import load_head
 from mutator.targets.process_environment import THREAD_VARIABLES
-from mutator.targets.target_facts import metric_facts
+from mutator.targets.stored_target_facts import metric_facts
 from mutator.workspace import Workspace
 from tests.costs import is_cheap, is_refused
 

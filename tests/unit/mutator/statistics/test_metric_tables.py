@@ -9,7 +9,7 @@ import pytest
 from mutator.statistics import median_intervals
 from mutator.statistics.median_intervals import median_difference, median_interval
 from mutator.statistics.metric_tables import fault_tolerant_times_sheet, metrics_sheet, severity_sheet
-from mutator.targets.target_facts import MetricFacts
+from mutator.targets.stored_target_facts import MetricFacts
 
 METRICS = [
     MetricFacts("t_end", "s", "x", "lower"),

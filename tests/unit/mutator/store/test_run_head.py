@@ -13,7 +13,7 @@ from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError, Outside
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import RunHead, load_head
-from mutator.targets.target_facts import TargetFacts
+from mutator.targets.stored_target_facts import TargetFacts
 from mutator.workspace import Workspace
 from tests.made_head import made_head
 

@@ -6,7 +6,7 @@ from mutator._common.hashing import as_json_types
 from mutator._common.typed_json import from_json_types
 from mutator.errors import TypeMisfit
 from mutator.targets.channels import Role
-from mutator.targets.target_facts import ChannelFacts, MetricFacts
+from mutator.targets.stored_target_facts import ChannelFacts, MetricFacts
 
 
 def test_facts_are_stored_as_the_list_of_their_values() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.faults.injected_imports import check_import
+from mutator.faults.import_checks import check_import
 from mutator.faults.spec_expansion import expand_spec
 from mutator.workspace import Workspace
 
