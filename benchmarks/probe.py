@@ -59,7 +59,7 @@ def main() -> int:
     workspace = Workspace.find(root=ROOT)
     manifest = workspace.manifest("openpilot")
     null = build(manifest, workspace.fault_models(), None, always_trigger()).files
-    (changed,) = null.keys() - {probe_path(manifest.package)}
+    (changed,) = null.keys() - {probe_path(manifest.probe_package)}
     with tempfile.TemporaryDirectory() as folder:
         base = JobTreePool(manifest.tree, Path(folder))
         trees = {"pristine": Path(folder, "pristine"), "null mutant": Path(folder, "null")}

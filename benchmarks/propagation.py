@@ -43,7 +43,7 @@ def main() -> int:
         load_manifest_channels(manifest, trial.single.golden),
         load_manifest_channels(manifest, out),
     )
-    needed = [*dict.fromkeys((*manifest.compared_channels, *manifest.judged_channels))]
+    needed = [*dict.fromkeys((*manifest.compared_channels, *manifest.criteria_channels))]
     time = manifest.time_channel
     parts = {
         "load what a verdict needs": cpu_ms(lambda: load_trace(manifest, out, needed), repeat),

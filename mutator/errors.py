@@ -3,12 +3,12 @@
     MutatorError            the user can fix it
       CheckFailed           a check says no; exit code 1
         ReviewConflict
-      Shortage, DiskFull    the machine's limits; exit code 3
-      Outside, TooLarge     files of others that must not be read
+      ResourceShortage, DiskFull  the machine's limits; exit code 3
+      UnsafePath, TooLarge  files of others that must not be read
       InvalidMutant, BadOutput, BadAddition
-      JobEnded, GroupsChanged, Absent, UnknownPage    the server refuses a request
+      JobAlreadyEnded, GroupsChanged, NotServed, RequestFromWrongPage    the server refuses a request
     MutatorWarning, IncompleteRun
-    Signal                  caught by the harness itself; users see what it makes of it
+    InternalException       caught by the harness itself; users see what it makes of it
 
 Each docstring has a line on each (`When:`, `To do:`). The page of the Python API shows those of public ones.
 Code in a target's process has its exceptions beside it, because it cannot import this module.
@@ -114,7 +114,7 @@ class ReviewConflict(CheckFailed):
     review: Any
 
 
-class Shortage(MutatorError):
+class ResourceShortage(MutatorError):
     """The machine is out of a resource. Finished work is kept.
 
     * When: memory, processes or open files are used up, or this process has reached its limit of them.
@@ -134,7 +134,7 @@ class DiskFull(MutatorError):
     exit_code = EXIT_HARNESS_ERRORS
 
 
-class Outside(MutatorError):
+class UnsafePath(MutatorError):
     """A folder is not safe to read.
 
     * When: a name points out of its folder, or something in the folder is a link, a pipe or a device.
@@ -176,7 +176,7 @@ class BadAddition(MutatorError):
     """
 
 
-class JobEnded(MutatorError):
+class JobAlreadyEnded(MutatorError):
     """A job of the server cannot be cancelled.
 
     * When: it has already ended.
@@ -204,7 +204,7 @@ class NotServed(MutatorError):
     """
 
 
-class PageRefused(MutatorError):
+class RequestFromWrongPage(MutatorError):
     """A request to the server is refused.
 
     * When: it comes from a page that may not send it, or from a page of an earlier server.
@@ -220,7 +220,7 @@ class IncompleteRun(UserWarning):
     """
 
 
-class HarnessSignal(Exception):
+class InternalException(Exception):
     """What the harness raises for itself; users see what the catcher makes of it.
 
     * When: a function cannot do its part, and its caller has another way.
@@ -228,7 +228,7 @@ class HarnessSignal(Exception):
     """
 
 
-class BadTrace(HarnessSignal, ValueError):
+class BadTrace(InternalException, ValueError):
     """A trace file is invalid.
 
     * When: its bytes are not what its format prescribes, or its format cannot be read here.
@@ -240,7 +240,7 @@ class BadTrace(HarnessSignal, ValueError):
         self.got, self.expected = got, expected
 
 
-class TypeMisfit(HarnessSignal, ValueError):
+class TypeMisfit(InternalException, ValueError):
     """A value of a file does not fit its type. `path` leads to it, from the outermost key.
 
     * When: a record is read from JSON that has another type there, or a key too few or too many.
@@ -253,7 +253,7 @@ class TypeMisfit(HarnessSignal, ValueError):
         self.path: list[str | int] = []
 
 
-class ForkServerLost(HarnessSignal):
+class ForkServerLost(InternalException):
     """The fork server cannot be used any more.
 
     * When: one of its processes is gone, does not answer, or does not have the pristine tree.
@@ -261,7 +261,7 @@ class ForkServerLost(HarnessSignal):
     """
 
 
-class NotForkable(HarnessSignal):
+class NotForkable(InternalException):
     """A target or run that cannot be forked. The text says why; `remedy` is for the user, if known.
 
     * When: the target is not stepwise, cannot be loaded or driven, or has threads.
@@ -276,7 +276,7 @@ class NotForkable(HarnessSignal):
         return str(self.args[0])
 
 
-class NotSwappable(HarnessSignal):
+class MutantNotSwappable(InternalException):
     """A mutant that cannot be put into a running program. The text says why.
 
     * When: it changes more than functions, or a line that does not ask the probe first.
@@ -284,7 +284,7 @@ class NotSwappable(HarnessSignal):
     """
 
 
-class NotTestable(HarnessSignal):
+class BoundaryNotTestable(InternalException):
     """A comparison whose boundary cannot be tested.
 
     * When: it does not compare one variable with a constant.
@@ -292,7 +292,7 @@ class NotTestable(HarnessSignal):
     """
 
 
-class HarnessErrors(HarnessSignal):
+class PytestItemFailed(InternalException):
     """The work of a pytest item failed.
 
     * When: the harness could not judge some of its experiments, or the session met a problem.
@@ -300,7 +300,7 @@ class HarnessErrors(HarnessSignal):
     """
 
 
-class PieceNoLongerNeeded(HarnessSignal):
+class PieceNoLongerNeeded(InternalException):
     """A piece of work is no longer needed.
 
     * When: the command no longer waits for it.
@@ -308,7 +308,7 @@ class PieceNoLongerNeeded(HarnessSignal):
     """
 
 
-class GoldenRunsDiffer(HarnessSignal):
+class WorkerGoldenRunsDiffer(InternalException):
     """A worker computes something else than the machine of the command.
 
     * When: a golden run made on the worker differs from the campaign's.
@@ -316,7 +316,7 @@ class GoldenRunsDiffer(HarnessSignal):
     """
 
 
-class WorkerRefused(HarnessSignal):
+class WorkerRefused(InternalException):
     """A worker gets no work, or no more work.
 
     * When: its calls fail, it differs from the command's machine, or it left the run.
@@ -332,7 +332,7 @@ class WorkerCutOff(WorkerRefused):
     """
 
 
-class SchedulerGone(HarnessSignal):
+class SchedulerGone(InternalException):
     """A session on a cluster cannot go on.
 
     * When: the scheduler no longer answers.

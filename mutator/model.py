@@ -9,16 +9,16 @@ from functools import cached_property
 from typing import Any
 
 from mutator._common.hashing import added_field, added_values, as_json_types, content_id
-from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 
 Value = int | float | str | bool | None
 
-MOST_LIMIT = 1_000_000_000  # maximum of any limit or time
-OPERATORS_MODULE = "operators"  # the `module` of faults that mutation operators make
+MOST_LIMIT_OR_TIME = 1_000_000_000  # maximum of any limit or time
+OPERATOR_FAULTS_MODULE = "operators"  # the `module` of faults that mutation operators make
 
 
 class AnchorKind(StrEnum):
-    """Where a snippet is inserted, or, for VALUE_ANCHORS and FIXED_ANCHORS, which value changes."""
+    """Where a snippet is inserted, or, for VALUE_ANCHORS and LOAD_TIME_ANCHORS, which value changes."""
 
     AFTER_ASSIGN = "after_assign"
     BEFORE_ASSIGN = "before_assign"
@@ -46,7 +46,7 @@ VALUE_ANCHORS = frozenset(
         AnchorKind.VALUE,
     )
 )
-FIXED_ANCHORS = frozenset((AnchorKind.CONSTANT, AnchorKind.DEFAULT))  # values that the probe sets
+LOAD_TIME_ANCHORS = frozenset((AnchorKind.CONSTANT, AnchorKind.DEFAULT))  # values that the probe sets
 
 
 class Hold(StrEnum):
@@ -239,22 +239,26 @@ class Experiment:
 class Limits:
     """The resources that one run can use before it is stopped."""
 
-    __pydantic_config__ = mapping_config("Limits")
+    __pydantic_config__ = pydantic_mapping_config("Limits")
 
-    cpu_s: int = field(default=60, metadata=yaml_metadata("CPU time in seconds.", ge=1, le=MOST_LIMIT))
-    wall_s: int = field(default=300, metadata=yaml_metadata("Wall time in seconds.", ge=1, le=MOST_LIMIT))
+    cpu_s: int = field(
+        default=60, metadata=yaml_metadata("CPU time in seconds.", ge=1, le=MOST_LIMIT_OR_TIME)
+    )
+    wall_s: int = field(
+        default=300, metadata=yaml_metadata("Wall time in seconds.", ge=1, le=MOST_LIMIT_OR_TIME)
+    )
     memory_mb: int = field(
-        default=4096, metadata=yaml_metadata("Address space in MiB.", ge=256, le=MOST_LIMIT)
+        default=4096, metadata=yaml_metadata("Address space in MiB.", ge=256, le=MOST_LIMIT_OR_TIME)
     )
     steps: int = field(
-        default=20_000, metadata=yaml_metadata("Number of simulation steps.", ge=1, le=MOST_LIMIT)
+        default=20_000, metadata=yaml_metadata("Number of simulation steps.", ge=1, le=MOST_LIMIT_OR_TIME)
     )
     disk_mb: int = added_field(
         1024,
         yaml_metadata(
             "MiB in the run's output folder and TMPDIR together; also the limit for each file.",
             ge=1,
-            le=MOST_LIMIT,
+            le=MOST_LIMIT_OR_TIME,
         ),
     )
 

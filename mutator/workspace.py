@@ -9,10 +9,15 @@ from pathlib import Path
 
 from mutator._common.argument_checks import check_whole_number
 from mutator._common.bounded_reading import MOST_FILE_BYTES, check_file_size, open_regular
-from mutator._common.confined_files import check_inside, files_inside
+from mutator._common.confined_files import checked_path_inside, files_inside
 from mutator._common.files import check_path_encodable
-from mutator._common.folder_search import environment_path, library_files, library_folder, templates_folder
-from mutator._common.message_text import counted, describe_choices, suggestion
+from mutator._common.folder_search import (
+    environment_path,
+    library_folder,
+    library_yaml_files,
+    templates_folder,
+)
+from mutator._common.message_text import counted, describe_choices, spelling_suggestion
 from mutator._common.shipped_files import shipped_folder
 from mutator._common.table_rendering import TextTable
 from mutator.errors import MutatorError
@@ -199,7 +204,7 @@ class Workspace:
                 f"no fault matches '{glob}'",
                 where=self.library / "faults",
                 expected="<module>/<fault_type>, with or without /<variant>, with * for any text",
-                remedy="see `mutator list specs`" + suggestion(glob, names),
+                remedy="see `mutator list specs`" + spelling_suggestion(glob, names),
             )
         return faults
 
@@ -248,7 +253,7 @@ class Workspace:
 
     def hazards(self) -> HazardList | None:
         """Return the accidents and hazards in fault_library/stpa/hazards.yaml; None without that file."""
-        path = check_inside(self.library, self.library / "stpa" / "hazards.yaml")
+        path = checked_path_inside(self.library, self.library / "stpa" / "hazards.yaml")
         return load_hazard_list(path) if os.path.lexists(path) else None
 
     def analysis(self) -> HazardAnalysis | None:
@@ -259,19 +264,21 @@ class Workspace:
 
     def structure(self, manifest: TargetManifest) -> ControlStructureModel | None:
         """Return a target's control structure; None if no channel names one of its components."""
-        path = check_inside(self.library, self.library / "stpa" / "control_structure.yaml")
+        path = checked_path_inside(self.library, self.library / "stpa" / "control_structure.yaml")
         structure = load_control_structure(path) if path.exists() else None
         components = structure.components if structure else {}
         return structure if any(channel.component in components for channel in manifest.channels) else None
 
     @property
     def references(self) -> Path:
-        """The folder of published numbers, which need not exist. Outside for a link that leads out of it."""
+        """The folder of published numbers, which need not exist. UnsafePath for a link that leads out of
+        it.
+        """
         files_inside(self.library, "references", "*.yaml")
         return self.library / "references"
 
     def _path_by_name(self, folder: str) -> dict[str, Path]:
-        return library_files(self.library, folder)
+        return library_yaml_files(self.library, folder)
 
     def _find_file(self, folder: str, name: str | Path, kind: str) -> Path:
         path_by_name = self._path_by_name(folder)
@@ -281,7 +288,7 @@ class Workspace:
                     f"no file {name}",
                     expected=f"a {kind}: the path of a YAML file, or {describe_choices(path_by_name)}",
                     remedy="correct the path"
-                    + suggestion(str(Path(name).with_suffix("")), list(path_by_name)),
+                    + spelling_suggestion(str(Path(name).with_suffix("")), list(path_by_name)),
                 )
             return _checked_file(Path(name))
         if (path := path_by_name.get(str(name))) is not None:
@@ -290,7 +297,7 @@ class Workspace:
             f"no {kind} '{name}'",
             where=self.library / folder,
             expected=f"{describe_choices(path_by_name)}, or the path of a YAML file",
-            remedy="correct the name" + suggestion(str(name), list(path_by_name)),
+            remedy="correct the name" + spelling_suggestion(str(name), list(path_by_name)),
         )
 
 

@@ -18,10 +18,10 @@ from mutator.errors import TooLarge
 
 MOST_FILE_BYTES = 128_000_000  # bytes of a file that is read as a whole; a reader can have another limit
 MOST_JSON_BYTES = 6_000_000  # bytes of a JSON object; as Python objects they can take 30 times as much memory
-MOST_DATA_BYTES = 8_000_000_000  # bytes of a file that grows with the number of experiments
+MOST_EXPERIMENT_DATA_BYTES = 8_000_000_000  # bytes of a file that grows with the number of experiments
 MOST_LINE_BYTES = 4_000_000  # bytes of a line
 _NO_HOLES_FROM_BYTES = 64_000_000  # from this size, a file must not have holes
-_FURTHER_READ_BYTES = 1_000_000  # at a time, so that a file that grows without end is noticed early
+_READ_CHUNK_BYTES = 1_000_000  # at a time, so that a file that grows without end is noticed early
 _GZIP_WBITS = zlib.MAX_WBITS | 16  # zlib's flag for data with a header of gzip
 
 
@@ -51,14 +51,14 @@ def read_open_file(file: BinaryIO, where: Path, most_bytes: int = MOST_FILE_BYTE
     remaining = os.fstat(file.fileno()).st_size - file.tell()
     data = file.read(max(remaining, 0) + 1)  # not `most_bytes`, because that many bytes would be reserved
     # a file that grows, or one that has no size, such as those in /proc
-    while len(data) <= most_bytes and (more := file.read(_FURTHER_READ_BYTES)):
+    while len(data) <= most_bytes and (more := file.read(_READ_CHUNK_BYTES)):
         data += more
     if len(data) > most_bytes:
         raise _too_large_error(len(data), where, most_bytes)
     return data
 
 
-def check_file_size(file: BinaryIO, where: Path, most_bytes: int = MOST_DATA_BYTES) -> None:
+def check_file_size(file: BinaryIO, where: Path, most_bytes: int = MOST_EXPERIMENT_DATA_BYTES) -> None:
     """Raise TooLarge if an open file has more than `most_bytes`, or if it is large and has holes."""
     size = os.fstat(file.fileno()).st_size
     if size > most_bytes:
@@ -87,7 +87,7 @@ def read_bounded_lines(file: BinaryIO, where: Path, most_bytes: int = MOST_LINE_
         yield line
 
 
-def unpack_bounded(data: bytes, most_bytes: int, dictionary: bytes = b"", *, gzip: bool = False) -> bytes:
+def decompress_bounded(data: bytes, most_bytes: int, dictionary: bytes = b"", *, gzip: bool = False) -> bytes:
     """Return what zlib (or gzip) data unpacks to. ValueError if that is more than `most_bytes`.
 
     zlib.error for damaged or incomplete data.

@@ -5,10 +5,10 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from mutator._common.bounded_reading import MOST_DATA_BYTES, read_bounded
+from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bounded
 from mutator._common.confined_files import check_only_plain_files
 from mutator._common.hashing import digest
-from mutator.errors import Outside
+from mutator.errors import UnsafePath
 
 _DIGEST_FILE = "sum"  # the file with the digest of all others
 
@@ -22,7 +22,7 @@ def copy_from_cache(cached: Path, copy: Path) -> None:
     shutil.copytree(cached, copy, symlinks=True)
     try:
         check_only_plain_files(copy)
-    except Outside as err:  # the copy of a link would be the file at its end
+    except UnsafePath as err:  # the copy of a link would be the file at its end
         raise OSError(str(err)) from None
     digest_path = copy / _DIGEST_FILE
     expected_digest = read_bounded(digest_path)
@@ -47,7 +47,7 @@ def store_in_cache(cached: Path, fill: Callable[[Path], object]) -> None:
 
 def _digest_of_files(folder: Path) -> bytes:
     files = sorted(path for path in folder.rglob("*") if path.is_file())
-    digests = [(path, digest(read_bounded(path, MOST_DATA_BYTES))) for path in files]
+    digests = [(path, digest(read_bounded(path, MOST_EXPERIMENT_DATA_BYTES))) for path in files]
     return digest(
         sorted((path.relative_to(folder).as_posix(), file_digest) for path, file_digest in digests)
     ).encode()

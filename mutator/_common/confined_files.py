@@ -6,7 +6,7 @@ way is opened relative to the one before, without following links: nothing can b
 use. Only `root` itself may be reached through links, because the user named it.
 
 What is only read, and only at the user's side, may use links that stay inside: a library, its templates, a
-target's tree (`check_inside`, `files_inside`).
+target's tree (`checked_path_inside`, `files_inside`).
 """
 
 import errno
@@ -21,7 +21,7 @@ from typing import BinaryIO
 
 from mutator._common.bounded_reading import read_open_file
 from mutator._common.files import make_accessible, raising_disk_full, remove_anything_at
-from mutator.errors import MutatorError, Outside
+from mutator.errors import MutatorError, UnsafePath
 
 # The kernel refuses a link (O_NOFOLLOW), so that nothing can be exchanged between a look and the opening.
 _OPEN_FOLDER_FLAGS = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -33,19 +33,19 @@ _MOST_DEPTH, _MOST_OUTPUT_DEPTH = 30, 20  # folders in each other; an output lie
 _MOST_NAME_BYTES = 220  # bytes; Linux allows 255, and a half-written file has a longer name
 
 
-def check_name(name: object, where: str | Path, *, folders: bool = True) -> str:
+def checked_relative_path(name: object, where: str | Path, *, allow_folders: bool = True) -> str:
     """Return `name` if it is a relative path in its shortest form, such as `golden/S1/trace.npz`.
 
-    Outside for anything else, and without `folders` also for several parts. `where` is the file or folder
+    UnsafePath for anything else, and without `folders` also for several parts. `where` is the file or folder
     that the name comes from.
     """
     text = name if isinstance(name, str) else ""
     parts = text.split("/")
-    if (folders or len(parts) == 1) and all(
+    if (allow_folders or len(parts) == 1) and all(
         part not in ("", ".", "..") and part.isprintable() and _is_short_enough(part) for part in parts
     ):
         return text
-    raise Outside(
+    raise UnsafePath(
         f"the name {name!a}",
         where=where,
         expected="the name of a file inside its folder, without `..`, links or unprintable characters",
@@ -53,11 +53,11 @@ def check_name(name: object, where: str | Path, *, folders: bool = True) -> str:
     )
 
 
-def check_library_name(name: str, where: str | Path) -> str:
-    """Return the name of a target or scenario of the library; Outside for the path of a YAML file."""
+def checked_name_not_path(name: str, where: str | Path) -> str:
+    """Return the name of a target or scenario of the library; UnsafePath for the path of a YAML file."""
     if not name.endswith((".yaml", ".yml")):
         return name
-    raise Outside(
+    raise UnsafePath(
         f"the path {name!a}",
         where=where,
         expected="the name of a file in the library",
@@ -66,15 +66,15 @@ def check_library_name(name: str, where: str | Path) -> str:
 
 
 def path_below(root: Path, name: object) -> Path:
-    """Join a name that is not a constant of the code to `root`; Outside as in `check_name`."""
-    return root / check_name(name, root)
+    """Join a name that is not a constant of the code to `root`; UnsafePath as in `checked_relative_path`."""
+    return root / checked_relative_path(name, root)
 
 
 def open_below(root: Path, name: str) -> BufferedReader:
     """Open a regular file below `root` for reading.
 
-    FileNotFoundError if it is missing; Outside if it is a link or no regular file, or if a folder on the way
-    is a link.
+    FileNotFoundError if it is missing; UnsafePath if it is a link or no regular file, or if a folder on the
+    way is a link.
     """
     file = open_descriptor_below(root, name, os.O_RDONLY)
     if not stat.S_ISREG(os.fstat(file).st_mode):
@@ -90,7 +90,7 @@ def open_descriptor_below(root: Path, name: str, flags: int) -> int:
 
 
 def read_below(root: Path, name: str) -> bytes:
-    """Return the content of a file; errors as in `open_below` and `read_open`."""
+    """Return the content of a file; errors as in `open_below` and `read_open_file`."""
     with open_below(root, name) as file:
         return read_open_file(file, root / name)
 
@@ -105,7 +105,7 @@ def write_below(root: Path, name: str, data: bytes) -> None:
 def writing_below(root: Path, name: str) -> Iterator[BinaryIO]:
     """Yield a file to write. It takes its name at the end of the block, and its folders are made.
 
-    What stands in its place is replaced, never written to. Outside if a folder on the way is a link;
+    What stands in its place is replaced, never written to. UnsafePath if a folder on the way is a link;
     MutatorError if a folder stands in its place.
     """
     with raising_disk_full(root / name), _open_parent(root, name, make=True) as (parent, last_part):
@@ -141,16 +141,16 @@ def move_below(root: Path, name: str, to: str) -> None:
 
 
 def check_only_plain_files(root: Path) -> None:
-    """Raise Outside if anything below `root` is neither a regular file nor a folder."""
+    """Raise UnsafePath if anything below `root` is neither a regular file nor a folder."""
     for _, entry in entries_below(root):
         if not is_file_or_folder(entry):
             raise not_plain_error(Path(entry.path))
 
 
-def check_inside(root: Path, path: Path) -> Path:
-    """Return `path`, a place below `root`; Outside if a link on the way leads out of `root`."""
+def checked_path_inside(root: Path, path: Path) -> Path:
+    """Return `path`, a place below `root`; UnsafePath if a link on the way leads out of `root`."""
     if not is_inside(root, path):
-        raise Outside(
+        raise UnsafePath(
             "a link that leads out of its folder",
             where=path,
             expected=f"only files and folders of {root}, and links to them",
@@ -167,22 +167,22 @@ def is_inside(root: Path, path: Path) -> bool:
 def files_inside(root: Path, folder: str, pattern: str) -> list[Path]:
     """Return the files below `root`/`folder` whose names match a glob, sorted; linked folders are skipped.
 
-    Outside for a name that `check_name` refuses, and for a link that leads out of `root`.
+    UnsafePath for a name that `checked_relative_path` refuses, and for a link that leads out of `root`.
     """
-    base = check_inside(root, root / folder)
+    base = checked_path_inside(root, root / folder)
     files = sorted(path for path in base.rglob(pattern) if not path.is_dir())
     for path in files:
-        check_name(path.relative_to(root).as_posix(), base)
+        checked_relative_path(path.relative_to(root).as_posix(), base)
         if path.is_symlink():
-            check_inside(root, path)
+            checked_path_inside(root, path)
     return files
 
 
 def entries_below(
-    root: Path, is_closed: Callable[[str], bool] = lambda name: False
+    root: Path, should_not_enter: Callable[[str], bool] = lambda name: False
 ) -> Iterator[tuple[str, os.DirEntry[str]]]:
     """Yield everything below `root` with its path from there, but nothing in links, nor in folders
-    that `is_closed`. What disappears meanwhile is left out.
+    that `should_not_enter`. What disappears meanwhile is left out.
     """
     folders = [""]
     while folders:
@@ -191,11 +191,11 @@ def entries_below(
             for entry in entries:
                 name = f"{folder}{entry.name}"
                 yield name, entry
-                if entry.is_dir(follow_symlinks=False) and not is_closed(name):
+                if entry.is_dir(follow_symlinks=False) and not should_not_enter(name):
                     folders.append(f"{name}/")
 
 
-def move_plain_files(source: int, target: int, depth: int = 0) -> None:
+def move_plain_files(source_fd: int, target_fd: int, depth: int = 0) -> None:
     """Move regular files between open folders, whoever can change the first one meanwhile.
 
     Folders are made anew. Links, pipes and the like, unprintable names and deep folders stay behind.
@@ -203,19 +203,19 @@ def move_plain_files(source: int, target: int, depth: int = 0) -> None:
     if depth >= _MOST_OUTPUT_DEPTH:
         return
     with suppress(OSError):  # a run can take its user the permission to list a folder
-        os.fchmod(source, stat.S_IRWXU)
-    with os.scandir(source) as entries:
+        os.fchmod(source_fd, stat.S_IRWXU)
+    with os.scandir(source_fd) as entries:
         names = [entry.name for entry in entries if entry.name.isprintable()]
     for name in sorted(names):
         with suppress(FileNotFoundError, NotADirectoryError):
-            kind = _file_type(source, name)
+            kind = _file_type(source_fd, name)
             if kind == stat.S_IFREG:
-                os.rename(name, name, src_dir_fd=source, dst_dir_fd=target)
-                if _file_type(target, name) != stat.S_IFREG:  # exchanged between look and move
-                    remove_anything_at(Path(f"/proc/self/fd/{target}", name))
+                os.rename(name, name, src_dir_fd=source_fd, dst_dir_fd=target_fd)
+                if _file_type(target_fd, name) != stat.S_IFREG:  # exchanged between look and move
+                    remove_anything_at(Path(f"/proc/self/fd/{target_fd}", name))
             elif kind == stat.S_IFDIR:
-                os.mkdir(name, dir_fd=target)
-                with open_folder(name, source) as below, open_folder(name, target) as there:
+                os.mkdir(name, dir_fd=target_fd)
+                with open_folder(name, source_fd) as below, open_folder(name, target_fd) as there:
                     move_plain_files(below, there, depth + 1)
 
 
@@ -249,7 +249,7 @@ def is_file_or_folder(entry: os.DirEntry[str]) -> bool:
 @contextmanager
 def _open_parent(root: Path, name: str, *, make: bool = False) -> Iterator[tuple[int, str]]:
     """Open the folder that contains `name`; yield its descriptor and the last part of the name."""
-    *folders, last = check_name(name, root).split("/")
+    *folders, last = checked_relative_path(name, root).split("/")
     handle = os.open(root, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         for part in folders:
@@ -268,9 +268,9 @@ def _open_parent(root: Path, name: str, *, make: bool = False) -> Iterator[tuple
         os.close(handle)
 
 
-def not_plain_error(path: Path) -> Outside:
+def not_plain_error(path: Path) -> UnsafePath:
     """Return the error about a link, a pipe and the like, for the caller to raise."""
-    return Outside(
+    return UnsafePath(
         "a link, a pipe or something else that is not a plain file",
         where=path,
         expected="only files and folders",

@@ -17,9 +17,9 @@ from traceback import walk_tb
 from typing import TYPE_CHECKING, Any
 
 from mutator._common.files import is_disk_full_error
-from mutator._common.message_text import suggestion
+from mutator._common.message_text import spelling_suggestion
 from mutator._common.resource_shortages import find_shortage
-from mutator.errors import BadAddition, HarnessSignal, MutatorError
+from mutator.errors import BadAddition, InternalException, MutatorError
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
@@ -41,8 +41,8 @@ class Door:
     group: str
     type_path: str
     shipped_package: str | None = None
-    argument: str | None = None  # the API's argument that names one; None if only files do
-    first_names: tuple[str, ...] = ()  # these come before all others, in this order
+    api_argument: str | None = None  # the API's argument that names one; None if only files do
+    first_sorted_names: tuple[str, ...] = ()  # these come before all others, in this order
 
     @property
     def attribute_in_module(self) -> str:
@@ -66,7 +66,9 @@ class Door:
 
     def sort_key(self, name: str) -> tuple[int, str]:
         """Return a key that sorts names."""
-        return self.first_names.index(name) if name in self.first_names else len(self.first_names), name
+        return self.first_sorted_names.index(name) if name in self.first_sorted_names else len(
+            self.first_sorted_names
+        ), name
 
     def has_name(self, name: str) -> bool:
         return name in self.shipped_names() or name in self.installed_names()
@@ -89,7 +91,7 @@ class Door:
         if not points:
             remedy = "correct the name, or install the package that adds it"
             raise self._name_error(
-                name, f"no {self.addition} '{name}'", remedy + suggestion(name, list(self.names()))
+                name, f"no {self.addition} '{name}'", remedy + spelling_suggestion(name, list(self.names()))
             )
         return self._load_entry_point(points[0])
 
@@ -108,7 +110,7 @@ class Door:
             )
         return loaded
 
-    def package_of(self, name: str) -> str | None:
+    def other_package_of(self, name: str) -> str | None:
         """Return the package that adds that name; None if the harness does, or nobody."""
         return next((point.dist.name for point in self._entry_points_of_others(name) if point.dist), None)
 
@@ -119,18 +121,18 @@ class Door:
         """
         try:
             yield
-        except (MutatorError, HarnessSignal):
+        except (MutatorError, InternalException):
             raise
         except Exception as err:
             if (
                 find_shortage(err)
                 or is_disk_full_error(err)
-                or (failure := self.addition_error(name, err)) is None
+                or (failure := self.other_package_error(name, err)) is None
             ):
                 raise
             raise failure from err
 
-    def addition_error(self, name: str, err: Exception) -> BadAddition | None:
+    def other_package_error(self, name: str, err: Exception) -> BadAddition | None:
         """Return the error that blames another package for an exception in what it adds under that name;
         None if the harness adds it.
         """
@@ -152,7 +154,7 @@ class Door:
     def _name_error(self, name: str, got: str, remedy: str) -> MutatorError:
         others = ", ".join(other for other in self.names() if other != name)
         expected = f"one of {others}" if others else f"no {self.addition}, because none is installed"
-        return MutatorError(got, argument=self.argument, expected=expected, remedy=remedy)
+        return MutatorError(got, argument=self.api_argument, expected=expected, remedy=remedy)
 
 
 @cache
@@ -190,30 +192,30 @@ EXPORTS = Door(
     group="mutator.exports",
     type_path="mutator.exports:Export",
     shipped_package="mutator.exports.formats",
-    argument="format",
+    api_argument="format",
 )
 IMPORTERS = Door(
     addition="importer",
     group="mutator.importers",
     type_path="mutator.outcomes.trace_files:Importer",
     shipped_package="mutator.outcomes.importers",
-    argument="trace",
+    api_argument="trace",
 )
 DISTRIBUTORS = Door(
     addition="distributor",
     group="mutator.distributors",
     type_path="mutator.execution.distributor_choice:DistributorKind",
     shipped_package="mutator.execution.distributors",
-    argument="cluster",
+    api_argument="cluster",
 )
 OPERATORS = Door(
     addition="operator",
     group="mutator.operators",
     type_path="mutator.operators:Operator",
     shipped_package="mutator.operators.shipped",
-    argument="operators",
+    api_argument="operators",
     # if two make the same change, it belongs to the first, so another order changes samples
-    first_names=("arithmetic", "comparison", "constant", "branch", "omission", "return", "argument"),
+    first_sorted_names=("arithmetic", "comparison", "constant", "branch", "omission", "return", "argument"),
 )
 STUDIES = Door(
     addition="study", group="mutator.studies", type_path="mutator.report.reported_run:PublishedWork"

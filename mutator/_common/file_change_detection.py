@@ -19,7 +19,7 @@ class UnchangedFiles:
         self._files = files
         self._states = {path: _state_at(path) for path in files}  # None for a file that is already missing
 
-    def first_changed(self) -> str:
+    def first_changed_path(self) -> str:
         """Return the path of a file that was changed, replaced or removed; empty if there is none."""
         return next((path for path in self._files if not self._is_unchanged(path)), "")
 

@@ -221,10 +221,10 @@ def writing_atomic(path: Path) -> Iterator[BinaryIO]:
 
 def is_half_written(name: str) -> bool:
     """Whether a file of this name is left over from a killed `write_atomic` or `writing_temporary_path`."""
-    return final_name(name) != name
+    return final_name_of_half_written(name) != name
 
 
-def final_name(name: str) -> str:
+def final_name_of_half_written(name: str) -> str:
     """Return the final name of a half-written file; any other name unchanged."""
     match = re.fullmatch(r"\.(.+)\.\d+", name)
     return match[1] if match else name

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from mutator._common.confined_files import open_descriptor_below, unlink_below
 from mutator._common.files import raising_disk_full
-from mutator.errors import MutatorError, Outside
+from mutator.errors import MutatorError, UnsafePath
 
 OWNER_LOCK_FILE = "owner.lock"  # locked by the owner; its content, a process id, only serves the error
 WORKERS_FOLDER = "workers"  # a locked file for each living worker, named after its process id
@@ -63,7 +63,7 @@ def locking_folder(folder: Path) -> Iterator[None]:
         os.close(fd)
 
 
-def register_worker(run: Path) -> int:
+def open_worker_lock(run: Path) -> int:
     """Register this process as a worker in `run` until the returned descriptor is closed."""
     with raising_disk_full(run):
         (run / WORKERS_FOLDER).mkdir(exist_ok=True)
@@ -103,7 +103,7 @@ def _open_lock_file(run: Path, name: str, more_flags: int = 0) -> int:
     """Open a lock; MutatorError unless it is a file with no other name, because it is written in place."""
     try:
         fd = open_descriptor_below(run, name, os.O_RDWR | more_flags)
-    except (Outside, IsADirectoryError):
+    except (UnsafePath, IsADirectoryError):
         raise _bad_lock_file_error(run / name) from None
     state = os.fstat(fd)
     if not stat.S_ISREG(state.st_mode) or state.st_nlink > 1:

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from mutator._common.confined_files import check_name, files_inside
+from mutator._common.confined_files import checked_relative_path, files_inside
 from mutator._common.shipped_files import shipped_folder
 
 RUNS_FOLDER = Path("runs")
@@ -36,11 +36,11 @@ def environment_path(variable: str) -> Path | None:
     return Path(value) if value else None
 
 
-def library_files(library: Path, folder: str) -> dict[str, Path]:
+def library_yaml_files(library: Path, folder: str) -> dict[str, Path]:
     """Return the YAML files in a library folder by name, sorted; errors are those of `files_inside`."""
     base = library / folder
     paths = files_inside(library, folder, "*.yaml")
-    files = {check_name(p.relative_to(base).with_suffix("").as_posix(), p): p for p in paths}
+    files = {checked_relative_path(p.relative_to(base).with_suffix("").as_posix(), p): p for p in paths}
     return dict(sorted(files.items()))
 
 

@@ -22,8 +22,8 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
-def process_count_for(experiments: int) -> int:
-    return min(_MOST_PROCESSES, usable_cores()) if experiments >= _MIN_EXPERIMENTS_TO_SHARE else 1
+def process_count_for(experiment_count: int) -> int:
+    return min(_MOST_PROCESSES, usable_cores()) if experiment_count >= _MIN_EXPERIMENTS_TO_SHARE else 1
 
 
 def map_in_processes(compute: Callable[[T], R], items: Sequence[T], process_count: int) -> Iterator[R]:
@@ -42,7 +42,7 @@ def map_in_processes(compute: Callable[[T], R], items: Sequence[T], process_coun
 
 
 @contextmanager
-def computing_meanwhile(compute: Callable[[], R], process_count: int) -> Iterator[Callable[[], R]]:
+def computing_in_background(compute: Callable[[], R], process_count: int) -> Iterator[Callable[[], R]]:
     """Run `compute` in another process during the block. Yield a function that waits for its result.
 
     The function raises what `compute` raised. With fewer than two processes, `compute` itself is yielded.
@@ -86,14 +86,14 @@ def _send_results(
     compute: Callable[[T], Any],
     items: Sequence[T],
     pipes: Sequence[tuple[Connection, Connection]],
-    number: int,
+    worker_number: int,
 ) -> None:
     gc.disable()  # results have no cycles, and a collection would copy shared memory
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the parent ends its workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     for receiver, _ in pipes:  # otherwise no worker would notice that the parent died
         receiver.close()
-    sender = pipes[number][1]
+    sender = pipes[worker_number][1]
     try:
         for item in items:
             sender.send_bytes(pickle.dumps((compute(item), None), pickle.HIGHEST_PROTOCOL))

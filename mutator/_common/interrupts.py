@@ -16,7 +16,7 @@ _state = _InterruptState()
 
 
 @contextmanager
-def interruptible() -> Iterator[None]:
+def raising_keyboard_interrupts() -> Iterator[None]:
     """Raise KeyboardInterrupt on SIGINT and SIGTERM within the block, so that finished work is kept.
 
     A process that ignores SIGINT keeps ignoring it.

@@ -29,7 +29,7 @@ def describe_value(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def suggestion(word: str, choices: list[str]) -> str:
+def spelling_suggestion(word: str, choices: list[str]) -> str:
     """Return `; did you mean 'x'?` if one of `choices` is close to `word`, else an empty text."""
     close = difflib.get_close_matches(word, choices, n=1)
     return f"; did you mean '{close[0]}'?" if close else ""

@@ -13,11 +13,11 @@ from pathlib import Path
 from mutator.errors import MutatorError
 
 EVENTS_FD_VARIABLE = "MUTATOR_EVENTS_FD"
-MOST_TEXT_LENGTH = 500  # characters; so that a line is written in one piece (PIPE_BUF)
+MOST_EVENT_TEXT_LENGTH = 500  # characters; so that a line is written in one piece (PIPE_BUF)
 _events_pipe: int | None = None
 
 
-def open_events() -> None:
+def open_events_pipe() -> None:
     """Use the pipe named by the environment, and hide it from child processes, which may run mutants.
 
     MutatorError if the variable does not name an open pipe.
@@ -41,28 +41,32 @@ def open_events() -> None:
 def report_phase(
     name: str, finished: int = 0, total: int = 0, outcomes: Mapping[str, int] | None = None
 ) -> None:
-    """Report what the command is doing: `done` of `total` steps (0: nothing to count)."""
+    """Report what the command is doing: `finished` of `total` steps (0: nothing to count)."""
     _send_event(
-        "phase", phase=name[:MOST_TEXT_LENGTH], done=finished, total=total, outcomes=dict(outcomes or {})
+        "phase",
+        phase=name[:MOST_EVENT_TEXT_LENGTH],
+        done=finished,
+        total=total,
+        outcomes=dict(outcomes or {}),
     )
 
 
 def report_warning(text: str) -> None:
-    _send_event("warning", text=text[:MOST_TEXT_LENGTH])
+    _send_event("warning", text=text[:MOST_EVENT_TEXT_LENGTH])
 
 
-def report_link(kind: str, path: Path) -> None:
+def report_written_file(kind: str, path: Path) -> None:
     """Report a written file, such as a plot."""
     _send_event("link", kind=kind, path=str(path.absolute()))
 
 
 def report_result(text: str) -> None:
     """Report what came out, in one sentence. The last result counts."""
-    _send_event("result", text=text[:MOST_TEXT_LENGTH])
+    _send_event("result", text=text[:MOST_EVENT_TEXT_LENGTH])
 
 
 def report_error(text: str) -> None:
-    _send_event("error", text=text[:MOST_TEXT_LENGTH])
+    _send_event("error", text=text[:MOST_EVENT_TEXT_LENGTH])
 
 
 def _send_event(event: str, **facts: object) -> None:

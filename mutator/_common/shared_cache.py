@@ -24,9 +24,9 @@ from mutator._common.hashing import content_id
 
 CHECKS, GOLDENS, RUNS = "checks", "goldens", "runs"
 LINES, PICTURES, PAGES, TARGETS = "lines", "pictures", "pages", "targets"
-_MOST_NAME_LENGTH = 200  # file systems allow 255 bytes
-MOST_TARGET_BYTES = 4_000_000_000  # size limit for one target, enforced between seeds
-MOST_PAGES_BYTES = 500_000_000  # size limit for all reports that the server built
+_MOST_FOLDER_NAME_LENGTH = 200  # file systems allow 255 bytes
+MOST_TARGET_CACHE_BYTES = 4_000_000_000  # size limit for one target, enforced between seeds
+MOST_CACHED_REPORTS_BYTES = 500_000_000  # size limit for all reports that the server built
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,44 +62,46 @@ def caches_folder() -> Path:
         return Path(os.devnull) / "mutator"
 
 
-def checks_folder() -> Path:
+def cached_checks_folder() -> Path:
     return caches_folder() / CHECKS
 
 
-def goldens_folder() -> Path:
+def cached_goldens_folder() -> Path:
     return caches_folder() / GOLDENS
 
 
-def runs_folder() -> Path:
+def cached_verifications_folder() -> Path:
     return caches_folder() / RUNS
 
 
-def lines_folder() -> Path:
+def cached_executed_lines_folder() -> Path:
     return caches_folder() / LINES
 
 
-def pictures_folder() -> Path:
+def cached_image_effects_folder() -> Path:
     return caches_folder() / PICTURES
 
 
-def pages_folder() -> Path:
+def cached_reports_folder() -> Path:
     return caches_folder() / PAGES
 
 
-def target_folder(name: str) -> Path:
+def target_cache_folder(name: str) -> Path:
     """Return the folder that all runs of a target share."""
     quoted = quote(name, safe="").replace(".", "%2E")
-    return caches_folder() / TARGETS / (quoted if len(quoted) <= _MOST_NAME_LENGTH else content_id(name))
+    return (
+        caches_folder() / TARGETS / (quoted if len(quoted) <= _MOST_FOLDER_NAME_LENGTH else content_id(name))
+    )
 
 
 def list_entries() -> list[CacheEntry]:
     """List all cached entries. Each file that a target keeps is an entry."""
-    listed = [_build_entry(CHECKS, path) for path in _paths_in(checks_folder())]
-    listed += [_build_entry(GOLDENS, path) for path in _paths_in(goldens_folder())]
-    listed += [_build_entry(RUNS, path) for path in _paths_in(runs_folder())]
-    listed += [_build_entry(LINES, path) for path in _paths_in(lines_folder())]
-    listed += [_build_entry(PICTURES, path) for path in _paths_in(pictures_folder())]
-    listed += [_build_entry(PAGES, path) for path in _paths_in(pages_folder())]
+    listed = [_build_entry(CHECKS, path) for path in _paths_in(cached_checks_folder())]
+    listed += [_build_entry(GOLDENS, path) for path in _paths_in(cached_goldens_folder())]
+    listed += [_build_entry(RUNS, path) for path in _paths_in(cached_verifications_folder())]
+    listed += [_build_entry(LINES, path) for path in _paths_in(cached_executed_lines_folder())]
+    listed += [_build_entry(PICTURES, path) for path in _paths_in(cached_image_effects_folder())]
+    listed += [_build_entry(PAGES, path) for path in _paths_in(cached_reports_folder())]
     for target in _paths_in(caches_folder() / TARGETS):
         listed += [_build_entry(f"target {target.name}", path) for path in _files_below(target)]
     return sorted(listed, key=lambda entry: (entry.what, entry.path))
@@ -110,21 +112,25 @@ def prune_cache(most_bytes: int) -> list[CacheEntry]:
     return _prune_entries(list_entries(), most_bytes)
 
 
-def prune_target(target: str) -> list[CacheEntry]:
-    """Delete the least recently used files of a target until at most TARGET_BYTES remain; return the deleted
-    entries.
+def prune_target_cache(target: str) -> list[CacheEntry]:
+    """Delete the least recently used files of a target until at most MOST_TARGET_CACHE_BYTES remain; return
+    the deleted entries.
 
     A run calls it before each seed, because each seed has its own images.
     """
     return _prune_entries(
-        [_build_entry(f"target {target}", path) for path in _files_below(target_folder(target))],
-        MOST_TARGET_BYTES,
+        [_build_entry(f"target {target}", path) for path in _files_below(target_cache_folder(target))],
+        MOST_TARGET_CACHE_BYTES,
     )
 
 
-def prune_pages() -> list[CacheEntry]:
-    """Delete the least recently used reports of the server until at most PAGES_BYTES remain; return them."""
-    return _prune_entries([_build_entry(PAGES, path) for path in _paths_in(pages_folder())], MOST_PAGES_BYTES)
+def prune_cached_reports() -> list[CacheEntry]:
+    """Delete the least recently used reports of the server until at most MOST_CACHED_REPORTS_BYTES remain;
+    return them.
+    """
+    return _prune_entries(
+        [_build_entry(PAGES, path) for path in _paths_in(cached_reports_folder())], MOST_CACHED_REPORTS_BYTES
+    )
 
 
 def _prune_entries(entries: list[CacheEntry], most_bytes: int) -> list[CacheEntry]:

@@ -18,7 +18,7 @@ ARCHIVE_PATH = Path(__file__).with_name("shipped.zip")  # created by setup.py; n
 CLONE_FOLDER = Path(__file__).resolve().parents[2]
 SHIPPED_TARGET_ROOT = "shipped:target"  # value of `root` in a manifest
 _LIBRARY_README_PATH = Path(__file__).with_name("new_library.md")
-_ROOT_LINE_IN_CLONE = "root: ../../target\n"
+_MANIFEST_ROOT_LINE_IN_CLONE = "root: ../../target\n"
 _MOST_NAMED_FILES = 3  # the maximum number of changed files that an error names
 
 
@@ -28,12 +28,16 @@ def shipped_folder() -> Path:
     Once per process, the unpacked files are compared with the archive. MutatorError if they differ or cannot
     be unpacked.
     """
-    return _unpacked_folder(ARCHIVE_PATH, _unpacking_folder()) if ARCHIVE_PATH.exists() else CLONE_FOLDER
+    return (
+        _checked_unpacked_folder(ARCHIVE_PATH, _unpacked_archives_folder())
+        if ARCHIVE_PATH.exists()
+        else CLONE_FOLDER
+    )
 
 
 def check_not_shipped(path: Path) -> None:
     """Raise MutatorError if `path`, which is about to be written, is in the unpacked archive."""
-    if ARCHIVE_PATH.exists() and path.absolute().is_relative_to(_unpacking_folder()):
+    if ARCHIVE_PATH.exists() and path.absolute().is_relative_to(_unpacked_archives_folder()):
         raise MutatorError(
             "part of the library that ships with mutator, which must not change",
             where=path,
@@ -54,7 +58,7 @@ def write_new_library(folder: Path) -> None:
     for manifest in (folder / "fault_library" / "targets").glob("*.yaml"):
         text = manifest.read_text(encoding="utf-8")
         manifest.write_text(
-            text.replace(_ROOT_LINE_IN_CLONE, f"root: {SHIPPED_TARGET_ROOT}\n"), encoding="utf-8"
+            text.replace(_MANIFEST_ROOT_LINE_IN_CLONE, f"root: {SHIPPED_TARGET_ROOT}\n"), encoding="utf-8"
         )
     shutil.copyfile(_LIBRARY_README_PATH, folder / "README.md")
 
@@ -75,14 +79,14 @@ def make_empty_folder(folder: Path) -> None:
         )
 
 
-def _unpacking_folder() -> Path:
+def _unpacked_archives_folder() -> Path:
     named = Path(os.environ.get("XDG_DATA_HOME", ""))
     base = named if named.is_absolute() else Path("~/.local/share").expanduser()
     return base / "mutator" / "shipped"
 
 
 @lru_cache(maxsize=1)
-def _unpacked_folder(archive: Path, home: Path) -> Path:
+def _checked_unpacked_folder(archive: Path, home: Path) -> Path:
     # a folder for each content: processes of an older version may still read theirs
     folder = home / digest(archive.read_bytes())[:16]
     if not folder.is_dir():

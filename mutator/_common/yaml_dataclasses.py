@@ -3,7 +3,7 @@
 from typing import Any
 
 
-def mapping_config(title: str) -> dict[str, Any]:
+def pydantic_mapping_config(title: str) -> dict[str, Any]:
     """Return the `__pydantic_config__` of a dataclass that is written as a mapping, as strict as its file.
 
     `title` is its heading on reference pages.

@@ -168,7 +168,9 @@ def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
     names = [name for name in trace if name != time and name not in time_channels]
     columns = {name: values_on_steps(trace, name, trace[time]) for name in names}
     frame = pd.DataFrame(columns, index=pd.Index(trace[time], name=time))
-    frame.attrs["units"] = {c.name: c.unit for c in (*manifest.compared_channels, *manifest.plotted_channels)}
+    frame.attrs["units"] = {
+        c.name: c.unit for c in (*manifest.compared_channels, *manifest.non_actuator_channels)
+    }
     return frame
 
 

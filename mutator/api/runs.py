@@ -21,7 +21,7 @@ from mutator.execution.shard_merging import merge_shards
 from mutator.exports import ExportSelection, Format, find_export
 from mutator.exports import ExportTable as ExportedTable
 from mutator.exports.write import export
-from mutator.model import OPERATORS_MODULE
+from mutator.model import OPERATOR_FAULTS_MODULE
 from mutator.outcomes.fault_free_runs import (
     FaultFreeRun,
     alerts_by_drive,
@@ -114,7 +114,7 @@ class Run(RunContents):
         such mutants.
         """
         frame = self._results_frame
-        if not (frame["module"] == OPERATORS_MODULE).any():
+        if not (frame["module"] == OPERATOR_FAULTS_MODULE).any():
             return mutation_score_sheet(prepare_results(frame), {}, None)
         try:
             alerts = alerts_by_drive(self.fault_free())

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import check_inside, check_only_plain_files, path_below
+from mutator._common.confined_files import check_only_plain_files, checked_path_inside, path_below
 from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
@@ -128,7 +128,7 @@ def try_fault(
     temporary = ScratchFolder("mutator-try-") if out is None else None
     out_folder = temporary.path if temporary else Path(out or "")
     # a link must not lead the output elsewhere
-    folder = check_inside(out_folder, path_below(out_folder, experiment.id))
+    folder = checked_path_inside(out_folder, path_below(out_folder, experiment.id))
     check_only_plain_files(folder)
     single = run_single(selected_target.workspace, selected_target.manifest, experiment, folder)
     scale = selected_target.workspace.scale_of(selected_target.manifest)

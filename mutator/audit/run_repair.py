@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mutator._common.bounded_reading import MOST_DATA_BYTES, check_file_size, read_bounded
+from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, check_file_size, read_bounded
 from mutator._common.confined_files import (
     move_below,
     open_below,
@@ -27,7 +27,7 @@ from mutator.audit.record_audit import load_stored_records
 from mutator.audit.series_repair import repair_series
 from mutator.campaigns.freezing import PLAN_CSV, plan_csv_bytes
 from mutator.campaigns.plan import load_plan
-from mutator.errors import MutatorError, Outside, TooLarge
+from mutator.errors import MutatorError, TooLarge, UnsafePath
 from mutator.model import Status
 from mutator.store import file_digests, integrity
 from mutator.store.allowed_contents import DAMAGED_FOLDER
@@ -69,7 +69,7 @@ def _renew_damaged_ledger(folder: RunFolder) -> Iterator[str]:
     run = folder.path
     try:
         file_digests.load_ledger(run)
-    except Outside:
+    except UnsafePath:
         raise  # somebody wrote this on purpose
     except MutatorError:
         plan_and_golden_paths = (path for name in ("plan", "golden") for path in (run / name).rglob("*"))
@@ -159,7 +159,7 @@ def _segment_changes(folder: RunFolder, ledger: DigestLedger, lost: Collection[s
             if not path.is_file():
                 yield name, None, f"{name} set aside: it is not a file"
                 continue
-            data = read_bounded(path, MOST_DATA_BYTES)
+            data = read_bounded(path, MOST_EXPERIMENT_DATA_BYTES)
             segment, file_digest = read_segment(path, data), ledger.files.get(name)
             dropped = lost if kind == "records" else ()
             remaining = list(

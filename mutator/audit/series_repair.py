@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from mutator._common.confined_files import check_name, path_below, unlink_below, write_below
+from mutator._common.confined_files import checked_relative_path, path_below, unlink_below, write_below
 from mutator.audit.series_audit import audit_series
 from mutator.errors import MutatorError
 from mutator.outcomes.hazards_and_metrics import load_manifest_channels
@@ -35,7 +35,7 @@ def repair_series(
         index = series_folder.index
     for path in sorted(paths):
         name = path.relative_to(run).as_posix()
-        check_name(name, run)
+        checked_relative_path(name, run)
         what_happened = "set aside" if os.path.lexists(path) else "is gone"
         set_aside(name)
         if path.suffix == SUFFIX:

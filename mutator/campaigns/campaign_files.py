@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import check_library_name
+from mutator._common.confined_files import checked_name_not_path
 from mutator.campaigns.campaign_model import CampaignModel, Canary, SelectionModel
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
@@ -104,7 +104,7 @@ def load_campaign(path: Path) -> Campaign:
     # these names become paths in the library
     for keys, name in {("target",): model.target, ("triggers", "table"): triggers.table or ""}.items():
         with source.locating_errors(keys):
-            check_library_name(name, path)
+            checked_name_not_path(name, path)
     return Campaign(
         name=model.name,
         purpose=model.about.strip(),

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, mod
 from pydantic_core import PydanticKnownError
 
 from mutator._common.doors import OPERATORS
-from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
     Triggers,
@@ -90,7 +90,7 @@ _NAMES_SCHEMA = {"type": "array", "items": {"type": "string"}}
 class Canary:
     """A fault known to be harmful. The campaign starts only if this fault causes its hazard."""
 
-    __pydantic_config__ = mapping_config("The canary")
+    __pydantic_config__ = pydantic_mapping_config("The canary")
 
     spec: str = field(
         metadata=yaml_metadata(

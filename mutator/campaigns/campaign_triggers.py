@@ -6,18 +6,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.config.yaml_files import StrictModel, YamlRecord
 from mutator.config.yaml_sources import KeyPath, YamlSource
-from mutator.model import MOST_LIMIT, Hold, Trigger
+from mutator.model import MOST_LIMIT_OR_TIME, Hold, Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import canonical_condition
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 
 EVERY_READING = "*"  # key of a value that applies to all readings
 _LIST_KEYS: KeyPath = ("triggers", "list")
-Seconds = Annotated[float, Field(ge=0.0, le=MOST_LIMIT, allow_inf_nan=False)]
-_SECONDS_SCHEMA = {"type": "number", "minimum": 0.0, "maximum": MOST_LIMIT}
+Seconds = Annotated[float, Field(ge=0.0, le=MOST_LIMIT_OR_TIME, allow_inf_nan=False)]
+_SECONDS_SCHEMA = {"type": "number", "minimum": 0.0, "maximum": MOST_LIMIT_OR_TIME}
 
 
 def to_value_by_reading(value: object) -> object:
@@ -34,7 +34,7 @@ def schema_with_readings(schema: dict[str, Any]) -> dict[str, Any]:
 class ListedTrigger:
     """Exactly one of `always`, `at_s` and `when`. `always` is short for `always: true`."""
 
-    __pydantic_config__ = mapping_config("A trigger")
+    __pydantic_config__ = pydantic_mapping_config("A trigger")
 
     always: bool = field(
         default=False, metadata=yaml_metadata("`true`: active from the time at which triggers are armed.")
@@ -104,7 +104,7 @@ class TriggersModel(StrictModel, title="Triggers"):
     random_until_s: float | None = Field(
         None,
         gt=0.0,
-        le=MOST_LIMIT,
+        le=MOST_LIMIT_OR_TIME,
         allow_inf_nan=False,
         description="The latest random time in s, required for `random` experiments. A fault whose time is "
         "past the end of its scenario is never active.",

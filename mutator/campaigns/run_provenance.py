@@ -97,7 +97,7 @@ def begin_stretch(
     manifest = workspace.manifest(folder.head.target)
     folder_by_name = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
     folder_by_name |= {"overlay": manifest.overlay} if manifest.overlay else {}
-    importer = IMPORTERS.package_of(Path(manifest.trace_file).suffix.removeprefix("."))
+    importer = IMPORTERS.other_package_of(Path(manifest.trace_file).suffix.removeprefix("."))
     used = (
         *(requirement.name for requirement in manifest.requires),
         *packages,

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Iterable, Sequence
 
 from mutator.model import Experiment
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import time_of
+from mutator.triggers.trigger_kinds import trigger_time_s
 
 
 def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
@@ -34,7 +34,7 @@ def order_for_sharing(runs: Iterable[list[Experiment]]) -> list[list[Experiment]
 
     def sort_key(run: list[Experiment]) -> tuple[str, tuple[str, ...], float, str]:
         first = run[0]
-        return (first.scenario, first.changes, time_of(first.trigger) or 0.0, first.trigger.condition)
+        return (first.scenario, first.changes, trigger_time_s(first.trigger) or 0.0, first.trigger.condition)
 
     return sorted(runs, key=sort_key)
 

@@ -9,7 +9,7 @@ from jinja2.meta import find_undeclared_variables
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from mutator.checks.findings import CheckState, Finding, FindingPlace
-from mutator.faults.fault_models import NAME_TYPES, FaultModels, SnippetKind
+from mutator.faults.fault_models import NAME_PARAM_TYPES, FaultModels, SnippetKind
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.injection_specs import DrawReference, InjectionSpec, parse_draw_reference
 
@@ -46,7 +46,7 @@ def _uses_draw(injection: InjectionSpec, name: str, models: FaultModels) -> bool
         drawn = (
             param.value if isinstance(param.value, DrawReference) else parse_draw_reference(str(param.value))
         )
-        if schema and schema.type not in NAME_TYPES and drawn and drawn.name == name:
+        if schema and schema.type not in NAME_PARAM_TYPES and drawn and drawn.name == name:
             return True
     return False
 

@@ -17,7 +17,7 @@ from typer.main import get_command
 
 from mutator._common import progress_events
 from mutator._common.files import disk_full_error, is_disk_full_error
-from mutator._common.interrupts import interruptible
+from mutator._common.interrupts import raising_keyboard_interrupts
 from mutator._common.resource_shortages import find_shortage
 from mutator._common.version import VERSION
 from mutator.cli import (
@@ -191,14 +191,14 @@ def _click_command() -> Any:
 
 def _run_command_line(argv: Sequence[str]) -> int:
     try:
-        progress_events.open_events()
+        progress_events.open_events_pipe()
         # Not `app()`, which has its own handling of errors, interrupts and closed pipes.
         command = _click_command()
         if "_MUTATOR_COMPLETE" in os.environ:  # a shell asks for completions
             command.main(prog_name="mutator")
         with (
             _warnings_in_one_line(),
-            interruptible(),
+            raising_keyboard_interrupts(),
             command.make_context("mutator", [*argv] or ["--help"]) as ctx,
         ):
             command.invoke(ctx)

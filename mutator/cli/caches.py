@@ -59,7 +59,7 @@ def cache(
     terminal = Terminal(as_json)
     deleted = mutator.clear_caches() if clear else None
     if max_size is not None:
-        deleted = mutator.prune_caches(parse_size(max_size))
+        deleted = mutator.prune_caches(parse_size_bytes(max_size))
     entries = mutator.cache_entries()
     if as_json:
         document = {"path": str(mutator.cache_folder()), "kept": _entries_as_json(entries)}
@@ -77,7 +77,7 @@ def cache(
     terminal.print_text(f"in {short_path(mutator.cache_folder())}")
 
 
-def parse_size(text: str) -> int:
+def parse_size_bytes(text: str) -> int:
     """Return the number of bytes of a size such as 2GB, 500 MB or 0; MutatorError otherwise."""
     match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kKMGT]?B)?", text.strip())
     if not match:

@@ -10,7 +10,7 @@ from typing import Any
 import typer
 
 from mutator._common.doors import EXPORTS
-from mutator._common.folder_search import library_files, library_folder, run_folders
+from mutator._common.folder_search import library_folder, library_yaml_files, run_folders
 from mutator.errors import MutatorError
 
 Completer = Callable[[typer.Context, str], list[str]]
@@ -21,7 +21,7 @@ def build_completer(folder: str) -> Completer:
 
     def complete(ctx: typer.Context, incomplete: str) -> list[str]:
         try:
-            return _names_starting(library_files(_library_folder(ctx), folder), incomplete)
+            return _names_starting(library_yaml_files(_library_folder(ctx), folder), incomplete)
         except MutatorError:  # a library that no command would use
             return []
 

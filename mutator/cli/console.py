@@ -70,7 +70,7 @@ class Terminal:
 
     def print_link(self, kind: str, path: Path, text: str | None = None) -> None:
         """Print where a file was written: `kind: path`, or `text`."""
-        progress_events.report_link(kind, path)
+        progress_events.report_written_file(kind, path)
         self.print_text(text or f"{kind}: {short_path(path)}")
 
     def print_note(self, text: str) -> None:

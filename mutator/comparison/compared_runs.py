@@ -13,7 +13,7 @@ from mutator.results.table_reader import frame_of_experiments
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.contact_severity import SeverityScale
-from mutator.targets.stored_target_facts import T_END
+from mutator.targets.stored_target_facts import DRIVE_END_COLUMN
 
 
 class ExperimentKey(NamedTuple):
@@ -78,7 +78,7 @@ def load_compared_run(run: Path, only: str | None = None) -> ComparedRun:
 
 
 def _metrics_of(record: Record) -> dict[str, float]:
-    return dict(record.metrics) | ({T_END: record.t_end} if record.t_end is not None else {})
+    return dict(record.metrics) | ({DRIVE_END_COLUMN: record.t_end} if record.t_end is not None else {})
 
 
 def experiment_key(experiment: Experiment) -> ExperimentKey:

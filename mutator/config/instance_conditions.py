@@ -2,7 +2,7 @@
 
 import ast
 
-from mutator.config.location_syntax import PROBE_NAME
+from mutator.config.location_syntax import PROBE_MODULE_NAME
 
 _MOST_LENGTH = 1000  # characters; the condition becomes part of one line of the mutant
 # no calls: the condition is evaluated in the controller's function, and must not change anything
@@ -23,7 +23,7 @@ def canonical_instance_condition(text: str) -> str:
         tree = None
     plain = tree is not None and all(isinstance(node, _ALLOWED_NODES) for node in ast.walk(tree))
     # `ast` ignores a comment, which would swallow what follows the condition in the mutant's line
-    if tree is None or not plain or PROBE_NAME in names_in_condition(text) or "#" in text:
+    if tree is None or not plain or PROBE_MODULE_NAME in names_in_condition(text) or "#" in text:
         raise ValueError(text)
     return ast.unparse(tree)
 

@@ -5,7 +5,7 @@ from pydantic import Field
 from mutator.config.location_syntax import is_assignable, is_dotted_name, is_expression
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
-from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
+from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 
 # a function has one entry, and an empty name matches any return or condition
 _NAMELESS_KINDS = (AnchorKind.ENTRY, AnchorKind.BEFORE_RETURN, AnchorKind.RETURN_VALUE, AnchorKind.CONDITION)
@@ -102,7 +102,7 @@ class LocationModel(StrictModel, title="A place"):
                 expected="the position, from 1, or the keyword of an `argument`",
                 remedy="correct it, or leave it out",
             )
-        if kind in FIXED_ANCHORS and self.nth is not None:
+        if kind in LOAD_TIME_ANCHORS and self.nth is not None:
             raise source.error(
                 (*keys, "nth"),
                 f"`nth` of a {kind.value}",

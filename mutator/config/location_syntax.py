@@ -7,7 +7,7 @@ from typing import Any
 
 from mutator.model import AnchorKind, FaultLocation
 
-PROBE_NAME = "_fi"  # reserved for the probe's module in every mutant (mutants/probe.py)
+PROBE_MODULE_NAME = "_fi"  # reserved for the probe's module in every mutant (mutants/probe.py)
 
 # what `ast` raises for invalid or too deeply nested source
 _INVALID_SOURCE_ERRORS = (SyntaxError, ValueError, RecursionError, MemoryError)
@@ -29,7 +29,7 @@ def is_expression(text: str) -> bool:
         tree = ast.parse(text.strip(), mode="eval")
     except _INVALID_SOURCE_ERRORS:
         return False
-    return not any(isinstance(node, ast.Name) and node.id == PROBE_NAME for node in ast.walk(tree))
+    return not any(isinstance(node, ast.Name) and node.id == PROBE_MODULE_NAME for node in ast.walk(tree))
 
 
 def is_assignable(text: str) -> bool:
@@ -43,14 +43,14 @@ def is_assignable(text: str) -> bool:
     return whole and text.isprintable()  # excludes line breaks
 
 
-def base_name(text: str) -> str:
+def base_variable(text: str) -> str:
     return re.split(r"[.\[\s]", text, maxsplit=1)[0]
 
 
 def _is_attribute_chain(node: ast.expr) -> bool:
     match node:
         case ast.Name(id=name):
-            return name != PROBE_NAME
+            return name != PROBE_MODULE_NAME
         case ast.Attribute(value=value):
             return _is_attribute_chain(value)
         case ast.Subscript(value=value, slice=index):
@@ -67,4 +67,4 @@ def _is_constant(node: ast.expr) -> bool:
 def is_dotted_name(text: str) -> bool:
     """Whether `text` is a chain of identifiers that does not start with the probe's name."""
     parts = text.split(".")
-    return all(p.isidentifier() and not keyword.iskeyword(p) for p in parts) and parts[0] != PROBE_NAME
+    return all(p.isidentifier() and not keyword.iskeyword(p) for p in parts) and parts[0] != PROBE_MODULE_NAME

@@ -56,7 +56,7 @@ UNITS = {
         ("percent", "%", "share", 1.0),
     )
 }
-UNIT_LIST = ", ".join(UNITS)
+UNIT_SUFFIXES_TEXT = ", ".join(UNITS)
 _MOST_SUFFIX_PARTS = 1 + max(suffix.count("_") for suffix in UNITS)  # number of parts of the longest suffix
 
 

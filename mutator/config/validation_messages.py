@@ -8,7 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
-from mutator._common.message_text import describe_value, suggestion
+from mutator._common.message_text import describe_value, spelling_suggestion
 
 _EXPECTED_AND_REMEDY_BY_ERROR = {
     "float_type": ("a number", "write it as a number, without quotes or unit"),
@@ -40,7 +40,7 @@ def explain_error(
         return (
             f"unknown key '{key}'",
             f"one of {', '.join(valid_keys)}",
-            ("correct or remove it" + suggestion(key, valid_keys)),
+            ("correct or remove it" + spelling_suggestion(key, valid_keys)),
             keys,
         )
     if kind == "missing":
@@ -56,7 +56,7 @@ def explain_error(
     return got, problem["msg"].removeprefix("Input should be "), "correct the value", keys
 
 
-def choose_error(errors: Sequence[ErrorDetails]) -> ErrorDetails:
+def choose_error_to_report(errors: Sequence[ErrorDetails]) -> ErrorDetails:
     """Choose the error to report. Prefer an unknown key, which can be the misspelling of a missing one.
 
     If a value can have several shapes, prefer an error about its actual shape.

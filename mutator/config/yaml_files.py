@@ -46,7 +46,7 @@ class StrictModel(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
-class _AsMapping:
+class _AcceptsMapping:
     def __get_pydantic_core_schema__(self, record: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         schema = handler(record)
         resolved = cast(dict[str, Any], handler.resolve_ref_schema(schema))
@@ -54,8 +54,10 @@ class _AsMapping:
         return schema
 
 
-YamlRecord = Annotated[T, _AsMapping()]
-"""A dataclass in a file model, with fields of `yaml_metadata` and a configuration of `mapping_config`."""
+YamlRecord = Annotated[T, _AcceptsMapping()]
+"""A dataclass in a file model, with fields of `yaml_metadata` and a configuration of
+`pydantic_mapping_config`.
+"""
 
 
 # the loader in C is many times as fast, but an installation of PyYAML can lack it
@@ -237,7 +239,7 @@ def load_yaml_model(
     except ValidationError as error:
         errors = error.errors(include_url=False)
         got, expected, remedy, keys = validation_messages.explain_error(
-            validation_messages.choose_error(errors), model
+            validation_messages.choose_error_to_report(errors), model
         )
         if len(errors) > 1:
             remedy += f" ({counted(len(errors) - 1, 'more mistake')} after this one)"

@@ -12,7 +12,7 @@ from functools import lru_cache
 from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_OPTIMIZED
 from types import CodeType
 
-from mutator.errors import NotSwappable
+from mutator.errors import MutantNotSwappable
 from mutator.mutants.constant_imports import module_name
 from mutator.mutants.injected_lines import has_constant_or_default_settings, tag_of
 from mutator.mutants.probe import Probe, probe_path
@@ -55,19 +55,19 @@ def plan_swap(
 ) -> CodeSwap:
     """Return what turns the pristine program, loaded from the folder `tree`, into the mutant with `files`.
 
-    Raises NotSwappable if the result could differ from that mutant in a fresh interpreter.
+    Raises MutantNotSwappable if the result could differ from that mutant in a fresh interpreter.
     """
     functions: list[FunctionSwap] = []
     settings: list[tuple[str, CodeType]] = []
     imports: dict[str, None] = {}
-    probe_file = probe_path(manifest.package)
+    probe_file = probe_path(manifest.probe_package)
     for path, data in mutated_files.items():
         if path == probe_file:
             continue
-        if matches_any_glob(path, manifest.self_read_globs):
-            raise NotSwappable(f"{path} is read by the run itself")
+        if matches_any_glob(path, manifest.globs_read_by_runs):
+            raise MutantNotSwappable(f"{path} is read by the run itself")
         if path not in manifest.tree.files:
-            raise NotSwappable(f"{path} is a new file")
+            raise MutantNotSwappable(f"{path} is a new file")
         swaps, imported = _swaps_and_imports_of_file(
             path, manifest.tree.files[path], data, f"{tree_folder}/{path}"
         )
@@ -94,7 +94,7 @@ def _swaps_and_imports_of_file(
     path: str, pristine: bytes, mutated: bytes, filename: str
 ) -> tuple[tuple[FunctionSwap, ...], tuple[str, ...]]:
     if unsplice(mutated) != pristine:
-        raise NotSwappable(f"{path} differs by more than inserted lines")
+        raise MutantNotSwappable(f"{path} differs by more than inserted lines")
     imports = _imports_of_injected_lines(path, mutated.splitlines())
     old, new = (
         _compile_cached(pristine, filename),
@@ -137,12 +137,14 @@ def _compile_cached(data: bytes, filename: str) -> CodeType:
 
 
 def _imports_of_injected_lines(path: str, lines: list[bytes]) -> tuple[str, ...]:
-    """Return the modules that injected lines import. NotSwappable if a block does not ask the probe first."""
+    """Return the modules that injected lines import. MutantNotSwappable if a block does not ask the probe
+    first.
+    """
     imports: list[str] = []
     before, margin = "", 0
     tags = [tag for line in lines if (tag := tag_of(line)) and tag.replaced_line is not None]
     if {name for tag in tags for name in tag.ids} != {name for tag in tags for name in tag.changed_value_ids}:
-        raise NotSwappable(f"{path} has a changed value that does not ask the probe first")
+        raise MutantNotSwappable(f"{path} has a changed value that does not ask the probe first")
     for line in lines:
         tag = tag_of(line)
         if tag and tag.is_of_fault and tag.replaced_line is None and not tag.is_constant_or_default_setting:
@@ -153,7 +155,9 @@ def _imports_of_injected_lines(path: str, lines: list[bytes]) -> tuple[str, ...]
             if tag.id != before or indent <= margin:
                 margin = indent
                 if not tag.is_guard:
-                    raise NotSwappable(f"{path} has an injected statement that does not ask the probe first")
+                    raise MutantNotSwappable(
+                        f"{path} has an injected statement that does not ask the probe first"
+                    )
             elif match := _IMPORT_PATTERN.match(tag.line_without_tag):
                 imports.append((match[1] or match[2]).decode())
         before = tag.id if tag else ""
@@ -166,11 +170,11 @@ def changed_functions(
     """Yield names, old code and new code of the functions that differ between two bodies of a module or
     class.
 
-    Raises NotSwappable if anything except functions differs.
+    Raises MutantNotSwappable if anything except functions differs.
     """
     old_functions, new_functions = _nested_code(old), _nested_code(new)
     if [code.co_name for code in old_functions] != [code.co_name for code in new_functions]:
-        raise NotSwappable(f"{path} is changed outside its functions")
+        raise MutantNotSwappable(f"{path} is changed outside its functions")
     for old_function, new_function in zip(old_functions, new_functions, strict=True):
         function_path = (*names, old_function.co_name)
         if not old_function.co_flags & CO_OPTIMIZED:  # a class body
@@ -179,7 +183,7 @@ def changed_functions(
                 new_function.co_freevars,
                 new_function.co_cellvars,
             ):
-                raise NotSwappable(f"the body of class {'.'.join(function_path)} in {path} is changed")
+                raise MutantNotSwappable(f"the body of class {'.'.join(function_path)} in {path} is changed")
             yield from changed_functions(old_function, new_function, path, function_path)
         elif not has_same_behaviour(old_function, new_function):
             _check_swappable(old_function, new_function, f"{'.'.join(function_path)} in {path}")
@@ -187,13 +191,13 @@ def changed_functions(
 
 
 def _check_swappable(old: CodeType, new: CodeType, described_function: str) -> None:
-    """Raise NotSwappable unless the new code acts like the old until a trigger holds."""
+    """Raise MutantNotSwappable unless the new code acts like the old until a trigger holds."""
     if old.co_name.startswith("<"):
-        raise NotSwappable(f"{described_function} is a function without a name")
+        raise MutantNotSwappable(f"{described_function} is a function without a name")
     if new.co_flags & _SUSPENDABLE_FLAGS:
-        raise NotSwappable(f"{described_function} may be suspended between two steps")
+        raise MutantNotSwappable(f"{described_function} may be suspended between two steps")
     if _signature(old) != _signature(new):
-        raise NotSwappable(
+        raise MutantNotSwappable(
             f"{described_function} has another signature, or other variables of an outer function"
         )
     before = _nested_code(old)
@@ -201,7 +205,7 @@ def _check_swappable(old: CodeType, new: CodeType, described_function: str) -> N
     if len(before) > sum(
         any(has_same_behaviour(nested, new_nested) for new_nested in _nested_code(new)) for nested in before
     ):
-        raise NotSwappable(f"a function inside {described_function} is changed")
+        raise MutantNotSwappable(f"a function inside {described_function} is changed")
 
 
 def _signature(code: CodeType) -> tuple[object, ...]:

@@ -44,7 +44,7 @@ from mutator.engines.process_endings import (
 )
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
-from mutator.errors import ForkServerLost, NotForkable, NotSwappable
+from mutator.errors import ForkServerLost, MutantNotSwappable, NotForkable
 from mutator.model import Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import Probe, probe_attributes_after, probe_module, untriggered_report
@@ -109,7 +109,7 @@ class ForkEngine:
         try:
             with raising_disk_full(self._work_folder):
                 return self._execute_by_fork(job, folder)
-        except (NotSwappable, NotForkable) as why:
+        except (MutantNotSwappable, NotForkable) as why:
             return self._run_on_reference_engine(job, without_run_specifics(str(why), folder))
         except ForkServerLost as why:
             self.close()
@@ -248,7 +248,7 @@ class ForkEngine:
             "memory_mb": self._limits.memory_mb,
             "disk_mb": self._limits.disk_mb,
             "steps": self._limits.steps,
-            "probe_name": probe_module(self._manifest.package),
+            "probe_name": probe_module(self._manifest.probe_package),
             "probe": swap.probe_code,
             "functions": [(f.module, f.name_path, f.old_code, f.new_code) for f in swap.functions],
             "settings": swap.probe_value_setters,
@@ -364,7 +364,7 @@ class ForkEngine:
             return GoldenObservations(
                 values=content[0], counts_before_steps=content[1], imported_modules=content[2]
             )
-        except NotSwappable as why:
+        except MutantNotSwappable as why:
             raise NotForkable(f"its observing statement cannot be inserted: {why}") from None
         finally:
             remove_folder(folder)

@@ -119,7 +119,7 @@ def raising_if_server_input_changes(path: Path) -> Iterator[None]:
     """Raise ForkServerLost if a file is written to while the server uses it."""
     used = UnchangedFiles({str(path.resolve()): read_bounded(path)})
     yield
-    if used.first_changed():
+    if used.first_changed_path():
         raise ForkServerLost(f"{path.name} was changed while it was in use")
 
 
@@ -195,7 +195,7 @@ class ForkServer:
                 f"once it is loaded, {describe_too_many_threads(others)}", remedy_for_threads(others)
             )
         self._process_group = welcome["group"]
-        if self._tree.first_changed_path() or self._start_file.first_changed():
+        if self._tree.first_changed_path() or self._start_file.first_changed_path():
             raise ForkServerLost("the tree of the fork server is not the pristine one")
         if self._sandbox:
             self._sandbox.note_initial_temporary_paths()

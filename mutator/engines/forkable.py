@@ -6,7 +6,7 @@ from pathlib import Path
 from mutator.engines.code_swap import plan_swap
 from mutator.engines.engine_choice import reason_not_forkable
 from mutator.engines.fork_server_client import ForkServer
-from mutator.errors import ForkServerLost, MutatorError, NotForkable, NotSwappable
+from mutator.errors import ForkServerLost, MutantNotSwappable, MutatorError, NotForkable
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault
 from mutator.mutants.mutant_building import build
@@ -53,7 +53,7 @@ def reasons_by_unforkable_variant(
         try:
             mutant = build(manifest, models, fault, always_trigger())
             plan_swap(manifest, mutant.files, mutant.probe, "")
-        except NotSwappable as reason:
+        except MutantNotSwappable as reason:
             reasons[name] = str(reason)
         except MutatorError:
             continue  # a fault that cannot be built never runs; the checks before a campaign report it

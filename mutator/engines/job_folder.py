@@ -20,7 +20,7 @@ from typing import Any
 from mutator._common.confined_files import move_plain_files, open_folder, read_below
 from mutator._common.files import remove_anything_at
 from mutator.engines.process_endings import parse_run_report, read_log_tail
-from mutator.errors import Outside
+from mutator.errors import UnsafePath
 
 PLAIN_OUTPUT_FOLDER = "output"  # the name of the folder with the output's plain files
 _OUT_FOLDER, _LOG_FILE, _REPORT_FILE, _INACTIVE_MARKER = "out", "log", "report.json", "inactive"
@@ -79,7 +79,7 @@ class JobFolder:
         """Return the child's report; None if it is missing, incomplete or invalid (`parse_run_report`)."""
         try:
             return parse_run_report(read_below(self._path_by_handle, _REPORT_FILE), **extra_fields)
-        except (OSError, Outside, ValueError):
+        except (OSError, UnsafePath, ValueError):
             return None
 
     def log_tail(self) -> str:

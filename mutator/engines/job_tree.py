@@ -35,7 +35,7 @@ class JobTree:
 
     def first_changed_path(self) -> str:
         """Return a file that was changed, removed, or added where an import finds it; empty if none was."""
-        if path := self._files.first_changed() or self._first_replaced_folder():
+        if path := self._files.first_changed_path() or self._first_replaced_folder():
             return path.removeprefix(f"{self.folder}/")
         imported = (
             name

@@ -16,7 +16,7 @@ from mutator._common.confined_files import open_below
 from mutator._common.files import is_disk_full_error
 from mutator.engines.engine_jobs import RaisedException
 from mutator.engines.in_target import process_guard
-from mutator.errors import MutatorError, Outside
+from mutator.errors import MutatorError, UnsafePath
 from mutator.model import Limits, Status
 from mutator.targets.process_environment import FIXED_VARIABLES, INHERITED_VARIABLES
 
@@ -141,7 +141,7 @@ def read_log_tail(folder: Path, name: str) -> str:
         with open_below(folder, name) as file:
             file.seek(max(0, os.fstat(file.fileno()).st_size - _LOG_TAIL_BYTES))
             return file.read(_LOG_TAIL_BYTES).decode("utf-8", "replace")
-    except (OSError, Outside):
+    except (OSError, UnsafePath):
         return ""
 
 

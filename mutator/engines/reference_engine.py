@@ -134,7 +134,7 @@ class ReferenceEngine:
         scenario = job.scenario.resolve()
         inputs = UnchangedFiles({str(path): request, str(scenario): read_bounded(scenario)})
         ended = self._run_guarded(job, path, home)
-        changed_input = tree.first_changed_path() or inputs.first_changed().removeprefix(f"{folder}/")
+        changed_input = tree.first_changed_path() or inputs.first_changed_path().removeprefix(f"{folder}/")
         if not (changed_input or fresh_tree):
             self._tree_pool.take_back_tree(tree)
         return ended, changed_input
@@ -170,7 +170,7 @@ class ReferenceEngine:
             seed=job.seed,
             out=home.output_folder,
             changes=job.scenario_changes,
-            independent=self._is_independent or self.manifest.reads_any(job.changed_files),
+            independent=self._is_independent or self.manifest.run_reads_any(job.changed_files),
         )
         return {
             "home": str(home.path),
@@ -178,7 +178,7 @@ class ReferenceEngine:
             "packages": list(self.manifest.import_names),
             "module": self.manifest.entry_module,
             "args": list(arguments),
-            "probe": probe_module(self.manifest.package) if job.mutant_id is not None else None,
+            "probe": probe_module(self.manifest.probe_package) if job.mutant_id is not None else None,
             "out": str(home.output_folder),
             "report": str(home.report_path),
             "inactive": str(home.inactive_marker),

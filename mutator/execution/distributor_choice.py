@@ -66,7 +66,7 @@ def choose_distributor(cluster: str | None = None, *, insecure: bool = False) ->
 def packages_of_distributor(distributor: Distributor) -> tuple[str, ...]:
     """Return the package that adds a distributor, if the harness does not."""
     name = distributor.name if isinstance(distributor, _ForeignDistributor) else ""
-    return (package,) if (package := DISTRIBUTORS.package_of(name)) else ()
+    return (package,) if (package := DISTRIBUTORS.other_package_of(name)) else ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -88,7 +88,7 @@ class LoadedGoldens:
 
     def check_unchanged(self, folder: Path) -> None:
         """Raise MutatorError if the files of a golden run have been written to since they were read."""
-        if changed := self._files_of_folder(folder).first_changed():
+        if changed := self._files_of_folder(folder).first_changed_path():
             raise _changed_file_error(Path(changed))
 
     def _load_unchanged(self, folder: Path, load: Callable[[TargetManifest, Path], _T]) -> _T:

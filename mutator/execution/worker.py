@@ -92,7 +92,7 @@ class Worker:
     def _prune_cached_images(self, seed: int) -> None:
         """Delete images of earlier seeds, which would fill the disk."""
         if len(self.folder.seeds) > 1 and seed != self._current_seed:
-            shared_cache.prune_target(self._manifest.cache_name)
+            shared_cache.prune_target_cache(self._manifest.cache_name)
         self._current_seed = seed
 
     def prove(self, sample: SampledExperiment) -> list[tuple[str, str]]:

@@ -13,7 +13,7 @@ import pytest
 
 from mutator._common.folder_locks import living_worker_pids
 from mutator._common.resource_shortages import find_shortage
-from mutator.errors import HarnessErrors, MutatorError
+from mutator.errors import MutatorError, PytestItemFailed
 from mutator.execution.progress_reporting import reporting_progress
 from mutator.execution.progress_text import ProgressLines
 from mutator.execution.session import ProgressCallback, Session, Summary, open_session
@@ -48,7 +48,7 @@ class DistributedItem(CampaignItem):
         if self._campaign_session.interrupted:
             raise KeyboardInterrupt
         if self._campaign_session.problem:
-            raise HarnessErrors(self._campaign_session.problem)
+            raise PytestItemFailed(self._campaign_session.problem)
 
 
 def register_controller(

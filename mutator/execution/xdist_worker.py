@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from mutator._common.files import raising_disk_full
-from mutator._common.folder_locks import register_worker
+from mutator._common.folder_locks import open_worker_lock
 from mutator._common.resource_shortages import find_shortage
 from mutator.campaigns.chunks import PendingChunk
 from mutator.campaigns.run_inputs import RunInputs
-from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage
+from mutator.errors import DiskFull, MutatorError, PytestItemFailed, ResourceShortage
 from mutator.execution.suspended_workers import on_resume
 from mutator.execution.worker import Worker, WorkerAssignment, bind_to_parent
 from mutator.execution.written_files import FileDigests
@@ -29,7 +29,7 @@ class CampaignItem(pytest.Item):
     """An item that does part of a campaign's work. It fails only for harness errors."""
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        if isinstance(excinfo.value, HarnessErrors | MutatorError):
+        if isinstance(excinfo.value, PytestItemFailed | MutatorError):
             return str(excinfo.value)
         return super().repr_failure(excinfo, style)
 
@@ -56,11 +56,11 @@ class WorkItem(CampaignItem):
             reported_error = err if isinstance(err, MutatorError) else find_shortage(err)
             problem = str(reported_error) if reported_error else _describe_defect(err, self.name)
             self.user_properties.append((PROBLEM_KEY, problem))
-            if isinstance(reported_error, DiskFull | Shortage):
+            if isinstance(reported_error, DiskFull | ResourceShortage):
                 self.session.shouldstop = problem
             raise
         if errors:
-            raise HarnessErrors("\n".join(f"{name}: {detail}" for name, detail in errors))
+            raise PytestItemFailed("\n".join(f"{name}: {detail}" for name, detail in errors))
 
 
 def _describe_defect(err: Exception, item_name: str) -> str:
@@ -132,7 +132,7 @@ class WorkerPlugin:
             parent_pid=campaign_input["parent"],
         )
         self._config = config
-        self._registration = register_worker(run)
+        self._registration = open_worker_lock(run)
         self._pending_work: list[PendingChunk | SampledExperiment] = [
             *(PendingChunk(chunk, tuple(places)) for chunk, places in campaign_input["pending"]),
             *(SampledExperiment(number, name) for number, name in campaign_input["proof"]),

@@ -9,22 +9,22 @@ from pydantic import Field
 
 from mutator._common import hashing
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import check_inside
+from mutator._common.confined_files import checked_path_inside
 from mutator.config import units
 from mutator.config.yaml_files import MOST_YAML_BYTES, StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults import probe_template_parts
 from mutator.faults.fault_models import (
-    TARGET_UNIT,
     TEMPLATE_FOLDER_GLOBS,
+    UNIT_OF_CHANGED_VARIABLE,
     FaultModel,
     FaultModelExample,
     FaultModels,
-    Param,
     ParamSchema,
     SnippetKind,
     TemplateNeed,
+    UnnamedParamSchema,
 )
 from mutator.faults.injection_model import InjectionModel
 from mutator.faults.probe_template_parts import ProbeTemplates
@@ -42,7 +42,7 @@ _TEMPLATE_VARIABLES = (
 )
 
 
-_TARGET_PARAM = ParamSchema(
+_CHANGED_VARIABLE_PARAM = ParamSchema(
     name="target",
     type="variable",
     about="the variable to change, if it is not the one that the anchor names",
@@ -84,14 +84,18 @@ class FaultModelModel(StrictModel, title="The file"):
         "is a call, passed as `called` and `arguments`. `statement`: the anchored statement on "
         "one line. `next_statement`: also the statement after it; a guard then wraps both.",
     )
-    params: dict[str, YamlRecord[Param]] = Field(default_factory=dict, description="Name -> parameter.")
+    params: dict[str, YamlRecord[UnnamedParamSchema]] = Field(
+        default_factory=dict, description="Name -> parameter."
+    )
     examples: list[_ExampleModel] = Field(min_length=1, description="At least one.")
 
 
 def load_fault_models(folder: Path) -> FaultModels:
     """Load the fault models of a templates folder, from memory unless a file has changed."""
     paths = [
-        check_inside(folder, path) for kind in TEMPLATE_FOLDER_GLOBS for path in sorted(folder.glob(kind))
+        checked_path_inside(folder, path)
+        for kind in TEMPLATE_FOLDER_GLOBS
+        for path in sorted(folder.glob(kind))
     ]
     try:
         contents = tuple((path, read_bounded(path, MOST_YAML_BYTES)) for path in paths)
@@ -144,11 +148,13 @@ def _load_model(path: Path) -> FaultModel:
         about=model.about,
         raises=model.raises,
         needs=TemplateNeed(model.needs) if model.needs else None,
-        params=(*params, _TARGET_PARAM) if kind is SnippetKind.VALUE and model.needs != "call" else params,
+        params=(*params, _CHANGED_VARIABLE_PARAM)
+        if kind is SnippetKind.VALUE and model.needs != "call"
+        else params,
         examples=tuple(
             FaultModelExample(
                 about=example.about,
-                injection=example.injection.injection(source, ("examples", i, "injection")),
+                injection=example.injection.injection_spec(source, ("examples", i, "injection")),
                 before=example.before,
                 after=example.after,
                 line=source.line_of(("examples", i)),
@@ -162,7 +168,7 @@ def _load_model(path: Path) -> FaultModel:
     )
 
 
-def _build_param(name: str, param: Param, source: YamlSource) -> ParamSchema:
+def _build_param(name: str, param: UnnamedParamSchema, source: YamlSource) -> ParamSchema:
     keys = ("params", name)
     if not name.isidentifier() or units.split_unit(name)[1]:
         raise source.error(keys, f"parameter '{name}'", expected="an identifier without a unit suffix")
@@ -174,8 +180,10 @@ def _build_param(name: str, param: Param, source: YamlSource) -> ParamSchema:
             + ", ".join(_TEMPLATE_VARIABLES),
             remedy="rename the parameter",
         )
-    if param.unit not in (None, TARGET_UNIT, *units.UNITS):
-        raise source.error((*keys, "unit"), f"'{param.unit}'", expected=f"target or one of {units.UNIT_LIST}")
+    if param.unit not in (None, UNIT_OF_CHANGED_VARIABLE, *units.UNITS):
+        raise source.error(
+            (*keys, "unit"), f"'{param.unit}'", expected=f"target or one of {units.UNIT_SUFFIXES_TEXT}"
+        )
     if (param.type == "choice") != bool(param.choices):
         state = "no `choices`" if param.type == "choice" else "`choices`"
         raise source.error(

@@ -7,19 +7,19 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Literal
 
-from mutator._common.message_text import suggestion
-from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator._common.message_text import spelling_suggestion
+from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.faults.probe_template_parts import ProbeTemplates
 
 TEMPLATE_FOLDER_GLOBS = ("*.yaml", "*.j2")  # what a templates folder consists of
-TARGET_UNIT = "target"
+UNIT_OF_CHANGED_VARIABLE = "target"
 ParamType = Literal[
     "variable", "import", "number", "integer", "boolean", "constant", "choice", "unit", "seed"
 ]
-NAME_TYPES = ("variable", "import")
+NAME_PARAM_TYPES = ("variable", "import")
 _EXPRESSION_PART_PATTERN = re.compile(r"\b(?:left|right|called|arguments)\b")
 
 
@@ -40,10 +40,10 @@ class TemplateNeed(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Param:
+class UnnamedParamSchema:
     """The key is the parameter's name without a unit. A spec adds the unit: `by_m` for the parameter `by`."""
 
-    __pydantic_config__ = mapping_config("A parameter")
+    __pydantic_config__ = pydantic_mapping_config("A parameter")
 
     type: ParamType = field(
         metadata=yaml_metadata(
@@ -82,7 +82,7 @@ class Param:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ParamSchema(Param):
+class ParamSchema(UnnamedParamSchema):
     """A parameter of a model, with its name."""
 
     name: str
@@ -156,6 +156,6 @@ class FaultModels:
                 f"unknown fault model '{name}'",
                 expected=f"one of {', '.join(self.models)}",
                 remedy=f"correct the name, or add the model to {self.folder}"
-                + suggestion(name, list(self.models)),
+                + spelling_suggestion(name, list(self.models)),
             )
         return self.models[name]

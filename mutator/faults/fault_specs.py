@@ -70,13 +70,13 @@ class Variant:
     keys: KeyPath
 
     def injections_in_reading(self, reading: str) -> tuple[InjectionSpec, ...]:
-        return self.injections_by_reading[self._defined_reading(reading)]
+        return self.injections_by_reading[self._reading_or_default(reading)]
 
     def hold_in_reading(self, reading: str) -> Hold | None:
         """Return how long the fault stays active; None: the trigger decides."""
-        return self.hold_by_reading[self._defined_reading(reading)]
+        return self.hold_by_reading[self._reading_or_default(reading)]
 
-    def _defined_reading(self, reading: str) -> str:
+    def _reading_or_default(self, reading: str) -> str:
         return reading if reading in self.injections_by_reading else next(iter(self.injections_by_reading))
 
     @property
@@ -171,7 +171,7 @@ _HOLD_DESCRIPTION = (
 )
 
 
-class _ReadingModel(StrictModel, title="A reading"):
+class _VariantReadingModel(StrictModel, title="A reading"):
     hold: Literal["while", "to_end"] | None = Field(
         None, description=f"{_HOLD_DESCRIPTION} in this reading; default: the variant's `hold`."
     )
@@ -215,7 +215,7 @@ def build_spec_model(readings: Readings) -> type[SpecModel]:
     keys: dict[str, Any] = {}
     for name, about in zip(readings.names, readings.descriptions, strict=True):
         required = name == readings.default_name
-        kind = _ReadingModel if required else _ReadingModel | None
+        kind = _VariantReadingModel if required else _VariantReadingModel | None
         keys[name] = (kind, Field(... if required else None, description=about))
     variant = create_model(
         "_VariantModel", __base__=_VariantModelBase, __doc__=_VariantModelBase.__doc__, **keys
@@ -230,7 +230,7 @@ def build_spec_model(readings: Readings) -> type[SpecModel]:
 
 
 def load_spec(path: Path, readings: Readings) -> FaultSpec:
-    """Read one spec of a library; errors have file and line. `expand` does the remaining checks."""
+    """Read one spec of a library; errors have file and line. `expand_spec` does the remaining checks."""
     model, source = load_yaml_model(path, build_spec_model(readings), SCHEMA)
     models: dict[str, _VariantModelBase] = model.variants  # type: ignore[attr-defined]
     for key in ("module", "fault_type"):
@@ -259,7 +259,7 @@ def _build_variant(
 ) -> Variant:
     keys: KeyPath = ("variants", name)
     _check_name(name, source, keys)
-    models_by_reading: dict[str, _ReadingModel | None] = {
+    models_by_reading: dict[str, _VariantReadingModel | None] = {
         name: getattr(model, name) for name in readings.names
     }
     holds = {
@@ -285,11 +285,14 @@ def _build_variant(
     )
 
 
-def _build_injections(model: _ReadingModel, source: YamlSource, keys: KeyPath) -> tuple[InjectionSpec, ...]:
+def _build_injections(
+    model: _VariantReadingModel, source: YamlSource, keys: KeyPath
+) -> tuple[InjectionSpec, ...]:
     if not model.injections:
         raise source.error((*keys, "injections"), "no injection", expected="at least one")
     return tuple(
-        injection.injection(source, (*keys, "injections", i)) for i, injection in enumerate(model.injections)
+        injection.injection_spec(source, (*keys, "injections", i))
+        for i, injection in enumerate(model.injections)
     )
 
 

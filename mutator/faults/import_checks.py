@@ -4,13 +4,13 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-from mutator._common.message_text import describe_choices, suggestion
+from mutator._common.message_text import describe_choices, spelling_suggestion
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
 
-def check_import(manifest: TargetManifest, dotted_name: str) -> None:
-    """Raise MutatorError unless `dotted` names something that a module of the target defines.
+def check_import_defined(manifest: TargetManifest, dotted_name: str) -> None:
+    """Raise MutatorError unless `dotted_name` names something that a module of the target defines.
 
     The caller adds file and line to the error.
     """
@@ -23,19 +23,19 @@ def check_import(manifest: TargetManifest, dotted_name: str) -> None:
             expected="a module of the target and a name in it, such as package.module.Name",
             remedy=f"correct the name, or the `files` of {manifest.path.name}",
         )
-    names = manifest.tree.derive_once(path, _sorted_module_names)
+    names = manifest.tree.derive_once(path, _sorted_top_level_names)
     if name not in names:
         public = [x for x in names if not x.startswith("_")]
         raise MutatorError(
             f"'{name}' is not defined in {path}",
             expected=describe_choices(public),
-            remedy="correct the name" + suggestion(name, public),
+            remedy="correct the name" + spelling_suggestion(name, public),
         )
 
 
-def _sorted_module_names(path: str, data: bytes, root: Path) -> list[str]:
+def _sorted_top_level_names(path: str, data: bytes, root: Path) -> list[str]:
     try:
-        return sorted(_module_names(ast.parse(data)))
+        return sorted(_top_level_names(ast.parse(data)))
     except (SyntaxError, ValueError, RecursionError) as error:
         message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
         raise MutatorError(
@@ -43,7 +43,7 @@ def _sorted_module_names(path: str, data: bytes, root: Path) -> list[str]:
         ) from None
 
 
-def _module_names(module: ast.Module) -> Iterator[str]:
+def _top_level_names(module: ast.Module) -> Iterator[str]:
     for node in module.body:
         if isinstance(node, ast.ClassDef | ast.FunctionDef):
             yield node.name

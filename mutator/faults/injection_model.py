@@ -18,7 +18,7 @@ from mutator.faults.injection_specs import (
     ParamValue,
     parse_draw_reference,
 )
-from mutator.model import FIXED_ANCHORS, AnchorKind
+from mutator.model import LOAD_TIME_ANCHORS, AnchorKind
 
 
 class InjectionModel(StrictModel, title="An injection"):
@@ -55,13 +55,13 @@ class InjectionModel(StrictModel, title="An injection"):
         None, ge=1, description="The fault acts in every n-th execution of the place, counted as for `call`."
     )
 
-    def injection(self, source: YamlSource, keys: KeyPath) -> InjectionSpec:
+    def injection_spec(self, source: YamlSource, keys: KeyPath) -> InjectionSpec:
         """Check and convert the injection; errors point into `source` at `keys`."""
         if self.unit is not None and self.unit != DIMENSIONLESS and self.unit not in units.UNITS:
             raise source.error(
                 (*keys, "unit"),
                 f"unit '{self.unit}'",
-                expected=f"one of {units.UNIT_LIST}, or '1' for a plain number",
+                expected=f"one of {units.UNIT_SUFFIXES_TEXT}, or '1' for a plain number",
                 remedy="name the unit that the variable has in the source",
             )
         params = []
@@ -92,7 +92,7 @@ class InjectionModel(StrictModel, title="An injection"):
 
     def _check_instance_keys(self, kind: AnchorKind, source: YamlSource, keys: KeyPath) -> None:
         instance_keys = [name for name in ("where", "call", "every") if getattr(self, name) is not None]
-        if instance_keys and kind in FIXED_ANCHORS:
+        if instance_keys and kind in LOAD_TIME_ANCHORS:
             raise source.error(
                 (*keys, instance_keys[0]),
                 f"`{instance_keys[0]}` at a {kind.value}",
@@ -130,11 +130,11 @@ def _parse_param_value(value: Any, source: YamlSource, keys: KeyPath) -> ParamVa
             raise source.error(
                 (*keys, name),
                 f"{describe_value(value[name])} for '{name}'",
-                expected=f"one of {units.UNIT_LIST}",
+                expected=f"one of {units.UNIT_SUFFIXES_TEXT}",
             )
     drawn = parse_draw_reference(str(value["draw"]))
     if not drawn:
         raise source.error(
             (*keys, "draw"), f"{describe_value(value['draw'])} for 'draw'", expected="the draw's name"
         )
-    return replace(drawn, written_in=value["written_in"], read_as=value["read_as"])
+    return replace(drawn, written_unit=value["written_in"], misread_unit=value["read_as"])

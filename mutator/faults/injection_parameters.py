@@ -1,12 +1,12 @@
 """Check an injection's parameters and convert them from the spec's form to the template's."""
 
-from mutator._common.message_text import describe_choices, describe_value, suggestion
+from mutator._common.message_text import describe_choices, describe_value, spelling_suggestion
 from mutator._common.random_streams import random_generator
 from mutator.config import units
 from mutator.config.location_syntax import is_assignable, is_dotted_name
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import NAME_TYPES, TARGET_UNIT, FaultModel, ParamSchema
+from mutator.faults.fault_models import NAME_PARAM_TYPES, UNIT_OF_CHANGED_VARIABLE, FaultModel, ParamSchema
 from mutator.faults.fault_specs import Draw
 from mutator.faults.injection_specs import (
     DIMENSIONLESS,
@@ -16,13 +16,13 @@ from mutator.faults.injection_specs import (
     convert_drawn_value,
     parse_draw_reference,
 )
-from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection, Value
+from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection, Value
 
 _EXPECTED_BY_NAME_TYPE = {
     "variable": "a name as in the source",
     "import": "a module of the target and a name in it",
 }
-_ANCHOR_KINDS_WITHOUT_TARGET = VALUE_ANCHORS | FIXED_ANCHORS
+_ANCHOR_KINDS_WITHOUT_TARGET = VALUE_ANCHORS | LOAD_TIME_ANCHORS
 _ANCHOR_KINDS_WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
 
@@ -45,7 +45,7 @@ def resolve_injection(
     resolver = _ParameterResolver(spec, model, source, draw, value)
     params: dict[str, Value] = {}
     for param in spec.params:
-        schema = resolver.schema_of(param)
+        schema = resolver.checked_schema_of(param)
         params[schema.name] = resolver.resolved_value(param, schema)
         if schema.name == "target" and spec.location.anchor.kind in _ANCHOR_KINDS_WITHOUT_TARGET:
             raise source.error(
@@ -93,7 +93,7 @@ class _ParameterResolver:
         self.draw = draw
         self.drawn_value = value
 
-    def schema_of(self, param: ParamSpec) -> ParamSchema:
+    def checked_schema_of(self, param: ParamSpec) -> ParamSchema:
         """Return the schema of a parameter, after checking the dimension of its unit suffix.
 
         A constant that is not a number must have no unit suffix.
@@ -106,7 +106,7 @@ class _ParameterResolver:
                 param.keys,
                 f"unknown parameter '{param.key}' of model {self.model.name}",
                 expected=describe_choices(map(self.example_key, settable)),
-                remedy="correct or remove it" + suggestion(param.key, names),
+                remedy="correct or remove it" + spelling_suggestion(param.key, names),
             )
         unit = None if self.is_verbatim(param, schema) else self.unit_of(schema)
         key_unit = units.UNITS[param.unit] if param.unit else None
@@ -142,20 +142,20 @@ class _ParameterResolver:
         return f"`{self.valid_keys(schema)[0]}`"
 
     def unit_of(self, schema: ParamSchema) -> units.Unit | None:
-        if schema.unit != TARGET_UNIT:
+        if schema.unit != UNIT_OF_CHANGED_VARIABLE:
             return units.UNITS[schema.unit] if schema.unit else None
         if self.spec.unit is None:
             raise self.source.error(
                 self.spec.keys,
                 f"model {self.model.name} without `unit`",
-                expected=f"the changed variable's unit, one of {units.UNIT_LIST}, or '1'",
+                expected=f"the changed variable's unit, one of {units.UNIT_SUFFIXES_TEXT}, or '1'",
                 remedy="add `unit: m` (the variable's unit in the source) next to `model`",
             )
         return None if self.spec.unit == DIMENSIONLESS else units.UNITS[self.spec.unit]
 
     def resolved_value(self, param: ParamSpec, schema: ParamSchema) -> Value:
         """Return the value in the template's unit, after checking its type and range."""
-        if schema.type in NAME_TYPES:
+        if schema.type in NAME_PARAM_TYPES:
             fits = is_dotted_name if schema.type == "import" else is_assignable
             if not isinstance(param.value, str) or not fits(param.value):
                 raise self._value_error(param, _EXPECTED_BY_NAME_TYPE[schema.type])
@@ -190,7 +190,7 @@ class _ParameterResolver:
     def _constant_value(self, param: ParamSpec) -> Value:
         """Return the value; MutatorError for a text that resembles the draw's name, a likely typo."""
         assert not isinstance(param.value, DrawReference)
-        if isinstance(param.value, str) and self.draw and suggestion(param.value, [self.draw.name]):
+        if isinstance(param.value, str) and self.draw and spelling_suggestion(param.value, [self.draw.name]):
             raise self._value_error(param, f"'{self.draw.name}', the draw, or a text that is less similar")
         return param.value
 

@@ -21,8 +21,8 @@ class DrawReference:
 
     name: str
     sign: int = 1
-    written_in: str | None = None
-    read_as: str | None = None
+    written_unit: str | None = None
+    misread_unit: str | None = None
 
 
 ParamValue = int | float | str | bool | None | DrawReference
@@ -65,7 +65,7 @@ def parse_draw_reference(text: str) -> DrawReference | None:
 def convert_drawn_value(drawn: DrawReference, number: float, unit: units.Unit, target: units.Unit) -> float:
     """Convert the drawn `number` from `unit` to `target`; ValueError if the units are incompatible."""
     number = math.copysign(1.0, drawn.sign) * number
-    if drawn.written_in and drawn.read_as:
-        number = units.convert_unit(number, unit, units.UNITS[drawn.written_in])
-        unit = units.UNITS[drawn.read_as]
+    if drawn.written_unit and drawn.misread_unit:
+        number = units.convert_unit(number, unit, units.UNITS[drawn.written_unit])
+        unit = units.UNITS[drawn.misread_unit]
     return units.convert_unit(number, unit, target)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator._common.confined_files import check_inside
+from mutator._common.confined_files import checked_path_inside
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.errors import MutatorError
 
@@ -61,7 +61,7 @@ class ReadingsModel(StrictModel, title="readings.yaml"):
 
 
 def load_readings(library: Path) -> Readings:
-    path = check_inside(library, library / READINGS_FILE)
+    path = checked_path_inside(library, library / READINGS_FILE)
     if not path.is_file():
         return DEFAULT_READINGS
     model, source = load_yaml_model(path, ReadingsModel, SCHEMA)

@@ -1,4 +1,4 @@
-"""The probe's two templates: settings, which differ between mutants, and code, which does not.
+"""Part the probe's two templates: settings, which differ between mutants, and code, which does not.
 
 A probe is one file in which parts of the two alternate. Lines of each template mark where the parts of the
 other go. The parts are rendered separately, so that the code is rendered and compiled once for all mutants.
@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
 
-from mutator.config.location_syntax import PROBE_NAME
+from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.errors import MutatorError
 
-CODE_TEMPLATE_FILE = f"{PROBE_NAME}.py.j2"
-SETTINGS_TEMPLATE_FILE = f"{PROBE_NAME}_settings.py.j2"
+CODE_TEMPLATE_FILE = f"{PROBE_MODULE_NAME}.py.j2"
+SETTINGS_TEMPLATE_FILE = f"{PROBE_MODULE_NAME}_settings.py.j2"
 PROBE_TEMPLATE_FILES = (CODE_TEMPLATE_FILE, SETTINGS_TEMPLATE_FILE)
 _SETTINGS_MARK, _CODE_MARK = "{# settings #}\n", "{# code #}\n"
 
@@ -35,9 +35,9 @@ class ProbeTemplates:
 
     @classmethod
     def from_texts(cls, folder: Path, code_text: str, settings_text: str) -> "ProbeTemplates":
-        """Make the parts of the texts of `FILES`; MutatorError if their marks do not fit."""
-        before, *code = _split_at_marks(folder / CODE_TEMPLATE_FILE, code_text, _SETTINGS_MARK)
-        settings = _split_at_marks(folder / SETTINGS_TEMPLATE_FILE, settings_text, _CODE_MARK)
+        """Make the parts of the texts of `PROBE_TEMPLATE_FILES`; MutatorError if their marks do not fit."""
+        before, *code = _split_template_at_marks(folder / CODE_TEMPLATE_FILE, code_text, _SETTINGS_MARK)
+        settings = _split_template_at_marks(folder / SETTINGS_TEMPLATE_FILE, settings_text, _CODE_MARK)
         if before.text or len(code) != len(settings):
             raise MutatorError(
                 f"{len(settings)} parts of settings",
@@ -57,7 +57,7 @@ class ProbeTemplates:
         )
 
 
-def _split_at_marks(path: Path, text: str, mark: str) -> list[TemplatePart]:
+def _split_template_at_marks(path: Path, text: str, mark: str) -> list[TemplatePart]:
     texts = text.split(mark)
     lines = accumulate((part.count("\n") + 1 for part in texts[:-1]), initial=1)
     return [

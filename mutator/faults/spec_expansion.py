@@ -10,7 +10,7 @@ from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import Draw, FaultSpec, Variant
-from mutator.faults.import_checks import check_import
+from mutator.faults.import_checks import check_import_defined
 from mutator.faults.injection_parameters import resolve_injection
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.model import Fault, Injection
@@ -18,7 +18,7 @@ from mutator.targets.allowed_locations import check_location_allowed
 from mutator.targets.manifest import TargetManifest
 
 _MOST_REDRAWS_OF_VALUE = 100  # of one value
-_MOST_REDRAWS = 20_000  # of all values; more mean that the ranges have too few different values
+_MOST_REDRAWS_OF_ALL_VALUES = 20_000  # of all values; more mean that the ranges have too few different values
 
 
 def expand_spec(
@@ -51,7 +51,7 @@ def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
         return draw.values
     stream = random_generator(seed, draw.key).random(len(draw.ranges))
     values: list[int | float] = []
-    remaining_redraws = _MOST_REDRAWS
+    remaining_redraws = _MOST_REDRAWS_OF_ALL_VALUES
     for i, fraction in enumerate(map(float, stream)):
         value = _value_in_range(draw, i, fraction)
         for attempt in range(min(_MOST_REDRAWS_OF_VALUE, remaining_redraws)):
@@ -143,7 +143,7 @@ class _SpecExpander:
                 schema = model.param(param.name)
                 if schema and schema.type == "import":
                     keys = param.keys
-                    check_import(self.manifest, str(param.value))
+                    check_import_defined(self.manifest, str(param.value))
         except MutatorError as error:
             raise self.spec.source.error(
                 keys, error.got, expected=error.expected, remedy=error.remedy

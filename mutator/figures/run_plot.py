@@ -91,7 +91,7 @@ def draw_run(
     """
     channels = [
         c
-        for c in (*manifest.compared_channels, *manifest.plotted_channels)
+        for c in (*manifest.compared_channels, *manifest.non_actuator_channels)
         if c.name in golden and c.name in faulty
     ]
     if not channels:

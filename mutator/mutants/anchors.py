@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator._common.interrupts import delaying_interrupts
-from mutator._common.message_text import counted, suggestion
+from mutator._common.message_text import counted, spelling_suggestion
 from mutator.errors import MutatorError
-from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
+from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 from mutator.mutants.constants_and_defaults import (
     ConstantOrDefault,
     choose_constant_or_default,
@@ -88,7 +88,7 @@ class ParsedFile:
         if location.anchor.kind in VALUE_ANCHORS:
             expression = self.resolve_expression(location)
             return expression.start[0], expression.end[0] + 1
-        if location.anchor.kind in FIXED_ANCHORS:
+        if location.anchor.kind in LOAD_TIME_ANCHORS:
             fixed = self.resolve_constant_or_default(location)
             return fixed.first_line, fixed.end_line
         anchor = self.resolve_statement(location)
@@ -161,7 +161,7 @@ def functions_named(file: ParsedFile, function: str) -> tuple[Function, ...]:
             f"no function '{function}'",
             where=file.full_path,
             expected=f"a function of the file: {', '.join(names) or 'it has none'}",
-            remedy="correct the qualified name" + suggestion(name, names),
+            remedy="correct the qualified name" + spelling_suggestion(name, names),
         )
     return functions
 

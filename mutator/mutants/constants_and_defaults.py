@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mutator._common.message_text import suggestion
+from mutator._common.message_text import spelling_suggestion
 from mutator.errors import MutatorError
 from mutator.model import AnchorKind, FaultLocation
 from mutator.mutants.expression_roles import blocks_of
@@ -224,7 +224,7 @@ def choose_constant_or_default(
             expected=f"one of {', '.join(names)}"
             if names
             else "another kind of anchor: there is none of this kind",
-            remedy="write the name exactly as in the source" + suggestion(name, names),
+            remedy="write the name exactly as in the source" + spelling_suggestion(name, names),
         )
     if match.unsettable_reason:
         raise MutatorError(

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mutator.config.location_syntax import PROBE_NAME
+from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.model import Injection
 
 PROBE_IMPORT_TAG = "probe"  # on the line that imports the probe
@@ -27,20 +27,20 @@ _TAG_START_BYTES = _TAG_START.encode()
 _TAG_PATTERN = rf"{_TAG_START}([0-9a-z]+(?:\+[0-9a-z]+)*)(?: guard:(\d+)| was:([^\r\n]*))?"
 # only at the end of a line, because a string of the target can contain the text of a tag
 _TAG_AT_LINE_END_PATTERN = re.compile(rf"[ \t]*{_TAG_PATTERN}(?=\r?\n?\Z)".encode())
-_PROBE_NAME_PATTERN = re.compile(rf"\b{PROBE_NAME}\b".encode())
+_PROBE_NAME_PATTERN = re.compile(rf"\b{PROBE_MODULE_NAME}\b".encode())
 _ACTIVE_CHECK_PATTERN = (  # checks of the instance or execution come first
-    rf"(?:{PROBE_NAME}\.on\(\) and \(.*?\) and )?"
-    rf'(?:{PROBE_NAME}\.(?:call|every)\("[0-9a-z]+", \d+\) and )?'
-    rf'{PROBE_NAME}\.active\("(?P<id>[0-9a-z]+)"\)'
+    rf"(?:{PROBE_MODULE_NAME}\.on\(\) and \(.*?\) and )?"
+    rf'(?:{PROBE_MODULE_NAME}\.(?:call|every)\("[0-9a-z]+", \d+\) and )?'
+    rf'{PROBE_MODULE_NAME}\.active\("(?P<id>[0-9a-z]+)"\)'
 )
 # a drift that stays after its trigger has ended guards its lines with `or _fi.steps()`
 _GUARD_PATTERN = re.compile(
-    rf"\s*if (?:not )?\(?{_ACTIVE_CHECK_PATTERN}\)?(?: or {PROBE_NAME}\.steps\(\))?:\Z".encode()
+    rf"\s*if (?:not )?\(?{_ACTIVE_CHECK_PATTERN}\)?(?: or {PROBE_MODULE_NAME}\.steps\(\))?:\Z".encode()
 )
 _CHANGED_VALUE_PATTERN = re.compile(rf" if {_ACTIVE_CHECK_PATTERN} else ".encode())
-_PROBE_CHECK_CALLS = [f"{PROBE_NAME}.{name}" for name in ("call", "every", "active")]
+_PROBE_CHECK_CALLS = [f"{PROBE_MODULE_NAME}.{name}" for name in ("call", "every", "active")]
 _CONSTANT_OR_DEFAULT_SETTING_PATTERN = re.compile(
-    rf'\s*{PROBE_NAME}\.(?:constant|default)\("[0-9a-z]+", '.encode()
+    rf'\s*{PROBE_MODULE_NAME}\.(?:constant|default)\("[0-9a-z]+", '.encode()
 )
 _TAGGED_ADDITION_PATTERN = re.compile(rf"^\+.*{_TAG_PATTERN}\r?$", re.MULTILINE)
 _FAULT_ADDITION_PATTERN = re.compile(
@@ -140,7 +140,7 @@ def replacement_tag(ids: Iterable[str], replaced_line: bytes) -> bytes:
 
 def active_check_source(tag: str) -> str:
     """Return the call that asks the probe whether the injection is active."""
-    return f'{PROBE_NAME}.active("{tag}")'
+    return f'{PROBE_MODULE_NAME}.active("{tag}")'
 
 
 def activation_condition(tag: str, injection: Injection) -> str:
@@ -148,10 +148,10 @@ def activation_condition(tag: str, injection: Injection) -> str:
 
     The limits are checked only while the fault is active.
     """
-    terms = [f"{PROBE_NAME}.on()", f"({injection.where})"] if injection.where else []
+    terms = [f"{PROBE_MODULE_NAME}.on()", f"({injection.where})"] if injection.where else []
     for name in ("call", "every"):
         if (number := getattr(injection, name)) is not None:
-            terms.append(f'{PROBE_NAME}.{name}("{tag}", {number})')
+            terms.append(f'{PROBE_MODULE_NAME}.{name}("{tag}", {number})')
     return " and ".join([*terms, active_check_source(tag)])
 
 
@@ -170,16 +170,16 @@ def constant_setting_line(tag: str, path: str, changed: str, imported: Iterable[
     """
     further = "".join(f', "{name}"' for name in imported)
     new_value = f"lambda {ORIGINAL_VALUE_NAME}: {changed}"
-    return f'{PROBE_NAME}.constant("{tag}", globals(), "{path}", {new_value}{further})'
+    return f'{PROBE_MODULE_NAME}.constant("{tag}", globals(), "{path}", {new_value}{further})'
 
 
 def default_setting_line(tag: str, function: str, parameter: str, changed: str) -> str:
     where = f'globals(), "{function}", "{parameter}"'
-    return f'{PROBE_NAME}.default("{tag}", {where}, lambda {ORIGINAL_VALUE_NAME}: {changed})'
+    return f'{PROBE_MODULE_NAME}.default("{tag}", {where}, lambda {ORIGINAL_VALUE_NAME}: {changed})'
 
 
 def has_constant_or_default_settings(data: bytes) -> bool:
-    return any(f"{PROBE_NAME}.{call}(".encode() in data for call in ("constant", "default"))
+    return any(f"{PROBE_MODULE_NAME}.{call}(".encode() in data for call in ("constant", "default"))
 
 
 def tags_for_page_scripts() -> dict[str, Any]:
@@ -188,12 +188,12 @@ def tags_for_page_scripts() -> dict[str, Any]:
 
 def probe_import_line(package: str | None) -> str:
     return tagged_line(
-        f"from {package} import {PROBE_NAME}" if package else f"import {PROBE_NAME}", PROBE_IMPORT_TAG
+        f"from {package} import {PROBE_MODULE_NAME}" if package else f"import {PROBE_MODULE_NAME}", PROBE_IMPORT_TAG
     )
 
 
 def observe_call(expressions: Sequence[tuple[str, str]]) -> str:
-    return f"{PROBE_NAME}.observe({', '.join(f'{name}={text}' for name, text in expressions)})"
+    return f"{PROBE_MODULE_NAME}.observe({', '.join(f'{name}={text}' for name, text in expressions)})"
 
 
 def find_instrumented_line(data: bytes) -> int | None:

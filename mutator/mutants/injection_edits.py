@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from mutator.config.instance_conditions import names_in_condition
-from mutator.config.location_syntax import base_name
+from mutator.config.location_syntax import base_variable
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind, TemplateNeed
-from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
+from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
 from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, parsed_file
 from mutator.mutants.changed_file_reuse import reuse_key
 from mutator.mutants.constant_imports import dotted_names_importing_constant
@@ -79,7 +79,7 @@ def injection_edit(
     model = models.get(injection.model)
     if injection.location.anchor.kind in VALUE_ANCHORS:
         return _expression_edit(file, model, injection, tag)
-    if injection.location.anchor.kind in FIXED_ANCHORS:
+    if injection.location.anchor.kind in LOAD_TIME_ANCHORS:
         return _constant_or_default_edit(file, model, injection, tag, tree)
     anchor = file.resolve_statement(injection.location)
     variables = _checked_variable_params(
@@ -191,7 +191,7 @@ def _checked_variable_params(
     for param in model.params:
         value = params.get(param.name)
         if param.type == "variable" and isinstance(value, str):
-            variable = normalize_identifier(base_name(value))
+            variable = normalize_identifier(base_variable(value))
             if variable not in names:
                 raise MutatorError(
                     f"'{value}' is not known in {injection.location.function}",

@@ -10,7 +10,7 @@ from mutator._common.hashing import content_id
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.probe_template_parts import CODE_TEMPLATE_FILE as PROBE_CODE
-from mutator.model import FIXED_ANCHORS, Fault, Hold, Trigger
+from mutator.model import LOAD_TIME_ANCHORS, Fault, Hold, Trigger
 from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.mutants.changed_file_reuse import (
     ChangedFile,
@@ -85,8 +85,8 @@ def _build_with(
     hold = fault.hold if fault and fault.hold else trigger.hold
     mutant_id = content_id([manifest.tree.digest, models.digest, fault.id if fault else None, trigger])
     edits = _edits_by_path(manifest, injection_edits)
-    probe_file = probe_path(manifest.package)
-    sets = any(injection.location.anchor.kind in FIXED_ANCHORS for injection in injections)
+    probe_file = probe_path(manifest.probe_package)
+    sets = any(injection.location.anchor.kind in LOAD_TIME_ANCHORS for injection in injections)
     probe = _build_probe(manifest, models, mutant_id, trigger, hold, ids, sets)
     text = probe.text
     splicer.check_probe_compiles(text, (mutant_id, *ids), models.folder / PROBE_CODE)
@@ -95,7 +95,7 @@ def _build_with(
     for path, file_edits in edits.items():
         file = parsed_file(manifest.tree, path)
         injection_edit = splicer.splice_and_compile(
-            file, [probe_import_edit(file, manifest.package), *file_edits], ids
+            file, [probe_import_edit(file, manifest.probe_package), *file_edits], ids
         )
         files[path], patches[path] = injection_edit.data, injection_edit.patch
     return Mutant(
@@ -139,7 +139,7 @@ def _build_probe(
     sets_constants_or_defaults: bool,
 ) -> Probe:
     # also a package or an extension module of this name would be imported instead of the probe
-    probe_stem = probe_path(manifest.package).removesuffix("py")
+    probe_stem = probe_path(manifest.probe_package).removesuffix("py")
     if clashes := [
         path for path in manifest.tree.files if path.startswith((probe_stem, f"{probe_stem[:-1]}/"))
     ]:

@@ -12,13 +12,13 @@ from itertools import chain
 from typing import Any
 
 from mutator._common.hashing import content_id
-from mutator.config.location_syntax import PROBE_NAME
+from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.errors import MutatorError
 from mutator.faults.probe_template_parts import ProbeTemplates, TemplatePart
 from mutator.model import Activation, Hold, Injection, Trigger
 from mutator.mutants.template_rendering import render_template
 from mutator.targets.observed_values import Observation
-from mutator.triggers.conditions import TIME, canonical_condition, to_python
+from mutator.triggers.conditions import TIME, canonical_condition, to_python_source
 
 _SETTINGS_USED_BY_CODE_TEMPLATE = (
     "observed",
@@ -87,15 +87,15 @@ class Probe:
 
 def probe_path(package: str | None) -> str:
     """Return the path of the probe in a mutated tree; without a package, it is at the tree's root."""
-    return f"{package}/{PROBE_NAME}.py" if package else f"{PROBE_NAME}.py"
+    return f"{package}/{PROBE_MODULE_NAME}.py" if package else f"{PROBE_MODULE_NAME}.py"
 
 
 def probe_module(package: str | None) -> str:
-    return f"{package}.{PROBE_NAME}" if package else PROBE_NAME
+    return f"{package}.{PROBE_MODULE_NAME}" if package else PROBE_MODULE_NAME
 
 
 def is_probe_path(path: str) -> bool:
-    return path.rpartition("/")[2] == f"{PROBE_NAME}.py"
+    return path.rpartition("/")[2] == f"{PROBE_MODULE_NAME}.py"
 
 
 def injection_id(index: int, injection: Injection) -> str:
@@ -127,11 +127,13 @@ def build_probe_settings(
         hold=hold.value,
         hold_s=float(trigger.hold_s or 0.0),
         armed_after_s=float(trigger.armed_after_s),
-        condition=to_python(canonical_condition(trigger.condition, variables=observation.variables)),
+        condition=to_python_source(canonical_condition(trigger.condition, variables=observation.variables)),
         variables=(TIME, *names),
         values=names,
         observed=tuple(name for name, _ in observation.name_expression_pairs),
-        derived=tuple((value.name, to_python(value.text, number=True)) for value in observation.derived),
+        derived=tuple(
+            (value.name, to_python_source(value.text, is_formula=True)) for value in observation.derived
+        ),
         counted=observation.time is None,
         step_s=float(step_s),
         sets=sets,

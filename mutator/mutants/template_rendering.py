@@ -17,9 +17,9 @@ from typing import NoReturn
 from jinja2 import TemplateError, TemplateSyntaxError, Undefined
 
 from mutator.config import units
-from mutator.config.location_syntax import PROBE_NAME, is_assignable, is_dotted_name
+from mutator.config.location_syntax import PROBE_MODULE_NAME, is_assignable, is_dotted_name
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import NAME_TYPES, FaultModel, ParamSchema, SnippetKind
+from mutator.faults.fault_models import NAME_PARAM_TYPES, FaultModel, ParamSchema, SnippetKind
 from mutator.model import Value
 from mutator.mutants.normalized_source import normalize_numbers_and_ids
 from mutator.mutants.template_language import TemplateEnvironment
@@ -132,7 +132,7 @@ def render_snippet(
     if model.kind is SnippetKind.VALUE:
         target = str(_checked_param(next(param for param in model.params if param.name == "target"), params))
         return (
-            f'if {PROBE_NAME}.active("{injection_id}"):',
+            f'if {PROBE_MODULE_NAME}.active("{injection_id}"):',
             f"    {target} = {render_changed_value(model, params, injection_id, target)}",
         )
     names = {param.name: _checked_param(param, params) for param in model.params}
@@ -216,7 +216,7 @@ def _checked_param(param: ParamSchema, params: Mapping[str, Value]) -> Value:
         return value
     fits = is_assignable if param.type == "variable" else is_dotted_name
     is_name = isinstance(value, str) and fits(value)
-    if is_name != (param.type in NAME_TYPES) or (isinstance(value, str) and not is_name):
+    if is_name != (param.type in NAME_PARAM_TYPES) or (isinstance(value, str) and not is_name):
         raise MutatorError(
             f"{value!r} for '{param.name}'",
             expected=_EXPECTED_BY_PARAM_TYPE.get(param.type, f"a {param.type}"),

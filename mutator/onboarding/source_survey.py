@@ -10,10 +10,10 @@ from importlib import metadata
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import check_inside
-from mutator.errors import MutatorError, Outside
-from mutator.targets.target_roots import INSTALLED_PREFIX, find_installed
+from mutator._common.confined_files import checked_path_inside
+from mutator.errors import MutatorError, UnsafePath
 from mutator.targets.source_tree import MOST_SOURCE_BYTES
+from mutator.targets.target_roots import INSTALLED_PREFIX, find_installed_package
 
 _MOST_FILES = 5000  # a controller has hundreds; more are a home folder or an environment, passed by mistake
 _SKIPPED_FOLDERS_AND_MODULES = {
@@ -69,7 +69,7 @@ def survey_source(target: str) -> SourceSurvey:
 
 
 def _survey_installed(name: str) -> SourceSurvey:
-    package_path = find_installed(name) if name.isidentifier() else None
+    package_path = find_installed_package(name) if name.isidentifier() else None
     if package_path is None:
         raise MutatorError(
             f"no installed package '{name}'",
@@ -145,9 +145,9 @@ def _survey_packages(root: Path, packages: tuple[str, ...], *, any_links: bool =
             relative = path.relative_to(root).as_posix()
             try:
                 if not any_links:
-                    check_inside(root, path)
+                    checked_path_inside(root, path)
                 modules.append(SourceModule(path=relative, tree=_parse(path)))
-            except Outside as err:
+            except UnsafePath as err:
                 unread.append((f"{relative}:1", err.got))
             except (SyntaxError, ValueError, RecursionError, MemoryError, OSError) as err:
                 line = getattr(err, "lineno", None) or 1

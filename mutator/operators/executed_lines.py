@@ -84,7 +84,7 @@ def _cache_key(manifest: TargetManifest, golden_run: GoldenRunInputs) -> str:
 
 
 def _load_cached(key: str) -> ExecutedLines | None:
-    path = shared_cache.lines_folder() / f"{key}.json"
+    path = shared_cache.cached_executed_lines_folder() / f"{key}.json"
     try:
         data: dict[str, Any] = json.loads(read_bounded(path))
         if data["sum"] == digest([key, data["lines"]]):
@@ -97,7 +97,7 @@ def _load_cached(key: str) -> ExecutedLines | None:
 
 def _save_cached(key: str, executed: ExecutedLines) -> None:
     lines = {file: sorted(numbers) for file, numbers in executed.items()}
-    path = shared_cache.lines_folder() / f"{key}.json"
+    path = shared_cache.cached_executed_lines_folder() / f"{key}.json"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomic(path, json_bytes({"sum": digest([key, lines]), "lines": lines}))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from mutator._common.hashing import digest
-from mutator._common.message_text import counted, suggestion
+from mutator._common.message_text import counted, spelling_suggestion
 from mutator._common.random_streams import random_generator
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
@@ -122,7 +122,7 @@ def _functions_at(manifest: TargetManifest, place: str) -> Iterator[tuple[str, s
             f"no function '{function}' in {path}" if function else f"no function in {path}",
             argument="in",
             expected=f"one of {', '.join(names)}" if function and names else "a file with functions",
-            remedy="correct the place" + suggestion(function, names),
+            remedy="correct the place" + spelling_suggestion(function, names),
         )
     yield from matching
 

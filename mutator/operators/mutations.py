@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from mutator.model import OPERATORS_MODULE, Fault, FaultLocation, Injection, Value
+from mutator.model import OPERATOR_FAULTS_MODULE, Fault, FaultLocation, Injection, Value
 from mutator.mutants.expressions import Expression
 from mutator.mutants.statements import Statement
 
@@ -47,8 +47,8 @@ class Mutation:
     def to_fault(self, reading: str) -> Fault:
         injection = Injection(location=self.location, model=self.model, params=self.params)
         return Fault(
-            spec=f"{OPERATORS_MODULE}/{self.operator}/{self.location.path}::{self.location.function}",
-            module=OPERATORS_MODULE,
+            spec=f"{OPERATOR_FAULTS_MODULE}/{self.operator}/{self.location.path}::{self.location.function}",
+            module=OPERATOR_FAULTS_MODULE,
             fault_type=self.operator,
             reading=reading,
             value=self.description,

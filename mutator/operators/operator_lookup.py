@@ -5,7 +5,7 @@ from functools import cache
 
 from mutator._common import doors
 from mutator.errors import MutatorError
-from mutator.model import OPERATORS_MODULE, Fault
+from mutator.model import OPERATOR_FAULTS_MODULE, Fault
 from mutator.operators import Operator
 
 _OPERATOR_MODEL_SUFFIXES = ("constant", "drop", "empty", "infix", "prefix", "swap")
@@ -25,7 +25,7 @@ def find_operator(name: str) -> Operator:
 
 def operator_name_of(fault: Fault) -> str | None:
     """Return the operator that made a fault, or None if a spec did. Names of specs contain no `::`."""
-    return fault.fault_type if fault.module == OPERATORS_MODULE and "::" in fault.spec else None
+    return fault.fault_type if fault.module == OPERATOR_FAULTS_MODULE and "::" in fault.spec else None
 
 
 def unique_operator_names(names: Iterable[str]) -> tuple[str, ...]:

@@ -33,7 +33,7 @@ def load_fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[F
         run_folder = folder.golden_folder(*golden_run)
         trace = load_trace(manifest, run_folder)
         judged = judge_run(manifest, trace, load_target_record(manifest, run_folder))
-        plotted = [channel.name for channel in manifest.plotted_channels if channel.name in trace]
+        plotted = [channel.name for channel in manifest.non_actuator_channels if channel.name in trace]
         runs.append(
             FaultFreeRun(
                 **golden_run._asdict(),

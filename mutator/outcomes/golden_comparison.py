@@ -76,14 +76,14 @@ def load_trace(
 
 def _check_importer_works(err: Exception, manifest: TargetManifest, path: Path) -> None:
     """Raise BadAddition if an importer of another package failed: nobody knows whether the run did."""
-    names = {name for channel in manifest.channels for name in (channel.name_in_trace, channel.time)}
+    names = {name for channel in manifest.channels for name in (channel.name_in_trace, channel.times_channel)}
     is_missing_channel = (
         isinstance(err, KeyError) and err.args[:1] and err.args[0] in {manifest.time_channel, *names}
     )
     if (
         path.is_file()
         and not is_missing_channel
-        and (failure := IMPORTERS.addition_error(path.suffix.removeprefix("."), err))
+        and (failure := IMPORTERS.other_package_error(path.suffix.removeprefix("."), err))
     ):
         raise failure from err
 
@@ -166,7 +166,9 @@ def load_target_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
 
 
 def _check_no_shortage(err: Exception) -> None:
-    """Raise Shortage if mutator itself ran out of memory or file handles, so the output can be valid."""
+    """Raise ResourceShortage if mutator itself ran out of memory or file handles, so the output can be
+    valid.
+    """
     if short := find_shortage(err):
         if isinstance(err, MemoryError):
             with suppress(MemoryError):

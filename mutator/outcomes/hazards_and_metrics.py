@@ -54,7 +54,7 @@ def load_manifest_channels(manifest: TargetManifest, out: Path) -> Trace:
 
     BadOutput if a channel that the verdict needs is missing.
     """
-    needed = {*manifest.compared_channels, *manifest.judged_channels}
+    needed = {*manifest.compared_channels, *manifest.criteria_channels}
     others = [channel for channel in manifest.channels if channel not in needed]
     return load_trace(manifest, out, [c for c in manifest.channels if c in needed], others)
 
@@ -71,7 +71,7 @@ def judge_run(
     hazards, metrics = [], []
     ends: dict[str, float] = {}
     for hazard in manifest.hazard_rules:
-        robustness = _robustness(hazard, values, manifest) if hazard.stl else None
+        robustness = _robustness(hazard, values, manifest) if hazard.required_stl else None
         first = _first_hazard_time(hazard, values, robustness, record)
         if first is not None:
             hazards.append((hazard.name, first))
@@ -93,7 +93,7 @@ def judge_run(
     contact = manifest.contact
     if contact and t_end is not None and ends.get(contact.hazard) == t_end:
         speed = value_by_metric.get(contact.speed_metric)
-        value_by_metric[DELTA_V_NAME] = None if speed is None else contact.delta_v(speed)
+        value_by_metric[DELTA_V_NAME] = None if speed is None else contact.delta_v_mps(speed)
     return RunJudgement(
         hazards=tuple(hazards),
         alerts=tuple(alert_times(record, manifest.alerts)),
@@ -109,7 +109,7 @@ def formula_values(manifest: TargetManifest, trace: Trace) -> ValuesByName:
     """
     time = np.asarray(trace[manifest.time_channel], dtype=float)
     values = {TIME: time}
-    for channel in manifest.judged_channels:
+    for channel in manifest.criteria_channels:
         values[channel.name] = values_on_steps(trace, channel.name, time).astype(float)
     for value in manifest.observation.derived:
         if value.name not in values and all(name in values for name in names_in(value.text)):
@@ -127,7 +127,7 @@ def _golden_values(golden: ValuesByName, steps: np.ndarray) -> ValuesByName:
 
 def _robustness(hazard: Hazard, values: ValuesByName, manifest: TargetManifest) -> np.ndarray:
     try:
-        return temporal_logic.robustness_at_each_step(hazard.stl, values, manifest.step_s)
+        return temporal_logic.robustness_at_each_step(hazard.required_stl, values, manifest.step_s)
     except MutatorError as error:
         where = manifest.trace_file
         raise BadOutput(error.got, where=where, expected=error.expected, remedy=error.remedy) from None
@@ -160,11 +160,13 @@ def _first_true_time(holds: np.ndarray, time: np.ndarray) -> float | None:
 
 
 def _drive_end(hazard: Hazard, first: float | None, values: ValuesByName) -> float | None:
-    if hazard.terminal == "True":
+    if hazard.terminal_condition == "True":
         return first
-    if not hazard.terminal:
+    if not hazard.terminal_condition:
         return None
-    return _first_true_time(trace_formulas.condition_at_each_step(hazard.terminal, values), values[TIME])
+    return _first_true_time(
+        trace_formulas.condition_at_each_step(hazard.terminal_condition, values), values[TIME]
+    )
 
 
 def _metric_values(metric: Metric, values: ValuesByName) -> np.ndarray:

@@ -32,7 +32,7 @@ class SeriesSampler:
 
     def __init__(self, manifest: TargetManifest, golden: Trace) -> None:
         self._channels = [
-            c for c in (*manifest.compared_channels, *manifest.plotted_channels) if c.name in golden
+            c for c in (*manifest.compared_channels, *manifest.non_actuator_channels) if c.name in golden
         ]
         self._clock = manifest.time_channel
         self._time = np.asarray(golden[self._clock], dtype=float)

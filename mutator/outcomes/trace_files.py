@@ -40,9 +40,11 @@ class TraceRequest:
         """Return the names to read from a file that has the `available` ones, and those that it must have."""
         if self.everything:
             return dict.fromkeys(available)
-        of_time = [channel.time for channel in self.channels if channel.time]
+        of_time = [channel.times_channel for channel in self.channels if channel.times_channel]
         names = [self.time_channel, *of_time, *(channel.name_in_trace for channel in self.channels)]
-        optional_names = {name for channel in self.optional for name in (channel.name_in_trace, channel.time)}
+        optional_names = {
+            name for channel in self.optional for name in (channel.name_in_trace, channel.times_channel)
+        }
         return {name: None for name in names if name in available or name not in optional_names}
 
 
@@ -109,7 +111,9 @@ def by_channel(columns: Arrays, request: TraceRequest, *, has_empty_cells: bool 
 
     With `has_empty_cells`, rows without a step time belong to channels with their own times.
     """
-    channel_names = {c.name_in_trace for c in request.channels} | {c.time for c in request.channels if c.time}
+    channel_names = {c.name_in_trace for c in request.channels} | {
+        c.times_channel for c in request.channels if c.times_channel
+    }
     rest = {
         name: column for name, column in columns.items() if request.everything and name not in channel_names
     }
@@ -121,9 +125,9 @@ def by_channel(columns: Arrays, request: TraceRequest, *, has_empty_cells: bool 
             continue
         column = columns[channel.name_in_trace]
         rows = steps
-        if channel.time:
+        if channel.times_channel:
             rows = ~_empty_mask(column) if has_empty_cells else slice(None)
-            values[own_times(channel.name)] = columns[channel.time][rows]
+            values[own_times(channel.name)] = columns[channel.times_channel][rows]
         values[channel.name] = column[rows]
     return values
 

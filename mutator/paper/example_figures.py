@@ -64,7 +64,7 @@ def _build_drawing(frame: pd.DataFrame, traces: RunTraces | None, figure: Action
     if traces is None:
         return _empty_drawing(figure, "no fault library was found, so the channels are unknown")
     manifest = traces.manifest
-    recorded = {channel.name for channel in (*manifest.compared_channels, *manifest.plotted_channels)}
+    recorded = {channel.name for channel in (*manifest.compared_channels, *manifest.non_actuator_channels)}
     if missing := [name for name in figure.action_channels if name not in recorded]:
         return _empty_drawing(figure, f"the target records no {missing[0]}")
     faults = plan_file.load_faults(traces.folder.path)

@@ -38,7 +38,8 @@ def plot_run_pair(
 ) -> "Figure":
     """Draw the panels of `figure_spec` that both runs have. In its action channels, shade `steps`."""
     units = {
-        channel.name: channel.unit for channel in (*manifest.compared_channels, *manifest.plotted_channels)
+        channel.name: channel.unit
+        for channel in (*manifest.compared_channels, *manifest.non_actuator_channels)
     }
     panels = [(c, meaning) for c, meaning in figure_spec.panels if c in pair.golden and c in pair.faulty]
     first_s = max(float(pair.times_s[0]), pair.start_s - SHOWN_BEFORE_S)

@@ -14,7 +14,7 @@ def cached_checks_path(key: str) -> Path:
     """Return the path for checks with this digest. Machines with a shared home folder have separate entries,
     because the digest might not cover everything that changes last digits.
     """
-    return path_below(shared_cache.checks_folder(), digest([key, platform.node()]))
+    return path_below(shared_cache.cached_checks_folder(), digest([key, platform.node()]))
 
 
 def store_passed_checks(entry: Path, run: Path, checks_file: str, observation_folder: Path) -> None:

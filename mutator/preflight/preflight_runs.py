@@ -118,7 +118,7 @@ class CheckRunner:
             execution = engine.execute(job, scratch)
             run = read_check_run(self.manifest, execution)
             if name[0] == GOLDEN and name[1].seed is not None:
-                shared_cache.prune_target(self.manifest.cache_name)
+                shared_cache.prune_target_cache(self.manifest.cache_name)
             if name[0] == NULL_MUTANT:
                 unreached_triggers.save_observations(
                     self.pending_folder, name[1].key, execution.watch_report.get("seen", ())

@@ -19,7 +19,7 @@ from mutator.engines.first_activation import activity_at_observations
 from mutator.model import Experiment, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import time_of
+from mutator.triggers.trigger_kinds import trigger_time_s
 from mutator.workspace import Workspace
 
 OBSERVATIONS_FOLDER = "observed"
@@ -69,7 +69,7 @@ def describe_unreached(
         trigger = experiment.trigger
         if key not in observed or not len(observed[key]):
             continue
-        if (time := time_of(trigger)) is not None:
+        if (time := trigger_time_s(trigger)) is not None:
             if time > (end := observed[key][:, 0].max()):
                 late[f"{experiment.scenario}, which ends at {end:g} s"] += 1
             continue

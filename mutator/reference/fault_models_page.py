@@ -5,7 +5,13 @@ from collections.abc import Iterator
 
 from mutator._common.table_rendering import TextTable
 from mutator.faults import fault_model_files
-from mutator.faults.fault_models import TARGET_UNIT, FaultModel, FaultModelExample, ParamSchema, SnippetKind
+from mutator.faults.fault_models import (
+    UNIT_OF_CHANGED_VARIABLE,
+    FaultModel,
+    FaultModelExample,
+    ParamSchema,
+    SnippetKind,
+)
 from mutator.reference.yaml_key_tables import generated_page_head, model_sections
 from mutator.workspace import Workspace
 
@@ -75,7 +81,7 @@ def _model_section(model: FaultModel) -> Iterator[str]:
 
 
 def _parameter_row(param: ParamSchema) -> tuple[str, str, str, str]:
-    unit = "the variable's" if param.unit == TARGET_UNIT else param.unit or "-"
+    unit = "the variable's" if param.unit == UNIT_OF_CHANGED_VARIABLE else param.unit or "-"
     low = [] if param.min is None else [f"at least {param.min:g}"]
     high = [] if param.max is None else [f"at most {param.max:g}"]
     limits = low + high + [f"`{word}`".replace("|", "\\|") for word in param.choices]

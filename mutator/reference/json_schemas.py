@@ -11,7 +11,13 @@ from mutator.config.yaml_files import StrictModel
 from mutator.execution.cluster import cluster_files
 from mutator.faults import fault_model_files, library_readings
 from mutator.faults import fault_specs as spec
-from mutator.faults.fault_models import NAME_TYPES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
+from mutator.faults.fault_models import (
+    NAME_PARAM_TYPES,
+    UNIT_OF_CHANGED_VARIABLE,
+    FaultModel,
+    FaultModels,
+    ParamSchema,
+)
 from mutator.faults.injection_specs import DIMENSIONLESS
 from mutator.faults.library_readings import Readings
 from mutator.stpa import analysis_files, context_tables, hazard_list
@@ -164,7 +170,7 @@ def _parameters_rule(model: FaultModel) -> dict[str, Any]:
 
 def spec_keys_of_parameter(param: ParamSchema) -> Iterator[str]:
     """Yield the keys of a parameter in a spec, one for each possible unit."""
-    if param.unit in (None, TARGET_UNIT):
+    if param.unit in (None, UNIT_OF_CHANGED_VARIABLE):
         yield param.name
     if param.unit is not None:
         default_unit = units.UNITS.get(param.unit)
@@ -174,7 +180,7 @@ def spec_keys_of_parameter(param: ParamSchema) -> Iterator[str]:
 
 
 def _value_schema(param: ParamSchema) -> dict[str, Any]:
-    if param.type in NAME_TYPES:
+    if param.type in NAME_PARAM_TYPES:
         return {"type": "string"}
     if param.type == "boolean":
         return {"type": "boolean"}

@@ -12,7 +12,7 @@ from mutator.targets.channels import Channel
 from mutator.targets.contact_severity import DELTA_V_NAME
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.observed_values import units_and_meanings
+from mutator.targets.observed_values import unit_and_meaning_by_name
 from mutator.targets.stored_target_facts import metric_facts
 from mutator.workspace import Workspace
 
@@ -81,7 +81,7 @@ def render_channels_page(workspace: Workspace) -> str:
 def _target_section(manifest: TargetManifest) -> Iterator[str]:
     yield f"## {manifest.name}\n"
     yield "Triggers and contexts can use these variables:\n"
-    observed_variables = units_and_meanings(manifest.observation)
+    observed_variables = unit_and_meaning_by_name(manifest.observation)
     variables = [(f"`{name}`", *unit_and_meaning) for name, unit_and_meaning in observed_variables.items()]
     yield TextTable(heads=("variable", "unit", "meaning"), rows=variables).as_markdown(escape=False)
     yield ""
@@ -122,10 +122,10 @@ def _channel_row(channel: Channel) -> tuple[str, ...]:
 
 
 def _hazard_row(hazard: Hazard) -> tuple[str, ...]:
-    condition = f"`{hazard.when or hazard.stl}`" if not hazard.is_in_record else "as recorded"
+    condition = f"`{hazard.when or hazard.required_stl}`" if not hazard.is_in_record else "as recorded"
     if hazard.for_s:
         condition += f" for {hazard.for_s:g} s"
-    ends = {"": "no", "True": "yes"}.get(hazard.terminal, f"`{hazard.terminal}`")
+    ends = {"": "no", "True": "yes"}.get(hazard.terminal_condition, f"`{hazard.terminal_condition}`")
     return hazard.name, condition, ends, hazard.about or "-"
 
 

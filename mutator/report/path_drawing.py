@@ -20,7 +20,7 @@ _THINNEST_LINE_PX = 1.8
 def draw_path_counts(structure: ControlStructureModel, counts: PathCounts, links: Collection[str]) -> str:
     """Return the control structure as SVG. `links` are those that a fault can take."""
     plain = {n: c.model_copy(update={"process_model": {}}) for n, c in structure.components.items()}
-    layout = lay_out_structure(structure.model_copy(update={"components": plain}), lines=2)
+    layout = lay_out_structure(structure.model_copy(update={"components": plain}), least_text_lines=2)
     size = f"{layout.width:.0f} {layout.height:.0f}"
     lines = [
         f'<svg class="path-figure" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" '

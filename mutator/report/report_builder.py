@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mutator._common.helper_processes import computing_meanwhile, process_count_for
+from mutator._common.helper_processes import computing_in_background, process_count_for
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
 from mutator.report.experiment_list import ExperimentListData, build_list_data
@@ -80,7 +80,7 @@ def write_report(run: Path, workspace: Workspace | None) -> WrittenReport:
 def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
     """Build the report of a run folder whose tables are up to date, without writing anything."""
     reported = ReportedRun.open(folder, workspace)
-    with computing_meanwhile(
+    with computing_in_background(
         lambda: build_list_data(reported), process_count_for(len(reported.results))
     ) as wait_for_list_data:
         study_panels = build_study_panels(reported)

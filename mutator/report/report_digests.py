@@ -5,7 +5,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from mutator._common.confined_files import check_name, files_inside, read_below, unlink_below, write_below
+from mutator._common.confined_files import (
+    checked_relative_path,
+    files_inside,
+    read_below,
+    unlink_below,
+    write_below,
+)
 from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
@@ -92,7 +98,7 @@ def _read_stamp(run: Path) -> dict[str, Any]:
         stamp = parse_json_object(read_below(run, STAMP_FILE), run / STAMP_FILE, STAMP_SCHEMA)
         if isinstance(files := stamp.get("files"), dict):
             for name in files:
-                check_name(name, run / STAMP_FILE)
+                checked_relative_path(name, run / STAMP_FILE)
             return stamp
     except (OSError, MutatorError):
         pass

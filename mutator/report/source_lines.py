@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
-from mutator.model import OPERATORS_MODULE, Fault, Outcome, Status
+from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Outcome, Status
 from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.results.outcome_counting import endings_of_rows
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
@@ -85,13 +85,13 @@ class SourceLines:
         faults: Mapping[str, Fault],
     ) -> "SourceLines | None":
         """Return the source of a run; None if it has no operators. `faults` are those of the plan."""
-        if not (results["module"] == OPERATORS_MODULE).any():
+        if not (results["module"] == OPERATOR_FAULTS_MODULE).any():
             return None
         faults_with_results = {name: faults[name] for name in results["fault_id"].unique() if name in faults}
         changes = {
             name: str(fault.value)
             for name, fault in faults_with_results.items()
-            if fault.module == OPERATORS_MODULE
+            if fault.module == OPERATOR_FAULTS_MODULE
         }
         try:
             manifest = workspace.manifest(folder.head.target) if workspace else None

@@ -10,7 +10,7 @@ from typing import Any
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json, write_json, writing_temporary_path
 from mutator._common.hashing import digest
-from mutator._common.helper_processes import computing_meanwhile, map_in_processes, process_count_for
+from mutator._common.helper_processes import computing_in_background, map_in_processes, process_count_for
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.outcomes.fault_paths import fault_paths_of
@@ -71,7 +71,7 @@ def write_tables(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     Experiments are read in batches, so that a million of them need only a few hundred MB of memory. For a
     large run, two processes build the batches.
     """
-    with computing_meanwhile(
+    with computing_in_background(
         lambda: _write_timings(folder, paths[TIMINGS_FILE]), process_count_for(folder.planned_count)
     ) as end:
         _write_result_tables(folder, paths)

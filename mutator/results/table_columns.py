@@ -21,7 +21,7 @@ from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, LAST_PLAN_COLUMNS, 
 from mutator.results.table_files import TableColumn
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stored_target_facts import T_END, MetricFacts
+from mutator.targets.stored_target_facts import DRIVE_END_COLUMN, MetricFacts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -208,7 +208,7 @@ def result_columns(
 
     `severity` is from `severity_columns`. `paths` adds the columns of the fault's path.
     """
-    ends = T_END in (metric.name for metric in metrics)
+    ends = DRIVE_END_COLUMN in (metric.name for metric in metrics)
     return (
         *FIRST_PLAN_COLUMNS,
         *_COLUMNS_TO_MANIFESTATION,
@@ -259,13 +259,13 @@ def _deviation_column(channel: str, column: str) -> ResultColumn:
 
 
 def _driven_deviation_column(channel: str, column: str) -> ResultColumn:
-    about = f"largest difference of `{channel}` from golden, up to `{T_END}`"
+    about = f"largest difference of `{channel}` from golden, up to `{DRIVE_END_COLUMN}`"
     return ResultColumn(column, "number", UNIT_OF_CHANNEL, about, lambda f: f.dev.get(channel))
 
 
 def _metric_column(metric: MetricFacts) -> ResultColumn:
     name = metric.name
-    if name == T_END:
+    if name == DRIVE_END_COLUMN:
         return ResultColumn(
             name, "number", metric.unit, metric.about, lambda f: _rounded_time(f.record.t_end)
         )
@@ -343,7 +343,7 @@ def check_column_names(manifest: TargetManifest) -> None:
     compared = [channel.name for channel in manifest.compared_channels]
     used_names = {column.name for column in result_columns((), compared, paths=True)}
     used_names |= {SEVERITY_COLUMN.name, *(column.name for column in TIME_TO_HAZARD_COLUMNS)}
-    used_names |= {*DERIVED_COLUMN_NAMES, T_END, *driven_column_by_channel(compared).values()}
+    used_names |= {*DERIVED_COLUMN_NAMES, DRIVE_END_COLUMN, *driven_column_by_channel(compared).values()}
     is_mapping = isinstance(manifest.source.data.get("hazards"), dict)
     for i, hazard in enumerate(manifest.hazard_names):
         names = {column.name for column in hazard_columns(hazard)}

@@ -10,7 +10,7 @@ from itertools import islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.bounded_reading import MOST_DATA_BYTES, read_bounded
+from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bounded
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
 from mutator.results import table_building
@@ -73,7 +73,7 @@ class Results:
 
     def _read_file(self, name: str) -> bytes:
         try:
-            return read_bounded(self.run / name, MOST_DATA_BYTES)
+            return read_bounded(self.run / name, MOST_EXPERIMENT_DATA_BYTES)
         except FileNotFoundError:
             raise MutatorError(
                 f"no results here (no {name})",

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from mutator.config.location_syntax import PROBE_NAME
+from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.mutants.injected_lines import changed_value_positions, tag_of
 from mutator.review import source_names
 from mutator.review.source_names import SUPER, NameUse, SourceImport, SourceModule, uses_in
@@ -101,7 +101,7 @@ class CalledCode:
         self, path: str, uses: Iterable[NameUse], self_class: _ClassKey | None = None
     ) -> Iterator[_Definition]:
         for use in uses:
-            if use.words[0] == PROBE_NAME:  # the probe has a group of its own
+            if use.words[0] == PROBE_MODULE_NAME:  # the probe has a group of its own
                 continue
             if use.imported:
                 yield from self._definitions_of_import(path, use.imported, use.words[1:], 0)

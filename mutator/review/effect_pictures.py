@@ -228,7 +228,7 @@ def _images_of_run(
     probe_request = {"file": location.path, "picture": picture, "effects": lines, "mutant": mutant.id}
     stub = Path(picture_probe.__file__).read_text(encoding="utf-8")
     probe = stub.replace('json.loads("{}")', f"json.loads({json.dumps(probe_request)!r})")
-    files = {**mutant.files, probe_path(manifest.package): probe.encode()}
+    files = {**mutant.files, probe_path(manifest.probe_package): probe.encode()}
     job = Job(
         name=folder.name,
         scenario=scenario,
@@ -287,7 +287,7 @@ def _jpeg_bytes(picture: np.ndarray) -> bytes:
 
 
 def _load_cached(key: str) -> EffectPictures | None:
-    path = shared_cache.pictures_folder() / f"{key}.json"
+    path = shared_cache.cached_image_effects_folder() / f"{key}.json"
     try:
         data: dict[str, Any] = json.loads(read_bounded(path))
         before, levels = data["before"], data["levels"]
@@ -306,7 +306,7 @@ def _load_cached(key: str) -> EffectPictures | None:
 
 
 def _save_cached(key: str, pictures: EffectPictures) -> None:
-    path = shared_cache.pictures_folder() / f"{key}.json"
+    path = shared_cache.cached_image_effects_folder() / f"{key}.json"
     before = base64.b64encode(pictures.before).decode()
     levels = [[level.name, level.label, base64.b64encode(level.after).decode()] for level in pictures.levels]
     data = {"sum": digest([key, before, levels]), "before": before, "levels": levels}

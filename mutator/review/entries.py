@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 
 from mutator._common.hashing import content_id
-from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 
 # for each parameter: least and greatest number, then values that are not finite (`nan`), as text
 ValueRanges = Mapping[str, tuple[float | str, ...]]
@@ -75,7 +75,7 @@ class Decision:
 class Remark:
     """A line of text about a group."""
 
-    __pydantic_config__ = mapping_config("A remark")
+    __pydantic_config__ = pydantic_mapping_config("A remark")
 
     by: str = field(metadata=_NON_EMPTY)
     at: str | None = field(default=None, metadata=yaml_metadata(pattern=TIME_PATTERN))
@@ -86,7 +86,7 @@ class Remark:
 class Flag:
     """A mark that asks for another look at a group."""
 
-    __pydantic_config__ = mapping_config("A flag")
+    __pydantic_config__ = pydantic_mapping_config("A flag")
 
     by: str = field(metadata=_NON_EMPTY)
     at: str = field(metadata=yaml_metadata(pattern=TIME_PATTERN))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from mutator._common.hashing import content_id
 from mutator.campaigns.plan import Plan
-from mutator.config.location_syntax import PROBE_NAME
+from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.faults import probe_template_parts
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec
@@ -264,7 +264,7 @@ class _GroupBuilder:
             injection_labels=(label,),
             files=(location.path,),
             functions=(location.function,),
-            models=(PROBE_NAME,),
+            models=(PROBE_MODULE_NAME,),
             trigger_kinds="",
             hold_kinds="",
             shapes=tuple(patch_shapes.shapes_of_patches([("", label, patch)])),

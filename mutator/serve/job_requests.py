@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field, TypeAdapter
 
 from mutator._common.confined_files import check_only_plain_files
 from mutator._common.cpu_cores import usable_cores
-from mutator._common.message_text import describe_choices, suggestion
+from mutator._common.message_text import describe_choices, spelling_suggestion
 from mutator.campaigns.filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
@@ -271,5 +271,5 @@ def _unknown_name_error(what: str, name: str, accepted: Collection[str]) -> Muta
         f"no {what} '{name}'",
         where=what,
         expected=describe_choices(accepted),
-        remedy="correct the name" + suggestion(name, list(accepted)),
+        remedy="correct the name" + spelling_suggestion(name, list(accepted)),
     )

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from mutator._common.progress_events import EVENTS_FD_VARIABLE
-from mutator.errors import JobEnded, MutatorError, NotServed
+from mutator.errors import JobAlreadyEnded, MutatorError, NotServed
 from mutator.execution.progress_text import describe_outcomes
 from mutator.serve.job_events import EventReader, FileEvent, JobEvent, PhaseEvent
 from mutator.serve.job_requests import TRIALS_FOLDER, JobCommand
@@ -146,11 +146,11 @@ class ServeJobs:
         raise NotServed(f"no job '{name}'", expected="the id of a job of this server")
 
     def cancel(self, name: str) -> None:
-        """Cancel a job with all its processes; JobEnded if the job has already ended."""
+        """Cancel a job with all its processes; JobAlreadyEnded if the job has already ended."""
         job = self.get(name)
         with self._lock:
             if job.ended:
-                raise JobEnded(f"job {name} has ended ({job.state})")
+                raise JobAlreadyEnded(f"job {name} has ended ({job.state})")
             self._cancel(job)
 
     def close(self) -> None:

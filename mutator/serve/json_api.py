@@ -5,7 +5,7 @@ from urllib.parse import parse_qsl
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from mutator.errors import GroupsChanged, JobEnded, MutatorError
+from mutator.errors import GroupsChanged, JobAlreadyEnded, MutatorError
 from mutator.serve.job_requests import JobCommand, RequestChecker
 from mutator.serve.jobs import ServeJobs
 from mutator.serve.page_tokens import HOME_PAGE, TOKEN_HEADER, PageTokens, review_page_name, run_page_name
@@ -87,7 +87,7 @@ class JobApi:
         self._check_token(request, job.job_command)
         try:
             self._jobs.cancel(job.id)
-        except JobEnded as err:
+        except JobAlreadyEnded as err:
             return JSONResponse(error_facts(err), 409)
         return JSONResponse({"id": job.id})
 

@@ -11,7 +11,7 @@ import secrets
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator.errors import PageRefused
+from mutator.errors import RequestFromWrongPage
 
 TOKEN_HEADER = "x-mutator-page"
 HOME_PAGE = "home"
@@ -28,9 +28,9 @@ class PageTokens:
         return hmac.new(self._key, page.encode("utf-8", "surrogateescape"), hashlib.sha256).hexdigest()
 
     def check_page(self, token: str, *pages: str) -> None:
-        """Raise PageRefused unless the token is that of one of these pages."""
+        """Raise RequestFromWrongPage unless the token is that of one of these pages."""
         if not any(hmac.compare_digest(self.token_of(page).encode(), token.encode()) for page in pages):
-            raise PageRefused(
+            raise RequestFromWrongPage(
                 "the request does not come from the page that may send it",
                 remedy="reload the page; start other jobs on the first page",
             )

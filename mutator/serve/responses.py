@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.types import Receive, Scope, Send
 
-from mutator.errors import MutatorError, NotServed, PageRefused
+from mutator.errors import MutatorError, NotServed, RequestFromWrongPage
 from mutator.serve.home_and_error_pages import error_page
 
 _MEDIA_TYPES = {
@@ -76,7 +76,9 @@ def error_facts(error: MutatorError) -> dict[str, Any]:
 def on_error(request: Request, error: Exception) -> Response:
     """Return the response to a failed request: JSON for scripts, a page for people."""
     failure = _as_mutator_error(error)
-    status = 404 if isinstance(failure, NotServed) else 403 if isinstance(failure, PageRefused) else 400
+    status = (
+        404 if isinstance(failure, NotServed) else 403 if isinstance(failure, RequestFromWrongPage) else 400
+    )
     if isinstance(error, HTTPException):
         status = error.status_code
     facts = error_facts(failure)

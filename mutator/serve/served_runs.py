@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from mutator._common.confined_files import open_below
 from mutator._common.folder_search import RUN_HEAD_FILE
-from mutator.errors import MutatorError, NotServed, Outside
+from mutator.errors import MutatorError, NotServed, UnsafePath
 from mutator.results.outcome_counting import count_endings
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
@@ -116,7 +116,7 @@ def open_plain_file(root: Path, name: str) -> BinaryIO:
     """Open a file below a folder without following links; NotServed if there is no plain file."""
     try:
         return open_below(root, name)
-    except (OSError, Outside):
+    except (OSError, UnsafePath):
         raise _no_such_file() from None
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from mutator._common.table_rendering import TextTable
-from mutator.model import OPERATORS_MODULE, Fault, Status
+from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Status
 from mutator.results.table_columns import alert_names_in
 from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.shares import Share, share
@@ -50,7 +50,7 @@ def mutant_drives(
     transient), a flag `active`, and a flag for each effect. A crashed or timed-out drive is active. Without
     `golden_alerts`, there is no flag for alerts.
     """
-    mutant_runs = frame[frame["module"] == OPERATORS_MODULE]
+    mutant_runs = frame[frame["module"] == OPERATOR_FAULTS_MODULE]
     is_broken = mutant_runs["status"].isin([Status.CRASHED.value, Status.TIMEOUT.value])
     flags = {
         _ACTIVE_COLUMN: mutant_runs["is_activated"] | is_broken,
@@ -108,7 +108,7 @@ def mutation_score_sheet(
     exclusions.
     """
     drives = mutant_drives(frame, faults, golden_alerts)
-    planned = {name for name, fault in faults.items() if fault.module == OPERATORS_MODULE}
+    planned = {name for name, fault in faults.items() if fault.module == OPERATOR_FAULTS_MODULE}
     missing = len(planned - set(drives["mutant"]))
     without = f" Without a result, and therefore not counted: {missing} of {len(planned)}." if missing else ""
     chosen = f" Chosen: {'; '.join(f'`{text}`' for text in operator_notes)}." if operator_notes else ""

@@ -13,7 +13,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from mutator._common.confined_files import entries_below, is_file_or_folder, is_too_deep, not_plain_error
-from mutator.errors import Outside
+from mutator.errors import UnsafePath
 from mutator.store import file_digests
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD
 
@@ -44,7 +44,7 @@ _UNCHECKED_FOLDERS = (SCRATCH_FOLDER, DAMAGED_FOLDER, f"{TRACES_FOLDER}/*/{SCRAT
 
 
 def check_contents(run: Path) -> None:
-    """Raise Outside for a link, a special file, an unprintable name, a file in place of a folder, folders
+    """Raise UnsafePath for a link, a special file, an unprintable name, a file in place of a folder, folders
     nested too deeply, or two names that differ only in case.
 
     Folders that can contain anything only have to be folders.
@@ -77,5 +77,7 @@ def is_unchecked_folder(name: str) -> bool:
     )
 
 
-def _outside_error(got: str, where: Path, expected: str) -> Outside:
-    return Outside(got, where=where, expected=expected, remedy="rename or delete what does not belong here")
+def _outside_error(got: str, where: Path, expected: str) -> UnsafePath:
+    return UnsafePath(
+        got, where=where, expected=expected, remedy="rename or delete what does not belong here"
+    )

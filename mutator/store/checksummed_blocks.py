@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from mutator._common.bounded_reading import MOST_DATA_BYTES, read_bounded
+from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bounded
 from mutator._common.files import raising_disk_full
 
 _BLOCK_MARK = b"FIB1"
@@ -103,13 +103,17 @@ def block_bytes(kind: int, key: str, data: bytes) -> bytes:
 
 
 def read_blocks(path: Path) -> BlockFile:
-    parts = list(_blocks_or_none(read_bounded(path, MOST_DATA_BYTES)))
+    parts = list(_blocks_or_none(read_bounded(path, MOST_EXPERIMENT_DATA_BYTES)))
     blocks = tuple(block for block in parts if block is not None)
     return BlockFile(path=path, blocks=blocks, is_damaged=len(blocks) < len(parts))
 
 
 def intact_blocks(path: Path) -> Iterator[Block]:
-    yield from (block for block in _blocks_or_none(read_bounded(path, MOST_DATA_BYTES)) if block is not None)
+    yield from (
+        block
+        for block in _blocks_or_none(read_bounded(path, MOST_EXPERIMENT_DATA_BYTES))
+        if block is not None
+    )
 
 
 def _blocks_or_none(data: bytes) -> Iterator[Block | None]:

@@ -14,7 +14,12 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mutator._common.bounded_reading import MOST_DATA_BYTES, open_regular, read_bounded_lines, read_open_file
+from mutator._common.bounded_reading import (
+    MOST_EXPERIMENT_DATA_BYTES,
+    open_regular,
+    read_bounded_lines,
+    read_open_file,
+)
 from mutator._common.files import check_schema, raising_disk_full, writing_atomic
 from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
@@ -222,7 +227,7 @@ def _is_intact(last_checksum: bytes, line: bytes) -> bool:
 
 def _read_bytes(path: Path) -> bytes:
     with _open_lines(path) as file:
-        return read_open_file(file, path, MOST_DATA_BYTES)
+        return read_open_file(file, path, MOST_EXPERIMENT_DATA_BYTES)
 
 
 def _open_lines(path: Path) -> BinaryIO:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mutator._common.confined_files import unlink_below
 from mutator._common.doors import EXPORTS
-from mutator._common.files import final_name, is_half_written, read_json, remove_folder
+from mutator._common.files import final_name_of_half_written, is_half_written, read_json, remove_folder
 from mutator._common.folder_locks import owning_run_folder
 from mutator.errors import MutatorError
 from mutator.store.allowed_contents import (
@@ -118,7 +118,7 @@ def _run_file_globs() -> tuple[str, ...]:
 
 
 def _matches_any(name: str, patterns: Iterable[str]) -> bool:
-    whole = Path(name).with_name(final_name(Path(name).name)).as_posix()
+    whole = Path(name).with_name(final_name_of_half_written(Path(name).name)).as_posix()
     return any(fnmatchcase(whole, pattern) for pattern in patterns)
 
 

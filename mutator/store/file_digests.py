@@ -17,18 +17,18 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from mutator._common.bounded_reading import (
-    MOST_DATA_BYTES,
+    MOST_EXPERIMENT_DATA_BYTES,
     MOST_JSON_BYTES,
     check_file_size,
     open_regular,
     read_bounded,
     read_open_file,
 )
-from mutator._common.confined_files import check_name, open_below, path_below, write_below
+from mutator._common.confined_files import checked_relative_path, open_below, path_below, write_below
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.files import is_no_file_error, json_bytes, read_json, write_json
 from mutator._common.hashing import digest
-from mutator.errors import MutatorError, Outside
+from mutator.errors import MutatorError, UnsafePath
 from mutator.store.checksummed_lines import read_segment
 
 SCHEMA, FILE = "digests/1", "digests.json"
@@ -70,7 +70,7 @@ class FileDigest:
         try:
             with open_below(run, name) as file:
                 return cls._of_open_file(file, path_below(run, name))
-        except Outside:
+        except UnsafePath:
             return None
         except OSError as err:
             if not is_no_file_error(err):
@@ -174,8 +174,8 @@ def load_ledger(run: Path) -> DigestLedger:
         )
     try:
         for name in (*data["files"], *data["rewriting"]):
-            if not is_ledger_name(check_name(name, path)):
-                raise Outside(f"names {name!a}", where=path, expected="files of a run", remedy=remedy)
+            if not is_ledger_name(checked_relative_path(name, path)):
+                raise UnsafePath(f"names {name!a}", where=path, expected="files of a run", remedy=remedy)
         return DigestLedger(
             files={name: FileDigest(**value) for name, value in data["files"].items()},
             rewriting={name: value and FileDigest(**value) for name, value in data["rewriting"].items()},
@@ -275,7 +275,7 @@ def list_segments(run: Path) -> list[str]:
 
 def _close_segment(run: Path, name: str) -> FileDigest:
     with open_below(run, name) as file:
-        data = read_open_file(file, path_below(run, name), MOST_DATA_BYTES)
+        data = read_open_file(file, path_below(run, name), MOST_EXPERIMENT_DATA_BYTES)
         os.fsync(file.fileno())  # the ledger must not name bytes that a power cut can still take
     segment = read_segment(path_below(run, name), data)
     if segment.damaged_lines:

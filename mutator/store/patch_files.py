@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from mutator._common.bounded_reading import unpack_bounded
+from mutator._common.bounded_reading import decompress_bounded
 from mutator._common.confined_files import path_below
 from mutator._common.files import write_atomic
 from mutator._common.hashing import digest
@@ -79,7 +79,7 @@ class _CompletePatch:
 
     @property
     def data(self) -> bytes:
-        return unpack_bounded(self._block.data, MOST_PATCH_BYTES)
+        return decompress_bounded(self._block.data, MOST_PATCH_BYTES)
 
     @cached_property
     def shared_end(self) -> bytes:
@@ -100,8 +100,8 @@ def _unpack_patch(block: Block, complete: _CompletePatch | None) -> bytes | None
     """Return the patch in a block; None if it or the complete patch on which it depends is damaged."""
     try:
         if block.kind == COMPLETE_BLOCK or complete is None:
-            return unpack_bounded(block.data, MOST_PATCH_BYTES)
-        return unpack_bounded(block.data, MOST_PATCH_BYTES, complete.shared_end)
+            return decompress_bounded(block.data, MOST_PATCH_BYTES)
+        return decompress_bounded(block.data, MOST_PATCH_BYTES, complete.shared_end)
     except (zlib.error, ValueError):
         return None
 

@@ -11,7 +11,7 @@ from functools import lru_cache
 from hashlib import sha256
 from typing import Any, TypeVar
 
-from mutator._common.confined_files import check_library_name
+from mutator._common.confined_files import checked_name_not_path
 from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
 from mutator.model import (
@@ -124,7 +124,7 @@ _parse_scalar = lru_cache(maxsize=1024)(_parse_canonical)
 
 @lru_cache(maxsize=1024)
 def _parse_scenario(text: bytes) -> str:
-    return check_library_name(_parse_canonical(text), "plan")
+    return checked_name_not_path(_parse_canonical(text), "plan")
 
 
 @lru_cache(maxsize=64)
@@ -146,7 +146,7 @@ def experiment_from_json(data: Mapping[str, Any], faults: Mapping[str, Fault]) -
         raise MutatorError(
             f"fault {data['fault']} is missing from plan/faults.jsonl, or was changed there", remedy=REMEDY
         )
-    check_library_name(str(data["scenario"]), "plan")
+    checked_name_not_path(str(data["scenario"]), "plan")
     trigger = data["trigger"]
     values = {name: value for name, value in data.items() if name != "id"}
     converted = {

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mutator._common.bounded_reading import MOST_DATA_BYTES, read_bounded
+from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bounded
 from mutator._common.confined_files import path_below
 from mutator._common.files import check_path_encodable
 from mutator._common.hashing import as_json_types
@@ -148,7 +148,7 @@ class RunFolder:
         for stretch in reversed(self.stretches):
             for path in files:
                 if fnmatchcase(path.stem, stretch.records) and experiment_id.encode() in read_bounded(
-                    path, MOST_DATA_BYTES
+                    path, MOST_EXPERIMENT_DATA_BYTES
                 ):
                     return stretch
         return None

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from mutator._common.confined_files import check_library_name, check_name
+from mutator._common.confined_files import checked_name_not_path, checked_relative_path
 from mutator._common.files import json_bytes, read_json
 from mutator._common.folder_search import RUN_HEAD_FILE
 from mutator._common.hashing import added_field, as_json_types
@@ -94,9 +94,9 @@ def load_head(run: Path) -> RunHead:
     except TypeMisfit as err:
         raise _damage_error(path, err) from None
     for name in head.golden_files:
-        check_name(name, path)
+        checked_relative_path(name, path)
     for name in (head.target, *(golden[0] for golden in head.goldens)):
-        check_library_name(name, path)
+        checked_name_not_path(name, path)
     return head
 
 

@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator._common.bounded_reading import MOST_DATA_BYTES, open_regular, read_open_file
+from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, open_regular, read_open_file
 from mutator.model import Status
 
 
@@ -71,7 +71,7 @@ class RecordTail:
             offset = self._offset_by_file.get(path, 0)
             with open_regular(path) as file:
                 file.seek(offset)
-                data = read_open_file(file, path, MOST_DATA_BYTES)
+                data = read_open_file(file, path, MOST_EXPERIMENT_DATA_BYTES)
             end = data.rfind(b"\n") + 1  # a line that is still being written is read at the next poll
             self._offset_by_file[path] = offset + end
             for line in data[:end].splitlines():

@@ -12,8 +12,8 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from mutator._common.bounded_reading import unpack_bounded
-from mutator._common.confined_files import check_name, path_below
+from mutator._common.bounded_reading import decompress_bounded
+from mutator._common.confined_files import checked_relative_path, path_below
 from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
 from mutator.model import Record
@@ -215,13 +215,13 @@ def load_index(path: Path) -> SeriesIndex:
     try:
         packed = read_script(path)
         data = json.loads(
-            unpack_bounded(packed, _MOST_INDEX_RATIO * len(packed) + _MOST_INDEX_BYTES, gzip=True)
+            decompress_bounded(packed, _MOST_INDEX_RATIO * len(packed) + _MOST_INDEX_BYTES, gzip=True)
         )
         if data["schema"] != SCHEMA:
             raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SCHEMA, remedy=remedy)
         index = SeriesIndex.from_json(data)
         for name in (*(name for name, _ in index.chunks), *index.golden_entries):
-            check_name(name, path)
+            checked_relative_path(name, path)
         for number in (*index.golden_entries.values(), *index.experiment_entries.values()):
             if number not in range(len(index.entry_places)):
                 raise ValueError(f"no entry {number}")

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.bounded_reading import unpack_bounded
+from mutator._common.bounded_reading import decompress_bounded
 from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
 
@@ -98,7 +98,7 @@ def encode_series(series: Series, golden: Series | None = None) -> bytes:
 def decode_series(data: bytes, golden: Series | None = None) -> Series:
     """Decode a run that was encoded with `golden`; MutatorError if the bytes are damaged."""
     try:
-        return _decode_unpacked(unpack_bounded(data, MOST_SERIES_BYTES, gzip=True), golden)
+        return _decode_unpacked(decompress_bounded(data, MOST_SERIES_BYTES, gzip=True), golden)
     except (*_DECODE_ERRORS, struct.error, zlib.error) as err:
         raise MutatorError(f"a damaged series ({err})", expected="unchanged bytes") from None
 

@@ -56,4 +56,4 @@ def remember_facts(key: str, **facts: Any) -> None:
 
 
 def _entry_path(key: str) -> Path:
-    return path_below(shared_cache.runs_folder(), f"{key}.json")
+    return path_below(shared_cache.cached_verifications_folder(), f"{key}.json")

@@ -3,7 +3,7 @@
 import ast
 from collections.abc import Iterator
 
-from mutator._common.message_text import suggestion
+from mutator._common.message_text import spelling_suggestion
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
@@ -73,7 +73,7 @@ def _unrecorded_actions(analysis: HazardAnalysis, manifest: TargetManifest) -> I
                 ("channels", channel.name, "component"),
                 f"component '{channel.component}'",
                 expected=f"a component of the control structure: {', '.join(components)}",
-                remedy="correct the name" + suggestion(channel.component, list(components)),
+                remedy="correct the name" + spelling_suggestion(channel.component, list(components)),
             )
 
 
@@ -86,7 +86,7 @@ def _unknown_variables(analysis: HazardAnalysis, manifest: TargetManifest) -> It
                     ("components", name, "process_model", variable, "observed"),
                     f"variable '{model.observed}'",
                     expected=f"one of the values observed in the target: {', '.join(observed)}",
-                    remedy="correct the name" + suggestion(model.observed, list(observed)),
+                    remedy="correct the name" + spelling_suggestion(model.observed, list(observed)),
                 )
 
 
@@ -197,7 +197,7 @@ def _missing_files_and_places(analysis: HazardAnalysis, manifest: TargetManifest
                 yield analysis.structure_source.error(
                     ("components", name, "modules", i),
                     f"no file '{path}' in target {manifest.name}",
-                    remedy="correct the path" + suggestion(path, list(files)),
+                    remedy="correct the path" + spelling_suggestion(path, list(files)),
                 )
     for name, factor in analysis.factors_by_id.items():
         for i, place in enumerate(factor.at):
@@ -210,7 +210,7 @@ def _missing_files_and_places(analysis: HazardAnalysis, manifest: TargetManifest
                     ("causal_factors", name, "at", i),
                     f"no place '{place}' in target {manifest.name}",
                     expected="file::Class.function",
-                    remedy="correct the place" + suggestion(function, function_names),
+                    remedy="correct the place" + spelling_suggestion(function, function_names),
                 )
 
 
@@ -233,7 +233,7 @@ def _factor_problems(analysis: HazardAnalysis, specs: SpecsByName) -> Iterator[M
                     (*keys, "faults", i),
                     f"fault spec '{fault}'",
                     expected="a spec of the library",
-                    remedy="correct the name" + suggestion(fault, list(specs)),
+                    remedy="correct the name" + spelling_suggestion(fault, list(specs)),
                 )
         if all_exist and factor.faults:
             yield from _wrong_places(analysis, keys, factor, specs)

@@ -12,7 +12,7 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator._common.confined_files import path_below
-from mutator._common.message_text import describe_choices, suggestion
+from mutator._common.message_text import describe_choices, spelling_suggestion
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.stpa.context_tables import ContextTable, load_context_table
@@ -200,7 +200,7 @@ def _check_exists(source: YamlSource, keys: KeyPath, what: str, name: str, names
             keys,
             f"{what} '{name}'",
             expected=describe_choices(names),
-            remedy="correct the name" + suggestion(name, list(names)),
+            remedy="correct the name" + spelling_suggestion(name, list(names)),
         )
 
 

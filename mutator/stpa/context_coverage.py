@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from itertools import pairwise, product
 
 from mutator._common.message_text import counted
-from mutator.errors import NotTestable
+from mutator.errors import BoundaryNotTestable
 from mutator.triggers.conditions import evaluate_condition
 
-MOST_TESTS = 400_000  # most tests: contexts times cells
+MOST_CELL_TESTS = 400_000  # most tests: contexts times cells
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,13 +44,13 @@ def measure_coverage(conditions: Mapping[str, str]) -> TableCoverage:
     """Test the conditions of a table, row id -> condition, in every cell."""
     try:
         cuts = _constants_by_variable(conditions.values())
-    except NotTestable as error:
+    except BoundaryNotTestable as error:
         return TableCoverage(
             no_proof_reason=f"{error}; only comparisons of one variable with a constant can be tested"
         )
     axes = [_axis_cells(name, sorted(values)) for name, values in cuts.items()]
     total = math.prod(len(axis) for axis in axes)
-    if total * len(conditions) > MOST_TESTS:
+    if total * len(conditions) > MOST_CELL_TESTS:
         size = f"{counted(total, 'cell')} for {counted(len(conditions), 'context')}"
         return TableCoverage(no_proof_reason=f"its constants yield {size}, too many to test")
     for place in product(*axes):
@@ -78,7 +78,7 @@ def _variable_and_constant(left: ast.expr, right: ast.expr) -> tuple[str, float]
         value = _constant_value(constant)
         if isinstance(variable, ast.Name) and value is not None:
             return variable.id, value
-    raise NotTestable(f"a condition compares '{ast.unparse(left)}' with '{ast.unparse(right)}'")
+    raise BoundaryNotTestable(f"a condition compares '{ast.unparse(left)}' with '{ast.unparse(right)}'")
 
 
 def _constant_value(node: ast.expr) -> float | None:

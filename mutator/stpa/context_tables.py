@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
@@ -23,7 +23,7 @@ _CONSTANT_NAME_PATTERN = re.compile(r"[a-z][a-z0-9_]*\Z")
 class ActionHazards:
     """The hazards that follow from one control action in one context; `null` means no hazard."""
 
-    __pydantic_config__ = mapping_config("The hazards of an action")
+    __pydantic_config__ = pydantic_mapping_config("The hazards of an action")
 
     provided: str | None = field(metadata=yaml_metadata("The hazard that occurs if the action is provided."))
     not_provided: str | None = field(

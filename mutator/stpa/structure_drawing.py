@@ -53,7 +53,7 @@ def render_structure(analysis: HazardAnalysis) -> str:
     return "\n".join(lines) + "\n"
 
 
-def factors_by_place(analysis: HazardAnalysis) -> dict[str, list[str]]:
+def factors_with_faults_by_place(analysis: HazardAnalysis) -> dict[str, list[str]]:
     """Return the links and components at which faults enter, with the causal factors of these faults."""
     places: dict[str, list[str]] = {}
     for name, factor in analysis.factors_by_id.items():
@@ -67,7 +67,7 @@ def _escaped_line(text: str) -> str:
 
 
 def _link_arrows(analysis: HazardAnalysis, layout: StructureLayout) -> Iterator[str]:
-    faulty = factors_by_place(analysis)
+    faulty = factors_with_faults_by_place(analysis)
     actions = {action.link for action in analysis.structure.control_actions.values()}
     for name, link in analysis.structure.links.items():
         colour = FAULT_COLOUR if name in faulty else ACTION_COLOUR if name in actions else FEEDBACK_COLOUR
@@ -84,7 +84,7 @@ def _arrow_path(points: Iterable[Point], colour: str, width: float, *, dashed: b
 
 
 def _component_boxes(analysis: HazardAnalysis, layout: StructureLayout) -> Iterator[str]:
-    faulty = factors_by_place(analysis)
+    faulty = factors_with_faults_by_place(analysis)
     for name, component in analysis.structure.components.items():
         box = layout.boxes[name]
         edge, width = (FAULT_COLOUR, 3) if name in faulty else (INK_COLOUR, 1.2)
@@ -105,7 +105,7 @@ def _box_text(box: ComponentBox) -> Iterator[str]:
 
 
 def _link_labels(analysis: HazardAnalysis, layout: StructureLayout) -> Iterator[str]:
-    faulty = factors_by_place(analysis)
+    faulty = factors_with_faults_by_place(analysis)
     for name, link in analysis.structure.links.items():
         arrow = layout.arrows[name]
         yield svg_shapes.label_line(arrow, _escaped_line(link.label))

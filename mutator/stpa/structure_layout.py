@@ -17,8 +17,8 @@ LEFT_MARGIN = 110  # margin left of the first column, for arrows around the rows
 DRAWING_EDGE = 20
 BOX_HEIGHT = 46
 TEXT_LINE_HEIGHT = 17  # height of each further line of text in a box
-TRACK_HEIGHT = 44
-CHANNEL_HEIGHT = 64  # height of a channel without tracks
+ARROW_TRACK_HEIGHT = 44
+ROW_GAP_HEIGHT = 64  # height of a channel without tracks
 MIN_ARROW_DISTANCE = 24  # distance between parallel arrows
 
 
@@ -58,9 +58,9 @@ class StructureLayout:
     height: float
 
 
-def lay_out_structure(structure: ControlStructureModel, lines: int = 1) -> StructureLayout:
-    """Place every component and link. Each box has room for at least `lines` lines of text."""
-    boxes = _place_boxes(structure, lines)
+def lay_out_structure(structure: ControlStructureModel, least_text_lines: int = 1) -> StructureLayout:
+    """Place every component and link. Each box has room for at least `least_text_lines` lines of text."""
+    boxes = _place_boxes(structure, least_text_lines)
     ports = _place_ports(structure.links, boxes)
     points: dict[str, tuple[Point, ...]] = {}
     used: dict[int, int] = defaultdict(int)
@@ -69,14 +69,14 @@ def lay_out_structure(structure: ControlStructureModel, lines: int = 1) -> Struc
         if tail.row == tip.row:
             points[name] = _sideways_points(tail, tip)
         elif _is_blocked(ports[name], tail, tip, boxes.values()):
-            points[name] = _margin_points(tail, tip)
+            points[name] = _left_margin_points(tail, tip)
         elif ports[name][0] == ports[name][1]:
             points[name] = _straight_points(ports[name][0], tail, tip)
         else:
             row = min(tail.row, tip.row)
             used[row] += 1
             top = max(box.bottom for box in boxes.values() if box.row == row)
-            points[name] = _elbow_points(ports[name], tail, tip, top + used[row] * TRACK_HEIGHT)
+            points[name] = _elbow_points(ports[name], tail, tip, top + used[row] * ARROW_TRACK_HEIGHT)
     words = {name: link.label for name, link in structure.links.items()}
     areas = [(box.x, box.y, box.x + box.width, box.bottom) for box in boxes.values()]
     labels = place_labels(words, points, areas)
@@ -88,16 +88,16 @@ def lay_out_structure(structure: ControlStructureModel, lines: int = 1) -> Struc
     )
 
 
-def _place_boxes(structure: ControlStructureModel, lines: int) -> dict[str, ComponentBox]:
+def _place_boxes(structure: ControlStructureModel, least_text_lines: int) -> dict[str, ComponentBox]:
     components = structure.components
     heights: dict[int, float] = defaultdict(float)
     for component in components.values():
-        height = BOX_HEIGHT + TEXT_LINE_HEIGHT * (max(len(_box_lines(component)), lines) - 1)
+        height = BOX_HEIGHT + TEXT_LINE_HEIGHT * (max(len(_box_lines(component)), least_text_lines) - 1)
         heights[component.drawn[0]] = max(heights[component.drawn[0]], height)
     tops, y = {}, float(DRAWING_EDGE)
     for row in sorted(heights):
         tops[row] = y
-        y += heights[row] + CHANNEL_HEIGHT + TRACK_HEIGHT * _count_tracks(structure, row)
+        y += heights[row] + ROW_GAP_HEIGHT + ARROW_TRACK_HEIGHT * _count_tracks(structure, row)
     columns = max(component.drawn[1] + component.drawn[2] for component in components.values())
     boxes = {}
     for name, component in components.items():
@@ -171,8 +171,8 @@ def _spread_port(
     links: dict[str, LinkModel],
     boxes: dict[str, ComponentBox],
 ) -> float:
-    """Return the x of a link at the box `own`. The links of an edge are spread evenly, in the order of their
-    other ends.
+    """Return the x of a link at the box `box_name`. The links of an edge are spread evenly, in the order of
+    their other ends.
     """
     other = links[name].to if links[name].from_ == box_name else links[name].from_
     mates = edges[box_name, boxes[box_name].row < boxes[other].row]
@@ -181,8 +181,8 @@ def _spread_port(
 
 
 def _free_port(x: float, toward: float, box: ComponentBox, others: list[float]) -> float:
-    """Return the place on the box's edge that is nearest to `x` and at least `APART` from `others`. It is
-    added to `others`.
+    """Return the place on the box's edge that is nearest to `x` and at least `MIN_ARROW_DISTANCE` from
+    `others`. It is added to `others`.
 
     The side towards the other end, `toward`, is tried first, because this saves a crossing.
     """
@@ -230,6 +230,6 @@ def _sideways_points(tail: ComponentBox, tip: ComponentBox) -> tuple[Point, ...]
     return (x1, y), (x2, y)
 
 
-def _margin_points(tail: ComponentBox, tip: ComponentBox) -> tuple[Point, ...]:
+def _left_margin_points(tail: ComponentBox, tip: ComponentBox) -> tuple[Point, ...]:
     x, y = DRAWING_EDGE + LEFT_MARGIN / 2.0, tail.y + tail.height / 2.0
     return (tail.x, y), (x, y), (x, tip.y if tail.row < tip.row else tip.bottom)

@@ -37,8 +37,9 @@ class ChannelModel(StrictModel, title="A channel"):
         "rounding.",
     )
     about: str = Field("", description="What the channel contains.")
-    time: str = Field(
+    times_channel: str = Field(
         "",
+        alias="time",
         description="For a channel that is not recorded in each step: the channel that holds its times. If "
         "the trace is a table (`.csv`, `.parquet`), its empty cells are skipped.",
     )
@@ -107,10 +108,10 @@ def _build_channel(name: str, model: ChannelModel, trace: TraceModel, source: Ya
             f"'{model.from_}'",
             expected="the topic and the field of its messages: `/car/state:speed`",
         )
-    if in_topics and model.time:
+    if in_topics and model.times_channel:
         raise source.error(
             (*keys, "time"),
-            f"'{model.time}'",
+            f"'{model.times_channel}'",
             expected="no `time` for an .mcap file, in which each message has its own",
             remedy="leave it out",
         )

@@ -37,7 +37,7 @@ class Channel:
     component: str = ""
     tolerance: float = 0.0
     about: str = ""
-    time: str = ""
+    times_channel: str = ""
     other_trace_name: str = ""
 
     @property

@@ -2,19 +2,19 @@
 
 from dataclasses import dataclass, field
 
-from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 
 SEVERITY_CLASSES = ("S0", "S1", "S2", "S3")  # from ISO 26262-3, the mildest first
 DELTA_V_NAME = "delta_v"  # name of the metric
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contact:
+class ContactSettings:
     """How severe a contact is. The metric `delta_v` is the delta-v of the ego car, `contact_speed *
     other_mass_kg / (mass_kg + other_mass_kg)`; the scale assigns its class.
     """
 
-    __pydantic_config__ = mapping_config("Severity")
+    __pydantic_config__ = pydantic_mapping_config("Severity")
 
     hazard: str = field(
         metadata=yaml_metadata("The terminal hazard that is a contact with another vehicle.", alias="contact")
@@ -41,7 +41,7 @@ class Contact:
         )
     )
 
-    def delta_v(self, closing_speed_mps: float) -> float:
+    def delta_v_mps(self, closing_speed_mps: float) -> float:
         """Return the change of the ego car's speed in m/s, in an inelastic collision along the line of
         travel; 0 if the closing speed is not positive.
         """
@@ -63,6 +63,6 @@ class SeverityScale:
         if not any(least <= 0.0 for _, least, _ in self.classes):
             raise ValueError("no class of severity begins at 0")
 
-    def class_of(self, delta_v: float) -> str:
+    def class_of(self, delta_v_mps: float) -> str:
         """Return the class of a delta-v in m/s, 0 or more; a value on a bound is in the upper class."""
-        return [name for name, least, _ in self.classes if delta_v >= least][-1]
+        return [name for name, least, _ in self.classes if delta_v_mps >= least][-1]

@@ -31,31 +31,33 @@ class Metric:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hazard:
-    """A hazard, and how to find it in a trace. Without `when` and `stl`, the target's record reports it.
+    """A hazard, and how to find it in a trace. Without `when` and `required_stl`, the target's record reports
+    it.
 
-    It occurs when `when` has held for `for_s` seconds, or when the STL formula `stl` is violated and all
-    values that the formula needs are known. `margin` is a step's distance from the hazard, in `unit`; for
-    `stl` it is the robustness. Once `terminal` holds, the drive is over, and metrics ignore later steps ('':
-    never; `True`: from the hazard on). Later hazards are still recorded.
+    It occurs when `when` has held for `for_s` seconds, or when the STL formula `required_stl`, which must
+    hold, is violated and all values that the formula needs are known. `margin` is a step's distance from the
+    hazard, in `unit`; for `required_stl` it is the robustness. Once `terminal_condition` holds, the drive is
+    over, and metrics ignore later steps ('': never; `True`: from the hazard on). Later hazards are still
+    recorded.
     """
 
     name: str
     about: str = ""
     when: str = ""
-    stl: str = ""
+    required_stl: str = ""
     for_s: float = 0.0
     margin: str = ""
     unit: str = "-"
-    terminal: str = ""
+    terminal_condition: str = ""
 
     @property
     def is_in_record(self) -> bool:
-        return not (self.when or self.stl)
+        return not (self.when or self.required_stl)
 
     @property
     def margin_metric(self) -> Metric | None:
         """The metric `margin_<hazard>`: a run's smallest margin."""
-        if not (self.margin or self.stl):
+        if not (self.margin or self.required_stl):
             return None
         return Metric(
             name=f"margin_{self.name.lower()}",

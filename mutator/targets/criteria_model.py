@@ -26,8 +26,9 @@ class HazardModel(StrictModel, title="A hazard"):
         "triggers, plus `ever(CONDITION)` (true once the condition has held) and `rate(x)` "
         "(change per second).",
     )
-    stl: str | None = Field(
+    required_stl: str | None = Field(
         None,
+        alias="stl",
         description="Instead of `when`: a formula of signal temporal logic that must hold. rtamt evaluates "
         "it (`pip install rtamt`), and steps must be evenly spaced. The hazard occurs at the "
         "first step at which the formula does not hold. If the formula looks ahead, the hazard "
@@ -106,9 +107,9 @@ def _build_hazard(
     name: str, model: HazardModel, names: Collection[str], source: YamlSource, step_s: float
 ) -> Hazard:
     keys: KeyPath = ("hazards", name)
-    if model.when is not None and model.stl is not None:
+    if model.when is not None and model.required_stl is not None:
         raise source.error((*keys, "stl"), "`when` and `stl`", expected="one of them", remedy="remove one")
-    judged_by = "stl" if model.stl is not None else "the record"
+    judged_by = "stl" if model.required_stl is not None else "the record"
     condition_keys = () if model.when is not None else ("for_s", "margin")
     for key in condition_keys:
         if key in model.model_fields_set:
@@ -119,19 +120,19 @@ def _build_hazard(
                 remedy="remove it",
             )
     when = manifest_condition(model.when, names, source, (*keys, "when"))
-    if model.stl:
+    if model.required_stl:
         with source.locating_errors((*keys, "stl")):
-            temporal_logic.check_stl_formula(model.stl, names, step_s)
+            temporal_logic.check_stl_formula(model.required_stl, names, step_s)
     terminal = model.terminal
     return Hazard(
         name=name,
         about=model.about,
         when=when,
-        stl=model.stl or "",
+        required_stl=model.required_stl or "",
         for_s=model.for_s,
         margin=manifest_formula(model.margin, names, source, (*keys, "margin")) or _margin_of(when),
         unit=model.unit,
-        terminal=manifest_condition(terminal, names, source, (*keys, "terminal"))
+        terminal_condition=manifest_condition(terminal, names, source, (*keys, "terminal"))
         if isinstance(terminal, str)
         else ("True" if terminal else ""),
     )

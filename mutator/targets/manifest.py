@@ -10,11 +10,11 @@ from packaging.requirements import Requirement
 from mutator._common import shared_cache
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import digest
-from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
-from mutator.targets.contact_severity import DELTA_V_NAME, Contact
+from mutator.targets.contact_severity import DELTA_V_NAME, ContactSettings
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.observed_values import Observation
 from mutator.targets.placeholders import fill_placeholders
@@ -41,7 +41,7 @@ class FilmCommands:
     `{out}` the file to write, and `{t}` the time of a still in s.
     """
 
-    __pydantic_config__ = mapping_config("Films")
+    __pydantic_config__ = pydantic_mapping_config("Films")
 
     run_args: tuple[str, ...] = field(
         metadata=yaml_metadata(
@@ -85,7 +85,7 @@ class TargetManifest:
     entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}, {root}
     stepwise_function: str | None  # function of the entry module: arguments -> a steppable run
     independent_args: tuple[str, ...]  # extra arguments for a run that must not use data left by other runs
-    self_read_globs: tuple[str, ...]  # globs: files of the tree whose content a run reads
+    globs_read_by_runs: tuple[str, ...]  # globs: files of the tree whose content a run reads
     args_by_change: Mapping[str, tuple[str, ...]]  # scenario change -> extra arguments
     step_s: float
     armed_after_s: float  # by default, triggers are armed at this time, when the controller is ready
@@ -96,7 +96,7 @@ class TargetManifest:
     observation: Observation
     hazard_rules: tuple[Hazard, ...]
     metrics: tuple[Metric, ...]
-    contact: Contact | None
+    contact: ContactSettings | None
     scene: Scene | None
     alerts: tuple[str, ...]  # other alerts are ignored
     source: YamlSource = field(repr=False, compare=False)  # the file's lines, for errors
@@ -106,7 +106,7 @@ class TargetManifest:
     sandbox: bool = False  # whether the target's code runs in a sandbox
 
     @property
-    def package(self) -> str | None:
+    def probe_package(self) -> str | None:
         """The package to which mutants add the probe; None if the probe is a top-level module."""
         first, *others = self.packages
         return None if others or first.endswith(".py") else first
@@ -141,15 +141,17 @@ class TargetManifest:
         return tuple(channel for channel in self.channels if channel.role is Role.ACTUATOR)
 
     @cached_property
-    def plotted_channels(self) -> tuple[Channel, ...]:
+    def non_actuator_channels(self) -> tuple[Channel, ...]:
         return tuple(channel for channel in self.channels if channel.role is not Role.ACTUATOR)
 
     @cached_property
-    def judged_channels(self) -> tuple[Channel, ...]:
+    def criteria_channels(self) -> tuple[Channel, ...]:
         """The channels that hazards and metrics use."""
         channels = [channel.name for channel in self.channels]
-        names = self.observation.judgeable_names(channels)
-        needed = self.observation.with_inputs(_names_in_criteria(self.hazard_rules, self.metrics, names))
+        names = self.observation.names_for_trace_formulas(channels)
+        needed = self.observation.names_with_inputs(
+            _names_in_criteria(self.hazard_rules, self.metrics, names)
+        )
         return tuple(channel for channel in self.channels if channel.name in needed)
 
     @cached_property
@@ -167,9 +169,9 @@ class TargetManifest:
         """The files that a run writes into {out}."""
         return (self.trace_file, *([self.record_file] if self.record_file else []))
 
-    def reads_any(self, paths: Iterable[str]) -> bool:
+    def run_reads_any(self, paths: Iterable[str]) -> bool:
         """Whether a run reads one of these files, so that its caches depend on it."""
-        return any(matches_any_glob(path, self.self_read_globs) for path in paths)
+        return any(matches_any_glob(path, self.globs_read_by_runs) for path in paths)
 
     def run_arguments(
         self,
@@ -207,7 +209,7 @@ class TargetManifest:
     @property
     def cache_folder(self) -> Path:
         """The folder `{cache}`, which need not exist."""
-        return shared_cache.target_folder(self.cache_name)
+        return shared_cache.target_cache_folder(self.cache_name)
 
     def paths_read_by_runs(self) -> tuple[Path, ...]:
         """Return what runs read besides their tree, scenario and cache: the target's root, if an argument
@@ -235,9 +237,9 @@ class TargetManifest:
 def _names_in_criteria(
     rules: Iterable[Hazard], metrics: Iterable[Metric], names: Collection[str]
 ) -> set[str]:
-    texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal)]
+    texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal_condition)]
     texts += [text for metric in metrics for text in (metric.formula, metric.where)]
-    in_stl = (name for rule in rules for name in temporal_logic.names_in_stl(rule.stl, names))
+    in_stl = (name for rule in rules for name in temporal_logic.names_in_stl(rule.required_stl, names))
     return {name.removeprefix(GOLDEN_PREFIX) for text in texts if text for name in names_in(text)}.union(
         in_stl
     )

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator._common.confined_files import check_name
+from mutator._common.confined_files import checked_relative_path
 from mutator._common.shipped_files import SHIPPED_TARGET_ROOT
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
 from mutator.targets.channel_model import ChannelModel, TraceModel, build_channels
-from mutator.targets.contact_severity import Contact
+from mutator.targets.contact_severity import ContactSettings
 from mutator.targets.criteria_model import HazardModel, MetricModel, build_hazards, build_metrics
 from mutator.targets.entry_model import EntryModel, ScenarioChangeModel, check_commands
 from mutator.targets.manifest import FilmCommands, TargetManifest
@@ -18,6 +18,8 @@ from mutator.targets.observation_model import ObservationModel, build_observatio
 from mutator.targets.process_environment import check_environment
 from mutator.targets.relative_paths import clean_relative_path
 from mutator.targets.required_packages import parse_requirements
+from mutator.targets.scene_model import SceneModel, build_scene
+from mutator.targets.severity_model import check_contact
 from mutator.targets.target_roots import (
     INSTALLED_PREFIX,
     check_only_installed_package,
@@ -25,8 +27,6 @@ from mutator.targets.target_roots import (
     find_overlay,
     find_root,
 )
-from mutator.targets.scene_model import SceneModel, build_scene
-from mutator.targets.severity_model import check_contact
 from mutator.triggers import temporal_logic
 
 SCHEMA = "target/2"
@@ -111,7 +111,7 @@ class ManifestModel(StrictModel, title="The file"):
         default_factory=dict,
         description="The numbers computed for each run. They are columns of the results.",
     )
-    severity: YamlRecord[Contact] | None = Field(
+    severity: YamlRecord[ContactSettings] | None = Field(
         None, description="How severe a contact is. Without it, results have no severity class."
     )
     scene: SceneModel | None = Field(None, description="How to draw a drive from above.")
@@ -148,7 +148,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
     trace = model.trace or TraceModel.model_validate({})
     channels = build_channels(model.channels, trace, source)
     observation = build_observation(model.observation, source)
-    judgeable_names = observation.judgeable_names(channel.name for channel in channels)
+    judgeable_names = observation.names_for_trace_formulas(channel.name for channel in channels)
     _check_criteria_recorded(source, set(observation.variables) - set(judgeable_names))
     rules = build_hazards(
         model.hazards, judgeable_names, source, has_record=model.record is not None, step_s=model.step_s
@@ -171,7 +171,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         entry_args=tuple(model.entry.args),
         stepwise_function=model.entry.stepwise,
         independent_args=tuple(model.entry.independent),
-        self_read_globs=tuple(model.reads_itself),
+        globs_read_by_runs=tuple(model.reads_itself),
         args_by_change={n: tuple(c if isinstance(c, list) else c.args) for n, c in changes.items()},
         same_scenarios_by_change={
             n: tuple(c.same_in) for n, c in changes.items() if isinstance(c, ScenarioChangeModel)
@@ -196,10 +196,10 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
 def _check_names_confined(model: ManifestModel, source: YamlSource) -> None:
     """Refuse names that point out of the folders to which they belong."""
     with source.locating_errors(("name",)):
-        check_name(model.name, source.path)
+        checked_relative_path(model.name, source.path)
     for name in model.entry.changes:
         with source.locating_errors(("entry", "changes", name)):
-            check_name(name, source.path, folders=False)
+            checked_relative_path(name, source.path, allow_folders=False)
     for key in ("files", "forbid", "reads_itself"):
         for i, glob in enumerate(getattr(model, key) or ()):
             with source.locating_errors((key, i)):

@@ -17,7 +17,7 @@ def manifest_condition(text: str | None, names: Collection[str], source: YamlSou
 
 
 def manifest_formula(text: str | None, names: Collection[str], source: YamlSource, keys: KeyPath) -> str:
-    """Return the formula in canonical text; otherwise like `condition`."""
+    """Return the formula in canonical text; otherwise like `manifest_condition`."""
     if text is None:
         return ""
     with source.locating_errors(keys):

@@ -7,10 +7,10 @@ from pydantic import Field
 
 from mutator._common.message_text import describe_value
 from mutator.config.location_model import LocationModel
-from mutator.config.location_syntax import PROBE_NAME, is_dotted_name
+from mutator.config.location_syntax import PROBE_MODULE_NAME, is_dotted_name
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import YamlSource
-from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS
+from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS
 from mutator.targets.observed_values import Observation, ObservedValue
 from mutator.targets.relative_paths import clean_relative_path
 from mutator.triggers.conditions import RESERVED_NAMES, TIME, canonical_formula
@@ -68,7 +68,7 @@ class ObservationModel(StrictModel, title="The observation"):
 
 def build_observation(model: ObservationModel, source: YamlSource) -> Observation:
     location = model.at.location(source, ("observation", "at"))
-    if location.anchor.kind in VALUE_ANCHORS | FIXED_ANCHORS:
+    if location.anchor.kind in VALUE_ANCHORS | LOAD_TIME_ANCHORS:
         raise source.error(
             ("observation", "at", location.anchor.kind.value),
             f"an observation at `{location.anchor.kind.value}`",
@@ -150,7 +150,7 @@ def _canonical_expression(text: str) -> str:
             _check_constant_key(node.slice, text)
         elif not _is_allowed_node(node):
             raise ValueError(text)
-    return ast.unparse(_HypotOfProbe().visit(tree))
+    return ast.unparse(_HypotToProbeRewriter().visit(tree))
 
 
 def _check_constant_key(node: ast.expr, text: str) -> None:
@@ -170,11 +170,11 @@ def _is_allowed_node(node: ast.AST) -> bool:
     return isinstance(node, _ALLOWED_NODES)
 
 
-class _HypotOfProbe(ast.NodeTransformer):
+class _HypotToProbeRewriter(ast.NodeTransformer):
     """Replace `hypot` by the probe's function, because the target's file might not import `hypot`."""
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
         if isinstance(node.func, ast.Name) and node.func.id == "hypot":
-            node.func = ast.Attribute(ast.Name(PROBE_NAME, ast.Load()), "hypot", ast.Load())
+            node.func = ast.Attribute(ast.Name(PROBE_MODULE_NAME, ast.Load()), "hypot", ast.Load())
         return node

@@ -41,7 +41,7 @@ class Observation:
         """The names for conditions: the time, the observed values and the derived values."""
         return (TIME, *(value.name for value in (*self.values, *self.derived)))
 
-    def with_inputs(self, names: Iterable[str]) -> frozenset[str]:
+    def names_with_inputs(self, names: Iterable[str]) -> frozenset[str]:
         """Return these names, and the inputs of those that are derived values."""
         needed = set(names)
         for value in reversed(self.derived):
@@ -49,7 +49,7 @@ class Observation:
                 needed.update(names_in(value.text))
         return frozenset(needed)
 
-    def judgeable_names(self, channels: Iterable[str]) -> tuple[str, ...]:
+    def names_for_trace_formulas(self, channels: Iterable[str]) -> tuple[str, ...]:
         """Return the names that formulas over a trace with these channels can use: time, channels, and values
         derived from them.
         """
@@ -60,7 +60,7 @@ class Observation:
         return tuple(judgeable)
 
 
-def units_and_meanings(observation: Observation) -> Mapping[str, tuple[str, str]]:
+def unit_and_meaning_by_name(observation: Observation) -> Mapping[str, tuple[str, str]]:
     """Return the unit and meaning of every name in conditions."""
     values = (*observation.values, *observation.derived)
     return {TIME: ("s", "time"), **{value.name: (value.unit, value.about) for value in values}}

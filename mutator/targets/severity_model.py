@@ -8,7 +8,7 @@ from pydantic import Field
 from mutator.config.units import UNITS
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
-from mutator.targets.contact_severity import SEVERITY_CLASSES, Contact, SeverityScale
+from mutator.targets.contact_severity import SEVERITY_CLASSES, ContactSettings, SeverityScale
 from mutator.targets.criteria import Hazard, Metric
 
 SCHEMA = "severity/1"
@@ -33,10 +33,10 @@ class SeverityScaleModel(StrictModel, title="severity/*.yaml"):
 
 
 def check_contact(
-    contact: Contact, hazards: Sequence[Hazard], metrics: Sequence[Metric], source: YamlSource
+    contact: ContactSettings, hazards: Sequence[Hazard], metrics: Sequence[Metric], source: YamlSource
 ) -> None:
     """Raise MutatorError, with the line, for an unsuitable hazard or metric of a manifest's severity."""
-    terminal = [hazard.name for hazard in hazards if hazard.terminal]
+    terminal = [hazard.name for hazard in hazards if hazard.terminal_condition]
     if contact.hazard not in terminal:
         raise source.error(
             ("severity", "contact"),

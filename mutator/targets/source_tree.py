@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import check_inside, check_name, is_inside, path_below
+from mutator._common.confined_files import checked_path_inside, checked_relative_path, is_inside, path_below
 from mutator._common.files import check_path_encodable
 from mutator._common.hashing import canonical_json, digest
 from mutator.errors import MutatorError
@@ -18,7 +18,7 @@ from mutator.errors import MutatorError
 T = TypeVar("T")
 MOST_SOURCE_BYTES = 1_000_000  # bytes of a Python file
 MOST_TREE_BYTES = 128_000_000  # bytes of all files, which are kept in memory
-_FILES_PER_LINK = 100  # files for which a link counts: it takes longer, and links in links multiply
+_FILE_COUNT_OF_LINK = 100  # files for which a link counts: it takes longer, and links in links multiply
 MOST_FILES = 50_000  # files and folders below the folders that a manifest's globs name
 _WILDCARD_PATTERN = re.compile(r"(\*\*/|\*\*|\*|\?)")  # special characters in a glob
 
@@ -119,27 +119,27 @@ def read_tree(
 
 
 def _read_files(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, bytes]:
-    """Read the files of `root` that match; Outside for a link that leads out of the folder `bounds`."""
+    """Read the files of `root` that match; UnsafePath for a link that leads out of the folder `bounds`."""
     file_count = 0
 
     def count(path: Path) -> None:
         nonlocal file_count
-        file_count += _FILES_PER_LINK if path.is_symlink() else 1
+        file_count += _FILE_COUNT_OF_LINK if path.is_symlink() else 1
         if file_count > MOST_FILES:
             raise MutatorError(
-                f"more than {MOST_FILES:,} files and folders (a link counts as {_FILES_PER_LINK})",
+                f"more than {MOST_FILES:,} files and folders (a link counts as {_FILE_COUNT_OF_LINK})",
                 where=root,
                 expected="the source of one controller",
                 remedy="name narrower folders in the manifest's `files`",
             )
 
     def should_enter(folder: Path) -> bool:
-        """Whether to read a folder; Outside if its files could be part of the tree but are elsewhere."""
+        """Whether to read a folder; UnsafePath if its files could be part of the tree but are elsewhere."""
         count(folder)
         if bounds is None or is_inside(bounds, folder):
             return True
         if any(_may_match_below(folder.relative_to(root).parts, glob.split("/")) for glob in globs):
-            check_inside(bounds, folder)
+            checked_path_inside(bounds, folder)
         return False
 
     folders = {_WILDCARD_PATTERN.split(glob)[0].rpartition("/")[0] for glob in globs}
@@ -151,9 +151,9 @@ def _read_files(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict
     remaining_bytes = MOST_TREE_BYTES
     for path in sorted(path for path, name in name_by_path.items() if matches_any_glob(name, globs)):
         check_path_encodable(path)
-        check_name(name_by_path[path], root)
+        checked_relative_path(name_by_path[path], root)
         if bounds is not None and path.is_symlink():
-            check_inside(bounds, path)
+            checked_path_inside(bounds, path)
         if path.is_symlink() and not path.exists():
             raise MutatorError(
                 f"a link to {path.readlink()}, which does not exist",

@@ -7,7 +7,7 @@ from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.targets.criteria import Hazard
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import TIME, divide, names_in, parse_expression, to_python
+from mutator.triggers.conditions import TIME, ieee_divide, names_in, parse_expression, to_python_source
 
 _STOP_REMEDY = "leave `after_hazard` out of the campaign, so that runs continue"
 
@@ -24,7 +24,9 @@ def stop_function_source(manifest: TargetManifest) -> str:
         raise _cannot_stop_error(
             manifest, ("entry",), "no `stepwise`", "a run that can be ended between two steps"
         )
-    conditions = [_stop_condition(manifest, hazard) for hazard in manifest.hazard_rules if hazard.terminal]
+    conditions = [
+        _stop_condition(manifest, hazard) for hazard in manifest.hazard_rules if hazard.terminal_condition
+    ]
     if not conditions:
         raise _cannot_stop_error(manifest, ("hazards",), "no terminal hazard", "one with `terminal`")
     channels = {channel.name: channel for channel in manifest.channels}
@@ -34,26 +36,28 @@ def stop_function_source(manifest: TargetManifest) -> str:
         needed |= {*names_in(value.text)} if value.name in needed else set()
     lines = [f"    {TIME} = float(recorded[{manifest.time_channel!r}])"]
     for channel in manifest.channels:
-        if channel.name in needed and channel.time:
+        if channel.name in needed and channel.times_channel:
             keys = ("channels", channel.name, "time")
             raise _cannot_stop_error(
                 manifest, keys, f"{channel.name} has separate times", "a number in each step"
             )
         if channel.name in needed:
             lines.append(f"    {channel.name} = float(recorded[{channel.name_in_trace!r}])")
-    lines += [f"    {v.name} = {to_python(v.text, number=True)}" for v in derived if v.name in needed]
-    holds = " or ".join(f"({to_python(text)})" for text in conditions)
+    lines += [
+        f"    {v.name} = {to_python_source(v.text, is_formula=True)}" for v in derived if v.name in needed
+    ]
+    holds = " or ".join(f"({to_python_source(text)})" for text in conditions)
     return "\n".join(
-        [getsource(divide), "_div = divide", "def over(recorded):", *lines, f"    return {holds}", ""]
+        [getsource(ieee_divide), "_div = divide", "def over(recorded):", *lines, f"    return {holds}", ""]
     )
 
 
 def _stop_condition(manifest: TargetManifest, hazard: Hazard) -> str:
-    has_end_condition = hazard.terminal != "True"
-    text = hazard.terminal if has_end_condition else hazard.when
+    has_end_condition = hazard.terminal_condition != "True"
+    text = hazard.terminal_condition if has_end_condition else hazard.when
     keys = ("hazards", hazard.name)
     if not text:
-        judge = "temporal logic" if hazard.stl else "the target itself"
+        judge = "temporal logic" if hazard.required_stl else "the target itself"
         raise _cannot_stop_error(
             manifest, keys, f"{hazard.name}, which is judged by {judge}", "a condition, `when`"
         )

@@ -8,7 +8,7 @@ from mutator.targets.channels import Role
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 
-T_END = "t_end"  # the metric column with the end of the drive
+DRIVE_END_COLUMN = "t_end"  # the metric column with the end of the drive
 
 
 class ChannelFacts(NamedTuple):
@@ -66,8 +66,8 @@ def metric_facts(manifest: TargetManifest) -> tuple[MetricFacts, ...]:
     """Return the facts of each metric column. If a hazard can end the drive, its end comes first."""
     about = "when a terminal hazard ended the drive; metrics do not cover later steps"
     end = (
-        [MetricFacts(T_END, "s", about, "lower")]
-        if any(hazard.terminal for hazard in manifest.hazard_rules)
+        [MetricFacts(DRIVE_END_COLUMN, "s", about, "lower")]
+        if any(hazard.terminal_condition for hazard in manifest.hazard_rules)
         else []
     )
     return (*end, *(MetricFacts(m.name, m.unit, m.about, m.worse) for m in manifest.all_metrics))
@@ -75,6 +75,6 @@ def metric_facts(manifest: TargetManifest) -> tuple[MetricFacts, ...]:
 
 def hazard_facts(manifest: TargetManifest) -> tuple[HazardFacts, ...]:
     return tuple(
-        HazardFacts(name=hazard.name, about=hazard.about, terminal=bool(hazard.terminal))
+        HazardFacts(name=hazard.name, about=hazard.about, terminal=bool(hazard.terminal_condition))
         for hazard in manifest.hazard_rules
     )

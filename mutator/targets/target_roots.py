@@ -8,7 +8,7 @@ from packaging.requirements import Requirement
 
 from mutator._common.confined_files import is_inside
 from mutator._common.shipped_files import SHIPPED_TARGET_ROOT, shipped_folder
-from mutator.config.location_syntax import PROBE_NAME
+from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.config.yaml_sources import YamlSource
 from mutator.targets.required_packages import pip_install_command
 
@@ -28,7 +28,7 @@ def find_root(root: str, source: YamlSource, requires: Sequence[Requirement]) ->
         raise source.error(
             ("root",), f"'{root}'", expected=f"{INSTALLED_PREFIX} and the name of an import package"
         )
-    place = find_installed(name)
+    place = find_installed_package(name)
     if place is None:
         raise source.error(
             ("root",),
@@ -82,14 +82,15 @@ def checked_package_names(
             )
         return (package,)
     names = tuple(packages or ())
-    used_names = {PROBE_NAME}
+    used_names = {PROBE_MODULE_NAME}
     for i, name in enumerate(names):
         stem = name.removesuffix(".py")
         if not stem.isidentifier() or stem in used_names:
             raise source.error(
                 ("packages", i),
                 f"'{name}'",
-                expected=f"a package, or a module's file such as drive.py, each once, and not {PROBE_NAME}",
+                expected="a package, or a module's file such as drive.py, each once, and not "
+                f"{PROBE_MODULE_NAME}",
                 remedy="correct the name; do not list modules that are inside a package",
             )
         used_names.add(stem)
@@ -118,7 +119,7 @@ def check_only_installed_package(
             )
 
 
-def find_installed(name: str) -> Path | None:
+def find_installed_package(name: str) -> Path | None:
     """Return the folder or file of an import package or module; None if it has no single place on disk."""
     try:
         spec = find_spec(name)

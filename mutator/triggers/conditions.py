@@ -85,12 +85,12 @@ def names_in(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(node.id for node in ordered if node.id not in _BUILT_IN_NAMES))
 
 
-def to_python(text: str, *, number: bool = False) -> str:
+def to_python_source(text: str, *, is_formula: bool = False) -> str:
     """Convert a checked condition or formula to Python that cannot raise and uses `_div` and `math`."""
     writer = _ExpressionWriter(text, {}, None, divide="_div({}, {})", infinity="math.inf", hypot="math.hypot")
     return (
         writer.write_number(parse_expression(text))
-        if number
+        if is_formula
         else writer.write_boolean(parse_expression(text))
     )
 
@@ -103,7 +103,7 @@ def evaluate_condition(condition: str, values: Mapping[str, float]) -> bool:
     )
 
 
-def divide(a: float, b: float) -> float:
+def ieee_divide(a: float, b: float) -> float:
     """Divide as IEEE 754 does: infinite or NaN for b = 0. The probe contains the same function."""
     if b:
         return a / b
@@ -113,8 +113,8 @@ def divide(a: float, b: float) -> float:
 
 @lru_cache(maxsize=256)
 def _compile_function(text: str, names: tuple[str, ...], number: bool) -> Callable[..., object]:
-    source = f"lambda {', '.join(names)}: {to_python(text, number=number)}"
-    functions = {"__builtins__": {}, "abs": abs, "min": min, "max": max, "math": math, "_div": divide}
+    source = f"lambda {', '.join(names)}: {to_python_source(text, is_formula=number)}"
+    functions = {"__builtins__": {}, "abs": abs, "min": min, "max": max, "math": math, "_div": ieee_divide}
     return eval(compile(source, "<condition>", "eval"), functions)  # type: ignore[no-any-return]
 
 

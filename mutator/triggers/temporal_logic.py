@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.message_text import suggestion
+from mutator._common.message_text import spelling_suggestion
 from mutator.errors import MutatorError
 from mutator.triggers.conditions import TIME
 
@@ -143,7 +143,7 @@ def _formula_error(error: Exception, formula: str, variables: Collection[str], s
         message = f"unexpected {rest!r}" if rest else "an unexpected end"
     elif isinstance(error, KeyError):
         name = str(error.args[0])
-        message, remedy = f"unknown name '{name}'", f"correct it{suggestion(name, [*variables])}"
+        message, remedy = f"unknown name '{name}'", f"correct it{spelling_suggestion(name, [*variables])}"
     elif "unbounded" in message:
         remedy = "bound the look-ahead, `always[0:2](x < 3)`, or look back: `historically(x < 3)`"
     elif message.startswith("intervals of"):

@@ -30,8 +30,8 @@ def trigger_at_time(time_s: float, *, name: str = "random", hold_s: float | None
     return Trigger(name=name, condition=f"t >= {float(time_s)!r}", hold=hold, hold_s=hold_s)
 
 
-def time_of(trigger: Trigger) -> float | None:
-    """Return the time at which a trigger of `at_time` fires; None for other triggers."""
+def trigger_time_s(trigger: Trigger) -> float | None:
+    """Return the time at which a trigger of `trigger_at_time` fires; None for other triggers."""
     name, _, time = trigger.condition.partition(" >= ")
     try:
         return float(time) if name == "t" else None

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.usefixtures("nowhere")
 @pytest.fixture
 def filled() -> Path:
     """A cache of three files of a target. Each takes 12 kB on any disk."""
-    place = shared_cache.target_folder("car")
+    place = shared_cache.target_cache_folder("car")
     place.mkdir(parents=True)
     for name in "abc":
         (place / name).write_bytes(b"1" * 12_288)

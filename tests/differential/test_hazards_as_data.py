@@ -52,7 +52,7 @@ def test_manifest_and_checker_find_the_same_hazards(
             )
         )
     columns = np.array(steps).T
-    names = [channel.name for channel in manifest.judged_channels]
+    names = [channel.name for channel in manifest.criteria_channels]
     trace = dict.fromkeys(names, np.zeros(len(steps))) | {"t": t}
     trace |= dict(zip(("d_rel", "v_ego", "lateral_offset"), columns, strict=True))
     found = dict(judge_run(manifest, trace, {"hazards": {}}).hazards)

@@ -226,7 +226,7 @@ def test_shards_of_other_machines_merge_if_their_golden_runs_agree(
     assert cli("merge", one, shard(2), "--out", tmp_path / "out")[0] == 0
     shutil.rmtree(tmp_path / "part2")
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
-    shutil.rmtree(shared_cache.checks_folder())  # simulate another machine
+    shutil.rmtree(shared_cache.cached_checks_folder())  # simulate another machine
     code, _, err = cli("merge", one, shard(2), "--out", tmp_path / "other")
     assert code == 1 and "the golden run A differs from the one in" in err
 

@@ -8,7 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mutator.errors import MutatorError
-from mutator.triggers.conditions import canonical_condition, canonical_formula, evaluate_condition, to_python
+from mutator.triggers.conditions import (
+    canonical_condition,
+    canonical_formula,
+    evaluate_condition,
+    to_python_source,
+)
 from mutator.triggers.trace_formulas import condition_at_each_step, formula_at_each_step
 
 VARIABLES = ("t", "gap", "speed", "closing")
@@ -62,7 +67,7 @@ def test_no_observation_raises(text: str, a: str, b: str, values: dict[str, floa
 @given(st.text(max_size=40) | st.text(alphabet="gap speed<=>()[].'_+-*/0123456789,:andort", max_size=40))
 def test_any_text_is_accepted_or_refused(text: str) -> None:
     try:
-        code = to_python(canonical_condition(text, variables=VARIABLES))
+        code = to_python_source(canonical_condition(text, variables=VARIABLES))
     except MutatorError:
         return
     names = {node.id for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Name)}

@@ -17,12 +17,17 @@ from hashlib import sha256
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import check_inside, check_name, files_inside, path_below
+from mutator._common.confined_files import (
+    checked_path_inside,
+    checked_relative_path,
+    files_inside,
+    path_below,
+)
 from mutator._common.files import raising_disk_full, read_json
 from mutator._common.hashing import as_json_types
 from mutator._common.version import VERSION
 from mutator.campaigns.run_inputs import RunInputs
-from mutator.errors import MutatorError, Outside
+from mutator.errors import MutatorError, UnsafePath
 from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.execution.cluster.unpacked_bundle import BUNDLE_SCHEMA, META_FILE, UnpackedBundle
 from mutator.faults.fault_model_files import load_fault_models
@@ -61,9 +66,9 @@ def _check_names_and_size(parts: Mapping[str, bytes], where: Path) -> None:
     """Raise MutatorError unless the parts can be written into a bundle's folders, on any file system."""
     names_by_lowercase: dict[str, str] = {}
     for name in parts:
-        folder = check_name(name, where).partition("/")[0]
+        folder = checked_relative_path(name, where).partition("/")[0]
         if name != META_FILE and (folder == name or folder not in _BUNDLE_FOLDERS):
-            raise Outside(
+            raise UnsafePath(
                 f"the name {name!a}", where=where, expected=f"a name in {', '.join(_BUNDLE_FOLDERS)}"
             )
         if other := names_by_lowercase.get(name.casefold()):
@@ -117,7 +122,7 @@ def _bundle_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Itera
             yield f"target/{name}", read_bounded(file)
     for kind in TEMPLATE_FOLDER_GLOBS:
         for file in sorted(workspace.templates.glob(kind)):
-            yield f"templates/{file.name}", read_bounded(check_inside(workspace.templates, file))
+            yield f"templates/{file.name}", read_bounded(checked_path_inside(workspace.templates, file))
     for name in sorted(folder.scenarios):
         yield f"scenarios/{name}.yaml", read_bounded(workspace.scenario(name))
 
@@ -127,8 +132,8 @@ def _files_named_by_arguments(manifest: TargetManifest) -> Iterator[Path]:
     for i, word in enumerate(manifest.entry_args):
         if word.startswith(_ROOT_PREFIX):
             with manifest.source.locating_errors(("entry", "args", i)):
-                name = check_name(word.removeprefix(_ROOT_PREFIX).removesuffix("/"), manifest.path)
-                place = check_inside(manifest.root, path_below(manifest.root, name))
+                name = checked_relative_path(word.removeprefix(_ROOT_PREFIX).removesuffix("/"), manifest.path)
+                place = checked_path_inside(manifest.root, path_below(manifest.root, name))
                 files = files_inside(manifest.root, name, "*")
             yield from (path for path in (place, *files) if path.is_file())
 

@@ -57,4 +57,4 @@ class GoldenRunCache:
         scenario = digest(read_bounded(self._bundle.scenario_path(golden.scenario)))
         seed = self._bundle.meta["seed"] if golden.seed is None else golden.seed
         content = [*self._common_key_parts, scenario, seed, list(golden.changes)]
-        return shared_cache.goldens_folder() / digest(content)
+        return shared_cache.cached_goldens_folder() / digest(content)

@@ -28,7 +28,7 @@ from mutator.engines import sandbox
 from mutator.engines.engine_choice import make_engine
 from mutator.engines.engine_jobs import MODES_TO_PROVE, EngineArguments, Job
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.errors import DiskFull, GoldenRunsDiffer, MutatorError, Shortage
+from mutator.errors import DiskFull, MutatorError, ResourceShortage, WorkerGoldenRunsDiffer
 from mutator.execution.cluster.golden_cache import GoldenRunCache
 from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceKind, PieceResult
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
@@ -64,7 +64,7 @@ class PieceRunner:
     def run_piece(self, piece: Piece, report_finished: Callable[[str], None]) -> PieceResult:
         """Run a piece. Calls `report_finished` with the id of each finished experiment.
 
-        Raises GoldenRunsDiffer if a golden run made here differs from the campaign's.
+        Raises WorkerGoldenRunsDiffer if a golden run made here differs from the campaign's.
         """
         began = time.monotonic()
         experiments = piece.parse_experiments()
@@ -116,7 +116,9 @@ class PieceRunner:
         return self._runners_by_kind[kind]
 
     def _ensure_golden(self, key: str) -> None:
-        """Make a golden run or copy it from the cache; GoldenRunsDiffer if it differs from the campaign's."""
+        """Make a golden run or copy it from the cache; WorkerGoldenRunsDiffer if it differs from the
+        campaign's.
+        """
         golden, expected_digest = self._bundle.golden_and_digest_by_key[key]
         folder = path_below(self._goldens_folder, key)
         self._goldens_folder.mkdir(exist_ok=True)
@@ -141,10 +143,10 @@ class PieceRunner:
                     examined.problem
                     or f"has the digest {examined.output_digest[:16]} here, not {expected_digest[:16]}"
                 )
-                raise GoldenRunsDiffer(f"golden run {golden.key} {problem}")
+                raise WorkerGoldenRunsDiffer(f"golden run {golden.key} {problem}")
             execution.out.rename(destination)
             if golden.seed is not None:  # the images of a hundred seeds would fill the disk
-                shared_cache.prune_target(self._manifest.cache_name)
+                shared_cache.prune_target_cache(self._manifest.cache_name)
 
     def _golden_of(self, experiment: Experiment) -> GoldenRun:
         return GoldenRun.for_experiment(experiment, several_seeds=self._bundle.meta["several_seeds"])
@@ -176,11 +178,11 @@ def _run_catching_errors(
     try:
         with raising_disk_full(runner.folder):
             return runner.run_piece(piece, report_finished)
-    except GoldenRunsDiffer as err:
+    except WorkerGoldenRunsDiffer as err:
         return PieceResult(number=piece.number, ending=PieceEnding.GOLDEN_DIFFERS, reason=str(err))
     except Exception as err:
         reported_error = err if isinstance(err, MutatorError) else find_shortage(err)
-        lacks_resources = isinstance(reported_error, DiskFull | Shortage)
+        lacks_resources = isinstance(reported_error, DiskFull | ResourceShortage)
         text = str(reported_error) if reported_error else "".join(traceback.format_exception(err)).rstrip()
         return PieceResult(
             number=piece.number,

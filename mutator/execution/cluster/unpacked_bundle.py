@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from mutator._common.confined_files import check_name, path_below
+from mutator._common.confined_files import checked_relative_path, path_below
 from mutator._common.files import read_json
 from mutator.errors import MutatorError
 from mutator.model import Limits
@@ -27,10 +27,10 @@ class UnpackedBundle:
         path = self.folder / META_FILE
         meta = read_json(path, BUNDLE_SCHEMA)
         try:
-            check_name(meta["manifest"], path, folders=False)
+            checked_relative_path(meta["manifest"], path, allow_folders=False)
             goldens = [(GoldenRun.from_stored(entry["golden"]), entry["digest"]) for entry in meta["goldens"]]
             for golden, _ in goldens:
-                check_name(golden.key, path)
+                checked_relative_path(golden.key, path)
             if Limits(**meta["limits"]) and meta.keys() >= {"engine", "seed", "series", "several_seeds"}:
                 return meta
         except (KeyError, TypeError, ValueError):

@@ -244,7 +244,7 @@ def _selected_ids(folder: RunFolder, only: str | None) -> list[str]:
 
 
 def _trace_topics(trace: Trace, manifest: TargetManifest) -> Iterator[Topic]:
-    for channel in (*manifest.compared_channels, *manifest.plotted_channels):
+    for channel in (*manifest.compared_channels, *manifest.non_actuator_channels):
         if channel.name in trace:
             clock = own_times(channel.name)
             time = trace[clock if clock in trace else manifest.time_channel]

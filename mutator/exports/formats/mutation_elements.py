@@ -14,7 +14,7 @@ from mutator._common.version import VERSION
 from mutator.execution import single_run
 from mutator.exports import Export, ExportRequest
 from mutator.faults.fault_models import FaultModels, SnippetKind
-from mutator.model import OPERATORS_MODULE, Experiment, Fault, Injection, Outcome, Record, Status
+from mutator.model import OPERATOR_FAULTS_MODULE, Experiment, Fault, Injection, Outcome, Record, Status
 from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.mutants.expressions import parenthesized_if_splittable
 from mutator.mutants.injection_edits import edits_of
@@ -79,7 +79,7 @@ def _mutant(
     description += f"; also at {', '.join(also)}" if also else ""
     return {
         "id": fault.id,
-        "mutatorName": fault.fault_type if fault.module == OPERATORS_MODULE else first.model,
+        "mutatorName": fault.fault_type if fault.module == OPERATOR_FAULTS_MODULE else first.model,
         "description": description,
         **_replacement_of(manifest, models, fault),
         **mutant_status(experiments, records),
@@ -97,7 +97,9 @@ def _replacement_of(manifest: TargetManifest, models: FaultModels, fault: Fault)
     if isinstance(edit, ExpressionEdit):
         # `parenthesized_if_splittable` adds parentheses if an adjacent operator could bind more tightly
         return _replacement_at(file, edit.start, edit.end, parenthesized_if_splittable(edit.changed))
-    if fault.module == OPERATORS_MODULE and model.kind is SnippetKind.GUARD:  # the mutant omits the statement
+    if (
+        fault.module == OPERATOR_FAULTS_MODULE and model.kind is SnippetKind.GUARD
+    ):  # the mutant omits the statement
         line, last = file.lines[span[0]], file.lines[span[1] - 1].rstrip(b"\r\n")
         start = len(line) - len(line.lstrip())
         return _replacement_at(file, (span[0], start), (span[1] - 1, len(last)), "pass")

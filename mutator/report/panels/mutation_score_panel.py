@@ -4,7 +4,7 @@ operators have no such panel.
 
 from dataclasses import replace
 
-from mutator.model import OPERATORS_MODULE
+from mutator.model import OPERATOR_FAULTS_MODULE
 from mutator.outcomes.fault_free_runs import alerts_by_drive
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import sheet_csv_and_markdown_files
@@ -26,7 +26,7 @@ _HTML_TEMPLATE = """\
 
 def build_mutation_score_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the shares in total and by operator."""
-    if not (run.results["module"] == OPERATORS_MODULE).any():
+    if not (run.results["module"] == OPERATOR_FAULTS_MODULE).any():
         return None
     runs = run.fault_free_runs()
     score = mutation_score_sheet(

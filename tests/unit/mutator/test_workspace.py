@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.errors import MutatorError, Outside
+from mutator.errors import MutatorError, UnsafePath
 from mutator.onboarding.todo_marks import unfilled_mark_errors
 from mutator.workspace import Workspace
 
@@ -180,7 +180,7 @@ def test_a_library_reads_nothing_outside_through_its_links(
         shutil.rmtree(link)
     link.unlink(missing_ok=True)
     link.symlink_to(end)
-    with pytest.raises(Outside, match="a link that leads out of its folder") as caught:
+    with pytest.raises(UnsafePath, match="a link that leads out of its folder") as caught:
         READS[name](toycar)
     assert "secret" not in str(caught.value)
 
@@ -197,6 +197,6 @@ def test_links_that_stay_in_the_library_are_followed(toycar: Workspace) -> None:
 def test_a_scenarios_name_is_a_plain_name(toycar: Workspace, name: str) -> None:
     """Names become folders of golden runs, and are printed."""
     (toycar.library / "scenarios" / name).write_bytes((toycar.library / "scenarios" / "A.yaml").read_bytes())
-    with pytest.raises(Outside) as caught:
+    with pytest.raises(UnsafePath) as caught:
         _ = toycar.scenarios
     assert str(caught.value).isprintable()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.bounded_reading import open_regular, read_bounded, read_bounded_lines, unpack_bounded
+from mutator._common.bounded_reading import decompress_bounded, open_regular, read_bounded, read_bounded_lines
 from mutator._common.files import is_no_file_error
 from mutator.errors import TooLarge
 
@@ -61,12 +61,12 @@ def test_lines_have_a_longest_length(tmp_path: Path) -> None:
 
 def test_data_is_unpacked_up_to_its_limit() -> None:
     data = bytes(1000)
-    assert unpack_bounded(zlib.compress(data), 1000) == data
-    assert unpack_bounded(gzip.compress(data), 1000, gzip=True) == data
+    assert decompress_bounded(zlib.compress(data), 1000) == data
+    assert decompress_bounded(gzip.compress(data), 1000, gzip=True) == data
     with pytest.raises(ValueError, match="more than 999 bytes"):
-        unpack_bounded(zlib.compress(data), 999)
+        decompress_bounded(zlib.compress(data), 999)
     for damaged in (b"", b"x", zlib.compress(data)[:-1]):
         with pytest.raises(zlib.error):
-            unpack_bounded(damaged, 1000)
+            decompress_bounded(damaged, 1000)
     with pytest.raises(zlib.error):
-        unpack_bounded(gzip.compress(data) + b"x", 1000, gzip=True)
+        decompress_bounded(gzip.compress(data) + b"x", 1000, gzip=True)

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from mutator._common.confined_files import (
-    check_library_name,
-    check_name,
     check_only_plain_files,
+    checked_name_not_path,
+    checked_relative_path,
     entries_below,
     move_below,
     move_plain_files,
@@ -18,7 +18,7 @@ from mutator._common.confined_files import (
     unlink_below,
     write_below,
 )
-from mutator.errors import Outside
+from mutator.errors import UnsafePath
 
 OUTSIDE = [
     "",
@@ -39,8 +39,8 @@ OUTSIDE = [
 
 @pytest.mark.parametrize("name", [*OUTSIDE, None, 3, ["a"]], ids=ascii)
 def test_a_name_that_leads_outside_is_refused(name: object, tmp_path: Path) -> None:
-    with pytest.raises(Outside, match="the name"):
-        check_name(name, tmp_path)
+    with pytest.raises(UnsafePath, match="the name"):
+        checked_relative_path(name, tmp_path)
 
 
 @pytest.fixture
@@ -82,14 +82,14 @@ def test_only_a_regular_file_is_opened(folder: Path, kind: str) -> None:
             os.mkfifo(place)
         case "folder":
             place.mkdir()
-    with pytest.raises(Outside, match="x: a link, a pipe"):
+    with pytest.raises(UnsafePath, match="x: a link, a pipe"):
         open_below(folder, "x")
 
 
 def test_a_linked_folder_is_not_entered(folder: Path) -> None:
     (folder / "c").symlink_to(folder.parent / "elsewhere")
     for reach in (read_below, unlink_below, lambda root, name: write_below(root, name, b"new")):
-        with pytest.raises(Outside):
+        with pytest.raises(UnsafePath):
             reach(folder, "c/b.txt")
     assert (folder.parent / "elsewhere" / "b.txt").read_bytes() == b"secret"
 
@@ -125,7 +125,7 @@ def test_a_folder_with_anything_else_is_not_plain(folder: Path, kind: str) -> No
         place.symlink_to(folder.parent)
     else:
         os.mkfifo(place)
-    with pytest.raises(Outside, match="a/x: a link, a pipe"):
+    with pytest.raises(UnsafePath, match="a/x: a link, a pipe"):
         check_only_plain_files(folder)
 
 
@@ -172,7 +172,7 @@ def test_a_move_does_not_follow_links(folder: Path) -> None:
     move_below(folder, "link", "d/link")
     assert (folder / "d" / "link").is_symlink()
     for name, to in (("d/link/b.txt", "x"), ("d/e.txt", "d/link/x")):
-        with pytest.raises(Outside):
+        with pytest.raises(UnsafePath):
             move_below(folder, name, to)
     assert [path.name for path in elsewhere.iterdir()] == ["b.txt"]
 
@@ -184,6 +184,6 @@ def test_a_closed_folder_is_listed_without_its_content(folder: Path) -> None:
 
 @pytest.mark.parametrize("name", ["S1.yaml", "../S1.yml"])
 def test_the_path_of_a_file_is_no_name_in_the_library(name: str) -> None:
-    with pytest.raises(Outside, match=r"run\.json: the path .*; expected the name"):
-        check_library_name(name, "run.json")
-    assert check_library_name("cut_in/S1", "run.json") == "cut_in/S1"
+    with pytest.raises(UnsafePath, match=r"run\.json: the path .*; expected the name"):
+        checked_name_not_path(name, "run.json")
+    assert checked_name_not_path("cut_in/S1", "run.json") == "cut_in/S1"

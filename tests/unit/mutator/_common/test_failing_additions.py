@@ -8,7 +8,7 @@ import pytest
 import mutator
 from mutator._common.doors import DOORS, EXPORTS, OPERATORS, STUDIES
 from mutator.cli.app import main
-from mutator.errors import EXIT_WRONG_INPUT, BadAddition, Shortage
+from mutator.errors import EXIT_WRONG_INPUT, BadAddition, ResourceShortage
 from mutator.execution.distributor_choice import choose_distributor
 from mutator.report import report_builder
 from mutator.workspace import Workspace
@@ -121,7 +121,7 @@ def test_only_the_code_of_other_packages_is_blamed() -> None:
 
 
 @pytest.mark.parametrize(
-    "error", [KeyboardInterrupt(), MemoryError(), Shortage("no memory"), OSError(28, "full")]
+    "error", [KeyboardInterrupt(), MemoryError(), ResourceShortage("no memory"), OSError(28, "full")]
 )
 def test_an_interrupt_and_a_machine_that_is_full_are_no_failures_of_a_package(error: BaseException) -> None:
     for door, name in ((OPERATORS, "boom"), (EXPORTS, "tally")):

@@ -6,7 +6,7 @@ from itertools import islice
 
 import pytest
 
-from mutator._common.helper_processes import computing_meanwhile, map_in_processes
+from mutator._common.helper_processes import computing_in_background, map_in_processes
 from mutator.errors import MutatorError
 
 
@@ -48,13 +48,13 @@ def test_no_process_keeps_running_after_the_consumer_stops() -> None:
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_beside_uses_another_process_if_two_are_allowed(processes: int) -> None:
-    with computing_meanwhile(os.getpid, processes) as found:
+    with computing_in_background(os.getpid, processes) as found:
         assert (found() == os.getpid()) is (processes == 1)
 
     def fails() -> None:
         raise MutatorError("there")
 
-    with computing_meanwhile(fails, processes) as found, pytest.raises(MutatorError, match="there"):
+    with computing_in_background(fails, processes) as found, pytest.raises(MutatorError, match="there"):
         found()
-    with pytest.raises(ValueError, match="here"), computing_meanwhile(fails, processes):
+    with pytest.raises(ValueError, match="here"), computing_in_background(fails, processes):
         raise ValueError("here")

@@ -24,10 +24,10 @@ def pipe(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 
 
 def test_the_reader_understands_every_event(pipe: int) -> None:
-    progress_events.open_events()
+    progress_events.open_events_pipe()
     progress_events.report_phase("golden runs", 1, 4, {"sdc": 2})
     progress_events.report_warning("old")
-    progress_events.report_link("plot", Path("plots/a.svg"))
+    progress_events.report_written_file("plot", Path("plots/a.svg"))
     progress_events.report_result("verdict: sdc \udcff")
     progress_events.report_error("x" * 9_999)
     data = os.read(pipe, 65_536)
@@ -36,7 +36,7 @@ def test_the_reader_understands_every_event(pipe: int) -> None:
         MessageEvent(event="warning", text="old"),
         FileEvent(event="link", kind="plot", path=str(Path.cwd() / "plots/a.svg")),
         MessageEvent(event="result", text="verdict: sdc ?"),
-        MessageEvent(event="error", text="x" * progress_events.MOST_TEXT_LENGTH),
+        MessageEvent(event="error", text="x" * progress_events.MOST_EVENT_TEXT_LENGTH),
     ]
     assert all(len(line) < 4_096 and json.loads(line)["event"] for line in data.splitlines())
 
@@ -45,7 +45,7 @@ def test_child_processes_do_not_get_the_pipe(pipe: int) -> None:
     """A mutant could otherwise send events."""
     fd = int(os.environ[progress_events.EVENTS_FD_VARIABLE])
     assert os.get_inheritable(fd)
-    progress_events.open_events()
+    progress_events.open_events_pipe()
     assert progress_events.EVENTS_FD_VARIABLE not in os.environ
     assert not os.get_inheritable(fd)
 
@@ -54,7 +54,7 @@ def test_child_processes_do_not_get_the_pipe(pipe: int) -> None:
 def test_anything_but_an_open_pipe_is_refused(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
     monkeypatch.setenv(progress_events.EVENTS_FD_VARIABLE, text)
     with pytest.raises(MutatorError, match=f"'{text}'"):
-        progress_events.open_events()
+        progress_events.open_events_pipe()
 
 
 def test_a_file_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -62,7 +62,7 @@ def test_a_file_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> N
     with (tmp_path / "events").open("w") as file:
         monkeypatch.setenv(progress_events.EVENTS_FD_VARIABLE, str(file.fileno()))
         with pytest.raises(MutatorError, match="open pipe"):
-            progress_events.open_events()
+            progress_events.open_events_pipe()
 
 
 def test_a_command_goes_on_when_nobody_reads_its_events(monkeypatch: pytest.MonkeyPatch) -> None:

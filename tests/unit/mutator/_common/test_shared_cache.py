@@ -11,11 +11,11 @@ from mutator._common import shared_cache
 @pytest.fixture
 def filled() -> Path:
     """A cache with three files of a target, used one after another, and checks that were used last."""
-    checks = shared_cache.checks_folder() / "ab12" / "golden" / "A"
+    checks = shared_cache.cached_checks_folder() / "ab12" / "golden" / "A"
     checks.mkdir(parents=True)
     (checks / "trace.npz").write_bytes(b"1" * 5000)
     (checks.parents[1] / "checks.json").write_bytes(b"2")
-    compiled = shared_cache.target_folder("car") / "compiled"
+    compiled = shared_cache.target_cache_folder("car") / "compiled"
     compiled.mkdir(parents=True)
     for used, path in enumerate((compiled / "hog.so", compiled.parent / "b.npy", compiled.parent / "a.npy")):
         path.write_bytes(b"3" * 9000)
@@ -42,7 +42,7 @@ def test_without_a_home_folder_the_cache_is_empty(monkeypatch: pytest.MonkeyPatc
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setattr(Path, "home", no_home)
     with pytest.raises(OSError):
-        shared_cache.target_folder("car").mkdir(parents=True)
+        shared_cache.target_cache_folder("car").mkdir(parents=True)
     assert (shared_cache.list_entries(), shared_cache.prune_cache(0), shared_cache.clear_cache()) == (
         [],
         [],
@@ -52,10 +52,10 @@ def test_without_a_home_folder_the_cache_is_empty(monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.parametrize("name", ["..", "a/b", "/", ".hidden", "plain", "ä" * 100])
 def test_any_target_name_gives_a_folder_directly_below_targets(name: str) -> None:
-    place = shared_cache.target_folder(name)
+    place = shared_cache.target_cache_folder(name)
     assert place.resolve().parent == (shared_cache.caches_folder() / "targets").resolve()
     place.mkdir(parents=True)
-    assert shared_cache.prune_target(name) == []
+    assert shared_cache.prune_target_cache(name) == []
 
 
 def test_checks_form_one_entry_and_each_target_file_has_its_own(filled: Path) -> None:
@@ -66,7 +66,7 @@ def test_checks_form_one_entry_and_each_target_file_has_its_own(filled: Path) ->
 
 
 def test_the_size_of_a_sparse_file_is_its_size_on_disk() -> None:
-    place = shared_cache.target_folder("car")
+    place = shared_cache.target_cache_folder("car")
     place.mkdir(parents=True)
     with (place / "table").open("wb") as file:
         file.truncate(800_000_000)
@@ -95,8 +95,8 @@ def test_clearing_deletes_links_but_not_their_targets(filled: Path) -> None:
 def test_making_room_deletes_the_least_recently_used_files_of_a_target(
     filled: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert shared_cache.prune_target("car") == []
-    monkeypatch.setattr(shared_cache, "MOST_TARGET_BYTES", 2 * 12_288)
-    assert [entry.path.name for entry in shared_cache.prune_target("car")] == ["hog.so"]
-    assert shared_cache.prune_target("truck") == []
+    assert shared_cache.prune_target_cache("car") == []
+    monkeypatch.setattr(shared_cache, "MOST_TARGET_CACHE_BYTES", 2 * 12_288)
+    assert [entry.path.name for entry in shared_cache.prune_target_cache("car")] == ["hog.so"]
+    assert shared_cache.prune_target_cache("truck") == []
     assert len(shared_cache.list_entries()) == 3

@@ -30,7 +30,7 @@ def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def as_in_a_new_process() -> Path:
-    shipped_files._unpacked_folder.cache_clear()
+    shipped_files._checked_unpacked_folder.cache_clear()
     return shipped_folder()
 
 

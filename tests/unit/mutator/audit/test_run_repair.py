@@ -9,7 +9,7 @@ import pytest
 
 from mutator._common.folder_locks import owning_run_folder
 from mutator.audit.run_repair import _set_aside, repair_run
-from mutator.errors import MutatorError, Outside
+from mutator.errors import MutatorError, UnsafePath
 from mutator.store import file_digests, plan_file
 from mutator.store.checksummed_lines import line_file_bytes, read_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
@@ -220,7 +220,7 @@ def test_links_are_not_followed(run: Path, name: str) -> None:
         (run / name).parent.mkdir(exist_ok=True)
         (run / name).symlink_to(mine)
     before = {path: path.read_bytes() for path in mine.iterdir()}
-    with pytest.raises(Outside, match="a link, a pipe"):
+    with pytest.raises(UnsafePath, match="a link, a pipe"):
         repair_run(RunFolder.open_unverified(run))
     assert {path: path.read_bytes() for path in mine.iterdir()} == before
 
@@ -233,7 +233,7 @@ def test_a_file_outside_that_the_ledger_names_stays(run: Path, name: str) -> Non
     file_digests.save_ledger(
         run, DigestLedger(files={**ledger.files, name: FileDigest.of_bytes(b"not mine")}, finished=True)
     )
-    with pytest.raises(Outside, match=r"digests\.json"):
+    with pytest.raises(UnsafePath, match=r"digests\.json"):
         repair_run(RunFolder.open_unverified(run))
     assert (run.parent / "setup.py").read_text() == "mine"
 

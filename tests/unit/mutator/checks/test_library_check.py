@@ -218,7 +218,7 @@ def test_every_mutant_of_the_library_compiles_and_can_be_undone(
             made = build(manifest, models, fault, trigger)
             ids.add(made.id)
             for path, data in made.files.items():
-                if path != probe_path(manifest.package):
+                if path != probe_path(manifest.probe_package):
                     assert unsplice(data) == manifest.tree.files[path]
     assert len(ids) == len(found) * 4
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import Field
 
-from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 
@@ -26,7 +26,7 @@ class Car(yaml_files.StrictModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WheelRecord:
-    __pydantic_config__ = mapping_config("A wheel")
+    __pydantic_config__ = pydantic_mapping_config("A wheel")
 
     size: float = field(metadata=yaml_metadata("The radius.", alias="radius"))
     spokes: int = 5

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from mutator.engines.code_swap import CodeSwap, plan_swap
-from mutator.errors import NotSwappable
+from mutator.errors import MutantNotSwappable
 from mutator.mutants.probe import Probe
 from mutator.targets.source_tree import SourceTree
 
@@ -50,7 +50,7 @@ def changes() -> Changes:
             new = "".join(f"{indent}{one}  # fi:abc\n" for one in lines.split("\n"))
             text = text.replace(line, new + line)
         tree = SourceTree(None, {"car/car.py": PRISTINE.encode()}, "", {})  # type: ignore[arg-type]
-        manifest = SimpleNamespace(package="car", self_read_globs=reads_itself, tree=tree)
+        manifest = SimpleNamespace(probe_package="car", globs_read_by_runs=reads_itself, tree=tree)
         return plan_swap(manifest, {"car/car.py": text.encode(), "car/_fi.py": b""}, PROBE, "/tree")  # type: ignore[arg-type]
 
     return make
@@ -96,7 +96,7 @@ def test_changes_that_cannot_be_swapped_are_refused_with_a_reason(
     if why is None:
         assert changes((before, lines)).functions == ()
         return
-    with pytest.raises(NotSwappable, match=re.escape(why)):
+    with pytest.raises(MutantNotSwappable, match=re.escape(why)):
         changes((before, lines))
 
 
@@ -109,27 +109,27 @@ def test_a_guard_must_keep_the_original_statement_in_its_else_branch(kept: int, 
     added = "" if kept else "            y = 0.0  # fi:abc guard:1\n"
     text = "from car import _fi  # fi:probe\n" + PRISTINE.replace(line, f"{guarded}{added}    {line}")
     tree = SourceTree(None, {"car/car.py": PRISTINE.encode()}, "", {})  # type: ignore[arg-type]
-    manifest = SimpleNamespace(package="car", self_read_globs=(), tree=tree)
+    manifest = SimpleNamespace(probe_package="car", globs_read_by_runs=(), tree=tree)
     files = {"car/car.py": text.encode(), "car/_fi.py": b""}
     if swappable:
         assert [f.name_path for f in plan_swap(manifest, files, PROBE, "/tree").functions] == [("Car", "go")]  # type: ignore[arg-type]
         return
-    with pytest.raises(NotSwappable):
+    with pytest.raises(MutantNotSwappable):
         plan_swap(manifest, files, PROBE, "/tree")  # type: ignore[arg-type]
 
 
 def test_a_file_that_the_run_reads_itself_is_not_swapped(changes: Changes) -> None:
-    with pytest.raises(NotSwappable, match="read by the run itself"):
+    with pytest.raises(MutantNotSwappable, match="read by the run itself"):
         changes(reads_itself=("car/*.py",))
 
 
 def test_a_change_beyond_inserted_lines_is_not_swapped(changes: Changes) -> None:
     manifest = SimpleNamespace(
-        package="car",
-        self_read_globs=(),
+        probe_package="car",
+        globs_read_by_runs=(),
         tree=SimpleNamespace(files={"car/car.py": b"x = 1\n"}),
     )
-    with pytest.raises(NotSwappable, match="more than inserted lines"):
+    with pytest.raises(MutantNotSwappable, match="more than inserted lines"):
         plan_swap(manifest, {"car/car.py": b"x = 2\n"}, PROBE, "/tree")  # type: ignore[arg-type]
-    with pytest.raises(NotSwappable, match="new file"):
+    with pytest.raises(MutantNotSwappable, match="new file"):
         plan_swap(manifest, {"car/new.py": b"x = 2\n"}, PROBE, "/tree")  # type: ignore[arg-type]

@@ -55,7 +55,7 @@ def test_a_mutant_of_a_file_that_runs_read_uses_no_shared_caches(
     toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
     said = 'import json, sys\nfrom pathlib import Path\nPath("words.json").write_text(json.dumps(sys.argv))\n'
-    changed = replace(manifest, independent_args=("--forget",), self_read_globs=("toycar/sens*.py",))
+    changed = replace(manifest, independent_args=("--forget",), globs_read_by_runs=("toycar/sens*.py",))
     engine = ReferenceEngine(changed, tmp_path, LIMITS)
     for read in ("toycar/sensing.py", "toycar/driver.py"):
         files = {"toycar/go.py": said.encode(), read: b""}

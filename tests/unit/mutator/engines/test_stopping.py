@@ -182,7 +182,11 @@ def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edi
         t, gap, speed = ([number] for number in numbers)
         values = {"t": t, "d_rel": gap, "near": gap, "speed": speed}
         trace = {name: np.array(value) for name, value in values.items()}
-        judged = [r.when if r.terminal == "True" else r.terminal for r in manifest.hazard_rules if r.terminal]
+        judged = [
+            r.when if r.terminal_condition == "True" else r.terminal_condition
+            for r in manifest.hazard_rules
+            if r.terminal_condition
+        ]
         expected = any(trace_formulas.condition_at_each_step(text, trace)[0] for text in judged)
         assert over({"time": t[0], "gap": gap[0], "speed": speed[0]}) is expected, numbers
 

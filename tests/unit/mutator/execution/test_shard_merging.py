@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.errors import Outside
+from mutator.errors import UnsafePath
 from mutator.execution.shard_merging import merge_shards
 from mutator.store import file_digests
 from mutator.store.file_digests import FileDigest
@@ -44,7 +44,7 @@ def test_a_file_that_the_ledger_should_not_name_is_not_copied(shard: Path, out: 
     mine.parent.mkdir(parents=True, exist_ok=True)
     if mine.resolve().parent != out.resolve():
         mine.resolve().write_text("mine")
-    with pytest.raises(Outside, match=r"digests\.json"):
+    with pytest.raises(UnsafePath, match=r"digests\.json"):
         merge_shards([shard], out)
     assert not mine.resolve().exists() or mine.resolve().read_text() == "mine"
 
@@ -53,7 +53,7 @@ def test_a_file_that_the_ledger_should_not_name_is_not_copied(shard: Path, out: 
 def test_a_shard_with_a_link_is_refused(shard: Path, out: Path, name: str) -> None:
     shutil.rmtree(shard / name, ignore_errors=True)
     (shard / name).symlink_to(out.parent)
-    with pytest.raises(Outside, match=f"{name}: a link"):
+    with pytest.raises(UnsafePath, match=f"{name}: a link"):
         merge_shards([shard], out)
     assert not out.parent.exists()
 
@@ -65,6 +65,6 @@ def test_nothing_is_merged_into_a_folder_with_a_link(shard: Path, out: Path, nam
     mine.mkdir()
     (mine / "1").write_text("mine")
     (out / name).symlink_to(mine)
-    with pytest.raises(Outside, match="a link"):
+    with pytest.raises(UnsafePath, match="a link"):
         merge_shards([shard], out)
     assert [path.read_text() for path in mine.iterdir()] == ["mine"]

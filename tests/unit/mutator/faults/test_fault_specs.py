@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.config.units import UNIT_LIST
+from mutator.config.units import UNIT_SUFFIXES_TEXT
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import Draw, load_spec
 from mutator.faults.spec_expansion import draw_values, expand_spec
@@ -307,7 +307,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
     ],
 )
 def test_a_mistake_is_reported_with_a_remedy(toy: Workspace, old: str, new: str, said: str) -> None:
-    assert said.replace("{KNOWN}", UNIT_LIST) in edited(toy, old, new)
+    assert said.replace("{KNOWN}", UNIT_SUFFIXES_TEXT) in edited(toy, old, new)
 
 
 def test_a_spec_outside_the_library_is_loaded_by_path(tmp_path: Path, toy: Workspace) -> None:

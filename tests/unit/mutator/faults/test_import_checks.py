@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.faults.import_checks import check_import
+from mutator.faults.import_checks import check_import_defined
 from mutator.faults.spec_expansion import expand_spec
 from mutator.workspace import Workspace
 
@@ -66,12 +66,12 @@ def test_an_undefined_name_is_reported_at_its_line(toy: Workspace, name: str, sa
 )
 def test_a_reexported_name_is_defined(toy: Workspace, line: str) -> None:
     (Path(toy.manifest("toy").root) / "toycar" / "sky.py").write_text(f"{line}\n")
-    check_import(toy.manifest("toy"), "toycar.sky.Rain")
+    check_import_defined(toy.manifest("toy"), "toycar.sky.Rain")
 
 
 def test_an_invalid_target_module_is_an_error_at_its_line(toy: Workspace) -> None:
     path = Path(toy.manifest("toy").root) / "toycar" / "sky.py"
     path.write_text("class Rain:\n    x = = 1\n")
     with pytest.raises(MutatorError, match="not valid Python: invalid syntax") as caught:
-        check_import(toy.manifest("toy"), "toycar.sky.Rain")
+        check_import_defined(toy.manifest("toy"), "toycar.sky.Rain")
     assert (caught.value.where, caught.value.line) == (str(path), 2)

@@ -28,7 +28,7 @@ TIME = np.arange(300) * 0.01
 def manifest() -> SimpleNamespace:
     gas, speed = Channel(name="gas", unit="0..1"), Channel(name="v_ego", unit="m/s")
     gone = Channel(name="not_recorded", unit="m")
-    channels = {"compared_channels": (gas,), "plotted_channels": (speed, gone)}
+    channels = {"compared_channels": (gas,), "non_actuator_channels": (speed, gone)}
     return SimpleNamespace(**channels, time_channel="t", path=Path("m.yaml"))
 
 

@@ -156,7 +156,7 @@ def test_an_unknown_name_or_an_unsuitable_model_is_refused(clone: Workspace) -> 
 def read(**given: Any) -> InjectionSpec:
     at = {"file": "m.py", "function": "f", "after_assign": "gap"}
     model = InjectionModel.model_validate({"at": at, "model": "omission", **given})
-    return model.injection(YamlSource(path=Path("spec.yaml"), data={}, lines={}), ())
+    return model.injection_spec(YamlSource(path=Path("spec.yaml"), data={}, lines={}), ())
 
 
 def test_a_condition_is_stored_in_canonical_form() -> None:

@@ -92,7 +92,7 @@ def test_the_patch_the_tree_and_the_digest_agree(toy: Workspace, tmp_path: Path)
     manifest = toy.manifest("toy")
     before = manifest.tree.digest
     made = build(toy, toy_faults(toy)["both"])
-    files = (*manifest.file_globs, probe_path(manifest.package))
+    files = (*manifest.file_globs, probe_path(manifest.probe_package))
     write_mutated_tree(manifest, made, tmp_path / "tree")
     assert read_tree(tmp_path / "tree", files).digest == made.tree_digest != before
     if shutil.which("patch"):

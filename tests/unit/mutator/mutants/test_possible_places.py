@@ -9,7 +9,7 @@ from mutator.config.location_model import LocationModel
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import ParamSchema
-from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Injection, Value
+from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, Injection, Value
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.possible_places import ListedPlace, places_of
@@ -112,7 +112,7 @@ def test_each_model_can_be_injected_at_the_places_that_list_it(
         for model in models:
             if model.name in ("ghost_object", "image_effect") or "exchanged" in model.template:
                 continue  # these models need more names than a place has
-            at_value = kind in VALUE_ANCHORS | FIXED_ANCHORS
+            at_value = kind in VALUE_ANCHORS | LOAD_TIME_ANCHORS
             params = {p.name: value(p) for p in model.params if not (at_value and p.name == "target")}
             given = tuple(sorted(params.items()))
             injection = Injection(location=one.location, model=model.name, params=given)

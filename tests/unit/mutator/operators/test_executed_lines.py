@@ -53,7 +53,7 @@ def test_executed_lines_are_cached(
     )
     [first] = measure_executed_lines(manifest, [drive], LIMITS)
     assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 1
-    [entry] = shared_cache.lines_folder().iterdir()
+    [entry] = shared_cache.cached_executed_lines_folder().iterdir()
     entry.write_text(entry.read_text().replace("[", "[1,", 1))
     assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 2
     broken = tmp_path / "broken.yaml"

@@ -22,11 +22,11 @@ MANIFEST: Any = SimpleNamespace(
     hazard_rules=(Hazard(name="H1"),),
     metrics=(),
     contact=None,
-    judged_channels=(),
+    criteria_channels=(),
     channels=(),
     observation=SimpleNamespace(derived=()),
     alerts=("fcw", "late"),
-    plotted_channels=(Channel(name="v", unit="m/s"), Channel(name="not_recorded", unit="m")),
+    non_actuator_channels=(Channel(name="v", unit="m/s"), Channel(name="not_recorded", unit="m")),
 )
 
 

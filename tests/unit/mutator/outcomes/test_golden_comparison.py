@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.errors import BadOutput, Shortage
+from mutator.errors import BadOutput, ResourceShortage
 from mutator.outcomes.golden_comparison import (
     alert_times,
     compare_traces,
@@ -77,7 +77,7 @@ def test_a_channel_is_compared_at_its_own_times() -> None:
 def test_a_value_at_another_time_is_a_difference(
     later: list[float], first: float | None, largest: float
 ) -> None:
-    pedal = Channel(name="pedal", unit="-", role=Role.ACTUATOR, time="t_pedal")
+    pedal = Channel(name="pedal", unit="-", role=Role.ACTUATOR, times_channel="t_pedal")
     values = np.array([2.0, 9.0, 5.0])
     golden = {"t": np.arange(6.0), "pedal": values, "pedal@": np.array([0.0, 1.0, 2.0])}
     found = compare_traces(golden, golden | {"pedal@": np.array(later)}, [pedal], "t")
@@ -222,7 +222,7 @@ def test_a_lack_of_file_handles_is_not_blamed_on_the_run(
         raise OSError(errno.EMFILE, "Too many open files")
 
     monkeypatch.setattr(npz, "read_bounded", full)
-    with pytest.raises(Shortage, match="too many open files"):
+    with pytest.raises(ResourceShortage, match="too many open files"):
         load_trace(MANIFEST, tmp_path)
 
 

@@ -19,7 +19,7 @@ def manifest() -> TargetManifest:
 
 def driven(manifest: TargetManifest, gaps: list[float], offsets: list[float]) -> RunJudgement:
     """Judge a drive at 10 m/s behind a vehicle at 8 m/s, in steps of one second."""
-    trace = {channel.name: np.zeros(len(gaps)) for channel in manifest.judged_channels}
+    trace = {channel.name: np.zeros(len(gaps)) for channel in manifest.criteria_channels}
     trace |= {"t": np.arange(len(gaps), dtype=float), "d_rel": np.array(gaps), "hwt": np.array(gaps) / 10}
     trace |= {"v_ego": np.full(len(gaps), 10.0), "v_lead": np.full(len(gaps), 8.0)}
     return judge_run(manifest, trace | {"lateral_offset": np.array(offsets)}, {"hazards": {}})

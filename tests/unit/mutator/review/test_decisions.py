@@ -11,7 +11,7 @@ import pytest
 
 from mutator._common import shipped_files
 from mutator._common.version import VERSION
-from mutator.errors import MutatorError, Outside, ReviewConflict
+from mutator.errors import MutatorError, ReviewConflict, UnsafePath
 from mutator.review.decisions import (
     Review,
     ReviewAction,
@@ -214,7 +214,7 @@ def test_nothing_is_read_or_written_through_a_link_of_the_library(
     before = sorted((path, path.read_text()) for path in mine.glob("*"))
     link.parent.mkdir(parents=True, exist_ok=True)
     link.symlink_to(end)
-    with pytest.raises(Outside) as caught:
+    with pytest.raises(UnsafePath) as caught:
         say(toycar, ReviewActionKind.APPROVE, "a")
     assert "secret" not in str(caught.value)
     assert sorted((path, path.read_text()) for path in mine.glob("*")) == before
@@ -222,7 +222,7 @@ def test_nothing_is_read_or_written_through_a_link_of_the_library(
 
 
 def test_a_target_whose_name_leads_out_has_no_reviews(toycar: Workspace) -> None:
-    with pytest.raises(Outside):
+    with pytest.raises(UnsafePath):
         load_review(toycar, "../../notes")
 
 

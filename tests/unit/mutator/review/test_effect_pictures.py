@@ -88,7 +88,7 @@ def test_images_are_cached_until_an_effect_changes(lit: Lit, runs: list[str]) ->
     runs.clear()
     assert drawn(workspace, group) == first
     assert not runs
-    [entry] = shared_cache.pictures_folder().iterdir()
+    [entry] = shared_cache.cached_image_effects_folder().iterdir()
     entry.write_bytes(entry.read_bytes().replace(b"least", b"lost!"))
     assert drawn(workspace, group) == first
     lens = workspace.library.parent / "tree/toycar/lens.py"

@@ -217,14 +217,14 @@ def test_a_report_is_built_once(client: Client, linked: Path, monkeypatch: pytes
     monkeypatch.setattr(client.site.run_pages, "_reports", ReportCache())
     first = client.get("/runs/linked/report/index.html").data
     assert not (linked / "report").exists()
-    before = [path.name for path in shared_cache.pages_folder().iterdir()]
+    before = [path.name for path in shared_cache.cached_reports_folder().iterdir()]
     with monkeypatch.context() as patch:
         patch.setattr(report_builder, "build_report", None)
         assert client.get("/runs/linked/report/index.html").data == first
         monkeypatch.setattr(client.site.run_pages, "_reports", ReportCache())
         assert client.get("/runs/linked/report/index.html").data == first
     for name in before:
-        page = shared_cache.pages_folder() / name / "index.html"
+        page = shared_cache.cached_reports_folder() / name / "index.html"
         page.write_bytes(page.read_bytes().replace(b"</main>", b"</main><b>forged</b>"))
     monkeypatch.setattr(client.site.run_pages, "_reports", ReportCache())
     assert client.get("/runs/linked/report/index.html").data == first

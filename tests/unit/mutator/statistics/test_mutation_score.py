@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from mutator.model import OPERATORS_MODULE, Experiment, Fault
+from mutator.model import OPERATOR_FAULTS_MODULE, Experiment, Fault
 from mutator.statistics.mutation_score import mutant_drives, mutation_score_sheet
 from mutator.statistics.shares import share
 
@@ -20,7 +20,12 @@ HEADS = ("of", "counted", "fault", "number", "not activated", "actuator changed"
 
 
 def drive(mutant: str, became: dict[str, Any], **given: str) -> dict[str, Any]:
-    told = {"module": OPERATORS_MODULE, "fault_type": "arithmetic", "trigger": "always", "fault_id": mutant}
+    told = {
+        "module": OPERATOR_FAULTS_MODULE,
+        "fault_type": "arithmetic",
+        "trigger": "always",
+        "fault_id": mutant,
+    }
     return told | became | given
 
 
@@ -32,7 +37,7 @@ def faults(experiment: Callable[..., Experiment]) -> dict[str, Fault]:
     found = {}
     for name, function in (("a", "f"), ("b", "f"), ("c", "g"), ("d", "g")):
         place = replace(injection, location=replace(injection.location, function=function))
-        found[name] = replace(one, module=OPERATORS_MODULE, injections=(place,))
+        found[name] = replace(one, module=OPERATOR_FAULTS_MODULE, injections=(place,))
     return found
 
 

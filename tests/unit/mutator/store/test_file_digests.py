@@ -9,7 +9,7 @@ import pytest
 
 from mutator._common import files
 from mutator._common.files import write_atomic
-from mutator.errors import MutatorError, Outside
+from mutator.errors import MutatorError, UnsafePath
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.file_digests import DigestLedger, FileDigest
@@ -90,7 +90,7 @@ def test_a_forged_ledger_is_refused(run: Path) -> None:
 def test_a_ledger_names_only_files_that_a_run_writes(run: Path, key: str, name: str) -> None:
     one = FileDigest.of_bytes(b"")
     file_digests.save_ledger(run, DigestLedger(**{"files": {}, "rewriting": {}} | {key: {name: one}}))  # type: ignore[arg-type]
-    with pytest.raises(Outside, match=r"digests\.json"):
+    with pytest.raises(UnsafePath, match=r"digests\.json"):
         file_digests.load_ledger(run)
 
 

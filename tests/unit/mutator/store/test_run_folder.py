@@ -26,7 +26,7 @@ if sys.argv[2] == "owner":
         print("held", flush=True)
         time.sleep(60)
 else:
-    folder_locks.register_worker(run)
+    folder_locks.open_worker_lock(run)
     print("held", flush=True)
     time.sleep(float(sys.argv[3]))
 """

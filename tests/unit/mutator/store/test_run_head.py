@@ -10,7 +10,7 @@ import pytest
 
 from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
-from mutator.errors import MutatorError, Outside
+from mutator.errors import MutatorError, UnsafePath
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import RunHead, load_head
 from mutator.targets.stored_target_facts import TargetFacts
@@ -103,5 +103,5 @@ def test_each_key_is_needed_unless_it_is_optional(run: Path) -> None:
 def test_names_in_the_head_lead_nowhere(tmp_path: Path) -> None:
     for change in ({"target": "../x.yaml"}, {"golden_files": ["../x"]}, {"goldens": [["x.yaml", []]]}):
         (tmp_path / "run.json").write_text(json.dumps(made_head(**change)))
-        with pytest.raises(Outside, match=r"run\.json"):
+        with pytest.raises(UnsafePath, match=r"run\.json"):
             load_head(tmp_path)

@@ -114,7 +114,7 @@ def test_space_is_freed_for_the_images_of_the_next_seed(
     made: tuple[Workspace, Path], cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = []
-    monkeypatch.setattr(shared_cache, "prune_target", asked.append)
+    monkeypatch.setattr(shared_cache, "prune_target_cache", asked.append)
     run_campaign(made[0], "small", tmp_path / "run", choices=Choices(limit=4), engine="reference")
     goldens = len(RunFolder.open(tmp_path / "run").golden_runs)
     assert asked == ["toycar"] * (goldens + 2)

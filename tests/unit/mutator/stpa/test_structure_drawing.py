@@ -10,7 +10,7 @@ import mutator
 from mutator.stpa.analysis_files import HazardAnalysis, load_hazard_analysis
 from mutator.stpa.structure_drawing import (
     FAULT_COLOUR,
-    factors_by_place,
+    factors_with_faults_by_place,
     join_with_common_prefix,
     render_structure,
 )
@@ -98,7 +98,7 @@ def test_only_places_with_faults_have_the_colour_of_faults(analysis: HazardAnaly
     assert text == render_structure(analysis)
     root = ElementTree.fromstring(text)
     lines = [e for e in root.iter("{http://www.w3.org/2000/svg}path") if e.get("stroke") == FAULT_COLOUR]
-    links = factors_by_place(analysis).keys() & analysis.structure.links.keys()
+    links = factors_with_faults_by_place(analysis).keys() & analysis.structure.links.keys()
     assert len(lines) == len(links) + 1  # the links and the legend's line
     words = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
     assert {"ACC", "LKAS", "steer torque", "CF13, 14"} <= set(words)

@@ -37,7 +37,7 @@ def test_the_shipped_contact_is_with_an_equal_car() -> None:
     """The mass is that of the simulator's car, so delta-v is half the closing speed."""
     contact = Workspace.find().manifest("openpilot").contact
     assert contact is not None
-    assert (contact.hazard, contact.mass_kg, contact.delta_v(20.0)) == ("H1", 1461.6, 10.0)
+    assert (contact.hazard, contact.mass_kg, contact.delta_v_mps(20.0)) == ("H1", 1461.6, 10.0)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common import shared_cache
-from mutator.errors import MutatorError, Outside
+from mutator.errors import MutatorError, UnsafePath
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import AnchorKind
 from mutator.mutants.mutant_building import build
@@ -88,7 +88,7 @@ def test_every_run_has_the_same_cache_folder(toy: Workspace) -> None:
     manifest = toy.manifest("toy")
     for independent in (False, True):
         given = manifest.run_arguments(scenario=Path("s"), seed=0, out=Path("o"), independent=independent)
-        assert given[given.index("--cache") + 1] == str(shared_cache.target_folder("toy"))
+        assert given[given.index("--cache") + 1] == str(shared_cache.target_cache_folder("toy"))
 
 
 def test_a_film_adds_arguments(toy: Workspace) -> None:
@@ -217,7 +217,7 @@ def test_the_probe_is_in_the_only_package(
     root = toy.library.parent / "target"
     (root / "drive.py").write_text("x = 1\n")
     manifest = toy.manifest("toy")
-    assert (manifest.package, manifest.import_names) == (package, names)
+    assert (manifest.probe_package, manifest.import_names) == (package, names)
     assert "drive.py" in manifest.tree.files
     (root / "drive.py").unlink()
     if "drive" in names:
@@ -321,7 +321,7 @@ def test_a_link_out_of_the_root_is_refused_where_the_tree_would_contain_it(
     before = toy.manifest("toy").tree.digest
     link = root / "toycar" / ("linked" if end == "folder" else "linked.py")
     link.symlink_to(mine / end)
-    with pytest.raises(Outside, match=rf"{link}: a link that leads out of its folder") as caught:
+    with pytest.raises(UnsafePath, match=rf"{link}: a link that leads out of its folder") as caught:
         _ = toy.manifest("toy").tree
     assert "secret" not in str(caught.value)
     link.unlink()

@@ -39,7 +39,7 @@ def test_the_tree_has_only_the_installed_package_and_the_overlay(pole: Workspace
     assert manifest.root == site.resolve()
     own = {"filters_of_poles/__init__.py", "filters_of_poles/gains.txt"}
     assert manifest.tree.files.keys() - manifest.tree.overlaid_paths == own
-    assert manifest.package == "filters_of_poles"
+    assert manifest.probe_package == "filters_of_poles"
     assert "filters_of_poles" not in sys.modules
     files = '["filters_of_poles/*.py"]'
     manifest = installed(pole, files=files).manifest("pole")

@@ -8,10 +8,10 @@ from mutator.errors import MutatorError
 from mutator.triggers.conditions import (
     canonical_condition,
     canonical_formula,
-    divide,
     evaluate_condition,
+    ieee_divide,
     names_in,
-    to_python,
+    to_python_source,
 )
 
 FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0, "hwt": 2.0, "rs": 2.0}
@@ -89,7 +89,7 @@ def test_formulas_have_a_canonical_text_and_code_that_cannot_raise(
     text: str, canonical: str, code: str
 ) -> None:
     assert canonical_formula(text, FOLLOWING) == canonical_formula(canonical, FOLLOWING) == canonical
-    assert to_python(canonical, number=True) == code
+    assert to_python_source(canonical, is_formula=True) == code
 
 
 @pytest.mark.parametrize("text", ["t > 1", "gap", "1 if t else 2", "(1 if t > 0 else 2) + 1", "hypot(t)"])
@@ -107,7 +107,7 @@ def test_names_come_in_the_order_of_the_text() -> None:
 )
 def test_division_by_zero_is_infinite(a: float, b: float, result: float) -> None:
     """With IEEE 754, every condition is either true or false."""
-    assert divide(a, b) == result
-    assert math.isnan(divide(0.0, b))
+    assert ieee_divide(a, b) == result
+    assert math.isnan(ieee_divide(0.0, b))
     assert evaluate_condition("1 / t > 5", {**FOLLOWING, "t": 0.0})
-    assert to_python("1 / t > 5") == "_div(1.0, t) > 5.0"
+    assert to_python_source("1 / t > 5") == "_div(1.0, t) > 5.0"

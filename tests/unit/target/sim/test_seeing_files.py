@@ -75,7 +75,7 @@ def drive(tmp_path: Path) -> Drive:
 
 def memory() -> Path:
     """The folder where the harness lets the target store detections."""
-    return shared_cache.target_folder("openpilot") / FILE_NAME
+    return shared_cache.target_cache_folder("openpilot") / FILE_NAME
 
 
 def test_the_manifest_lists_every_file_that_affects_detection() -> None:
@@ -94,14 +94,14 @@ def test_the_manifest_lists_every_file_that_affects_detection() -> None:
     assert [
         path
         for path in sorted(seeing)
-        if path.endswith(".py") and not matches_any_glob(path, manifest.self_read_globs)
+        if path.endswith(".py") and not matches_any_glob(path, manifest.globs_read_by_runs)
     ] == []
     for path in (
         "selfdrive/visiond/visiond.py",
         "selfdrive/sim/picture_camera.py",
         "selfdrive/sim/simulator.py",
     ):
-        assert not matches_any_glob(path, manifest.self_read_globs)
+        assert not matches_any_glob(path, manifest.globs_read_by_runs)
 
 
 def test_the_manifest_lists_every_file_that_compiled_code_replaces() -> None:
@@ -118,7 +118,9 @@ def test_the_manifest_lists_every_file_that_compiled_code_replaces() -> None:
         if name.endswith(".py")
     }
     assert len(stood_for) > 6
-    assert [path for path in sorted(stood_for) if not matches_any_glob(path, manifest.self_read_globs)] == []
+    assert [
+        path for path in sorted(stood_for) if not matches_any_glob(path, manifest.globs_read_by_runs)
+    ] == []
     choosing = [path.relative_to(target).as_posix() for path in target.rglob("compiled_*.py")]
     assert [path for path in sorted(choosing) if not matches_any_glob(path, manifest.forbidden_globs)] == []
 
