@@ -35,7 +35,7 @@ ALLOWED = {  # joins of names that no file contains
     "campaigns/git_clone.py: folder / excluded": "printed by git, and only read",
     "campaigns/git_clone.py: folder / within": "names from os.scandir",
     "execution/cluster/piece_process.py: bundle.folder / f'work-{os.getpid()}'": "a process id",
-    "faults/injected_imports.py: root / path": "only shown",
+    "faults/import_checks.py: root / path": "only shown",
     "mutants/anchors.py: root / path": "only shown",
     "mutants/constant_imports.py: tree.root / path": "only shown",
     "onboarding/first_library.py: folder / form.format(name=variables['name'], entry=variables['entry'])": (
@@ -47,7 +47,7 @@ ALLOWED = {  # joins of names that no file contains
     "review/called_code.py: folder / constant.value": "only compared with the tree's paths",
     "review/effect_pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
     "store/cleaning.py: Path(folder, name)": "names from os.walk",
-    "store/cleaning.py: Path(name).with_name(final_name(Path(name).name))": "only compared with patterns",
+    "store/cleaning.py: Path(name).with_name(final_name_of_half_written(Path(name).name))": "only compared with patterns",
     "targets/source_tree.py: root / name": "the folder of a checked glob",
 }
 
