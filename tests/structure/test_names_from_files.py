@@ -47,7 +47,9 @@ ALLOWED = {  # joins of names that no file contains
     "review/called_code.py: folder / constant.value": "only compared with the tree's paths",
     "review/effect_pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
     "store/cleaning.py: Path(folder, name)": "names from os.walk",
-    "store/cleaning.py: Path(name).with_name(final_name_of_half_written(Path(name).name))": "only compared with patterns",
+    "store/cleaning.py: Path(name).with_name(final_name_of_half_written(Path(name).name))": (
+        "only compared with patterns"
+    ),
     "targets/source_tree.py: root / name": "the folder of a checked glob",
 }
 
