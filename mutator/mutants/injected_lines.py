@@ -188,7 +188,8 @@ def tags_for_page_scripts() -> dict[str, Any]:
 
 def probe_import_line(package: str | None) -> str:
     return tagged_line(
-        f"from {package} import {PROBE_MODULE_NAME}" if package else f"import {PROBE_MODULE_NAME}", PROBE_IMPORT_TAG
+        f"from {package} import {PROBE_MODULE_NAME}" if package else f"import {PROBE_MODULE_NAME}",
+        PROBE_IMPORT_TAG,
     )
 
 
