@@ -27,8 +27,8 @@ from types import SimpleNamespace
 from typing import Any
 
 from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.campaigns.run_provenance import append_stretch
 from mutator.execution.cluster import cluster_distributor, worker_roster, worker_tasks
 from mutator.execution.cluster import result_intake as intakes
@@ -199,7 +199,7 @@ def ends(seed: int) -> None:
         for one in left:
             if count < EXPERIMENTS:
                 some.append(one)
-                count += len(one.positions)
+                count += len(one.pending_positions)
         ended, busy, pieces = simulated(folder, some, random.Random(seed))
     last, middle = max(ended), mean(ended)
     print(

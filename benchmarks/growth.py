@@ -19,8 +19,8 @@ from time import process_time
 
 from mutator._common.hashing import digest
 from mutator.audit.seal import seals_of
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import Plan, build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.results import table_building

@@ -24,8 +24,8 @@ from growth import record
 from mutator._common.hashing import canonical_json, digest
 from mutator.audit.seal import seals_of
 from mutator.campaigns import run_environment
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import SeedBySeedPlan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.campaigns.run_provenance import append_stretch
 from mutator.execution.single_run import run_golden
 from mutator.model import Experiment, Record

@@ -15,8 +15,8 @@ from time import process_time
 from typing import Any
 
 from mutator._common.files import json_bytes
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.campaign_running import run_campaign

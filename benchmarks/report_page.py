@@ -21,8 +21,8 @@ import numpy as np
 from growth import record
 from markupsafe import Markup
 
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.file_patches import patch_without_new_files
 from mutator.mutants.mutant_building import build

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import Plan, build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.campaigns.run_provenance import append_stretch
 from mutator.model import (
     Activation,

@@ -12,7 +12,7 @@ from mutator.api.notebook_html import text_html
 from mutator.api.runs import Run, alerts_note_if_any, load_run
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
-from mutator.comparison.pairs import ExperimentPair, ResultChange
+from mutator.comparison.pairs import ExperimentPair, ResultChangeKind
 from mutator.comparison.run_comparison import Comparison, Gate, GateFinding
 from mutator.errors import MutatorError
 from mutator.report import run_history
@@ -52,17 +52,17 @@ class RunComparison:
     @property
     def files_text(self) -> str:
         """A text that says which of the target's files differ."""
-        return comparison_files.files_text(self.comparison)
+        return comparison_files.differing_files_text(self.comparison)
 
     @property
     def not_compared(self) -> dict[str, int]:
         """Reasons why experiments could not be compared, with counts."""
-        return dict(comparison_files.count_by_reason(self.comparison))
+        return dict(comparison_files.unmatched_count_by_reason(self.comparison))
 
     @property
     def changes(self) -> dict[str, int]:
         """Number of pairs with each kind of change."""
-        return {change.value: len(self.comparison.pairs_with(change)) for change in ResultChange}
+        return {change.value: len(self.comparison.pairs_with_change(change)) for change in ResultChangeKind}
 
     @cached_property
     def pairs(self) -> "pd.DataFrame":

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from mutator.api.notebook_html import diff_html, facts_html, text_html
-from mutator.figures.run_plot import draw_run, event_marks
+from mutator.figures.golden_and_faulty_plot import draw_golden_and_faulty, event_marks
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.file_patches import patch_without_new_files
 from mutator.outcomes.golden_comparison import Trace, values_on_steps
@@ -144,7 +144,7 @@ class ExperimentResult(ABC):
         title = f"{facts['fault']}   {facts['scenario']}   {facts['trigger']}   [{self.id}]"
         marks = event_marks(self.record) if self.record else ()
         end = self.record.t_end if self.record else None
-        return draw_run(golden, faulty, self._manifest(), title=title, marks=marks, end=end)
+        return draw_golden_and_faulty(golden, faulty, self._manifest(), title=title, marks=marks, end=end)
 
     @abstractmethod
     def _channels(self) -> Sequence[ChannelFacts]: ...

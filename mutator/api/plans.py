@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
-from mutator.campaigns.freezing import freeze_plan_with_tally
 from mutator.campaigns.plan import Plan, SeedBySeedPlan, build_plan, load_plan
+from mutator.campaigns.plan_freezing import freeze_plan_with_tally
 from mutator.engines.forkable import reasons_by_unforkable_variant
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
@@ -33,7 +33,7 @@ def plan(
 
 def reasons_not_to_fork(plan: Plan, workspace: Workspace) -> dict[str, str]:
     """Return the variants of a plan that only the reference engine can run, with the reasons."""
-    faults = plan.tally.fault_by_variant.values()
+    faults = plan.tally.example_fault_by_variant.values()
     return reasons_by_unforkable_variant(
         workspace.manifest(plan.campaign.target), workspace.fault_models(), faults
     )

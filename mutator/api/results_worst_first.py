@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.row_filters import compile_filter
 from mutator.results.ranking import ranks_of_rows
 from mutator.results.result_rows import ResultRow, cells_by_row, rows_of
 from mutator.results.table_reader import Results

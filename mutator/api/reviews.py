@@ -7,15 +7,16 @@ from pathlib import Path
 from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
-from mutator.campaigns.filters import compile_filter
 from mutator.campaigns.git_clone import find_user_name
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.row_filters import compile_filter
 from mutator.errors import MutatorError
-from mutator.review import approval_gate, mutant_groups
+from mutator.review import mutant_groups
+from mutator.review.approval_gate import describe_experiment_count, unapproved_reason
 from mutator.review.decisions import Review, ReviewAction, ReviewActionKind, ReviewState, record_actions
 from mutator.review.decisions import load_review as load_decisions
 from mutator.review.effect_pictures import pictures_of_groups
-from mutator.review.group_columns import COLUMNS
+from mutator.review.group_columns import GROUP_FILTER_COLUMNS
 from mutator.review.mutant_groups import Group
 from mutator.review.review_page import write_review_page
 from mutator.store.plan_choices import Choices
@@ -44,7 +45,7 @@ class ReviewedGroups:
         return tuple(
             (
                 group,
-                f"{approval_gate.refusal_reason(self.review, group)}, {approval_gate.describe_share(group)}",
+                f"{unapproved_reason(self.review, group)}, {describe_experiment_count(group)}",
             )
             for group in self.review.in_list_order(self.groups)
             if self.review.state(group) is not ReviewState.APPROVED
@@ -59,7 +60,7 @@ class ReviewedGroups:
         groups = self.groups
         for text, keeps_matches in ((only, True), (exclude, False)):
             if text is not None:
-                accepts = compile_filter(text, COLUMNS)
+                accepts = compile_filter(text, GROUP_FILTER_COLUMNS)
                 groups = tuple(g for g in groups if accepts(group_facts(self.review, g)) is keeps_matches)
         return replace(self, groups=groups)
 
@@ -197,8 +198,8 @@ def write_pictures(
     if pictures_by_group:
         make_folder(folder)  # only if there is a picture to put into it
     for name, pictures in pictures_by_group.items():
-        picture_by_level = {"before": ("", pictures.before)}
-        picture_by_level |= {level.name: (level.label, level.after) for level in pictures.levels}
+        picture_by_level = {"before": ("", pictures.before_jpeg)}
+        picture_by_level |= {level.name: (level.label, level.after_jpeg) for level in pictures.levels}
         for level, (value, picture) in picture_by_level.items():
             path = path_below(folder, f"{name}-{level}.jpg")
             write_atomic(path, picture)

@@ -20,7 +20,7 @@ from mutator.execution.session import ProgressCallback, Summary
 from mutator.execution.shard_merging import merge_shards
 from mutator.exports import ExportSelection, Format, find_export
 from mutator.exports import ExportTable as ExportedTable
-from mutator.exports.write import export
+from mutator.exports.run_export import export
 from mutator.model import OPERATOR_FAULTS_MODULE
 from mutator.outcomes.fault_free_runs import (
     FaultFreeRun,
@@ -213,7 +213,7 @@ class Run(RunContents):
             workspace = self._workspace_if_any()
         out_path = None if out is None else Path(out)
         parts = ExportSelection(failures=failures, only=only, table=ExportedTable(table))
-        return export(self.path, str(format), out_path, workspace=workspace, parts=parts)
+        return export(self.path, str(format), out_path, workspace=workspace, selection=parts)
 
     def check_equivalence(self) -> None:
         """Raise CheckFailed if the equivalence check of the run failed."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from mutator._common.argument_checks import check_number, check_whole_number
-from mutator.campaigns.idle_faults import is_idle
+from mutator.campaigns.neutral_faults import is_neutral_fault
 from mutator.checks.library_check import spec_problems
 from mutator.config import units
 from mutator.errors import MutatorError, MutatorWarning
@@ -176,7 +176,7 @@ def _split_variant(name: str) -> tuple[str, str | None]:
 def _warn_of_value(
     value: float, declared_spec: FaultSpec, faults: Collection[Fault], models: FaultModels
 ) -> None:
-    ineffective = [fault.label for fault in faults if is_idle(fault, models)]
+    ineffective = [fault.label for fault in faults if is_neutral_fault(fault, models)]
     if ineffective:
         warnings.warn(f"the value changes nothing: {', '.join(ineffective)}", MutatorWarning, stacklevel=4)
     outside = []

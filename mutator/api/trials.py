@@ -12,7 +12,7 @@ from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_
 from mutator.api.target_and_fault_selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.execution.single_run import SingleRun, run_single
-from mutator.figures.run_plot import save_figure
+from mutator.figures.golden_and_faulty_plot import save_figure
 from mutator.model import Experiment, Method, Record
 from mutator.outcomes.golden_comparison import Trace, load_trace
 from mutator.outcomes.hazards_and_metrics import load_judged_run

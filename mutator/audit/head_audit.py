@@ -9,7 +9,7 @@ from typing import Any
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator.audit.record_audit import StoredRecord
-from mutator.campaigns.freezing import collect_target_facts
+from mutator.campaigns.plan_freezing import collect_target_facts
 from mutator.campaigns.shared_runs import run_key
 from mutator.errors import MutatorError
 from mutator.model import Outcome

@@ -21,9 +21,9 @@ from mutator.audit.record_audit import load_stored_records, mutant_problems, pro
 from mutator.audit.seal import golden_digests
 from mutator.audit.series_audit import audit_series
 from mutator.audit.table_audit import audit_tables
-from mutator.campaigns.freezing import PLAN_CSV, plan_csv_bytes
 from mutator.campaigns.plan import load_plan
-from mutator.campaigns.plan_parts import plan_digest
+from mutator.campaigns.plan_freezing import PLAN_CSV, plan_csv_bytes
+from mutator.campaigns.plan_tally import plan_digest
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.store import file_digests, plan_file

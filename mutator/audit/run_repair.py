@@ -25,8 +25,8 @@ from mutator._common.folder_locks import owning_run_folder
 from mutator._common.message_text import counted
 from mutator.audit.record_audit import load_stored_records
 from mutator.audit.series_repair import repair_series
-from mutator.campaigns.freezing import PLAN_CSV, plan_csv_bytes
 from mutator.campaigns.plan import load_plan
+from mutator.campaigns.plan_freezing import PLAN_CSV, plan_csv_bytes
 from mutator.errors import MutatorError, TooLarge, UnsafePath
 from mutator.model import Status
 from mutator.store import file_digests, integrity

@@ -20,7 +20,7 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator._common.hashing import canonical_json, digest
-from mutator.campaigns.freezing import PLAN_CSV
+from mutator.campaigns.plan_freezing import PLAN_CSV
 from mutator.store import file_digests, plan_file
 from mutator.store.approvals import review_digest
 from mutator.store.check_results import FILE as CHECKS

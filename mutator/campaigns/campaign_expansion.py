@@ -15,7 +15,7 @@ from mutator._common.message_text import describe_choices
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.campaigns.operator_faults import OperatorFault, OperatorFaults
-from mutator.campaigns.operator_selection import When
+from mutator.campaigns.operator_selection import MutantActivity
 from mutator.campaigns.sampling import evenly_spread_indices
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
@@ -60,16 +60,16 @@ class CampaignExpansion:
 
     def build_experiments(self) -> tuple[Experiment, ...]:
         """Return all experiments. Those that share a golden run are adjacent."""
-        self._check_changes()
+        self._check_change_names()
         faults = self._selected_faults()
-        mutants = self._selected_mutants()
+        operator_faults = self._selected_operator_faults()
         triggers = self._campaign_triggers()
         ordered = [
             (order, experiment)
             for order, scenario in enumerate(self.campaign.scenarios)
             for experiment in (
                 *self._experiments_of_faults(scenario, faults, triggers),
-                *self._experiments_of_mutants(scenario, mutants, triggers),
+                *self._experiments_of_operator_faults(scenario, operator_faults, triggers),
             )
         ]
         # changes within a scenario have golden runs of their own, which the experiments of a chunk share
@@ -85,15 +85,15 @@ class CampaignExpansion:
                 expected=f"one of {', '.join(self.manifest.hazard_names)}",
                 remedy="name a hazard of the target's manifest",
             )
-        candidates = (*self._library_faults(), *chain.from_iterable(self._faults_of_files().values()))
+        candidates = (*self._library_faults(), *chain.from_iterable(self._faults_of_spec_files().values()))
         faults = [fault for _, fault in candidates if fault.spec == canary.spec]
         if not faults:
-            raise self._unmatched_error(("canary", "spec"), canary.spec)
+            raise self._unmatched_pattern_error(("canary", "spec"), canary.spec)
         largest = max(faults, key=lambda fault: fault.size)  # the most likely one to cause the hazard
         trigger = trigger_at_time(canary.at_s, name="canary")
         return self._build_experiment(largest, canary.scenario, Method.RANDOM, trigger)
 
-    def _check_changes(self) -> None:
+    def _check_change_names(self) -> None:
         keys = self.campaign.keys_of_changes(self.reading)
         for i, change in enumerate(self.campaign.changes_in(self.reading)):
             if change not in self.manifest.args_by_change:
@@ -109,7 +109,7 @@ class CampaignExpansion:
             self._library_specs.append(self.workspace.specs())
         return self._expand_specs(self._library_specs[0])
 
-    def _faults_of_files(self) -> dict[int, list[_NumberedFault]]:
+    def _faults_of_spec_files(self) -> dict[int, list[_NumberedFault]]:
         files = {
             i: selection.spec_file
             for i, selection in enumerate(self.campaign.fault_selections)
@@ -157,42 +157,46 @@ class CampaignExpansion:
         return numbered
 
     def _selected_faults(self) -> list[_NumberedFault]:
-        library, files = self._library_faults(), self._faults_of_files()
+        library, files = self._library_faults(), self._faults_of_spec_files()
         selected: dict[str, _NumberedFault] = {}
         for i, selection in enumerate(self.campaign.fault_selections):
-            if selection.operators is not None:
+            if selection.operator_selection is not None:
                 continue
             variants: dict[str, list[_NumberedFault]] = {}
             for numbered in files.get(i, library):
                 if i in files or fnmatchcase(numbered[1].spec, selection.spec_pattern):
                     variants.setdefault(numbered[1].spec, []).append(numbered)
             if not variants:
-                raise self._unmatched_error(("faults", i, "spec"), selection.spec_pattern, library)
+                raise self._unmatched_pattern_error(("faults", i, "spec"), selection.spec_pattern, library)
             for faults in variants.values():
                 indices = evenly_spread_indices(len(faults), selection.values_per_variant or len(faults))
                 selected |= {faults[k][1].id: faults[k] for k in indices if faults[k][1].id not in selected}
         return list(selected.values())
 
-    def _selected_mutants(self) -> list[OperatorFault]:
+    def _selected_operator_faults(self) -> list[OperatorFault]:
         """Return the mutants of operators, without duplicates.
 
         A mutant in several selections is active whenever one of them requires it.
         """
-        mutant_by_id: dict[str, OperatorFault] = {}
+        operator_fault_by_id: dict[str, OperatorFault] = {}
         for i, selection in enumerate(self.campaign.fault_selections):
-            if selection.operators is not None:
-                with self._errors_at(("faults", i, "in")):
-                    mutants = self._operator_faults.faults_of_selection(
-                        selection.operators, self._golden_drives(), self.seed, self.reading
+            if selection.operator_selection is not None:
+                with self._errors_located_at(("faults", i, "in")):
+                    operator_faults = self._operator_faults.faults_of_selection(
+                        selection.operator_selection,
+                        self._golden_inputs_by_scenario(),
+                        self.seed,
+                        self.reading,
                     )
-                for mutant in mutants:
-                    earlier = mutant_by_id.get(mutant.fault.id, mutant)
-                    mutant_by_id[mutant.fault.id] = replace(
-                        mutant, activity=tuple(dict.fromkeys((*earlier.activity, *mutant.activity)))
+                for operator_fault in operator_faults:
+                    earlier = operator_fault_by_id.get(operator_fault.fault.id, operator_fault)
+                    operator_fault_by_id[operator_fault.fault.id] = replace(
+                        operator_fault,
+                        activities=tuple(dict.fromkeys((*earlier.activities, *operator_fault.activities))),
                     )
-        return list(mutant_by_id.values())
+        return list(operator_fault_by_id.values())
 
-    def _golden_drives(self) -> dict[str, GoldenRunInputs]:
+    def _golden_inputs_by_scenario(self) -> dict[str, GoldenRunInputs]:
         return {
             name: GoldenRunInputs(
                 scenario=self._scenario_file(name),
@@ -202,7 +206,7 @@ class CampaignExpansion:
             for name in self.campaign.scenarios
         }
 
-    def _unmatched_error(
+    def _unmatched_pattern_error(
         self, keys: KeyPath, pattern: str, library: Sequence[_NumberedFault] = ()
     ) -> MutatorError:
         with_variants = f"{pattern}/*"
@@ -224,10 +228,10 @@ class CampaignExpansion:
                 armed_after_s=self.armed_after_s,
                 hold_s=self.campaign.hold_s,
             )
-        with self._errors_at(("triggers", "table")):
+        with self._errors_located_at(("triggers", "table")):
             variables = self.manifest.observation.variables
             table = self.workspace.context_table(self.campaign.context_table, variables)
-        with self._errors_at(("triggers", "rows")):
+        with self._errors_located_at(("triggers", "rows")):
             return table.triggers(
                 hold_s=self.campaign.hold_s, armed_after_s=self.armed_after_s, rows=self.campaign.context_ids
             )
@@ -237,27 +241,29 @@ class CampaignExpansion:
     ) -> Iterator[Experiment]:
         for number, fault in faults:
             for method in self.campaign.methods:
-                for row in triggers:
-                    trigger = self._trigger_of_method(method, scenario, fault, number, row)
+                for paired_trigger in triggers:
+                    trigger = self._trigger_of_method(method, scenario, fault, number, paired_trigger)
                     yield self._build_experiment(fault, scenario, method, trigger)
 
-    def _experiments_of_mutants(
-        self, scenario: str, mutants: list[OperatorFault], triggers: tuple[Trigger, ...]
+    def _experiments_of_operator_faults(
+        self, scenario: str, operator_faults: list[OperatorFault], triggers: tuple[Trigger, ...]
     ) -> Iterator[Experiment]:
         """Yield the experiments of each mutant in the scenarios that execute its changed line.
 
         Permanent mutants are always active; transient ones follow the campaign's triggers.
         """
         permanent = always_trigger(armed_after_s=self.armed_after_s)
-        for mutant in mutants:
-            if scenario not in mutant.scenarios:
+        for operator_fault in operator_faults:
+            if scenario not in operator_fault.executing_scenarios:
                 continue
-            if When.PERMANENT in mutant.activity:
-                yield self._build_experiment(mutant.fault, scenario, Method.GUIDED, permanent)
-            if When.TRANSIENT in mutant.activity:
+            if MutantActivity.PERMANENT in operator_fault.activities:
+                yield self._build_experiment(operator_fault.fault, scenario, Method.GUIDED, permanent)
+            if MutantActivity.TRANSIENT in operator_fault.activities:
                 # a mutant has no values to count, so its id distinguishes its random times
-                number = int(mutant.fault.id, 16)
-                for experiment in self._experiments_of_faults(scenario, [(number, mutant.fault)], triggers):
+                number = int(operator_fault.fault.id, 16)
+                for experiment in self._experiments_of_faults(
+                    scenario, [(number, operator_fault.fault)], triggers
+                ):
                     # `always` in the campaign's list would repeat the permanent experiment
                     if experiment.trigger.condition != permanent.condition:
                         yield experiment
@@ -306,7 +312,7 @@ class CampaignExpansion:
         scenarios = self.workspace.scenarios
         if scenario not in scenarios:  # a file outside the library could change, or differ on another machine
             raise self.campaign.error(
-                self._scenario_keys(scenario),
+                self._scenario_key_path(scenario),
                 f"no scenario '{scenario}' in the library",
                 expected=describe_choices(scenarios),
                 remedy="correct the name, or add the file to the library's scenarios/",
@@ -314,7 +320,7 @@ class CampaignExpansion:
         return self.workspace.scenario(scenario)
 
     @contextmanager
-    def _errors_at(self, keys: KeyPath) -> Iterator[None]:
+    def _errors_located_at(self, keys: KeyPath) -> Iterator[None]:
         """Point errors without a line number to `keys` in the campaign file; leave others unchanged."""
         try:
             yield
@@ -325,7 +331,7 @@ class CampaignExpansion:
                 keys, err.got, expected=err.expected or "", remedy=err.remedy or "correct the name"
             ) from None
 
-    def _scenario_keys(self, scenario: str) -> KeyPath:
+    def _scenario_key_path(self, scenario: str) -> KeyPath:
         if scenario in self.campaign.scenarios:
             return ("scenarios", self.campaign.scenarios.index(scenario))
         return ("canary", "scenario")

@@ -11,10 +11,10 @@ from mutator.campaigns.campaign_model import CampaignModel, Canary, SelectionMod
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
     ListedTrigger,
-    with_list_below_triggers,
+    with_trigger_list_under_key,
 )
 from mutator.campaigns.installed_studies import CheckableStudy, load_installed_study
-from mutator.campaigns.operator_selection import OperatorSelection, When
+from mutator.campaigns.operator_selection import MutantActivity, OperatorSelection
 from mutator.config.yaml_files import load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.errors import MutatorError
@@ -33,7 +33,7 @@ class FaultSelection:
     spec_pattern: str
     spec_file: Path | None = None
     values_per_variant: int | None = None  # number of values from each variant, spread evenly; None: all
-    operators: OperatorSelection | None = None
+    operator_selection: OperatorSelection | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,10 +75,14 @@ class Campaign:
 
     def armed_after_s_in(self, reading: str) -> float | None:
         """Return the time at which triggers are armed; None if the campaign does not set it."""
-        return _value_in(self.armed_after_s_by_reading, reading) if self.armed_after_s_by_reading else None
+        return (
+            _value_for_reading(self.armed_after_s_by_reading, reading)
+            if self.armed_after_s_by_reading
+            else None
+        )
 
     def changes_in(self, reading: str) -> tuple[str, ...]:
-        return _value_in(self.changes_by_reading, reading)
+        return _value_for_reading(self.changes_by_reading, reading)
 
     def keys_of_changes(self, reading: str) -> KeyPath:
         """Return where the campaign file has the value of `changes_in`."""
@@ -89,7 +93,7 @@ class Campaign:
         return self.yaml_source.error(keys, got, expected=expected, remedy=remedy)
 
 
-def _value_in(value_by_reading: Mapping[str, _Value], reading: str) -> _Value:
+def _value_for_reading(value_by_reading: Mapping[str, _Value], reading: str) -> _Value:
     return value_by_reading[reading] if reading in value_by_reading else value_by_reading[EVERY_READING]
 
 
@@ -98,7 +102,7 @@ def load_campaign(path: Path) -> Campaign:
 
     The study need not be installed, so that old runs can be read. `load_campaign_study` checks it.
     """
-    model, source = load_yaml_model(path, CampaignModel, SCHEMA, prepare=with_list_below_triggers)
+    model, source = load_yaml_model(path, CampaignModel, SCHEMA, prepare=with_trigger_list_under_key)
     _check_no_duplicates(model, source)
     triggers = model.triggers
     # these names become paths in the library
@@ -119,7 +123,7 @@ def load_campaign(path: Path) -> Campaign:
                 spec_pattern=item.spec or "",
                 spec_file=_spec_file_path(path, item.spec or ""),
                 values_per_variant=item.values,
-                operators=_operator_selection(item),
+                operator_selection=_operator_selection(item),
             )
             for item in model.faults
         ),
@@ -149,7 +153,7 @@ def _operator_selection(item: SelectionModel) -> OperatorSelection | None:
         operators=tuple(dict.fromkeys(item.operators)),
         places=tuple(item.in_ or ()),
         sample_size=item.sample,
-        activity=tuple(dict.fromkeys(item.when or When)),
+        activities=tuple(dict.fromkeys(item.when or MutantActivity)),
     )
 
 

@@ -14,7 +14,7 @@ from mutator.campaigns.campaign_triggers import (
     schema_with_readings,
     to_value_by_reading,
 )
-from mutator.campaigns.operator_selection import When
+from mutator.campaigns.operator_selection import MutantActivity
 from mutator.config.yaml_files import StrictModel, YamlRecord
 from mutator.model import AfterHazard, Limits, Method
 
@@ -64,7 +64,7 @@ class SelectionModel(StrictModel, title="A selection"):
         description="Only with `operators`: how many mutants to draw, spread over operators and functions. "
         "Default: all.",
     )
-    when: list[Annotated[When, Field(strict=False)]] | None = Field(
+    when: list[Annotated[MutantActivity, Field(strict=False)]] | None = Field(
         None,
         min_length=1,
         description="Only with `operators`: `permanent` (under the trigger `always`) or `transient` (under "

@@ -129,17 +129,17 @@ class TriggersModel(StrictModel, title="Triggers"):
         return self
 
 
-def _unchanged(value: object) -> object:
+def _same_value(value: object) -> object:
     return value
 
 
-# `with_list_below_triggers` has already converted the list, so that errors have its lines
+# `with_trigger_list_under_key` has already converted the list, so that errors have its lines
 Triggers = Annotated[
-    TriggersModel, BeforeValidator(_unchanged, json_schema_input_type=TriggersModel | list[_TriggerOrAlways])
+    TriggersModel, BeforeValidator(_same_value, json_schema_input_type=TriggersModel | list[_TriggerOrAlways])
 ]
 
 
-def with_list_below_triggers(source: YamlSource) -> YamlSource:
+def with_trigger_list_under_key(source: YamlSource) -> YamlSource:
     """Convert a campaign whose key `triggers` has a list into one with that list under `list`."""
     triggers = source.data.get("triggers")
     if not isinstance(triggers, list):

@@ -10,24 +10,24 @@ from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 
 
-def chunk_lengths(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
+def chunk_lengths(group_of_each: Sequence[Hashable], size: int) -> tuple[int, ...]:
     """Return the lengths of a plan's chunks: at most `size` experiments each; no chunk spans two groups.
 
     The experiments of a group share a golden run, so an engine can share work within a chunk.
     """
     lengths: list[int] = []
-    for i, group in enumerate(groups):
-        if i and group == groups[i - 1] and lengths[-1] < size:
+    for i, group in enumerate(group_of_each):
+        if i and group == group_of_each[i - 1] and lengths[-1] < size:
             lengths[-1] += 1
         else:
             lengths.append(1)
     return tuple(lengths)
 
 
-def chunk_lengths_of_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]:
+def chunk_lengths_of_runs(experiments_by_run: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]:
     """Return the number of experiments in each chunk of at most `size` runs. No chunk splits a shared run."""
-    lengths = iter([len(same) for same in runs])
-    counts = chunk_lengths([(same[0].scenario, same[0].changes) for same in runs], size)
+    lengths = iter([len(same) for same in experiments_by_run])
+    counts = chunk_lengths([(same[0].scenario, same[0].changes) for same in experiments_by_run], size)
     return tuple(sum(islice(lengths, count)) for count in counts)
 
 
@@ -36,7 +36,7 @@ class PendingChunk:
     """The unfinished part of a chunk."""
 
     chunk_index: int
-    positions: tuple[int, ...]  # of its experiments in the chunk
+    pending_positions: tuple[int, ...]  # of its experiments in the chunk
 
 
 def pending_chunks_of(folder: RunFolder, records: Mapping[str, Record]) -> tuple[PendingChunk, ...]:

@@ -30,7 +30,7 @@ _BLOCK_BYTES = 1 << 20  # files are hashed in blocks, to limit memory
 _LINK_MODE, _SUBMODULE_MODE = 0o120000, 0o160000  # modes of git
 # a bare repository inside a clone brings a configuration of its own; fsmonitor names a program to run
 _CAUTIOUS_OPTIONS = ("-c", "safe.bareRepository=explicit", "-c", "core.fsmonitor=false")
-_USER_SCOPES = ("system", "global", "command")  # scopes of configuration that no clone can set
+_USER_CONFIG_SCOPES = ("system", "global", "command")  # scopes of configuration that no clone can set
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +49,9 @@ class GitClone:
     root: Path
     commit: str
     hash_name: str
-    _objects: Path
-    _shallow: Path
-    _excluded: bytes
+    _objects_folder: Path
+    _shallow_file: Path
+    _exclude_file_bytes: bytes
 
     @classmethod
     def find(cls, folder: Path) -> "GitClone | None":
@@ -68,9 +68,9 @@ class GitClone:
             root=Path(root),
             commit=commit,
             hash_name=hash_name,
-            _objects=(folder / objects).resolve(),
-            _shallow=(folder / shallow).resolve(),
-            _excluded=_read_exclude_file(folder / excluded),
+            _objects_folder=(folder / objects).resolve(),
+            _shallow_file=(folder / shallow).resolve(),
+            _exclude_file_bytes=_read_exclude_file(folder / excluded),
         )
 
     def differs_from_commit(self, folder: Path, leave_out: str | None = None) -> bool | None:
@@ -203,7 +203,7 @@ class GitClone:
             for name in ("refs", "info"):
                 Path(git_folder, name).mkdir()
             Path(git_folder, "HEAD").write_text(f"{self.commit}\n")
-            Path(git_folder, "info/exclude").write_bytes(self._excluded)
+            Path(git_folder, "info/exclude").write_bytes(self._exclude_file_bytes)
             format_lines = f"1\n[extensions]\n\tobjectFormat = {self.hash_name}\n"
             Path(git_folder, "config").write_text(
                 f"[core]\n\tbare = false\n\trepositoryFormatVersion = {format_lines}"
@@ -211,9 +211,9 @@ class GitClone:
             variables = {
                 "GIT_DIR": git_folder,
                 "GIT_WORK_TREE": str(self.root),
-                "GIT_SHALLOW_FILE": str(self._shallow),
+                "GIT_SHALLOW_FILE": str(self._shallow_file),
             }
-            variables["GIT_OBJECT_DIRECTORY"] = str(self._objects)
+            variables["GIT_OBJECT_DIRECTORY"] = str(self._objects_folder)
             return _git_output(folder, *arguments, variables=variables, input_bytes=input_bytes)
 
 
@@ -228,7 +228,9 @@ def find_user_name(folder: Path) -> str | None:
     """Return `user.name` of the user's own git configuration. The clone that `folder` is in cannot set it."""
     output = _git_output(folder, *_CAUTIOUS_OPTIONS, "config", "-z", "--show-scope", "--get-all", "user.name")
     parts = (output or b"").decode("utf-8", "replace").split("\0")[:-1]
-    names = [name for scope, name in zip(parts[::2], parts[1::2], strict=False) if scope in _USER_SCOPES]
+    names = [
+        name for scope, name in zip(parts[::2], parts[1::2], strict=False) if scope in _USER_CONFIG_SCOPES
+    ]
     return (names[-1].strip() or None) if names else None
 
 

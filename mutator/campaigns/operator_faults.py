@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from mutator._common.message_text import counted
-from mutator.campaigns.operator_selection import OperatorSelection, When
+from mutator.campaigns.operator_selection import MutantActivity, OperatorSelection
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, Limits
@@ -20,8 +20,8 @@ class OperatorFault:
     """A fault created by an operator, and the scenarios whose golden runs execute the changed line."""
 
     fault: Fault
-    activity: tuple[When, ...]
-    scenarios: frozenset[str]
+    activities: tuple[MutantActivity, ...]
+    executing_scenarios: frozenset[str]
 
 
 class OperatorFaults:
@@ -35,12 +35,18 @@ class OperatorFaults:
         self.notes: dict[str, None] = {}  # lines that say what was found and left out, without duplicates
 
     def faults_of_selection(
-        self, selection: OperatorSelection, drives: Mapping[str, GoldenRunInputs], seed: int, reading: str
+        self,
+        selection: OperatorSelection,
+        golden_inputs_by_scenario: Mapping[str, GoldenRunInputs],
+        seed: int,
+        reading: str,
     ) -> list[OperatorFault]:
         executed = dict(
             zip(
-                drives,
-                measure_executed_lines(self._manifest, list(drives.values()), self._limits),
+                golden_inputs_by_scenario,
+                measure_executed_lines(
+                    self._manifest, list(golden_inputs_by_scenario.values()), self._limits
+                ),
                 strict=True,
             )
         )
@@ -57,8 +63,10 @@ class OperatorFaults:
         return [
             OperatorFault(
                 fault=mutation.to_fault(reading),
-                activity=selection.activity,
-                scenarios=frozenset(name for name in executed if self._is_executed(mutation, executed[name])),
+                activities=selection.activities,
+                executing_scenarios=frozenset(
+                    name for name in executed if self._is_executed(mutation, executed[name])
+                ),
             )
             for mutation in draw
         ]

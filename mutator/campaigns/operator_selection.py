@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class When(StrEnum):
+class MutantActivity(StrEnum):
     """When a mutant of an operator is active."""
 
     PERMANENT = "permanent"  # from the time at which triggers are armed, to the end
@@ -18,4 +18,4 @@ class OperatorSelection:
     operators: tuple[str, ...]
     places: tuple[str, ...]
     sample_size: int | None  # number of mutants; None: all
-    activity: tuple[When, ...]
+    activities: tuple[MutantActivity, ...]

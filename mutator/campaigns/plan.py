@@ -15,9 +15,9 @@ from mutator._common.table_rendering import TextTable
 from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_campaign_study
 from mutator.campaigns.chunks import chunk_lengths_of_runs
-from mutator.campaigns.filters import compile_filter
-from mutator.campaigns.idle_faults import IdleFaults
-from mutator.campaigns.plan_parts import FaultTypeAndMethod, PlanPart, PlanTally, plan_digest
+from mutator.campaigns.neutral_faults import NeutralFaults
+from mutator.campaigns.plan_tally import FaultTypeAndMethod, PlanPart, PlanTally, plan_digest
+from mutator.campaigns.row_filters import compile_filter
 from mutator.campaigns.sampling import draw_balanced, draw_balanced_pairs, draw_in_proportion
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
 from mutator.errors import MutatorError
@@ -35,7 +35,7 @@ from mutator.workspace import Workspace
 if TYPE_CHECKING:
     import pandas as pd
 
-RUNS_PER_GOLDEN = 3  # two golden runs and the null mutant, for each scenario with its changes
+CHECK_RUNS_PER_GOLDEN = 3  # two golden runs and the null mutant, for each scenario with its changes
 _DEFAULT_RUN_CPU_S = 1.4  # one run on the reference engine, including interpreter start
 _TIME_OUTSIDE_RUNS_S = 3.0  # time that a campaign needs outside its runs
 _BYTES_PER_EXPERIMENT = 9_000  # series, patch, record and table rows of an experiment
@@ -89,11 +89,11 @@ class Plan:
 
     def empty_tally(self) -> PlanTally:
         """Return a tally without parts."""
-        return PlanTally(canary=self.canary, several_seeds=len(self.seeds) > 1)
+        return PlanTally(canary=self.canary, has_several_seeds=len(self.seeds) > 1)
 
     def parts(self) -> Iterator[PlanPart]:
         """Yield the plan as one part."""
-        yield PlanPart(experiments=self.experiments, chunks=self.chunks, runs=self.runs)
+        yield PlanPart(experiments=self.experiments, chunk_lengths=self.chunks, run_count=self.runs)
 
     def _repr_html_(self) -> str:
         groups = sorted(self.groups().items())
@@ -125,7 +125,7 @@ class Plan:
     def cost(self, workers: int = 2) -> PlanCost:
         """Return the expected time and disk space."""
         goldens = len(self.goldens())
-        runs = self.runs + RUNS_PER_GOLDEN * goldens + 1
+        runs = self.runs + CHECK_RUNS_PER_GOLDEN * goldens + 1
         cpu_s = runs * (self.run_cpu_s or _DEFAULT_RUN_CPU_S)
         return PlanCost(
             cpu_s=cpu_s,
@@ -171,7 +171,7 @@ class SeedBySeedPlan:
         return self._expansion.operator_notes
 
     def empty_tally(self) -> PlanTally:
-        return PlanTally(canary=self.canary, several_seeds=len(self.seeds) > 1)
+        return PlanTally(canary=self.canary, has_several_seeds=len(self.seeds) > 1)
 
     def parts(self) -> Iterator[PlanPart]:
         """Yield the experiments of each seed that has any.
@@ -179,7 +179,7 @@ class SeedBySeedPlan:
         MutatorError if no seed has an experiment, or if there are more shards than chunks; MutatorWarning for
         values that change nothing.
         """
-        idle, chunks = IdleFaults(self._workspace.fault_models()), 0
+        neutral_faults, chunks = NeutralFaults(self._workspace.fault_models()), 0
         limit = self.choices.limit
         for number, seed in enumerate(self.seeds):
             if limit == 0:
@@ -188,8 +188,8 @@ class SeedBySeedPlan:
             most_experiments = None if limit is None else -(-limit // (len(self.seeds) - number))
             part = self._build_part(seed, most_experiments)
             limit = None if limit is None else limit - len(part.experiments)
-            chunks += len(part.chunks)
-            idle.add(part.experiments)
+            chunks += len(part.chunk_lengths)
+            neutral_faults.add(part.experiments)
             if part.experiments:
                 yield part
         if not chunks:
@@ -201,7 +201,7 @@ class SeedBySeedPlan:
                 remedy="widen `only` or the campaign's faults, or narrow `exclude`",
             )
         self._check_shards(chunks)
-        idle.warn()
+        neutral_faults.warn()
 
     def _build_part(self, seed: int, most_experiments: int | None) -> PlanPart:
         experiments = self._expansion.with_seed(seed).build_experiments()
@@ -213,16 +213,16 @@ class SeedBySeedPlan:
         )
         return PlanPart(
             experiments=tuple(experiment for same in runs_in_order for experiment in same),
-            chunks=chunk_lengths_of_runs(runs_in_order, self.campaign.chunk_size),
-            runs=len(runs_in_order),
+            chunk_lengths=chunk_lengths_of_runs(runs_in_order, self.campaign.chunk_size),
+            run_count=len(runs_in_order),
         )
 
-    def _check_shards(self, chunks: int) -> None:
-        if self.choices.shard is not None and Shard.parse(self.choices.shard).shard_count > chunks:
+    def _check_shards(self, chunk_count: int) -> None:
+        if self.choices.shard is not None and Shard.parse(self.choices.shard).shard_count > chunk_count:
             raise MutatorError(
                 self.choices.shard,
                 argument="shard",
-                expected=f"at most {chunks}, because the plan has that many chunks",
+                expected=f"at most {chunk_count}, because the plan has that many chunks",
                 remedy="use fewer shards, or a smaller chunk in the campaign",
             )
 
@@ -240,7 +240,7 @@ def build_plan(workspace: Workspace, campaign: str | Path, choices: Choices | No
     planning = SeedBySeedPlan(workspace, campaign, choices)
     parts = tuple(planning.parts())
     experiments = tuple(chain.from_iterable(part.experiments for part in parts))
-    chunks = tuple(chain.from_iterable(part.chunks for part in parts))
+    chunks = tuple(chain.from_iterable(part.chunk_lengths for part in parts))
     canary, loaded = planning.canary, planning.campaign
     return Plan(
         campaign=loaded,
@@ -251,7 +251,7 @@ def build_plan(workspace: Workspace, campaign: str | Path, choices: Choices | No
         chunks=chunks,
         canary=canary,
         digest=plan_digest([e.id for e in experiments], chunks, canary.id, loaded),
-        runs=sum(part.runs for part in parts),
+        runs=sum(part.run_count for part in parts),
         operator_notes=planning.operator_notes,
     )
 

@@ -23,7 +23,7 @@ from mutator.targets.process_environment import THREAD_VARIABLES
 _BLAS_SCRIPT = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threadpool_info()))"
 
 
-def everything_outside_sources() -> list[Any]:
+def environment_affecting_results() -> list[Any]:
     """Return everything outside the target's sources that can affect its results."""
     return [
         python_version(),

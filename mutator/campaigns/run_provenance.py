@@ -26,8 +26,8 @@ _REMEDY = "undo the change, or use another run folder"
 _HARNESS_FOLDER = Path(__file__).parents[1]  # the harness
 
 
-def check_sources(run: Path, frozen: Mapping[str, str], now: Mapping[str, str]) -> None:
-    changed = [name for name in frozen if now.get(name) != frozen[name]]
+def check_sources(run: Path, planned_digests: Mapping[str, str], current_digests: Mapping[str, str]) -> None:
+    changed = [name for name in planned_digests if current_digests.get(name) != planned_digests[name]]
     if changed:
         raise MutatorError(
             f"sources changed since this run was planned: {', '.join(changed)}",
@@ -77,16 +77,21 @@ def version_error(run: Path, beginning: str, version_differences: Iterable[str])
     )
 
 
-def _versions_to_record(folder: RunFolder, more: Iterable[str] = ()) -> dict[str, str | None]:
+def _versions_to_record(folder: RunFolder, more_packages: Iterable[str] = ()) -> dict[str, str | None]:
     """Return the versions of the harness's requirements, packages that golden runs loaded, and `more`."""
     before = (name for stretch in folder.stretches[-1:] for name in stretch.packages)
     return run_environment.package_versions(
-        {*run_environment.required_packages(), *loaded_packages(folder), *before, *more}
+        {*run_environment.required_packages(), *loaded_packages(folder), *before, *more_packages}
     )
 
 
 def begin_stretch(
-    folder: RunFolder, workspace: "Workspace", *, records: str, accept: bool, packages: Iterable[str] = ()
+    folder: RunFolder,
+    workspace: "Workspace",
+    *,
+    records_glob: str,
+    accept_versions: bool,
+    packages: Iterable[str] = (),
 ) -> RunFolder:
     """Record this session's software and machine in run.json, before its first experiment, and return the
     folder with its new head.
@@ -111,7 +116,7 @@ def begin_stretch(
     return append_stretch(
         folder,
         Stretch(
-            accepted=accepted_version_differences(folder, accept=accept),
+            accepted=accepted_version_differences(folder, accept=accept_versions),
             python=run_environment.python_version(),
             packages={name: version for name, version in versions.items() if version},
             platform=platform.platform(),
@@ -119,7 +124,7 @@ def begin_stretch(
             blas=run_environment.loaded_blas(),
             threads=run_environment.thread_limits(),
             git={name: state for name, state in states.items() if state} or None,
-            records=records,
+            records=records_glob,
         ),
     )
 

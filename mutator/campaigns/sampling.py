@@ -112,7 +112,7 @@ def draw_in_proportion(experiments: Sequence[Experiment], count: int, seed: int)
     if count % size or count // size < len(strata):
         raise ValueError(f"a multiple of {size}, {size * len(strata)} or more")
     chosen: set[str] = set()
-    for stratum, number in _allot_seats(
+    for stratum, number in _allot_pairs_in_proportion(
         {key: len(pairs) for key, pairs in strata.items()}, count // size
     ).items():
         pairs = sorted(strata[stratum], key=lambda pair: (*pair[:2], digest([seed, pair])))
@@ -134,7 +134,7 @@ def _pair_key(experiment: Experiment) -> _PairKey:
     return (experiment.fault.spec, row, experiment.fault.id)
 
 
-def _allot_seats(sizes: dict[_Stratum, int], total: int) -> dict[_Stratum, int]:
+def _allot_pairs_in_proportion(sizes: dict[_Stratum, int], total: int) -> dict[_Stratum, int]:
     """Distribute `total` seats over strata: one each, then by the Sainte-Lague method (1910)."""
     seats = dict.fromkeys(sizes, 1)
     while sum(seats.values()) < total:

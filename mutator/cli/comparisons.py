@@ -100,8 +100,8 @@ def _parse_gates(texts: list[str]) -> "list[mutator.Gate]":
 
 def _print_comparison(terminal: Terminal, run_comparison: "mutator.RunComparison") -> None:
     comparison = run_comparison.comparison
-    if comparison.parts_remark:
-        terminal.print_text(comparison.parts_remark, style="bold")
+    if comparison.campaign_parts_remark:
+        terminal.print_text(comparison.campaign_parts_remark, style="bold")
         terminal.print_text()
     differing = [(f.name, f.a, f.b) for f in comparison.facts if f.is_different]
     if differing:
@@ -119,7 +119,7 @@ def _print_comparison(terminal: Terminal, run_comparison: "mutator.RunComparison
         terminal.print_text()
     terminal.print_text(run_comparison.summary)
     for remark in comparison.remarks:
-        if remark != comparison.parts_remark:
+        if remark != comparison.campaign_parts_remark:
             terminal.print_text(remark)
 
 
@@ -135,7 +135,7 @@ def _comparison_as_json(
         "changes": run_comparison.changes,
         "not_compared": run_comparison.not_compared,
         "differs": [fact for fact in comparison.facts if fact.is_different],
-        "files": comparison.files,
+        "files": comparison.differing_target_files,
         "remarks": list(comparison.remarks),
         "tables": {
             s.name: [dict(zip(s.heads, line, strict=True)) for line in s.lines] for s in comparison.sheets

@@ -156,7 +156,7 @@ def _print_decided(terminal: Terminal, reviewed: "mutator.ReviewedGroups", group
         terminal.print_json([review_view.group_as_json(review, group) for group in groups])
     for group in groups:
         state = review.state(group).value
-        description = review.describe(group) or state
+        description = review.describe_decision(group) or state
         description += ", flagged" * (review.flag(group.id) is not None)
         terminal.print_text(f"{group.id} {description}", style=review_view.STYLE_BY_STATE[state])
     terminal.print_text(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")

@@ -9,7 +9,7 @@ import mutator
 from mutator.cli.console import Terminal
 from mutator.cli.options import Manifest, Reading, Seed, WorkspaceOptions
 from mutator.errors import MutatorError
-from mutator.review.group_columns import COLUMNS
+from mutator.review.group_columns import GROUP_FILTER_COLUMNS
 
 Campaign = Annotated[
     str | None,
@@ -21,7 +21,9 @@ Specs = Annotated[
 ]
 OnlyGroups = Annotated[
     str | None,
-    typer.Option("--only", metavar="EXPR", help=f"Only groups that match. Columns: {', '.join(COLUMNS)}."),
+    typer.Option(
+        "--only", metavar="EXPR", help=f"Only groups that match. Columns: {', '.join(GROUP_FILTER_COLUMNS)}."
+    ),
 ]
 ExcludeGroups = Annotated[
     str | None, typer.Option("--exclude", metavar="EXPR", help="Leave out groups that match.")

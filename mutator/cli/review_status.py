@@ -23,7 +23,9 @@ def print_status(terminal: Terminal, reviewed: "mutator.ReviewedGroups", campaig
     if review.four_eyes:
         terminal.print_text("four eyes: nobody can approve what they changed last")
     if not campaign:
-        changed = [(group, review.describe(group)) for group in reviewed.groups if review.stale_parts(group)]
+        changed = [
+            (group, review.describe_decision(group)) for group in reviewed.groups if review.stale_parts(group)
+        ]
         _print_groups(terminal, "changed since the decision", changed)
     flags = [(group, review.flag(group.id)) for group in reviewed.groups]
     _print_groups(terminal, "flagged", [(group, f"by {flag.by}") for group, flag in flags if flag])

@@ -20,7 +20,7 @@ MOST_CONDITIONS = 6  # conditions shown in a terminal; a group can have one for 
 def group_as_json(review: "Review", group: "Group", *, with_diff_and_values: bool = False) -> dict[str, Any]:
     """Return a group as JSON data, on request also its diff and values."""
     from mutator.api.reviews import group_facts as group_facts
-    from mutator.review.readable_groups import value_table
+    from mutator.review.group_display import fault_value_table
 
     decision, flag = review.decision(group.id), review.flag(group.id)
     facts = {**group_facts(review, group), "what": group.label, "injections": group.injection_labels}
@@ -33,7 +33,7 @@ def group_as_json(review: "Review", group: "Group", *, with_diff_and_values: boo
     }
     if not with_diff_and_values:
         return facts
-    heads, rows = value_table(group)
+    heads, rows = fault_value_table(group)
     return facts | {
         "diff": group.diff,
         "changes": review.diff_since_decision(group),
@@ -72,7 +72,7 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
         flat = [(*row[:2], row[2].replace("\n", "; "), *row[3:]) for row in rows]
         terminal.print_table(["group", "state", "what", "when", "faults", "runs"], flat, right_aligned=(4, 5))
     terminal.print_text(f"{counted(len(groups), 'group')}: {describe_counts(review, groups)}")
-    unlisted = review.entries.keys() - {group.id for group in groups}
+    unlisted = review.entry_by_group.keys() - {group.id for group in groups}
     if unlisted:
         terminal.print_note(f"blocks of the review file for groups that are not listed: {len(unlisted)}")
 
@@ -90,7 +90,7 @@ def _describe_trigger(group: "Group") -> str:
 def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
     state, flag = review.state(group).value, review.flag(group.id)
     terminal.print_text(f"group {group.id}: {state}", style=STYLE_BY_STATE[state])
-    if decision := review.describe(group):
+    if decision := review.describe_decision(group):
         terminal.print_text(decision)
     if flag:
         terminal.print_text(f"flagged by {flag.by} on {flag.at[:10]}")
@@ -114,7 +114,7 @@ def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
 
 
 def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
-    from mutator.review.readable_groups import condition_lines, describe_value_ranges, value_table
+    from mutator.review.group_display import describe_value_ranges, fault_value_table, trigger_condition_lines
 
     _print_head(terminal, review, group)
     for injection in group.injection_labels:
@@ -123,7 +123,7 @@ def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
     if group.value_ranges:
         terminal.print_text(f"values: {describe_value_ranges(group)}")
     terminal.print_text(f"when: {_describe_trigger(group)}; {counted(len(group.faults), 'fault')}{runs}")
-    conditions = condition_lines(group.triggers)
+    conditions = trigger_condition_lines(group.triggers)
     for line in conditions[:MOST_CONDITIONS]:
         terminal.print_text(f"  {line}")
     if (more := len(conditions) - MOST_CONDITIONS) > 0:
@@ -131,7 +131,7 @@ def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
     terminal.print_text()
     terminal.print_diff(group.diff)
     terminal.print_text()
-    heads, rows = value_table(group)
+    heads, rows = fault_value_table(group)
     if rows:
         terminal.print_table(heads, rows[:MOST_VALUE_ROWS], right_aligned=range(2, len(heads)))
         if len(rows) > MOST_VALUE_ROWS:

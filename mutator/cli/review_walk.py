@@ -48,7 +48,7 @@ def walk_through(
             waiting.insert(0, (number, group))  # shown again, with what the other reviewer decided
             continue
         style = review_view.STYLE_BY_STATE[reviewed.review.state(group).value]
-        terminal.print_text(f"{group.id} {reviewed.review.describe(group)}", style=style)
+        terminal.print_text(f"{group.id} {reviewed.review.describe_decision(group)}", style=style)
     review = reviewed.review
     terminal.print_text(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.row_filters import compile_filter
 from mutator.model import Experiment, Record, Value
 from mutator.preflight import equivalence_check
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row

@@ -12,7 +12,7 @@ from mutator._common.files import make_folder, write_atomic
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable, markdown_line
 from mutator.comparison.input_differences import InputFact
-from mutator.comparison.pairs import ExperimentPair, ResultChange, time_to_hazard
+from mutator.comparison.pairs import ExperimentPair, ResultChangeKind, time_to_hazard
 from mutator.comparison.run_comparison import Comparison, Gate, describe_ending_change
 from mutator.results.plan_columns import plan_row
 from mutator.results.result_rows import ResultRow
@@ -60,10 +60,12 @@ def unmatched_csv(comparison: Comparison) -> bytes:
 
 def summary_text(comparison: Comparison) -> str:
     c = comparison
-    counts = Counter(change for pair in c.pairs for change in pair.changes)
+    counts = Counter(change for pair in c.pairs for change in pair.change_kinds)
     text = f"In both runs: {counted(len(c.pairs), 'experiment')}. "
     if counts:
-        listed = ", ".join(f"{change.value} {counts[change]}" for change in ResultChange if counts[change])
+        listed = ", ".join(
+            f"{change.value} {counts[change]}" for change in ResultChangeKind if counts[change]
+        )
         text += f"{len(c.changed_pairs)} of them changed: {listed}."
     else:
         text += "None of them changed."
@@ -71,16 +73,16 @@ def summary_text(comparison: Comparison) -> str:
         text += " Left out of the rates, because a run has a harness error or an invalid mutant: "
         text += f"{unusable}."
     if c.unmatched_experiments:
-        text += " Not compared: " + ", ".join(f"{n} {why}" for why, n in count_by_reason(c)) + "."
+        text += " Not compared: " + ", ".join(f"{n} {why}" for why, n in unmatched_count_by_reason(c)) + "."
     return text
 
 
-def count_by_reason(comparison: Comparison) -> list[tuple[str, int]]:
+def unmatched_count_by_reason(comparison: Comparison) -> list[tuple[str, int]]:
     return list(Counter(why for why, _ in comparison.unmatched_experiments).items())
 
 
-def files_text(comparison: Comparison) -> str:
-    differences = comparison.files
+def differing_files_text(comparison: Comparison) -> str:
+    differences = comparison.differing_target_files
     parts = {
         "changed": differences.changed,
         f"only in {comparison.names.a}": differences.only_a,
@@ -103,13 +105,13 @@ def render_markdown(comparison: Comparison) -> str:
         parts.append(differing.as_markdown())
     else:
         parts.append("Nothing: the same sources, choices and versions.")
-    parts.append(files_text(c))
+    parts.append(differing_files_text(c))
     parts += [sheet.as_markdown().rstrip() for sheet in c.sheets]
-    for change in ResultChange:
-        if pairs := c.pairs_with(change):
+    for change in ResultChangeKind:
+        if pairs := c.pairs_with_change(change):
             parts += [f"## {change.value}: {len(pairs)}", _pair_list(pairs)]
     if c.unmatched_experiments:
-        parts += ["## Not compared", _reasons_table(c).as_markdown()]
+        parts += ["## Not compared", _unmatched_reasons_table(c).as_markdown()]
         parts.append("`unmatched.csv` lists these experiments.")
     parts.append("All pairs are in `pairs.csv`; `index.html` lists those that changed.")
     return "\n\n".join(parts) + "\n"
@@ -133,8 +135,8 @@ def _facts_table(comparison: Comparison, facts: Sequence[InputFact]) -> TextTabl
     )
 
 
-def _reasons_table(comparison: Comparison) -> TextTable:
-    rows = [(why, str(number)) for why, number in count_by_reason(comparison)]
+def _unmatched_reasons_table(comparison: Comparison) -> TextTable:
+    rows = [(why, str(number)) for why, number in unmatched_count_by_reason(comparison)]
     return TextTable(heads=("why", "experiments"), rows=rows, right_aligned=(1,))
 
 
@@ -146,15 +148,15 @@ def render_page(comparison: Comparison) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    counts = Counter(change for pair in comparison.pairs for change in pair.changes)
+    counts = Counter(change for pair in comparison.pairs for change in pair.change_kinds)
     return environment.from_string(asset_text("comparison/comparison.html")).render(
         c=comparison,
         summary=summary_text(comparison),
         differing=_facts_table(comparison, [fact for fact in comparison.facts if fact.is_different]),
         origin=_facts_table(comparison, [f for f in comparison.facts if not f.name.startswith("package ")]),
-        files=files_text(comparison),
-        counts=[(change.value, counts[change]) for change in ResultChange if counts[change]],
-        reasons=_reasons_table(comparison),
+        files=differing_files_text(comparison),
+        counts=[(change.value, counts[change]) for change in ResultChangeKind if counts[change]],
+        reasons=_unmatched_reasons_table(comparison),
         changed=_changed_table(comparison),
         limit=MOST_SHOWN_ROWS,
         style=Markup(page_style()),
@@ -179,7 +181,7 @@ def _changed_row(pair: ExperimentPair) -> tuple[str, ...]:
     from markupsafe import Markup
 
     badge = Markup('<span class="change{}">{}</span> ').format
-    changes = [change.value for change in ResultChange if change in pair.changes]
+    changes = [change.value for change in ResultChangeKind if change in pair.change_kinds]
     sides = (pair.row_a, pair.row_b)
     return (
         pair.b.label,
@@ -215,7 +217,7 @@ def pair_cells(pair: ExperimentPair) -> dict[str, object]:
         **{name: planned[name] for name in ("module", "fault_type", "variant")},
         "value": "" if planned["value"] is None else str(planned["value"]),
         **{name: planned[name] for name in ("unit", "scenario", "method", "trigger")},
-        "changes": ";".join(change.value for change in ResultChange if change in pair.changes),
+        "changes": ";".join(change.value for change in ResultChangeKind if change in pair.change_kinds),
     }
     sides = [dict(_side_cells(row)) for row in (pair.row_a, pair.row_b)]
     return line | {f"{k}_{s}": side[k] for k in sides[0] for s, side in zip("ab", sides, strict=True)}

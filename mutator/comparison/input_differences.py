@@ -12,7 +12,7 @@ from mutator.store.work_stretches import describe_stretches as ran_with
 from mutator.store.work_stretches import package_versions
 
 _SHOWN_DIGEST_DIGITS = 12  # shown digits of a digest
-_HEAD_FIELDS = ("campaign", "target", "seed", "reading")
+_COMPARED_HEAD_FIELDS = ("campaign", "target", "seed", "reading")
 _SELECTING_CHOICES = ("limit", "shard", "only", "exclude")  # choices that select some of the experiments
 
 
@@ -30,7 +30,7 @@ class InputFact:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DifferingFiles:
+class DifferingTargetFiles:
     """Target files that differ between the runs, by path."""
 
     changed: tuple[str, ...]
@@ -47,7 +47,7 @@ def input_facts(a: ComparedRun, b: ComparedRun) -> tuple[InputFact, ...]:
 
 def _facts_of_run(run: ComparedRun) -> dict[str, str]:
     head, stretches = run.folder.head, run.folder.stretches
-    values = {name: str(getattr(head, name)) for name in _HEAD_FIELDS}
+    values = {name: str(getattr(head, name)) for name in _COMPARED_HEAD_FIELDS}
     if len(seeds := run.folder.seeds) > 1:
         values["seed"] = f"{seeds[0]} to {seeds[-1]}"
     values["setting"] = ", ".join(dict.fromkeys(c for e in run.experiments for c in e.setting)) or "-"
@@ -63,22 +63,22 @@ def _facts_of_run(run: ComparedRun) -> dict[str, str]:
     return values | ran_with(stretches) | {f"package {k}": v for k, v in package_versions(stretches).items()}
 
 
-def differing_files(a: RunFolder, b: RunFolder) -> DifferingFiles:
+def differing_target_files(a: RunFolder, b: RunFolder) -> DifferingTargetFiles:
     """Return the target's files that differ."""
     of_a, of_b = a.head.target_files, b.head.target_files
-    return DifferingFiles(
+    return DifferingTargetFiles(
         changed=tuple(sorted(path for path in of_a if path in of_b and of_a[path] != of_b[path])),
         only_a=tuple(sorted(set(of_a) - set(of_b))),
         only_b=tuple(sorted(set(of_b) - set(of_a))),
     )
 
 
-def pair_remarks(a: ComparedRun, b: ComparedRun, matching: ExperimentMatching) -> tuple[str, ...]:
+def differing_pairs_remarks(a: ComparedRun, b: ComparedRun, matching: ExperimentMatching) -> tuple[str, ...]:
     """Return remarks on the number of pairs that differ in each input."""
     checks: tuple[tuple[str, Callable[[ExperimentPair], bool]], ...] = (
         ("with different injections", lambda p: p.a.fault.injections != p.b.fault.injections),
         ("with different trigger conditions", lambda p: p.a.trigger.condition != p.b.trigger.condition),
-        ("with different holds or trigger times", lambda p: _hold_settings(p.a) != _hold_settings(p.b)),
+        ("with different holds or trigger times", lambda p: _hold_and_arming(p.a) != _hold_and_arming(p.b)),
         ("with different scenario files", lambda p: p.a.scenario_digest != p.b.scenario_digest),
         ("with different seeds", lambda p: p.a.seed != p.b.seed),
         (
@@ -125,7 +125,7 @@ def severity_remarks(a: ComparedRun, b: ComparedRun) -> tuple[str, ...]:
     return (f"The runs have different severity scales; only that of {b.name} is used.",)
 
 
-def _hold_settings(experiment: Any) -> tuple[object, ...]:
+def _hold_and_arming(experiment: Any) -> tuple[object, ...]:
     trigger, fault = experiment.trigger, experiment.fault
     return (fault.hold or trigger.hold, trigger.hold_s, trigger.armed_after_s)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import pandas as pd
 
 from mutator.comparison.compared_runs import ComparedRun
-from mutator.comparison.pair_sheets import RunNames, total_and_type_sheets, with_adjusted_p
+from mutator.comparison.pair_sheets import RunDisplayNames, lines_with_holm_p, total_and_type_sheets
 from mutator.comparison.pairs import ExperimentPair
 from mutator.statistics.median_intervals import median_difference
 from mutator.statistics.paired_statistics import wilcoxon_p
@@ -17,7 +17,7 @@ NO_CONTACT = "no contact"
 
 
 def metrics_sheets(
-    pairs: Sequence[ExperimentPair], a: ComparedRun, b: ComparedRun, names: RunNames
+    pairs: Sequence[ExperimentPair], a: ComparedRun, b: ComparedRun, names: RunDisplayNames
 ) -> tuple[Sheet, Sheet]:
     whole: list[tuple[SheetCell, ...]] = []
     parts: list[tuple[SheetCell, ...]] = []
@@ -31,7 +31,7 @@ def metrics_sheets(
             continue
         whole.append((name, unit, worse, *_median_cells(frame)))
         groups = {str(kind): (unit, worse, *_median_cells(group)) for kind, group in frame.groupby("kind")}
-        parts += with_adjusted_p(name, groups)
+        parts += lines_with_holm_p(name, groups)
     note = (
         f"Pairs with a value in both runs. Difference: the median of {names.b} minus that of {names.a}. Its "
         "interval resamples whole faults (variant and value); there is none if all faults agree. p: "
@@ -62,7 +62,7 @@ def _median_cells(frame: pd.DataFrame) -> tuple[SheetCell, ...]:
     return (len(frame), *medians, *interval, PValue(wilcoxon_p(first, second)))
 
 
-def severity_sheet(pairs: Sequence[ExperimentPair], names: RunNames) -> Sheet:
+def severity_cross_table(pairs: Sequence[ExperimentPair], names: RunDisplayNames) -> Sheet:
     order = [*SEVERITY_CLASSES[::-1], ""]
     counts = Counter((p.row_a.severity, p.row_b.severity) for p in pairs if p.is_usable)
     classes = [name for name in order if any(name in pair for pair in counts)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from mutator.comparison.pairs import ExperimentPair, ResultChange, time_to_hazard
+from mutator.comparison.pairs import ExperimentPair, ResultChangeKind, time_to_hazard
 from mutator.model import Outcome, Status
 from mutator.results.result_rows import ResultRow
 from mutator.statistics.guided_against_random import holm_adjusted
@@ -22,7 +22,7 @@ TIME_COLUMN_BY_EVENT = {
     "hazard": "t_hazard",
 }
 # the last time begins at the first alert, the others at activation
-TIME_NAMES = ("activation to manifest", "activation to alert", "activation to hazard", "alert to hazard")
+TIME_SPAN_NAMES = ("activation to manifest", "activation to alert", "activation to hazard", "alert to hazard")
 
 
 def pairs_frame(pairs: Sequence[ExperimentPair]) -> pd.DataFrame:
@@ -41,7 +41,7 @@ def pairs_frame(pairs: Sequence[ExperimentPair]) -> pd.DataFrame:
         for p in pairs
         if p.is_usable
     ]
-    names = [f"{name}_{side}" for side in "ab" for name in (*TIME_COLUMN_BY_EVENT, *TIME_NAMES)]
+    names = [f"{name}_{side}" for side in "ab" for name in (*TIME_COLUMN_BY_EVENT, *TIME_SPAN_NAMES)]
     frame = pd.DataFrame(rows, columns=["kind", "fault", *names])
     flags = [f"{name}_{side}" for side in "ab" for name in TIME_COLUMN_BY_EVENT]
     return frame.astype(dict.fromkeys(flags, bool) | {n: float for n in names if n not in flags})
@@ -58,7 +58,9 @@ def _event_cells(row: ResultRow, side: str) -> dict[str, object]:
     )
     flags = (start, row.t_manifest, alert, hazard)
     flags_by_name = dict(zip(TIME_COLUMN_BY_EVENT, (time is not None for time in flags), strict=True))
-    return {f"{k}_{side}": v for k, v in (flags_by_name | dict(zip(TIME_NAMES, spans, strict=True))).items()}
+    return {
+        f"{k}_{side}": v for k, v in (flags_by_name | dict(zip(TIME_SPAN_NAMES, spans, strict=True))).items()
+    }
 
 
 def _time_between(start: float | None, end: float | None) -> float:
@@ -66,17 +68,17 @@ def _time_between(start: float | None, end: float | None) -> float:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunNames:
+class RunDisplayNames:
     a: str
     b: str
 
 
-def rates_sheets(frame: pd.DataFrame, names: RunNames) -> tuple[Sheet, Sheet]:
+def rates_sheets(frame: pd.DataFrame, names: RunDisplayNames) -> tuple[Sheet, Sheet]:
     total_lines = tuple((flag, *_rate_cells(frame, flag)) for flag in TIME_COLUMN_BY_EVENT)
     type_lines: list[tuple[SheetCell, ...]] = []
     for flag in TIME_COLUMN_BY_EVENT:
         cells_by_type = {str(kind): _rate_cells(group, flag) for kind, group in frame.groupby("kind")}
-        type_lines += with_adjusted_p(flag, cells_by_type)
+        type_lines += lines_with_holm_p(flag, cells_by_type)
     note = (
         f"Pairs with a result in both runs. Difference: the rate of {names.b} minus that of {names.a}, as a "
         "fraction. Its interval resamples whole faults (variant and value); there is none if all faults "
@@ -99,16 +101,16 @@ def _rate_cells(frame: pd.DataFrame, flag: str) -> tuple[SheetCell, ...]:
     )
 
 
-def times_sheets(frame: pd.DataFrame, names: RunNames) -> tuple[Sheet, Sheet]:
+def times_sheets(frame: pd.DataFrame, names: RunDisplayNames) -> tuple[Sheet, Sheet]:
     complete_pairs = {
-        name: frame[frame[[f"{name}_a", f"{name}_b"]].notna().all(axis=1)] for name in TIME_NAMES
+        name: frame[frame[[f"{name}_a", f"{name}_b"]].notna().all(axis=1)] for name in TIME_SPAN_NAMES
     }
     total_lines = tuple(
         (name, *_time_cells(some, name)) for name, some in complete_pairs.items() if len(some)
     )
     type_lines: list[tuple[SheetCell, ...]] = []
     for name, some in complete_pairs.items():
-        type_lines += with_adjusted_p(
+        type_lines += lines_with_holm_p(
             name, {str(kind): _time_cells(group, name) for kind, group in some.groupby("kind")}
         )
     note = (
@@ -140,8 +142,8 @@ def _time_cells(frame: pd.DataFrame, name: str) -> tuple[SheetCell, ...]:
     )
 
 
-def with_adjusted_p(
-    name: str, cells_by_type: Mapping[str, tuple[SheetCell, ...]]
+def lines_with_holm_p(
+    measure: str, cells_by_type: Mapping[str, tuple[SheetCell, ...]]
 ) -> list[tuple[SheetCell, ...]]:
     """Return the lines of one measure by fault type, with Holm's adjusted p added after the last cell, which
     is p.
@@ -153,7 +155,7 @@ def with_adjusted_p(
     holm_values = dict(
         zip(defined_p_values, map(PValue, holm_adjusted(list(defined_p_values.values()))), strict=True)
     )
-    return [(name, kind, *cells, holm_values.get(kind)) for kind, cells in cells_by_type.items()]
+    return [(measure, kind, *cells, holm_values.get(kind)) for kind, cells in cells_by_type.items()]
 
 
 def total_and_type_sheets(
@@ -180,8 +182,8 @@ def total_and_type_sheets(
     )
 
 
-def changes_sheet(pairs: Sequence[ExperimentPair]) -> Sheet:
-    changes = [change for change in ResultChange if any(change in p.changes for p in pairs)]
+def change_counts_sheet(pairs: Sequence[ExperimentPair]) -> Sheet:
+    changes = [change for change in ResultChangeKind if any(change in p.change_kinds for p in pairs)]
     kinds = sorted({p.row_a.kind for p in pairs})
     parts = {kind: [p for p in pairs if p.row_a.kind == kind] for kind in kinds}
     lines = tuple(_count_line(kind, part, changes) for kind, part in parts.items())
@@ -195,13 +197,13 @@ def changes_sheet(pairs: Sequence[ExperimentPair]) -> Sheet:
 
 
 def _count_line(
-    name: str, pairs: Sequence[ExperimentPair], changes: Sequence[ResultChange]
+    name: str, pairs: Sequence[ExperimentPair], changes: Sequence[ResultChangeKind]
 ) -> tuple[SheetCell, ...]:
-    same = sum(not p.changes for p in pairs)
-    return (name, len(pairs), same, *(sum(change in p.changes for p in pairs) for change in changes))
+    same = sum(not p.change_kinds for p in pairs)
+    return (name, len(pairs), same, *(sum(change in p.change_kinds for p in pairs) for change in changes))
 
 
-def endings_sheet(pairs: Sequence[ExperimentPair], names: RunNames) -> Sheet:
+def endings_cross_table(pairs: Sequence[ExperimentPair], names: RunDisplayNames) -> Sheet:
     counts = Counter((p.row_a.ending, p.row_b.ending) for p in pairs)
     order = [*(o.value for o in Outcome), *(s.value for s in Status if s is not Status.OK)]
     before, after = ([e for e in order if any(pair[i] == e for pair in counts)] for i in (0, 1))

@@ -11,11 +11,11 @@ from mutator.model import Experiment, Outcome, Status
 from mutator.results.result_rows import ResultRow
 
 # a fault that never ran did as little harm as one that was masked
-_HARM_BY_OUTCOME = {Outcome.NOT_ACTIVATED: 0, Outcome.MASKED: 0, Outcome.SDC: 1, Outcome.HAZARD: 2}
+_HARM_RANK_BY_OUTCOME = {Outcome.NOT_ACTIVATED: 0, Outcome.MASKED: 0, Outcome.SDC: 1, Outcome.HAZARD: 2}
 _TIME_DECIMALS = 6  # decimals of a time from activation; absorbs rounding errors
 
 
-class ResultChange(StrEnum):
+class ResultChangeKind(StrEnum):
     """A change in the second run of a pair, relative to the first. `run_comparison.Gate` explains the changes
     for the worse.
     """
@@ -34,8 +34,10 @@ class ResultChange(StrEnum):
     NEW_CRASH = "new-crash"
     CRASH_GONE = "crash-gone"
     HARNESS_ERROR = "harness-error"
-    MENDED = "mended"  # a result, although the first run has none
-    OTHERWISE = "otherwise"  # another outcome that is neither better nor worse: masked or not activated
+    HARNESS_ERROR_GONE = "mended"  # a result, although the first run has none
+    OTHER_HARMLESS_OUTCOME = (
+        "otherwise"  # another outcome that is neither better nor worse: masked or not activated
+    )
 
 
 @dataclass(frozen=True)
@@ -53,9 +55,9 @@ class ExperimentPair:
         return self.row_a.usable and self.row_b.usable
 
     @cached_property
-    def changes(self) -> frozenset[ResultChange]:
+    def change_kinds(self) -> frozenset[ResultChangeKind]:
         """All changes; empty for equal results."""
-        return frozenset(_changes_between(self.row_a, self.row_b))
+        return frozenset(_change_kinds_between(self.row_a, self.row_b))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,41 +104,41 @@ def match_experiments(a: ComparedRun, b: ComparedRun) -> ExperimentMatching:
     )
 
 
-def _changes_between(a: ResultRow, b: ResultRow) -> Iterable[ResultChange]:
+def _change_kinds_between(a: ResultRow, b: ResultRow) -> Iterable[ResultChangeKind]:
     if not (a.usable and b.usable):
         if a.usable != b.usable:
-            yield ResultChange.HARNESS_ERROR if a.usable else ResultChange.MENDED
+            yield ResultChangeKind.HARNESS_ERROR if a.usable else ResultChangeKind.HARNESS_ERROR_GONE
         return
     if (a.status is Status.OK) != (b.status is Status.OK):
-        yield ResultChange.NEW_CRASH if a.status is Status.OK else ResultChange.CRASH_GONE
+        yield ResultChangeKind.NEW_CRASH if a.status is Status.OK else ResultChangeKind.CRASH_GONE
     elif a.ending != b.ending:
-        yield _change_by_harm(_harm(b) - _harm(a))
-    yield from _hazard_changes(a, b)
+        yield _change_kind_by_harm(_harm_rank(b) - _harm_rank(a))
+    yield from _hazard_change_kinds(a, b)
     if a.severity != b.severity:
-        yield ResultChange.HIGHER_SEVERITY if a.severity < b.severity else ResultChange.LOWER_SEVERITY
+        yield ResultChangeKind.HIGHER_SEVERITY if a.severity < b.severity else ResultChangeKind.LOWER_SEVERITY
     if bool(a.alerts) != bool(b.alerts):
-        yield ResultChange.LOST_ALERT if a.alerts else ResultChange.NEW_ALERT
+        yield ResultChangeKind.LOST_ALERT if a.alerts else ResultChangeKind.NEW_ALERT
 
 
-def _change_by_harm(difference: int) -> ResultChange:
-    if difference:
-        return ResultChange.WORSE if difference > 0 else ResultChange.BETTER
-    return ResultChange.OTHERWISE
+def _change_kind_by_harm(harm_increase: int) -> ResultChangeKind:
+    if harm_increase:
+        return ResultChangeKind.WORSE if harm_increase > 0 else ResultChangeKind.BETTER
+    return ResultChangeKind.OTHER_HARMLESS_OUTCOME
 
 
-def _harm(row: ResultRow) -> int:
-    return _HARM_BY_OUTCOME[row.outcome] if row.outcome else 0
+def _harm_rank(row: ResultRow) -> int:
+    return _HARM_RANK_BY_OUTCOME[row.outcome] if row.outcome else 0
 
 
-def _hazard_changes(a: ResultRow, b: ResultRow) -> Iterable[ResultChange]:
+def _hazard_change_kinds(a: ResultRow, b: ResultRow) -> Iterable[ResultChangeKind]:
     if bool(a.hazards) != bool(b.hazards):
-        yield ResultChange.HAZARD_GONE if a.hazards else ResultChange.NEW_HAZARD
+        yield ResultChangeKind.HAZARD_GONE if a.hazards else ResultChangeKind.NEW_HAZARD
     elif a.hazards:
         if {name for name, _ in b.hazards} - {name for name, _ in a.hazards}:
-            yield ResultChange.OTHER_HAZARD
+            yield ResultChangeKind.OTHER_HAZARD
         before, after = time_to_hazard(a), time_to_hazard(b)
         if before is not None and after is not None and before != after:
-            yield ResultChange.EARLIER_HAZARD if after < before else ResultChange.LATER_HAZARD
+            yield ResultChangeKind.EARLIER_HAZARD if after < before else ResultChangeKind.LATER_HAZARD
 
 
 def time_to_hazard(row: ResultRow) -> float | None:

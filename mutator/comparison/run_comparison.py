@@ -8,19 +8,19 @@ from pathlib import Path
 
 from mutator.comparison.compared_runs import ComparedRun, load_compared_run
 from mutator.comparison.input_differences import (
-    DifferingFiles,
+    DifferingTargetFiles,
     InputFact,
     campaign_parts_remark,
-    differing_files,
+    differing_pairs_remarks,
+    differing_target_files,
     input_facts,
-    pair_remarks,
     severity_remarks,
 )
-from mutator.comparison.metric_sheets import metrics_sheets, severity_sheet
+from mutator.comparison.metric_sheets import metrics_sheets, severity_cross_table
 from mutator.comparison.pair_sheets import (
-    RunNames,
-    changes_sheet,
-    endings_sheet,
+    RunDisplayNames,
+    change_counts_sheet,
+    endings_cross_table,
     pairs_frame,
     rates_sheets,
     times_sheets,
@@ -28,7 +28,7 @@ from mutator.comparison.pair_sheets import (
 from mutator.comparison.pairs import (
     ExperimentMatching,
     ExperimentPair,
-    ResultChange,
+    ResultChangeKind,
     match_experiments,
     time_to_hazard,
 )
@@ -41,20 +41,20 @@ from mutator.statistics.statistics_sheet import Sheet
 class Gate(StrEnum):
     """What a gate fails on: a change for the worse, or an unmatched experiment."""
 
-    NEW_HAZARD = ResultChange.NEW_HAZARD.value  #: a hazard, although the first run has none
+    NEW_HAZARD = ResultChangeKind.NEW_HAZARD.value  #: a hazard, although the first run has none
     #: another hazard, although the first run already has one
-    OTHER_HAZARD = ResultChange.OTHER_HAZARD.value
+    OTHER_HAZARD = ResultChangeKind.OTHER_HAZARD.value
     HIGHER_SEVERITY = (
-        ResultChange.HIGHER_SEVERITY.value
+        ResultChangeKind.HIGHER_SEVERITY.value
     )  #: a contact of a higher class, or a contact although the first run has none
-    EARLIER_HAZARD = ResultChange.EARLIER_HAZARD.value  #: less time from activation to the first hazard
-    LOST_ALERT = ResultChange.LOST_ALERT.value  #: no alert, although the first run has one
+    EARLIER_HAZARD = ResultChangeKind.EARLIER_HAZARD.value  #: less time from activation to the first hazard
+    LOST_ALERT = ResultChangeKind.LOST_ALERT.value  #: no alert, although the first run has one
     WORSE = (
-        ResultChange.WORSE.value
+        ResultChangeKind.WORSE.value
     )  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard
-    NEW_CRASH = ResultChange.NEW_CRASH.value  #: the controller crashes or does not finish
+    NEW_CRASH = ResultChangeKind.NEW_CRASH.value  #: the controller crashes or does not finish
     HARNESS_ERROR = (
-        ResultChange.HARNESS_ERROR.value
+        ResultChangeKind.HARNESS_ERROR.value
     )  #: the second run has no result, although the first has one
     UNMATCHED = "unmatched"  #: an experiment that only one of the runs has
     SEVERITY_S0 = "severity:S0"  #: a contact of class S0 or worse; in the first run a milder one or none
@@ -74,18 +74,18 @@ class GateFinding:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Two matched runs. `alerts_notes` has a note on the alerts of each run's fault-free runs, or ''."""
+    """Two matched runs. `golden_alerts_notes` has a note on the alerts of each run's golden runs, or ''."""
 
     a: ComparedRun
     b: ComparedRun
     matching: ExperimentMatching
-    alerts_notes: tuple[str, str] = ("", "")
+    golden_alerts_notes: tuple[str, str] = ("", "")
 
     @cached_property
-    def names(self) -> RunNames:
+    def names(self) -> RunDisplayNames:
         """The display names of the runs, made distinct if they are equal."""
         a, b = self.a.name, self.b.name
-        return RunNames(a=a, b=b) if a != b else RunNames(a=f"A: {a}", b=f"B: {b}")
+        return RunDisplayNames(a=a, b=b) if a != b else RunDisplayNames(a=f"A: {a}", b=f"B: {b}")
 
     @property
     def pairs(self) -> tuple[ExperimentPair, ...]:
@@ -93,37 +93,37 @@ class Comparison:
 
     @cached_property
     def changed_pairs(self) -> tuple[ExperimentPair, ...]:
-        """The pairs with any change: new hazards first, then in the order of `ResultChange` and the plan."""
-        order = list(ResultChange)
-        changed = (pair for pair in self.pairs if pair.changes)
-        return tuple(sorted(changed, key=lambda pair: sorted(map(order.index, pair.changes))))
+        """Pairs with any change: new hazards first, then in the order of `ResultChangeKind` and the plan."""
+        order = list(ResultChangeKind)
+        changed = (pair for pair in self.pairs if pair.change_kinds)
+        return tuple(sorted(changed, key=lambda pair: sorted(map(order.index, pair.change_kinds))))
 
-    def pairs_with(self, change: ResultChange) -> tuple[ExperimentPair, ...]:
-        return tuple(p for p in self.pairs if change in p.changes)
+    def pairs_with_change(self, change: ResultChangeKind) -> tuple[ExperimentPair, ...]:
+        return tuple(p for p in self.pairs if change in p.change_kinds)
 
     @cached_property
     def facts(self) -> tuple[InputFact, ...]:
         return input_facts(self.a, self.b)
 
     @cached_property
-    def files(self) -> DifferingFiles:
-        return differing_files(self.a.folder, self.b.folder)
+    def differing_target_files(self) -> DifferingTargetFiles:
+        return differing_target_files(self.a.folder, self.b.folder)
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
         """Caveats to read before the tables."""
-        noted = zip((self.names.a, self.names.b), self.alerts_notes, strict=True)
+        noted = zip((self.names.a, self.names.b), self.golden_alerts_notes, strict=True)
         alert_remarks = tuple(f"{name}: {note}" for name, note in noted if note)
-        first = (self.parts_remark,) if self.parts_remark else ()
+        first = (self.campaign_parts_remark,) if self.campaign_parts_remark else ()
         return (
             first
-            + pair_remarks(self.a, self.b, self.matching)
+            + differing_pairs_remarks(self.a, self.b, self.matching)
             + severity_remarks(self.a, self.b)
             + alert_remarks
         )
 
     @cached_property
-    def parts_remark(self) -> str:
+    def campaign_parts_remark(self) -> str:
         return campaign_parts_remark(self.a, self.b)
 
     @cached_property
@@ -132,9 +132,9 @@ class Comparison:
         frame = pairs_frame(self.pairs)
         rates, rates_by_type = rates_sheets(frame, self.names)
         spans, spans_by_type = times_sheets(frame, self.names)
-        counts = (endings_sheet(self.pairs, self.names), changes_sheet(self.pairs))
+        counts = (endings_cross_table(self.pairs, self.names), change_counts_sheet(self.pairs))
         metrics, metrics_by_type = metrics_sheets(self.pairs, self.a, self.b, self.names)
-        severity = severity_sheet(self.pairs, self.names)
+        severity = severity_cross_table(self.pairs, self.names)
         return (
             *(*counts, rates, spans),
             *(sheet for sheet in (severity, metrics) if sheet.lines),
@@ -166,7 +166,7 @@ class Comparison:
 
 
 def compare_runs(
-    run_a: Path, run_b: Path, only: str | None = None, alerts_notes: tuple[str, str] = ("", "")
+    run_a: Path, run_b: Path, only: str | None = None, golden_alerts_notes: tuple[str, str] = ("", "")
 ) -> Comparison:
     """Compare two run folders; `only` filters experiments by plan columns.
 
@@ -187,7 +187,7 @@ def compare_runs(
             expected="runs of the same faults, scenarios and triggers",
             remedy="compare runs of one campaign, or widen `only`",
         )
-    return Comparison(a=a, b=b, matching=matching, alerts_notes=alerts_notes)
+    return Comparison(a=a, b=b, matching=matching, golden_alerts_notes=golden_alerts_notes)
 
 
 def findings_of_gates(comparison: Comparison, gates: Sequence[Gate]) -> tuple[GateFinding, ...]:
@@ -204,7 +204,7 @@ def findings_of_gates(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Ga
         pairs = (
             _pairs_reaching_class(comparison, least)
             if is_severity
-            else comparison.pairs_with(ResultChange(gate.value))
+            else comparison.pairs_with_change(ResultChangeKind(gate.value))
         )
         gate_findings += [
             GateFinding(

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import load_campaign
-from mutator.campaigns.freezing import freeze_plan_in_owned_folder
 from mutator.campaigns.plan import SeedBySeedPlan, build_plan, load_plan
+from mutator.campaigns.plan_freezing import freeze_plan_in_owned_folder
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.errors import MutatorError

@@ -23,7 +23,7 @@ from mutator._common.folder_locks import owning_run_folder, wait_for_workers
 from mutator._common.interrupts import raising_keyboard_interrupts
 from mutator.audit.seal import Seals, seals_of
 from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
-from mutator.campaigns.freezing import make_run_folder
+from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import accepted_version_differences, append_machine, begin_stretch
 from mutator.engines.engine_choice import choose_engine, reason_not_to_fork
@@ -163,9 +163,9 @@ class Session:
             self.folder = begin_stretch(
                 self.folder,
                 self.workspace,
-                records=self.new_worker_name("*"),
+                records_glob=self.new_worker_name("*"),
                 packages=packages,
-                accept=self.accept_versions,
+                accept_versions=self.accept_versions,
             )
             self.golden_digests = golden_digests(self.folder)
             self._ledger_at_start = file_digests.load_ledger(self.folder.path)
@@ -197,7 +197,7 @@ class Session:
             "engine": self.engine,
             "goldens": dict(self.golden_digests),
             "secret": self.secret,
-            "pending": [[item.chunk_index, list(item.positions)] for item in self.pending],
+            "pending": [[item.chunk_index, list(item.pending_positions)] for item in self.pending],
             "proof": [[sample.number, sample.id] for sample in self.proof],
         }
 

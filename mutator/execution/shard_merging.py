@@ -12,7 +12,7 @@ from mutator._common.files import raising_disk_full, read_json, write_atomic, wr
 from mutator._common.folder_locks import owning_run_folder
 from mutator._common.message_text import counted
 from mutator.audit.seal import UNSEALED_KEYS, without_keys
-from mutator.campaigns.freezing import make_run_folder
+from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.run_provenance import version_error
 from mutator.errors import CheckFailed, MutatorError
 from mutator.preflight import equivalence_check

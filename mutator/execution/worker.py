@@ -80,7 +80,7 @@ class Worker:
         )
         self._prune_cached_images(experiments[0].seed)
         errors = []
-        for ended in self._runner.run([experiments[place] for place in pending.positions]):
+        for ended in self._runner.run([experiments[place] for place in pending.pending_positions]):
             finished = self._without_outcome_if_suspended(ended)
             self._store_finished(finished)
             if finished.mode in MODES_TO_PROVE:

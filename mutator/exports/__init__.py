@@ -66,7 +66,7 @@ class ExportRequest:
     folder: "RunFolder"
     out: Path
     workspace: "Workspace | None"
-    parts: ExportSelection
+    selection: ExportSelection
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,12 +99,12 @@ def find_export(name: str) -> Export:
     return export
 
 
-def check_options(name: str, export: Export, parts: ExportSelection) -> None:
+def check_options(name: str, export: Export, selection: ExportSelection) -> None:
     """Raise MutatorError for a part of a run that this format cannot write."""
     chosen = {
-        "failures": bool(parts.failures),
-        "only": parts.only is not None,
-        "table": parts.table is not ExportTable.RESULTS,
+        "failures": bool(selection.failures),
+        "only": selection.only is not None,
+        "table": selection.table is not ExportTable.RESULTS,
     }
     for option, is_chosen in chosen.items():
         if is_chosen and option not in export.options:

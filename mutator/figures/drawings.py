@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from mutator.figures import hazards_by_fault_type, heat_map, propagation_times
-from mutator.figures.run_plot import render_images
+from mutator.figures import hazard_heat_map, hazards_by_fault_type, propagation_times
+from mutator.figures.golden_and_faulty_plot import render_images
 from mutator.statistics.results_frame import select_common_columns
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class Drawing:
     title: str
     note: str
     figure: "Figure | None"
-    codes: tuple[tuple[str, str], ...] = ()
+    described_code_lines: tuple[tuple[str, str], ...] = ()
 
     def file_name(self, suffix: str) -> str:
         return f"{FIGURES_FOLDER}/{self.name}.{suffix}"
@@ -41,7 +41,7 @@ def draw_figures(frame: pd.DataFrame) -> tuple[Drawing, ...]:
     if scenarios > 1:
         drawings.append(_draw_propagation_times(frame))
     if kinds > 1 and scenarios > 1:
-        drawings.append(_draw_heat_map(frame))
+        drawings.append(_draw_hazard_heat_map(frame))
     return tuple(drawings)
 
 
@@ -75,10 +75,10 @@ def _draw_propagation_times(frame: pd.DataFrame) -> Drawing:
     )
 
 
-def _draw_heat_map(frame: pd.DataFrame) -> Drawing:
+def _draw_hazard_heat_map(frame: pd.DataFrame) -> Drawing:
     return Drawing(
         name="fault_type_by_scenario",
         title="Fault type and scenario",
         note="Runs with a hazard / activated faults. 0/0 without colour: never activated. Empty: no run.",
-        figure=heat_map.draw(frame),
+        figure=hazard_heat_map.draw(frame),
     )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mutator.figures import style
-from mutator.statistics.event_times import TimeSpread, propagation_times
+from mutator.statistics.event_times import TimeSpread, propagation_spreads_by_step
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 @style.shipped_style()
 def draw(frame: pd.DataFrame) -> "Figure":
     methods, scenarios = sorted(frame["method"].unique()), sorted(frame["scenario"].unique())
-    spreads = {(m, s): propagation_times(group) for (m, s), group in frame.groupby(["method", "scenario"])}
+    spreads = {
+        (m, s): propagation_spreads_by_step(group) for (m, s), group in frame.groupby(["method", "scenario"])
+    }
     steps = list(next(iter(spreads.values())))
     figure, axes = style.blank_figure(6.2, 2, 2)
     for axis, step in zip(axes, steps, strict=True):

@@ -24,13 +24,13 @@ INK_COLOUR = "#222222"
 HAZARD_COLOURS = ("#d55e00", "#f0e442", "#56b4e9", "#009e73", "#cc79a7", "#e69f00")
 SEVERAL_COLOUR = "#444444"
 _MATPLOTLIB, _RC_FILE = "matplotlib", "matplotlibrc"
-_STYLE_SETTINGS = {  # what differs from matplotlib's defaults
+_MATPLOTLIB_SETTINGS = {  # what differs from matplotlib's defaults
     "svg.hashsalt": "mutator",  # a fixed salt keeps the SVG deterministic
     "svg.fonttype": "none",
     "text.parse_math": False,  # a `$` in a name is a `$`
 }
 _style_lock = RLock()  # matplotlib's style is global
-_METHOD_LOOKS = (("#0072b2", "o"), ("#d55e00", "s"), ("#009e73", "^"), ("#cc79a7", "D"))
+_METHOD_COLOURS_AND_MARKERS = (("#0072b2", "o"), ("#d55e00", "s"), ("#009e73", "^"), ("#cc79a7", "D"))
 
 
 @contextmanager
@@ -43,7 +43,7 @@ def shipped_style() -> Iterator[None]:
         matplotlib = _matplotlib()
         with matplotlib.rc_context():
             matplotlib.rcdefaults()
-            matplotlib.rcParams.update(_STYLE_SETTINGS)
+            matplotlib.rcParams.update(_MATPLOTLIB_SETTINGS)
             yield
 
 
@@ -66,7 +66,7 @@ def _matplotlib() -> Any:
 
 
 def colour_and_marker(method: str) -> tuple[str, str]:
-    return _METHOD_LOOKS[list(Method).index(Method(method)) % len(_METHOD_LOOKS)]
+    return _METHOD_COLOURS_AND_MARKERS[list(Method).index(Method(method)) % len(_METHOD_COLOURS_AND_MARKERS)]
 
 
 def blank_figure(

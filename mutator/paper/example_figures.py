@@ -9,7 +9,7 @@ from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.execution.run_traces import RunTraces
 from mutator.figures.drawings import Drawing
-from mutator.figures.run_plot import event_marks
+from mutator.figures.golden_and_faulty_plot import event_marks
 from mutator.outcomes.series_sampling import MOST_SAMPLES_PER_S
 from mutator.paper.run_pair_plot import plot_run_pair
 from mutator.paper.unsafe_actions import ACTION_FIGURES, ActionFigure, RunPair
@@ -81,7 +81,7 @@ def _build_drawing(frame: pd.DataFrame, traces: RunTraces | None, figure: Action
                 title=figure.title,
                 note=_describe_example(figure, row, faults[row["fault_id"]].label, rank, len(rows)),
                 figure=plot_run_pair(pair, steps, figure, event_marks(record), manifest),
-                codes=(
+                described_code_lines=(
                     (QUERY_LABEL, figure.query),
                     (
                         "The whole experiment (DIR: this run folder)",
@@ -101,7 +101,7 @@ def _empty_drawing(figure: ActionFigure, reason: str) -> Drawing:
         title=figure.title,
         note=f"No figure: {reason}.",
         figure=None,
-        codes=((QUERY_LABEL, figure.query),),
+        described_code_lines=((QUERY_LABEL, figure.query),),
     )
 
 

@@ -96,18 +96,18 @@ def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
         tally_by_fault_type(_select_runs(runs, of)), "injected"
     )
     ratio = guided_against_random.pool_odds_ratios(strata)
-    types = counted(ratio.strata, "fault type")
+    types = counted(ratio.stratum_count, "fault type")
     text = f"- ({types})"
     if not math.isnan(ratio.odds_ratio):
         text = (
             f"odds ratio {ratio.odds_ratio:.3g} ({ratio.low:.3g} to {ratio.high:.3g}; {types}; "
-            f"p {ratio.p:.2g}, equal in all types: p {ratio.p_equal:.2g})"
+            f"p {ratio.p_of_odds_ratio_1:.2g}, equal in all types: p {ratio.p_of_equal_odds_ratios:.2g})"
         )
     return Estimate(
         value=ratio.odds_ratio,
         low=ratio.low,
         high=ratio.high,
-        n=min(sum(s.guided for s in strata), sum(s.random for s in strata)),
+        n=min(sum(s.guided_runs for s in strata), sum(s.random_runs for s in strata)),
         text=text,
     )
 
@@ -166,8 +166,8 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
     ends = {
         str(scenario): float(group["t_end"].iloc[0]) for scenario, group in selected_runs.groupby("scenario")
     }
-    reaction = event_times.reaction_times(selected_runs, ends, 0.0)
-    median, low, high = reaction.median, reaction.median_low, reaction.median_high
+    reaction = event_times.alert_to_hazard_times(selected_runs, ends, 0.0)
+    median, low, high = reaction.median_s, reaction.median_low_s, reaction.median_high_s
     if reaction.runs_alerted_first and math.isnan(low):  # the curve stays above one half or jumps past it
         median = math.inf if math.isnan(median) else median
         if reaction.runs_alerted_first >= _MIN_RUNS_TO_BOUND_MEDIAN:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mutator.figures import style
-from mutator.figures.run_plot import (
+from mutator.figures.golden_and_faulty_plot import (
     FAULTY_COLOUR,
     GOLDEN_COLOUR,
     MARK_COLOURS,
@@ -58,7 +58,9 @@ def plot_run_pair(
         axis.tick_params(labelbottom=axis is axes[-1])
     axes[-1].set_xlabel("time [s]", fontsize=style.TEXT_POINTS)
     _draw_marks(
-        axes, [mark for mark in with_first_alert_only(marks) if first_s <= mark.t <= last_s], last_s - first_s
+        axes,
+        [mark for mark in with_first_alert_only(marks) if first_s <= mark.t_s <= last_s],
+        last_s - first_s,
     )
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(
@@ -113,19 +115,19 @@ def _draw_marks(axes: Sequence["Axes"], marks: Sequence[EventMark], time_span_s:
     for mark in marks:
         for axis in axes:
             axis.axvline(
-                mark.t,
+                mark.t_s,
                 color=MARK_COLOURS[mark.kind],
                 linestyle=MARK_LINE_STYLES[mark.kind],
                 linewidth=1.8 if mark.kind is EventKind.HAZARD else 1.1,
             )
-        fits = mark.t + label_width <= end  # else the name ends at its mark instead of beginning there
-        begin = mark.t if fits else mark.t - label_width
+        fits = mark.t_s + label_width <= end  # else the name ends at its mark instead of beginning there
+        begin = mark.t_s if fits else mark.t_s - label_width
         level = next((i for i, name_end in enumerate(level_ends) if name_end <= begin), len(level_ends))
         level_ends[level : level + 1] = [begin + label_width]
         label = f"first alert, {mark.label}" if mark.kind is EventKind.ALERT else mark.label
         axes[0].annotate(
-            f"{label} {mark.t:.2f} s",
-            (mark.t, 1.0),
+            f"{label} {mark.t_s:.2f} s",
+            (mark.t_s, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0, 3 + 11 * level),  # points; a line of text is 11 high
             textcoords="offset points",

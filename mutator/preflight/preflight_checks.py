@@ -111,7 +111,7 @@ class _PreflightChecks:
         )
         content = [
             now,
-            run_environment.everything_outside_sources(),
+            run_environment.environment_affecting_results(),
             head.goldens,
             head.seed,
             folder.canary.id,

@@ -10,7 +10,7 @@ from mutator._common.helper_processes import map_in_processes, process_count_for
 from mutator.model import Fault, Record
 from mutator.outcomes.fault_paths import FaultPaths, PathInputs, UntimedPath
 from mutator.results.ranking import ranks_of_rows
-from mutator.statistics.event_times import AlertsByExperiment
+from mutator.statistics.event_times import FirstAlertsByHazardRun
 from mutator.store.run_folder import RunFolder
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class ExperimentFacts:
     worst_first_ranks: np.ndarray
     untimed_path_indices: np.ndarray
     distinct_untimed_paths: tuple[UntimedPath, ...]
-    alerts_by_hazardous_id: AlertsByExperiment
+    alerts_by_hazardous_id: FirstAlertsByHazardRun
     timings: "DataFrame"
 
     @classmethod

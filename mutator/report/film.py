@@ -17,7 +17,7 @@ from mutator.engines.process_endings import environment_variables_of_run
 from mutator.engines.sandbox import Sandbox
 from mutator.errors import MutatorError
 from mutator.execution.single_run import is_same_record, manifest_of_unchanged_target, run_golden, run_single
-from mutator.figures.run_plot import event_marks
+from mutator.figures.golden_and_faulty_plot import event_marks
 from mutator.model import Experiment, Record
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import FILM_FOLDER, TargetManifest
@@ -123,7 +123,7 @@ def _film_events(record: Record, title: str, names: Mapping[str, str]) -> dict[s
         "outcome": record.outcome.value if record.outcome else record.status.value,
         "active": [activation.first, activation.last] if activation else None,
         "marks": [
-            {"kind": mark.kind.value, "t": mark.t, "label": mark.label} for mark in event_marks(record)
+            {"kind": mark.kind.value, "t": mark.t_s, "label": mark.label} for mark in event_marks(record)
         ],
         "names": names,
         "end": record.t_end,

@@ -27,7 +27,7 @@ def require_approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
     review = load_review(workspace, manifest.name)
     refused = [group for group in groups if review.state(group) is not ReviewState.APPROVED]
     if refused:
-        raise _refusal(workspace, plan, review, refused)
+        raise _unapproved_error(workspace, plan, review, refused)
     decisions = [_approval_as_json(review, group) for group in groups]
     return {"schema": SCHEMA, "target": manifest.name, "groups": decisions}
 
@@ -37,18 +37,20 @@ def _approval_as_json(review: Review, group: Group) -> dict[str, Any]:
     return {**as_json_types(review.decision(group.id)), "remarks": remarks}
 
 
-def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Group]) -> CheckFailed:
+def _unapproved_error(
+    workspace: Workspace, plan: Plan, review: Review, unapproved_groups: list[Group]
+) -> CheckFailed:
     lines = [
-        f"  {group.id}  {refusal_reason(review, group)}, {describe_share(group)}: {group.label}"
-        for group in review.in_list_order(refused)
+        f"  {group.id}  {unapproved_reason(review, group)}, {describe_experiment_count(group)}: {group.label}"
+        for group in review.in_list_order(unapproved_groups)
     ]
-    several = len(refused) > 1
-    subject = f"{len(refused)} groups of mutants are" if several else "a group of mutants is"
+    several = len(unapproved_groups) > 1
+    subject = f"{len(unapproved_groups)} groups of mutants are" if several else "a group of mutants is"
     options = f"--campaign {_campaign_argument(workspace, plan)}"
     options += f" --reading {plan.reading}" if plan.choices.reading else ""
     approve_command = ""
-    if len(refused) <= _MOST_PRINTED_IDS:
-        ids = " ".join(group.id for group in refused)
+    if len(unapproved_groups) <= _MOST_PRINTED_IDS:
+        ids = " ".join(group.id for group in unapproved_groups)
         approve_command = f"; or approve {'all of them' if several else 'it'}: "
         approve_command += f"`mutator review approve {ids} {options} --by NAME`"
     return CheckFailed(
@@ -60,7 +62,7 @@ def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Gro
     )
 
 
-def refusal_reason(review: Review, group: Group) -> str:
+def unapproved_reason(review: Review, group: Group) -> str:
     """Why a group cannot run: `missing`, what has `changed`, or who `rejected` it."""
     state, decision = review.state(group), review.decision(group.id)
     if decision is None:
@@ -70,7 +72,7 @@ def refusal_reason(review: Review, group: Group) -> str:
     return decision.summary
 
 
-def describe_share(group: Group) -> str:
+def describe_experiment_count(group: Group) -> str:
     """Return the group's share of a campaign as text: a number of experiments, or only the canary."""
     return counted(group.experiment_count, "experiment") if group.experiment_count else "the canary"
 

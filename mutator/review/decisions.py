@@ -19,8 +19,8 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError, ReviewConflict
 from mutator.review import review_file, reviewed_texts
 from mutator.review.commit_authors import check_four_eyes, library_commit
-from mutator.review.entries import Decision, DecisionVerdict, Flag, Remark, ReviewEntry
 from mutator.review.mutant_groups import Group
+from mutator.review.review_entries import Decision, DecisionVerdict, Flag, Remark, ReviewEntry
 from mutator.workspace import Workspace
 
 _REVIEWS_FOLDER = "reviews"  # in the library
@@ -71,7 +71,7 @@ class Review:
 
     library: Path
     target: str
-    entries: Mapping[str, ReviewEntry]
+    entry_by_group: Mapping[str, ReviewEntry]
     four_eyes: bool = False
 
     @property
@@ -80,21 +80,21 @@ class Review:
         return path_below(self.library, _review_file_name(self.target))
 
     def decision(self, group_id: str) -> Decision | None:
-        entry = self.entries.get(group_id)
+        entry = self.entry_by_group.get(group_id)
         return entry.decision if entry else None
 
     def remarks(self, group_id: str) -> tuple[Remark, ...]:
         """Return the group's remarks, oldest first."""
-        entry = self.entries.get(group_id)
+        entry = self.entry_by_group.get(group_id)
         return entry.remarks if entry else ()
 
     def flag(self, group_id: str) -> Flag | None:
-        entry = self.entries.get(group_id)
+        entry = self.entry_by_group.get(group_id)
         return entry.flag if entry else None
 
     def revision(self, group_id: str) -> str:
         """Digest of the group's review; empty if there is none."""
-        entry = self.entries.get(group_id)
+        entry = self.entry_by_group.get(group_id)
         return entry.revision if entry else ""
 
     def stale_parts(self, group: Group) -> list[str]:
@@ -116,10 +116,10 @@ class Review:
         if decision is None or not self.stale_parts(group):
             return ""
         return reviewed_texts.diff_from_reviewed_text(
-            self.library, self.name_of_reviewed_text(group.id), decision.bound, group.reviewed_text
+            self.library, self.path_of_reviewed_text(group.id), decision.bound, group.reviewed_text
         )
 
-    def name_of_reviewed_text(self, group_id: str) -> str:
+    def path_of_reviewed_text(self, group_id: str) -> str:
         """Return the file in the library with the text of a group that the reviewer saw."""
         return f"{_REVIEWS_FOLDER}/seen/{self.target}/{group_id}.txt"
 
@@ -128,7 +128,7 @@ class Review:
         order = list(ReviewState)
         return sorted(groups, key=lambda group: order.index(self.state(group)))
 
-    def describe(self, group: Group) -> str:
+    def describe_decision(self, group: Group) -> str:
         """Return the decision about the group and what changed since, as text; empty without a decision."""
         decision = self.decision(group.id)
         if decision is None:
@@ -147,9 +147,11 @@ def load_review(workspace: Workspace, target: str) -> Review:
     try:
         open_below(library, name).close()
     except FileNotFoundError:
-        return Review(library=library, target=target, entries={})
+        return Review(library=library, target=target, entry_by_group={})
     content = review_file.load_review_file(path_below(library, name), target)
-    return Review(library=library, target=target, entries=content.entries, four_eyes=content.four_eyes)
+    return Review(
+        library=library, target=target, entry_by_group=content.entry_by_group, four_eyes=content.four_eyes
+    )
 
 
 def _review_file_name(target: str) -> str:
@@ -168,7 +170,7 @@ def record_actions(
     `four_eyes` forbids, and for the library shipped with mutator, which is read-only.
     """
     actions = [
-        replace(change, by=_one_line(change.by, "by"), text=_one_line(change.text, "text"))
+        replace(change, by=_printable_line(change.by, "by"), text=_printable_line(change.text, "text"))
         for change in requested
     ]
     for change in actions:
@@ -178,10 +180,10 @@ def record_actions(
     make_folder(path.parent)
     with locking_folder(path.parent):
         review = load_review(workspace, target)
-        _refuse_unseen(review, actions, revision_by_group)
+        _check_revisions(review, actions, revision_by_group)
         if review.four_eyes:
             check_four_eyes([(c.group, c.by) for c in actions if c.kind is ReviewActionKind.APPROVE])
-        return _store(workspace, review, actions)
+        return _store_actions(workspace, review, actions)
 
 
 def _check_action(action: ReviewAction) -> None:
@@ -191,7 +193,7 @@ def _check_action(action: ReviewAction) -> None:
         raise MutatorError("no text", argument="text", expected="a remark", remedy="write a remark")
 
 
-def _refuse_unseen(
+def _check_revisions(
     review: Review, actions: Sequence[ReviewAction], revision_by_group: Mapping[str, str]
 ) -> None:
     groups = {change.group.id: change.group for change in actions}
@@ -200,7 +202,7 @@ def _refuse_unseen(
     ]
     if not unseen:
         return
-    descriptions = [f"  {group.id}  {_describe_review(review, group)}" for group in unseen]
+    descriptions = [f"  {group.id}  {_describe_entry(review, group)}" for group in unseen]
     conflict = ReviewConflict(
         "\n".join(["somebody else has changed the review in the meantime:", *descriptions]),
         where=review.path,
@@ -211,14 +213,14 @@ def _refuse_unseen(
     raise conflict
 
 
-def _describe_review(review: Review, group: Group) -> str:
+def _describe_entry(review: Review, group: Group) -> str:
     remarks = review.remarks(group.id)
     flag = review.flag(group.id)
     return "; ".join(
         filter(
             None,
             (
-                review.describe(group) or "no decision",
+                review.describe_decision(group) or "no decision",
                 f"flagged by {flag.by}" if flag else "",
                 f"{remarks[-1].by}: {remarks[-1].text}" if remarks else "",
             ),
@@ -226,22 +228,24 @@ def _describe_review(review: Review, group: Group) -> str:
     )
 
 
-def _store(workspace: Workspace, review: Review, actions: Sequence[ReviewAction]) -> Review:
+def _store_actions(workspace: Workspace, review: Review, actions: Sequence[ReviewAction]) -> Review:
     """Store the changes. The texts that reviewers saw are written first."""
     at, commit = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", library_commit(workspace)
-    entries = dict(review.entries)
+    entries = dict(review.entry_by_group)
     for action in actions:
         group = action.group
         before = entries.get(group.id, ReviewEntry(group=group.id, what=group.label))
         entries[group.id] = _entry_after_action(before, action, at, commit)
     nonempty_entries = {name: entry for name, entry in entries.items() if not entry.is_empty}
-    updated = replace(review, entries=nonempty_entries)
+    updated = replace(review, entry_by_group=nonempty_entries)
     for action in actions:
         if action.kind in _VERDICT_BY_ACTION:
             reviewed_texts.write_reviewed_text(
-                updated.library, updated.name_of_reviewed_text(action.group.id), action.group.reviewed_text
+                updated.library, updated.path_of_reviewed_text(action.group.id), action.group.reviewed_text
             )
-    content = review_file.ReviewFileContent(entries=updated.entries, four_eyes=updated.four_eyes)
+    content = review_file.ReviewFileContent(
+        entry_by_group=updated.entry_by_group, four_eyes=updated.four_eyes
+    )
     write_below(
         updated.library,
         _review_file_name(updated.target),
@@ -274,7 +278,7 @@ def _entry_after_action(entry: ReviewEntry, action: ReviewAction, at: str, commi
     return entry
 
 
-def _one_line(text: str, argument: str) -> str:
+def _printable_line(text: str, argument: str) -> str:
     """Return the text as one line; MutatorError for characters that YAML cannot store."""
     line = " ".join(text.split())
     if not line.isprintable():

@@ -55,7 +55,7 @@ class PictureLevel:
 
     name: str
     label: str
-    after: bytes
+    after_jpeg: bytes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,25 +64,27 @@ class EffectPictures:
     `most`.
     """
 
-    before: bytes
+    before_jpeg: bytes
     levels: tuple[PictureLevel, ...]
 
     def find_level(self, name: str) -> PictureLevel | None:
         return next((level for level in self.levels if level.name == name), None)
 
 
-def has_pictures(group: Group) -> bool:
+def can_have_pictures(group: Group) -> bool:
     """Whether a group has images: all its image effects change the same variable in one place."""
-    return IMAGE_EFFECT_MODEL in group.models and all(_effect_place(fault) for fault in group.faults)
+    return IMAGE_EFFECT_MODEL in group.models and all(
+        _effect_location_and_variable(fault) for fault in group.faults
+    )
 
 
-def pictures_at_level(
+def jpegs_before_and_after(
     workspace: Workspace, manifest: TargetManifest, group: Group, level: str
 ) -> tuple[bytes, bytes] | None:
     """Return the image before and after the effect at one of LEVELS, as JPEG files."""
     pictures = pictures_of_groups(workspace, manifest, [group]).get(group.id)
     picture = pictures.find_level(level) if pictures else None
-    return (pictures.before, picture.after) if pictures and picture else None
+    return (pictures.before_jpeg, picture.after_jpeg) if pictures and picture else None
 
 
 def pictures_of_groups(
@@ -97,7 +99,7 @@ def pictures_of_groups(
     requests = {
         group.id: _DrawRequest.of(manifest, models, scenario, group)
         for group in groups
-        if has_pictures(group)
+        if can_have_pictures(group)
     }
     with _drawing_lock:
         pictures_by_group = {name: _load_cached(request.key) for name, request in requests.items()}
@@ -112,7 +114,7 @@ class _DrawRequest:
     """The faults of a group to draw, with their injected lines."""
 
     key: str
-    place: tuple[FaultLocation, str]
+    location_and_variable: tuple[FaultLocation, str]
     faults: tuple[Fault, ...]
     effect_lines: tuple[tuple[str, ...], ...]
 
@@ -122,7 +124,7 @@ class _DrawRequest:
     ) -> "_DrawRequest":
         faults = _choose_faults(group.faults)
         lines = tuple(_effect_lines(models, fault) for fault in faults)
-        place = _effect_place(faults[0])
+        place = _effect_location_and_variable(faults[0])
         assert place is not None  # the group has images
         entry = manifest.run_arguments(
             scenario=Path("scenario"), seed=0, out=Path("out"), changes=faults[0].changes
@@ -132,7 +134,7 @@ class _DrawRequest:
         labels = list(map(_level_label, faults))
         versions = [_SCHEMA, platform.python_version(), probe, manifest.tree.digest]
         key = content_id([*versions, run, content_id(place[0]), place[1], lines, labels])
-        return cls(key=key, place=place, faults=faults, effect_lines=lines)
+        return cls(key=key, location_and_variable=place, faults=faults, effect_lines=lines)
 
 
 def _first_scenario(workspace: Workspace) -> Path:
@@ -151,7 +153,7 @@ def _image_effects(fault: Fault) -> tuple[Injection, ...]:
     return tuple(injection for injection in fault.injections if injection.model == IMAGE_EFFECT_MODEL)
 
 
-def _effect_place(fault: Fault) -> tuple[FaultLocation, str] | None:
+def _effect_location_and_variable(fault: Fault) -> tuple[FaultLocation, str] | None:
     """Return the place of a fault's image effects, and the image variable; None for several places."""
     places = {
         (injection.location, str(dict(injection.params)["target"])) for injection in _image_effects(fault)
@@ -176,7 +178,7 @@ def _level_label(fault: Fault) -> str:
     )
 
 
-def _amounts(fault: Fault) -> tuple[float, ...]:
+def _effect_amounts(fault: Fault) -> tuple[float, ...]:
     return tuple(float(str(dict(injection.params)["amount"])) for injection in _image_effects(fault))
 
 
@@ -184,7 +186,7 @@ def _choose_faults(faults: Sequence[Fault]) -> tuple[Fault, ...]:
     """At most MOST faults with distinct amounts, evenly spread from least to largest."""
     by_amount: dict[tuple[float, ...], Fault] = {}
     for fault in faults:
-        by_amount.setdefault(_amounts(fault), fault)
+        by_amount.setdefault(_effect_amounts(fault), fault)
     sorted_faults = [by_amount[amounts] for amounts in sorted(by_amount)]
     last, count = len(sorted_faults) - 1, min(len(sorted_faults), MOST_DRAWN_VALUES)
     places = {round(i * last / max(1, count - 1)) for i in range(count)}
@@ -198,7 +200,7 @@ def _draw_pictures(
     check_requirements(manifest)
     places: dict[tuple[object, ...], list[str]] = {}
     for name, request in requests.items():
-        places.setdefault((request.place, request.faults[0].changes), []).append(name)
+        places.setdefault((request.location_and_variable, request.faults[0].changes), []).append(name)
     pictures_by_group = {}
     with ScratchFolder("mutator-pictures-") as scratch:
         (scratch / "work").mkdir()
@@ -221,7 +223,7 @@ def _images_of_run(
     engine: ReferenceEngine, models: FaultModels, scenario: Path, groups: Sequence[_DrawRequest], folder: Path
 ) -> list[np.ndarray]:
     """Return the image before the effect, then the images after each fault of each group."""
-    manifest, (location, picture) = engine.manifest, groups[0].place
+    manifest, (location, picture) = engine.manifest, groups[0].location_and_variable
     first = groups[0].faults[0]
     mutant = build(manifest, models, replace(first, injections=_image_effects(first)[:1]), always_trigger())
     lines = [effect_lines for group in groups for effect_lines in group.effect_lines]
@@ -253,19 +255,23 @@ def _images_of_run(
 
 
 def _build_pictures(
-    before: np.ndarray, faults: Sequence[Fault], after: Sequence[np.ndarray]
+    before_image: np.ndarray, faults: Sequence[Fault], after_images: Sequence[np.ndarray]
 ) -> EffectPictures:
-    changes = [float(np.sqrt(np.mean(np.square(image.astype(float) - before)))) for image in after]
+    changes = [
+        float(np.sqrt(np.mean(np.square(image.astype(float) - before_image)))) for image in after_images
+    ]
     order = _indices_by_severity(changes)
     names = {1: LEVEL_NAMES[2:], 2: LEVEL_NAMES[::2]}.get(len(order), LEVEL_NAMES)
     places = {"least": order[0], "middle": order[(len(order) - 1) // 2], "most": order[-1]}
     levels = [
         PictureLevel(
-            name=name, label=_level_label(faults[places[name]]), after=_jpeg_bytes(after[places[name]])
+            name=name,
+            label=_level_label(faults[places[name]]),
+            after_jpeg=_jpeg_bytes(after_images[places[name]]),
         )
         for name in names
     ]
-    return EffectPictures(before=_jpeg_bytes(before), levels=tuple(levels))
+    return EffectPictures(before_jpeg=_jpeg_bytes(before_image), levels=tuple(levels))
 
 
 def _indices_by_severity(changes: Sequence[float]) -> list[int]:
@@ -294,9 +300,9 @@ def _load_cached(key: str) -> EffectPictures | None:
         if data["sum"] == digest([key, before, levels]):
             os.utime(path)  # mark as recently used
             return EffectPictures(
-                before=base64.b64decode(before),
+                before_jpeg=base64.b64decode(before),
                 levels=tuple(
-                    PictureLevel(name=name, label=label, after=base64.b64decode(after))
+                    PictureLevel(name=name, label=label, after_jpeg=base64.b64decode(after))
                     for name, label, after in levels
                 ),
             )
@@ -307,8 +313,10 @@ def _load_cached(key: str) -> EffectPictures | None:
 
 def _save_cached(key: str, pictures: EffectPictures) -> None:
     path = shared_cache.cached_image_effects_folder() / f"{key}.json"
-    before = base64.b64encode(pictures.before).decode()
-    levels = [[level.name, level.label, base64.b64encode(level.after).decode()] for level in pictures.levels]
+    before = base64.b64encode(pictures.before_jpeg).decode()
+    levels = [
+        [level.name, level.label, base64.b64encode(level.after_jpeg).decode()] for level in pictures.levels
+    ]
     data = {"sum": digest([key, before, levels]), "before": before, "levels": levels}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

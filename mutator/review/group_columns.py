@@ -1,6 +1,6 @@
 """The columns for filters over groups. Help texts import them without the rest of the package."""
 
-COLUMNS = (
+GROUP_FILTER_COLUMNS = (
     "group",
     "state",
     "by",

@@ -83,9 +83,9 @@ def _results_by_label(path: Path, table_mtime_ns: int) -> dict[str, GroupResults
 
 def _build_results(
     frame: "pd.DataFrame",
-    ended: Sequence[str],
+    ending_by_row: Sequence[str],
     rows: Sequence[int],
-    hazard_meanings: Mapping[str, str],
+    meaning_by_hazard: Mapping[str, str],
     faults: Mapping[str, Fault],
 ) -> GroupResults:
     """Return the result for `rows`, sorted from worst to best. Of two equally frequent outcomes, the worse
@@ -93,7 +93,7 @@ def _build_results(
     """
     by_ending: dict[str, list[int]] = {}
     for row in rows:
-        by_ending.setdefault(ended[row], []).append(row)
+        by_ending.setdefault(ending_by_row[row], []).append(row)
     usable = {
         name: ending_rows for name, ending_rows in by_ending.items() if name not in UNUSABLE_STATUSES
     } or by_ending
@@ -101,20 +101,20 @@ def _build_results(
     order = [*Outcome, *Status]
     counts = {name.value: len(by_ending[name.value]) for name in order if name.value in by_ending}
     chosen = rows_of(frame.iloc[[most[len(most) // 2], rows[0]]], faults)
-    typical, worst = (_build_example(row, hazard_meanings) for row in chosen)
+    typical, worst = (_build_example(row, meaning_by_hazard) for row in chosen)
     return GroupResults(experiments=len(rows), outcomes=counts, typical=typical, worst=worst)
 
 
-def _build_example(row: ResultRow, hazard_meanings: Mapping[str, str]) -> ExampleExperiment:
+def _build_example(row: ResultRow, meaning_by_hazard: Mapping[str, str]) -> ExampleExperiment:
     return ExampleExperiment(
         id=row.experiment_id,
         label=f"{row.fault}, {row.scenario}, {row.trigger}",
         ending=row.ending,
-        verdict=describe_result(row, hazard_meanings),
+        verdict=describe_result(row, meaning_by_hazard),
     )
 
 
-def describe_result(row: ResultRow, hazard_meanings: Mapping[str, str]) -> str:
+def describe_result(row: ResultRow, meaning_by_hazard: Mapping[str, str]) -> str:
     """Return an experiment's result as text; `hazard_meanings` explain the hazards."""
     if row.ending in _TEXT_BY_OUTCOME:
         return _TEXT_BY_OUTCOME[row.ending]
@@ -123,7 +123,7 @@ def describe_result(row: ResultRow, hazard_meanings: Mapping[str, str]) -> str:
     if row.ending != Outcome.HAZARD.value:
         return f"{row.ending.replace('_', ' ')}: {row.detail}"
     name, time = row.hazards[0]
-    meaning = f" ({hazard_meanings[name]})" if hazard_meanings.get(name) else ""
+    meaning = f" ({meaning_by_hazard[name]})" if meaning_by_hazard.get(name) else ""
     after = f", {time - row.t_activation:.2f} s after activation" if row.t_activation is not None else ""
     alert_text = f"alert {row.alerts[0]} at {row.t_alert:.2f} s" if row.alerts else "no alert"
     return f"hazard {name}{meaning} at {time:.2f} s{after}; {alert_text}"

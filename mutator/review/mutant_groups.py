@@ -27,8 +27,8 @@ from mutator.operators.statement_facts import statement_facts_of
 from mutator.review import patch_shapes
 from mutator.review.called_code import CalledCode
 from mutator.review.decision_basis import DecisionBasis, distinct_diffs, fault_hunks, function_sources
-from mutator.review.entries import BasisDigests, ValueRanges
 from mutator.review.patch_shapes import PatchShape
+from mutator.review.review_entries import BasisDigests, ValueRanges
 from mutator.review.reviewed_texts import render_reviewed_text
 from mutator.review.value_ranges import value_ranges_of
 from mutator.targets.manifest import TargetManifest
@@ -139,33 +139,33 @@ class _GroupBuilder:
         self._called_code = CalledCode(manifest.tree)
 
     def build_groups(
-        self, members: Sequence[_FaultWithTrigger], runs: Mapping[str, int] | None
+        self, members: Sequence[_FaultWithTrigger], experiment_count_by_label: Mapping[str, int] | None
     ) -> tuple[Group, ...]:
         """Return the groups of `members`, sorted by label; `runs` counts experiments by label."""
         members_by_label: dict[str, list[_FaultWithTrigger]] = {}
         for fault, trigger in members:
             members_by_label.setdefault(patch_shapes.group_label(fault), []).append((fault, trigger))
-        patches: dict[tuple[Injection, ...], str] = {}
+        patch_by_injections: dict[tuple[Injection, ...], str] = {}
         for fault, trigger in members:
-            if fault.injections not in patches:
+            if fault.injections not in patch_by_injections:
                 mutant = build(self.manifest, self.models, fault, trigger)
-                patches[fault.injections] = fault_hunks(mutant.patch)
+                patch_by_injections[fault.injections] = fault_hunks(mutant.patch)
         built = [
-            self._build_group(what, members_by_label[what], patches, runs)
+            self._build_group(what, members_by_label[what], patch_by_injections, experiment_count_by_label)
             for what in sorted(members_by_label)
         ]
-        return (*built, self._build_probe_group(runs))
+        return (*built, self._build_probe_group(experiment_count_by_label))
 
     def _build_group(
         self,
         label: str,
         members: Sequence[_FaultWithTrigger],
-        patches: dict[tuple[Injection, ...], str],
-        runs: Mapping[str, int] | None,
+        patch_by_injections: dict[tuple[Injection, ...], str],
+        experiment_count_by_label: Mapping[str, int] | None,
     ) -> Group:
         faults = {fault.id: fault for fault, _ in members}
         shapes = patch_shapes.shapes_of_patches(
-            (fault.id, label, patches[fault.injections]) for fault in faults.values()
+            (fault.id, label, patch_by_injections[fault.injections]) for fault in faults.values()
         )
         fault, _ = members[0]
         injections = tuple(dict.fromkeys(i for f in faults.values() for i in f.injections))
@@ -177,7 +177,8 @@ class _GroupBuilder:
         else:
             representatives = [faults[shape.member_ids[0]] for shape in shapes]
             material = self._basis_of_mutants(
-                representatives, [patches[representative.injections] for representative in representatives]
+                representatives,
+                [patch_by_injections[representative.injections] for representative in representatives],
             )
             values = value_ranges_of(faults.values(), self.specs, self.models)
         return Group(
@@ -199,7 +200,9 @@ class _GroupBuilder:
             ),
             faults=tuple(faults.values()),
             triggers=tuple(dict.fromkeys(trigger for _, trigger in members)),
-            experiment_count=None if runs is None else runs.get(label, 0),
+            experiment_count=None
+            if experiment_count_by_label is None
+            else experiment_count_by_label.get(label, 0),
             basis_digests=material.digests,
             value_ranges=values,
             reviewed_text=render_reviewed_text(material.digests, values, material.sections),
@@ -245,7 +248,7 @@ class _GroupBuilder:
             ),
         )
 
-    def _build_probe_group(self, runs: Mapping[str, int] | None) -> Group:
+    def _build_probe_group(self, experiment_count_by_label: Mapping[str, int] | None) -> Group:
         """Return the group of the code that every mutant has: the probe, its import, and the observing
         statement.
         """
@@ -270,7 +273,9 @@ class _GroupBuilder:
             shapes=tuple(patch_shapes.shapes_of_patches([("", label, patch)])),
             faults=(),
             triggers=(),
-            experiment_count=None if runs is None else sum(runs.values()),
+            experiment_count=None
+            if experiment_count_by_label is None
+            else sum(experiment_count_by_label.values()),
             basis_digests=material.digests,
             reviewed_text=render_reviewed_text(material.digests, {}, material.sections),
             source_files=(

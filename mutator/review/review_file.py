@@ -10,7 +10,7 @@ from pydantic import Field
 
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
-from mutator.review.entries import (
+from mutator.review.review_entries import (
     TIME_PATTERN,
     BasisDigests,
     Decision,
@@ -54,7 +54,7 @@ class _FileModel(StrictModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReviewFileContent:
-    entries: Mapping[str, ReviewEntry]
+    entry_by_group: Mapping[str, ReviewEntry]
     four_eyes: bool = False
 
 
@@ -75,12 +75,12 @@ def load_review_file(path: Path, target: str) -> ReviewFileContent:
                 remedy="keep the valid one",
             )
         entries[block.group] = _parse_entry(block, source, i)
-    return ReviewFileContent(entries=entries, four_eyes=model.four_eyes)
+    return ReviewFileContent(entry_by_group=entries, four_eyes=model.four_eyes)
 
 
 def render_review_file(target: str, content: ReviewFileContent) -> str:
     """Return the text of a file, sorted so that git can merge parallel work."""
-    blocks = [_render_block(content.entries[name]) for name in sorted(content.entries)]
+    blocks = [_render_block(content.entry_by_group[name]) for name in sorted(content.entry_by_group)]
     head = f"schema: {SCHEMA}\ntarget: {json.dumps(target)}\n" + "four_eyes: true\n" * content.four_eyes
     return f"{_FILE_HEADER}{head}decisions:" + ("\n" + "".join(blocks) if blocks else " []\n")
 

@@ -13,16 +13,18 @@ from mutator._common.hashing import as_json_types, content_id
 from mutator.errors import MutatorError
 from mutator.mutants.injected_lines import tags_for_page_scripts
 from mutator.review.decisions import Review, ReviewState
-from mutator.review.effect_pictures import has_pictures
+from mutator.review.effect_pictures import can_have_pictures
+from mutator.review.group_display import fault_value_table, trigger_condition_lines
 from mutator.review.mutant_groups import Group
-from mutator.review.readable_groups import condition_lines, value_table
 from mutator.web import asset_text, json_script_element, load_order, packed_script_element
 
 
-def write_review_page(out: Path, review: Review, groups: Sequence[Group], options: Sequence[str]) -> None:
+def write_review_page(
+    out: Path, review: Review, groups: Sequence[Group], selecting_options: Sequence[str]
+) -> None:
     """Write the page of `groups`; its commands include `options`, which select the groups."""
     try:
-        write_atomic(out, review_page_html(review, groups, options).encode())
+        write_atomic(out, review_page_html(review, groups, selecting_options).encode())
     except OSError as err:
         raise MutatorError(
             f"cannot be written ({err.strerror})", where=out, remedy="choose another file"
@@ -32,8 +34,8 @@ def write_review_page(out: Path, review: Review, groups: Sequence[Group], option
 def review_page_html(
     review: Review,
     groups: Sequence[Group],
-    options: Sequence[str],
-    served: Mapping[str, Any] | None = None,
+    selecting_options: Sequence[str],
+    server_facts: Mapping[str, Any] | None = None,
 ) -> str:
     """Return the page of `groups`. `served` has what a served page needs: target, reviewer, address and token
     for decisions, runs.
@@ -41,9 +43,12 @@ def review_page_html(
     data = {
         "target": review.target,
         "states": [state.value for state in ReviewState],
-        "options": shlex.join(options),
-        "groups": [_group_as_json(review, group, stack) for group, stack in _groups_by_stack(review, groups)],
-        "served": served,
+        "options": shlex.join(selecting_options),
+        "groups": [
+            _group_as_json(review, group, stack)
+            for group, stack in _groups_with_stack_numbers(review, groups)
+        ],
+        "served": server_facts,
     }
     return render_review_page(data)
 
@@ -63,7 +68,7 @@ def render_review_page(data: dict[str, Any]) -> str:
     )
 
 
-def review_as_json(review: Review, group: Group) -> dict[str, Any]:
+def group_review_as_json(review: Review, group: Group) -> dict[str, Any]:
     """Return the review of a group, as the page shows it. `digest` identifies the mutants, so that decisions
     from a page that shows other mutants are refused.
     """
@@ -90,7 +95,7 @@ def review_as_json(review: Review, group: Group) -> dict[str, Any]:
     }
 
 
-def _groups_by_stack(review: Review, groups: Sequence[Group]) -> list[tuple[Group, int]]:
+def _groups_with_stack_numbers(review: Review, groups: Sequence[Group]) -> list[tuple[Group, int]]:
     """Return the groups with stack numbers, in stack order. The groups of a stack share state, template,
     function and called code.
     """
@@ -108,21 +113,21 @@ def _groups_by_stack(review: Review, groups: Sequence[Group]) -> list[tuple[Grou
     return sorted(numbered, key=lambda pair: pair[1])
 
 
-def _group_as_json(review: Review, group: Group, stack: int) -> dict[str, Any]:
-    heads, rows = value_table(group)
-    return review_as_json(review, group) | {
+def _group_as_json(review: Review, group: Group, stack_number: int) -> dict[str, Any]:
+    heads, rows = fault_value_table(group)
+    return group_review_as_json(review, group) | {
         "id": group.id,
-        "like": stack,
+        "like": stack_number,
         "injections": group.injection_labels,
         "specs": group.specs,
         "trigger": group.trigger_kinds,
         "hold": group.hold_kinds,
-        "conditions": condition_lines(group.triggers),
+        "conditions": trigger_condition_lines(group.triggers),
         "faults": len(group.faults),
         "runs": group.experiment_count,
         "diff": group.diff,
         "changes": review.diff_since_decision(group),
-        "pictures": has_pictures(group),
+        "pictures": can_have_pictures(group),
         "heads": heads,
         "rows": rows,
     }

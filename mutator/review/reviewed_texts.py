@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mutator._common.confined_files import read_below, write_below
 from mutator.errors import MutatorError
-from mutator.review.entries import BasisDigests, ValueRanges, describe_ranges
+from mutator.review.review_entries import BasisDigests, ValueRanges, describe_ranges
 
 _CONTEXT_LINES = 3  # unchanged lines around a change
 _HUNK_PATTERN = re.compile(r"@@ -\S+ \+(\d+)\S* @@")

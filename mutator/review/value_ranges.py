@@ -9,7 +9,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec, Variant
 from mutator.faults.injection_parameters import resolve_injection
 from mutator.model import Fault, Injection
-from mutator.review.entries import ValueRanges
+from mutator.review.review_entries import ValueRanges
 
 _Value = float | str
 

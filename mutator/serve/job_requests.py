@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, TypeAdapter
 from mutator._common.confined_files import check_only_plain_files
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.message_text import describe_choices, spelling_suggestion
-from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.row_filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES

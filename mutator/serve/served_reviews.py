@@ -17,7 +17,7 @@ from mutator.errors import GroupsChanged, MutatorError, NotServed, ReviewConflic
 from mutator.review import effect_pictures, group_results, mutant_groups
 from mutator.review.decisions import Review, ReviewAction, ReviewActionKind, load_review, record_actions
 from mutator.review.mutant_groups import Group
-from mutator.review.review_page import review_as_json, review_page_html
+from mutator.review.review_page import group_review_as_json, review_page_html
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -171,7 +171,7 @@ class ServedReviews:
     def picture(self, selection: GroupSelection, name: str, level: str, *, after: bool) -> bytes:
         """Return a frame before or after the group's effect, as a JPEG file; NotServed if there is none."""
         manifest = self.workspace.manifest(selection.target)
-        before_and_after = effect_pictures.pictures_at_level(
+        before_and_after = effect_pictures.jpegs_before_and_after(
             self.workspace, manifest, self.group(selection, name), level
         )
         if before_and_after is None:
@@ -230,7 +230,7 @@ class ServedReviews:
 
 
 def _review_json_by_group(review: Review, groups: Iterable[Group]) -> dict[str, Any]:
-    return {group.id: review_as_json(review, group) for group in groups}
+    return {group.id: group_review_as_json(review, group) for group in groups}
 
 
 def _file_stamps_in(root: Path) -> list[tuple[str, int, int]]:

@@ -16,19 +16,19 @@ _ALERT_NOTE = (
 
 
 def propagation_sheet(
-    frame: pd.DataFrame, published: PublishedCounts | None, *, alerts: bool = True
+    frame: pd.DataFrame, published: PublishedCounts | None, *, has_alerts: bool = True
 ) -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for method, scenario, group in _groups_with_totals(frame):
-        for step, spread in event_times.propagation_times(group).items():
-            if alerts or "alert" not in step:
+        for step, spread in event_times.propagation_spreads_by_step(group).items():
+            if has_alerts or "alert" not in step:
                 lines.append((method, scenario, step, *astuple(spread)))
     return Sheet(
         name="propagation",
         title="Propagation times by scenario",
         note="Time in s between two events, in the N runs with both. Manifest: first difference of an "
         "actuator output from the fault-free run."
-        + (_ALERT_NOTE if alerts else "")
+        + (_ALERT_NOTE if has_alerts else "")
         + (f" {published.times_note}" if published else ""),
         heads=(
             "method",
@@ -44,13 +44,13 @@ def propagation_sheet(
     )
 
 
-def reaction_sheet(
+def alert_to_hazard_sheet(
     frame: pd.DataFrame, end_by_scenario: Mapping[str, float], driver_reaction_s: float
 ) -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for method, scenario, group in _groups_with_totals(frame):
-        reaction = event_times.reaction_times(group, end_by_scenario, driver_reaction_s)
-        median: tuple[SheetCell, ...] = (reaction.median, reaction.median_low, reaction.median_high)
+        reaction = event_times.alert_to_hazard_times(group, end_by_scenario, driver_reaction_s)
+        median: tuple[SheetCell, ...] = (reaction.median_s, reaction.median_low_s, reaction.median_high_s)
         counts = (
             reaction.runs_alerted_first,
             reaction.hazards_after_alert,
@@ -79,10 +79,12 @@ def reaction_sheet(
     )
 
 
-def alerts_sheet(frame: pd.DataFrame, alerts: event_times.AlertsByExperiment) -> Sheet:
+def alerts_before_hazards_sheet(
+    frame: pd.DataFrame, first_alerts_by_hazard_run: event_times.FirstAlertsByHazardRun
+) -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for method, group in frame.groupby("method"):
-        shares = event_times.alerts_before_hazards(group, alerts)
+        shares = event_times.alert_first_share_by_hazard_and_alert(group, first_alerts_by_hazard_run)
         lines += [(str(method), hazard, alert, share) for (hazard, alert), share in shares.items()]
     return Sheet(
         name="alerts_before_hazards",
@@ -94,11 +96,12 @@ def alerts_sheet(frame: pd.DataFrame, alerts: event_times.AlertsByExperiment) ->
     )
 
 
-def orders_sheet(frame: pd.DataFrame) -> Sheet:
+def hazard_orders_sheet(frame: pd.DataFrame) -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for (method, module), group in frame.groupby(["method", "module"]):
         lines += [
-            (str(method), str(module), order, n) for order, n in event_times.hazard_orders(group).items()
+            (str(method), str(module), order, n)
+            for order, n in event_times.run_count_by_hazard_order(group).items()
         ]
     return Sheet(
         name="hazard_orders",

@@ -17,7 +17,7 @@ import pandas as pd
 from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares import CONFIDENCE, Share, share
 
-AlertsByExperiment = Mapping[str, tuple[tuple[str, float], ...]]
+FirstAlertsByHazardRun = Mapping[str, tuple[tuple[str, float], ...]]
 _SHARE_TOLERANCE = (
     1e-9  # shares closer than this are equal, because a curve is a product of rounded fractions
 )
@@ -35,15 +35,15 @@ class TimeSpread:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReactionTimes:
+class AlertToHazardTimes:
     """Times (s) and shares from the first alert to a hazard. NaN: not reached or not defined.
 
     `runs_alerted_first` is the number of runs with an alert before any hazard. Of these,
-    `hazards_after_alert` then had a hazard; the others are censored at their end. `median` is the time at
-    which the Kaplan-Meier curve crosses one half. If the curve is flat at one half, `median` is the middle of
-    the flat section, as in R's `survfit` and SAS; if the flat section reaches the end of the curve, `median`
-    is the section's beginning. From `median_low` to `median_high`, the curve's log-log transformed interval
-    contains one half (Brookmeyer and Crowley 1982). A bound is infinite if the runs do not reach it.
+    `hazards_after_alert` then had a hazard; the others are censored at their end. `median_s` is the time at
+    which the Kaplan-Meier curve crosses one half. If the curve is flat at one half, `median_s` is the middle
+    of the flat section, as in R's `survfit` and SAS; if the flat section reaches the end of the
+    curve, `median_s` is the section's beginning. From `median_low_s` to `median_high_s`, the curve's log-log transformed
+    interval contains one half (Brookmeyer and Crowley 1982). A bound is infinite if the runs do not reach it.
     `no_hazard_share` is the Kaplan-Meier share of alerts without a hazard within the driver's reaction time;
     `late_hazard_share` is the share, among the hazards after an alert, of those that came later than this
     reaction time.
@@ -51,9 +51,9 @@ class ReactionTimes:
 
     runs_alerted_first: int
     hazards_after_alert: int
-    median: float
-    median_low: float
-    median_high: float
+    median_s: float
+    median_low_s: float
+    median_high_s: float
     no_hazard_share: float
     late_hazard_share: Share
     runs_alerted_too_late: (
@@ -73,7 +73,7 @@ def spread_of_times(times: pd.Series) -> TimeSpread:
     )
 
 
-def propagation_times(frame: pd.DataFrame) -> dict[str, TimeSpread]:
+def propagation_spreads_by_step(frame: pd.DataFrame) -> dict[str, TimeSpread]:
     """Return the times from activation to the first actuator difference, alert and hazard, and from the first
     alert to the first hazard if the alert came first.
     """
@@ -87,9 +87,9 @@ def propagation_times(frame: pd.DataFrame) -> dict[str, TimeSpread]:
     }
 
 
-def reaction_times(
+def alert_to_hazard_times(
     frame: pd.DataFrame, end_by_scenario: Mapping[str, float], driver_reaction_s: float
-) -> ReactionTimes:
+) -> AlertToHazardTimes:
     """Return the Kaplan-Meier estimate (statsmodels) over the runs with an alert before any hazard.
 
     `end_by_scenario` has the end of each scenario's runs, in simulated seconds. Crashed and timed-out runs
@@ -113,30 +113,30 @@ def reaction_times(
     if not events:
         nan = math.nan
         no_hazard_share = 1.0 if len(first) else nan
-        return ReactionTimes(
+        return AlertToHazardTimes(
             **counts,
-            median=nan,
-            median_low=nan,
-            median_high=nan,
+            median_s=nan,
+            median_low_s=nan,
+            median_high_s=nan,
             no_hazard_share=no_hazard_share,
             late_hazard_share=late_hazards,
         )
     curve = SurvfuncRight(times.to_numpy().round(6), status.to_numpy())
     reached = curve.surv_prob[curve.surv_times <= driver_reaction_s]
     low, high = _median_time_interval(curve)
-    return ReactionTimes(
+    return AlertToHazardTimes(
         **counts,
-        median=_median_time(curve),
-        median_low=low,
-        median_high=high,
+        median_s=_median_time(curve),
+        median_low_s=low,
+        median_high_s=high,
         no_hazard_share=float(reached[-1]) if len(reached) else 1.0,
         late_hazard_share=late_hazards,
     )
 
 
 def _median_time(curve: Any) -> float:
-    """Return the time at which a Kaplan-Meier curve crosses one half, as defined in `ReactionTimes`; NaN if
-    it does not.
+    """Return the time at which a Kaplan-Meier curve crosses one half, as defined in `AlertToHazardTimes`; NaN
+    if it does not.
     """
     (reached,) = np.nonzero(curve.surv_prob < 0.5 + _SHARE_TOLERANCE)
     if not reached.size:
@@ -155,8 +155,8 @@ def _median_time_interval(curve: Any) -> tuple[float, float]:
     return float(low), math.inf if is_open else float(high)
 
 
-def alerts_before_hazards(
-    frame: pd.DataFrame, alerts_by_experiment: AlertsByExperiment
+def alert_first_share_by_hazard_and_alert(
+    frame: pd.DataFrame, first_alerts_by_hazard_run: FirstAlertsByHazardRun
 ) -> dict[tuple[str, str], Share]:
     """Return, by (hazard, alert), the share of the runs with this hazard in which the alert came first. The
     names `any` and `none` mean at least one alert and no alert.
@@ -168,7 +168,7 @@ def alerts_before_hazards(
         ends = frame[f"t_{hazard.lower()}"].dropna()
         runs = frame.loc[ends.index, "experiment_id"]
         before = [
-            {name for name, t in alerts_by_experiment[run] if t < end}
+            {name for name, t in first_alerts_by_hazard_run[run] if t < end}
             for run, end in zip(runs, ends, strict=True)
         ]
         counts = Counter(name for names in before for name in names)
@@ -179,7 +179,7 @@ def alerts_before_hazards(
     return shares
 
 
-def hazard_orders(frame: pd.DataFrame) -> dict[str, int]:
+def run_count_by_hazard_order(frame: pd.DataFrame) -> dict[str, int]:
     """Return the number of runs with each order of hazards: `A`, `A then B`, `A with B`."""
     names = hazard_names(frame)
     rows = frame[frame["is_hazard"]]

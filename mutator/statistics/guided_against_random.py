@@ -20,23 +20,23 @@ from mutator.statistics.tallies import Tally
 RateBase = Literal["activated", "injected"]
 RATE_BASES: tuple[RateBase, ...] = ("activated", "injected")
 GUIDED, RANDOM = "guided", "random"
-_PAIR_COLUMNS = ["fault_id", "scenario", "row", "seed"]
+_PAIR_KEY_COLUMNS = ["fault_id", "scenario", "row", "seed"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultTypeStratum:
     fault_type: str
     guided_hazards: int
-    guided: int
+    guided_runs: int
     random_hazards: int
-    random: int
+    random_runs: int
 
     @property
     def contingency_table(self) -> list[list[int]]:
         """The counts [hazard, no hazard], first of guided and then of random faults."""
         return [
-            [self.guided_hazards, self.guided - self.guided_hazards],
-            [self.random_hazards, self.random - self.random_hazards],
+            [self.guided_hazards, self.guided_runs - self.guided_hazards],
+            [self.random_hazards, self.random_runs - self.random_hazards],
         ]
 
 
@@ -45,15 +45,16 @@ class PooledOddsRatio:
     """The Mantel-Haenszel estimate over fault types: above 1 if guided faults are more hazardous, NaN if
     undefined.
 
-    `p` tests that the common odds ratio is 1, and `p_equal` that the odds ratio is the same in all types.
+    `p_of_odds_ratio_1` tests that the common odds ratio is 1, and `p_of_equal_odds_ratios` that
+    the odds ratio is the same in all types.
     """
 
     odds_ratio: float
     low: float
     high: float
-    p: float
-    p_equal: float
-    strata: int  # fault types with runs of both methods
+    p_of_odds_ratio_1: float
+    p_of_equal_odds_ratios: float
+    stratum_count: int  # fault types with runs of both methods
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,9 +81,9 @@ def strata_with_both_methods(
                 FaultTypeStratum(
                     fault_type=kind,
                     guided_hazards=guided.hazards,
-                    guided=getattr(guided, base),
+                    guided_runs=getattr(guided, base),
                     random_hazards=random.hazards,
-                    random=getattr(random, base),
+                    random_runs=getattr(random, base),
                 )
             )
     return tuple(strata)
@@ -92,10 +93,19 @@ def pool_odds_ratios(parts: Sequence[FaultTypeStratum]) -> PooledOddsRatio:
     """Compare the odds of a hazard in guided and random runs, stratified by fault type (statsmodels)."""
     from statsmodels.stats.contingency_tables import StratifiedTable  # type: ignore[import-untyped]
 
-    informative = [s for s in parts if 0 < s.guided_hazards + s.random_hazards < s.guided + s.random]
+    informative = [
+        s for s in parts if 0 < s.guided_hazards + s.random_hazards < s.guided_runs + s.random_runs
+    ]
     if not informative:  # in each type all or none were hazards, so there are no odds to compare
         nan = math.nan
-        return PooledOddsRatio(odds_ratio=nan, low=nan, high=nan, p=nan, p_equal=nan, strata=len(parts))
+        return PooledOddsRatio(
+            odds_ratio=nan,
+            low=nan,
+            high=nan,
+            p_of_odds_ratio_1=nan,
+            p_of_equal_odds_ratios=nan,
+            stratum_count=len(parts),
+        )
     table = StratifiedTable([np.array(stratum.contingency_table) for stratum in informative])
     with np.errstate(all="ignore"):  # an odds ratio of 0 or infinity has no finite interval
         low, high = table.oddsratio_pooled_confint(alpha=1 - CONFIDENCE)
@@ -103,9 +113,11 @@ def pool_odds_ratios(parts: Sequence[FaultTypeStratum]) -> PooledOddsRatio:
             odds_ratio=float(table.oddsratio_pooled),
             low=float(low),
             high=float(high),
-            p=float(table.test_null_odds(correction=False).pvalue),
-            p_equal=float(table.test_equal_odds().pvalue) if len(informative) > 1 else math.nan,
-            strata=len(parts),
+            p_of_odds_ratio_1=float(table.test_null_odds(correction=False).pvalue),
+            p_of_equal_odds_ratios=float(table.test_equal_odds().pvalue)
+            if len(informative) > 1
+            else math.nan,
+            stratum_count=len(parts),
         )
 
 
@@ -131,11 +143,14 @@ def matched_pairs(frame: pd.DataFrame) -> pd.DataFrame:
 
     Columns end in `_guided` and `_random`. Runs without a partner (unfinished or failed) are left out.
     """
-    columns = [*_PAIR_COLUMNS, "kind", "is_activated", "is_hazard"]
+    columns = [*_PAIR_KEY_COLUMNS, "kind", "is_activated", "is_hazard"]
     guided, random = (frame.loc[frame["method"] == how, columns] for how in (GUIDED, RANDOM))
     # a run that occurs twice would count as several pairs
     return guided.merge(
-        random.drop(columns="kind"), on=_PAIR_COLUMNS, suffixes=("_guided", "_random"), validate="one_to_one"
+        random.drop(columns="kind"),
+        on=_PAIR_KEY_COLUMNS,
+        suffixes=("_guided", "_random"),
+        validate="one_to_one",
     )
 
 

@@ -19,16 +19,16 @@ def hazard_odds_sheet(frame: pd.DataFrame, published: PublishedCounts | None) ->
             parts = guided_against_random.strata_with_both_methods(counts, base)
             pooled = guided_against_random.pool_odds_ratios(parts)
             rates = (
-                share(sum(s.guided_hazards for s in parts), sum(s.guided for s in parts)),
-                share(sum(s.random_hazards for s in parts), sum(s.random for s in parts)),
+                share(sum(s.guided_hazards for s in parts), sum(s.guided_runs for s in parts)),
+                share(sum(s.random_hazards for s in parts), sum(s.random_runs for s in parts)),
             )
             odds = (
-                pooled.strata,
+                pooled.stratum_count,
                 pooled.odds_ratio,
                 pooled.low,
                 pooled.high,
-                PValue(pooled.p),
-                PValue(pooled.p_equal),
+                PValue(pooled.p_of_odds_ratio_1),
+                PValue(pooled.p_of_equal_odds_ratios),
             )
             lines.append((base, source, *rates, *odds, *_difference_cells(frame, base, source)))
     return Sheet(
@@ -66,8 +66,8 @@ def hazards_by_fault_type_sheet(frame: pd.DataFrame, published: PublishedCounts 
             for stratum, p, adjusted in zip(
                 parts, p_values, guided_against_random.holm_adjusted(p_values), strict=True
             ):
-                guided = share(stratum.guided_hazards, stratum.guided)
-                random = share(stratum.random_hazards, stratum.random)
+                guided = share(stratum.guided_hazards, stratum.guided_runs)
+                random = share(stratum.random_hazards, stratum.random_runs)
                 lines.append((base, source, stratum.fault_type, guided, random, PValue(p), PValue(adjusted)))
     return Sheet(
         name="guided_against_random_by_fault_type",

@@ -15,7 +15,7 @@ from mutator.statistics.shares import CONFIDENCE
 
 RESAMPLES = 999  # fewer than for rates, because each draw of a median goes through all runs
 _RESAMPLING_SEED = 1  # fixed, so that equal results give equal tables
-_MOST_CELLS = 500_000  # maximum number of cells in one batch of draws, to limit memory
+_MOST_BATCH_CELLS = 500_000  # maximum number of cells in one batch of draws, to limit memory
 _MIN_BLOCK_SIZE = 256  # minimum number of values in a block
 
 
@@ -65,15 +65,15 @@ def _block_size(clusters: int, runs: int) -> int:
     return max(_MIN_BLOCK_SIZE, math.isqrt(clusters * runs // 50))
 
 
-def _draw_cluster_counts(clusters: int, others: int) -> Iterator[np.ndarray]:
+def _draw_cluster_counts(cluster_count: int, other_cells_per_draw: int) -> Iterator[np.ndarray]:
     """Yield batches of shape (draws, clusters): how often each cluster is drawn. Each draw also needs memory
     for `others` cells.
     """
     rng = np.random.default_rng(_RESAMPLING_SEED)
-    batch = max(1, _MOST_CELLS // max(clusters, others))
+    batch = max(1, _MOST_BATCH_CELLS // max(cluster_count, other_cells_per_draw))
     for begin in range(0, RESAMPLES, batch):
         size = min(batch, RESAMPLES - begin)
-        yield rng.multinomial(clusters, np.full(clusters, 1 / clusters), size=size)
+        yield rng.multinomial(cluster_count, np.full(cluster_count, 1 / cluster_count), size=size)
 
 
 class _SortedBlocks:

@@ -64,10 +64,10 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
     )
 
 
-def fault_tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
+def fault_tolerant_times_sheet(frame: pd.DataFrame, *, has_alerts: bool = True) -> Sheet:
     with_hazard = select_common_columns(frame)[frame["is_hazard"]]
     starts = {"activation": "t_activation", "manifestation": "t_manifest"}
-    starts |= {"alert": "t_alert"} if alerts else {}
+    starts |= {"alert": "t_alert"} if has_alerts else {}
     lines: list[tuple[SheetCell, ...]] = []
     for start, column in starts.items():
         times = (with_hazard["t_hazard"] - with_hazard[column]).round(6)

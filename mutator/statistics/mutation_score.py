@@ -41,7 +41,7 @@ _SEVERAL_SELECTIONS_NOTE = (
 _UNKNOWN_ALERTS_NOTE = " The fault-free runs cannot be read, so alerts are not compared with theirs."
 
 
-def mutant_drives(
+def mutant_effect_flags(
     frame: pd.DataFrame, faults: Mapping[str, Fault], golden_alerts: AlertsByGoldenRun | None
 ) -> pd.DataFrame:
     """Return a frame with a row for each usable experiment of an operator mutant.
@@ -107,7 +107,7 @@ def mutation_score_sheet(
     alerts that golden runs raise (None: not known). `operator_notes` describe the available mutants and
     exclusions.
     """
-    drives = mutant_drives(frame, faults, golden_alerts)
+    drives = mutant_effect_flags(frame, faults, golden_alerts)
     planned = {name for name, fault in faults.items() if fault.module == OPERATOR_FAULTS_MODULE}
     missing = len(planned - set(drives["mutant"]))
     without = f" Without a result, and therefore not counted: {missing} of {len(planned)}." if missing else ""

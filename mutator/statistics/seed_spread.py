@@ -34,7 +34,7 @@ def seeds_of(frame: pd.DataFrame) -> list[str]:
     return list(map(str, sorted(frame["seed"].unique())))
 
 
-def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
+def seeds_sheet(frame: pd.DataFrame, *, has_alerts: bool = True) -> Sheet:
     """Tabulate each share over all faults and by method. With a single seed, the table has no lines."""
     methods = sorted(map(str, frame["method"].unique()))
     groups = {ALL_FAULTS: np.ones(len(frame), dtype=bool)}
@@ -45,7 +45,7 @@ def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
         title="Spread between seeds",
         note=_NOTE,
         heads=_HEADS,
-        lines=tuple(_lines(frame, groups, _shares_to_list(frame, alerts=alerts))),
+        lines=tuple(_lines(frame, groups, _listed_shares(frame, has_alerts=has_alerts))),
     )
 
 
@@ -61,11 +61,11 @@ def seeds_by_fault_type_sheet(frame: pd.DataFrame) -> Sheet:
     )
 
 
-def _shares_to_list(frame: pd.DataFrame, *, alerts: bool) -> list[tuple[str, str]]:
+def _listed_shares(frame: pd.DataFrame, *, has_alerts: bool) -> list[tuple[str, str]]:
     """Return the shares to compute, each as (what is counted, the base)."""
     shares = [(_ACTIVATED, _INJECTED), ("manifested", _ACTIVATED), *_SHARES_BY_FAULT_TYPE[1:]]
     shares += [(name, whole) for name in hazard_names(frame) for whole in (_ACTIVATED, _INJECTED)]
-    if alerts:
+    if has_alerts:
         shares += [("alerts", _ACTIVATED), ("alerts", _INJECTED)]
         shares += [("hazards without alert", whole) for whole in (_ACTIVATED, _HAZARDS)]
         shares += [("alerts without hazard", _ACTIVATED)]

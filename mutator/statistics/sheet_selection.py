@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import pandas as pd
 
 from mutator.statistics import event_time_tables, guided_against_random_tables, summary_tables
-from mutator.statistics.event_times import AlertsByExperiment
+from mutator.statistics.event_times import FirstAlertsByHazardRun
 from mutator.statistics.guided_against_random import GUIDED, RANDOM
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.results_frame import select_common_columns
@@ -20,7 +20,7 @@ _DEFAULT_DRIVER_REACTION_S = (
 def run_sheets(
     frame: pd.DataFrame,
     published: PublishedCounts | None,
-    alerts_by_experiment: AlertsByExperiment | None,
+    first_alerts_by_hazard_run: FirstAlertsByHazardRun | None,
     end_by_scenario: Mapping[str, float] | None,
 ) -> tuple[Sheet, ...]:
     """Return the tables of a frame. A single method without published counts gets none, because they would
@@ -35,9 +35,10 @@ def run_sheets(
         return ()
     scenarios, kinds = tally_by_scenario(frame), tally_by_fault_type(frame)
     methods = sorted({method for method, _ in scenarios})
-    has_alerts = alerts_by_experiment is not None
+    has_alerts = first_alerts_by_hazard_run is not None
     sheets = [
-        summary_tables.summary_sheet(method, scenarios, published, alerts=has_alerts) for method in methods
+        summary_tables.summary_sheet(method, scenarios, published, has_alerts=has_alerts)
+        for method in methods
     ]
     sheets += [summary_tables.coverage_sheet(method, kinds, published) for method in methods]
     if {GUIDED, RANDOM} <= set(methods):
@@ -46,13 +47,13 @@ def run_sheets(
             guided_against_random_tables.hazards_by_fault_type_sheet(frame, published),
             guided_against_random_tables.matched_pairs_sheet(frame),
         ]
-    sheets.append(event_time_tables.propagation_sheet(frame, published, alerts=has_alerts))
+    sheets.append(event_time_tables.propagation_sheet(frame, published, has_alerts=has_alerts))
     if end_by_scenario is not None and has_alerts:
         driver_s = published.driver_reaction_s if published else _DEFAULT_DRIVER_REACTION_S
-        sheets.append(event_time_tables.reaction_sheet(frame, end_by_scenario, driver_s))
-    if alerts_by_experiment is not None and alerts_by_experiment.keys() >= set(
+        sheets.append(event_time_tables.alert_to_hazard_sheet(frame, end_by_scenario, driver_s))
+    if first_alerts_by_hazard_run is not None and first_alerts_by_hazard_run.keys() >= set(
         frame.loc[frame["is_hazard"], "experiment_id"]
     ):
-        sheets.append(event_time_tables.alerts_sheet(frame, alerts_by_experiment))
-    sheets.append(event_time_tables.orders_sheet(frame))
+        sheets.append(event_time_tables.alerts_before_hazards_sheet(frame, first_alerts_by_hazard_run))
+    sheets.append(event_time_tables.hazard_orders_sheet(frame))
     return tuple(sheet for sheet in sheets if sheet.lines)

@@ -26,14 +26,14 @@ _NOTE = "Shares with 95 % Wilson intervals; in brackets, the count and the total
 
 
 def summary_sheet(
-    method: str, run_counts: TallyByGroup, published: PublishedCounts | None, *, alerts: bool = True
+    method: str, run_counts: TallyByGroup, published: PublishedCounts | None, *, has_alerts: bool = True
 ) -> Sheet:
     scenarios = sorted({scenario for how, scenario in run_counts if how == method})
     published_tallies = published.by_scenario if published else {}
     sources = _tallies_by_source(method, run_counts, published, published_tallies, scenarios)
     lines: list[tuple[SheetCell, ...]] = []
     for part, whole in _MEASURES:
-        if "alerts" in part and not alerts:
+        if "alerts" in part and not has_alerts:
             continue
         for source, tallies in sources.items():
             cells = [

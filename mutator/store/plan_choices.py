@@ -10,7 +10,7 @@ from mutator.store.shards import Shard
 class Choices:
     """Options that override the campaign file; None: as in the file.
 
-    Filters (`mutator.campaigns.filters`) use the columns that are known before an experiment runs.
+    Filters (`mutator.campaigns.row_filters`) use the columns that are known before an experiment runs.
     """
 
     seed: int | None = None  #: the seed of the sample, of drawn values and of random triggers

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from mutator._common.hashing import digest
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.series_sampling import SeriesSampler, write_sampled_series

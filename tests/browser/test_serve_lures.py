@@ -163,7 +163,7 @@ def test_no_click_on_a_page_of_a_run_decides_or_reaches_other_jobs(
     [plot] = (path.name for path in (runs / "night/plots").glob("*.svg"))
     clicks = attack(page, page.url.replace("report/index.html", name.replace("PLOT", plot)))
     assert clicks >= (50 if name == "report/index.html" else 1)
-    assert not load_review(workspace, "toycar").entries
+    assert not load_review(workspace, "toycar").entry_by_group
     assert jobs_of_others(page, address) == STARTED
     assert page.evaluate("globalThis.hacked") is None
 
@@ -197,7 +197,7 @@ def test_even_a_script_on_a_report_decides_nothing(page: Any, address: str, work
         assert page.evaluate(script, [token, json.dumps(body)]) == 403, what
     assert page.evaluate(FRAME)  # the browser shows an error page of no origin
     assert page.evaluate(OWN_JOB) == 201
-    assert not load_review(workspace, "toycar").entries
+    assert not load_review(workspace, "toycar").entry_by_group
     assert jobs_of_others(page, address) == STARTED
 
 
@@ -223,5 +223,5 @@ def test_a_review_ignores_input_that_was_meant_for_another_page(page: Any, works
         page.keyboard.down("f")  # all but the first are repeats
     page.keyboard.up("f")
     page.wait_for_selector(".kept:text('saved')")
-    [entry] = load_review(workspace, "toycar").entries.values()
+    [entry] = load_review(workspace, "toycar").entry_by_group.values()
     assert entry.decision is None and entry.flag is not None

@@ -102,7 +102,7 @@ def test_a_decision_and_a_flag_can_be_withdrawn(review: Callable[..., Any], libr
         page.wait_for_timeout(50)
     page.wait_for_selector("[data-state=new]:text('new 6')")
     saved(page, current(page))
-    assert not load_review(library, "toycar").entries
+    assert not load_review(library, "toycar").entry_by_group
 
 
 def test_a_decision_needs_a_name(review: Callable[..., Any], library: Workspace) -> None:
@@ -110,7 +110,7 @@ def test_a_decision_needs_a_name(review: Callable[..., Any], library: Workspace)
     page.keyboard.press("j")
     page.keyboard.press("a")
     assert page.evaluate("document.activeElement.id") == "by"
-    assert not load_review(library, "toycar").entries
+    assert not load_review(library, "toycar").entry_by_group
 
 
 def test_reviewers_do_not_overwrite_decisions_that_they_have_not_seen(
@@ -149,7 +149,7 @@ def test_all_filtered_groups_are_approved_at_once(review: Callable[..., Any], li
     assert "2 new" in page.inner_text("#ask-about")
     page.keyboard.press("Enter")
     page.wait_for_selector("[data-state=approved]:text('approved 2')")
-    assert len(load_review(library, "toycar").entries) == 2
+    assert len(load_review(library, "toycar").entry_by_group) == 2
 
 
 def test_an_image_effect_has_images(review: Callable[..., Any]) -> None:
@@ -217,7 +217,7 @@ def test_a_pending_approval_is_not_applied_to_later_code(
             page.wait_for_selector(f"#group-{current(page)} .kept:text('reload this page')")
         finally:
             lens.write_text(text)
-    assert not load_review(library, "toycar").entries
+    assert not load_review(library, "toycar").entry_by_group
 
 
 def test_a_late_response_does_not_hide_a_mark(review: Callable[..., Any], library: Workspace) -> None:
@@ -262,14 +262,14 @@ def test_marks_survive_a_stopped_server(library: Workspace, serve: Callable[...,
     page.keyboard.press("a")
     page.wait_for_selector("#banner:visible")
     assert "1 mark waits" in page.inner_text("#banner")
-    assert not load_review(library, "toycar").entries
+    assert not load_review(library, "toycar").entry_by_group
     with serve(library, port=port, token="second") as address:
         page.wait_for_selector("#banner:text('no longer knows this page')")
         page.context.new_page().goto(address)
         page.bring_to_front()
         saved(page, current(page))
         assert not page.is_visible("#banner")
-    assert len(load_review(library, "toycar").entries) == 1
+    assert len(load_review(library, "toycar").entry_by_group) == 1
 
 
 @pytest.mark.slow

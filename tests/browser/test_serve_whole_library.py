@@ -101,7 +101,7 @@ def test_twenty_marks_survive_reloads_and_killed_servers(browser: Any, root: Pat
         assert len(marks) == 20
         assert {group: shown(fresh, group) for group in marks} == marks
     kept = load_review(Workspace(library=root / "fault_library", templates=root / "templates"), "openpilot")
-    assert set(kept.entries) == set(marks)
+    assert set(kept.entry_by_group) == set(marks)
     context.close()
 
 

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import pytest
 
 from mutator.audit.seal import seals_of
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines import engine_choice
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution import shard_merging

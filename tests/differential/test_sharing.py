@@ -12,8 +12,8 @@ import pytest
 
 from mutator._common.hashing import canonical_json
 from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan, load_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.execution.campaign_running import run_campaign

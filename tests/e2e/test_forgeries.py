@@ -15,9 +15,9 @@ import pytest
 import mutator
 from mutator._common.hashing import canonical_json, digest
 from mutator.audit.seal import golden_digests, seals_of
-from mutator.campaigns.freezing import plan_csv_bytes
 from mutator.campaigns.plan import load_plan
-from mutator.campaigns.plan_parts import plan_digest
+from mutator.campaigns.plan_freezing import plan_csv_bytes
+from mutator.campaigns.plan_tally import plan_digest
 from mutator.cli.app import main
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign

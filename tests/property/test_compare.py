@@ -5,18 +5,18 @@ import dataclasses
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mutator.comparison.pairs import ExperimentPair, ResultChange
+from mutator.comparison.pairs import ExperimentPair, ResultChangeKind
 from mutator.model import Outcome, Status
 from mutator.results.result_rows import ResultRow
 
 MIRROR = {
-    ResultChange.NEW_HAZARD: ResultChange.HAZARD_GONE,
-    ResultChange.EARLIER_HAZARD: ResultChange.LATER_HAZARD,
-    ResultChange.LOST_ALERT: ResultChange.NEW_ALERT,
-    ResultChange.WORSE: ResultChange.BETTER,
-    ResultChange.NEW_CRASH: ResultChange.CRASH_GONE,
-    ResultChange.HARNESS_ERROR: ResultChange.MENDED,
-    ResultChange.OTHERWISE: ResultChange.OTHERWISE,
+    ResultChangeKind.NEW_HAZARD: ResultChangeKind.HAZARD_GONE,
+    ResultChangeKind.EARLIER_HAZARD: ResultChangeKind.LATER_HAZARD,
+    ResultChangeKind.LOST_ALERT: ResultChangeKind.NEW_ALERT,
+    ResultChangeKind.WORSE: ResultChangeKind.BETTER,
+    ResultChangeKind.NEW_CRASH: ResultChangeKind.CRASH_GONE,
+    ResultChangeKind.HARNESS_ERROR: ResultChangeKind.HARNESS_ERROR_GONE,
+    ResultChangeKind.OTHER_HARMLESS_OUTCOME: ResultChangeKind.OTHER_HARMLESS_OUTCOME,
 }
 MIRROR |= {after: before for before, after in MIRROR.items()}
 TIME = st.sampled_from([2.0, 2.5, 3.0, 7.25])
@@ -46,12 +46,12 @@ def rows(draw: st.DrawFn) -> ResultRow:
 
 @given(rows())
 def test_a_run_does_not_differ_from_itself(row: ResultRow) -> None:
-    assert ExperimentPair(None, None, row, dataclasses.replace(row)).changes == set()  # type: ignore[arg-type]
+    assert ExperimentPair(None, None, row, dataclasses.replace(row)).change_kinds == set()  # type: ignore[arg-type]
 
 
 @given(rows(), rows())
 def test_swapping_two_runs_swaps_better_and_worse(a: ResultRow, b: ResultRow) -> None:
     """A different hazard has no opposite change."""
-    there = ExperimentPair(None, None, a, b).changes - {ResultChange.OTHER_HAZARD}  # type: ignore[arg-type]
-    back = ExperimentPair(None, None, b, a).changes - {ResultChange.OTHER_HAZARD}  # type: ignore[arg-type]
+    there = ExperimentPair(None, None, a, b).change_kinds - {ResultChangeKind.OTHER_HAZARD}  # type: ignore[arg-type]
+    back = ExperimentPair(None, None, b, a).change_kinds - {ResultChangeKind.OTHER_HAZARD}  # type: ignore[arg-type]
     assert {MIRROR[change] for change in there} == back

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from mutator._common.files import read_json
-from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.row_filters import compile_filter
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import load_spec

@@ -197,7 +197,7 @@ SHOWN_BY_THE_COMMAND_LINE = {
     "mutator.exports",
     "mutator.mutants.file_patches",
     "mutator.review.group_columns",
-    "mutator.review.readable_groups",
+    "mutator.review.group_display",
 }
 
 

@@ -34,7 +34,7 @@ class GoldenRunCache:
             VERSION,
             [[path.relative_to(bundle.folder).as_posix(), digest(read_bounded(path))] for path in files],
             bundle.meta["limits"],
-            run_environment.everything_outside_sources(),
+            run_environment.environment_affecting_results(),
             platform.node(),  # a cache on a shared disk has entries of many machines
         ]
 

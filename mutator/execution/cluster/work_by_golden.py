@@ -46,7 +46,7 @@ def group_by_golden(
         golden: GoldenRunGroup(
             golden,
             _list_runs(folder, chunk_works),
-            sum(len(chunk_work.positions) for chunk_work in chunk_works),
+            sum(len(chunk_work.pending_positions) for chunk_work in chunk_works),
         )
         for golden, chunk_works in chunks.items()
     }
@@ -55,7 +55,7 @@ def group_by_golden(
 def _list_runs(folder: RunFolder, pending: Sequence[PendingChunk]) -> Iterator[PlanLinesOfRun]:
     for chunk_work in pending:
         lines = list(plan_file.read_chunk_lines(folder.path, folder.head.chunks[chunk_work.chunk_index]))
-        for _, same in groupby((lines[place] for place in chunk_work.positions), key=_shared_run_key):
+        for _, same in groupby((lines[place] for place in chunk_work.pending_positions), key=_shared_run_key):
             yield {id_on_line(line): line for line in same}
 
 

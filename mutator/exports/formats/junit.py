@@ -20,9 +20,9 @@ POSSIBLE_FAILURES = (Outcome.HAZARD, Outcome.SDC, Outcome.MASKED, Status.CRASHED
 _NOT_XML_PATTERN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def _content(request: ExportRequest) -> bytes:
+def _junit_xml(request: ExportRequest) -> bytes:
     """Return the XML. MutatorError for an outcome that cannot be a failure."""
-    folder, failures = request.folder, request.parts.failures
+    folder, failures = request.folder, request.selection.failures
     names = [ending.value for ending in POSSIBLE_FAILURES]
     if unknown := [name for name in failures if name not in names]:
         raise MutatorError(f"'{unknown[0]}'", argument="failures", expected=f"one of {', '.join(names)}")
@@ -35,7 +35,7 @@ def _content(request: ExportRequest) -> bytes:
     for name in sorted(suites):
         suite = ET.SubElement(root, "testsuite", name=name)
         for experiment in suites[name]:
-            suite.append(_test_case(experiment, rows.get(experiment.id), failures))
+            suite.append(_test_case_element(experiment, rows.get(experiment.id), failures))
         _set_counts(suite)
     _set_counts(root)
     ET.indent(root)
@@ -43,7 +43,9 @@ def _content(request: ExportRequest) -> bytes:
     return data + b"\n"
 
 
-def _test_case(experiment: Experiment, row: ResultRow | None, failures: Collection[str]) -> ET.Element:
+def _test_case_element(
+    experiment: Experiment, row: ResultRow | None, failures: Collection[str]
+) -> ET.Element:
     case = ET.Element("testcase", classname=experiment.fault.spec.replace("/", "."), name=experiment.label)
     facts = {"experiment": experiment.id, "ending": row.ending if row else "not run"}
     if row:
@@ -77,5 +79,5 @@ def _xml_text(text: str) -> str:
 
 
 EXPORT = Export(
-    about="JUnit XML for CI servers", file="junit.xml", write=_content, options=frozenset({"failures"})
+    about="JUnit XML for CI servers", file="junit.xml", write=_junit_xml, options=frozenset({"failures"})
 )

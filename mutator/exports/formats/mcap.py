@@ -19,7 +19,7 @@ import numpy as np
 from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
 from mutator._common.message_text import counted
-from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.row_filters import compile_filter
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.execution.run_traces import RunTraces
 from mutator.exports import Export, ExportRequest
@@ -43,7 +43,7 @@ TimedValues = list[tuple[float, float]]  # time (s) and value
 @dataclass(frozen=True, kw_only=True)
 class Topic:
     name: str
-    about: Mapping[str, str]  # unit, role, component, about
+    metadata: Mapping[str, str]  # unit, role, component, about
     values: TimedValues
 
 
@@ -55,7 +55,7 @@ def _write_experiments(request: ExportRequest) -> None:
     """
     folder, out = request.folder, request.out
     builder = ExperimentFileBuilder(folder, request.workspace)
-    selected_ids = _selected_ids(folder, request.parts.only)
+    selected_ids = _selected_ids(folder, request.selection.only)
     ids_with_data = [name for name in selected_ids if builder.has_data(name)]
     remedy = f"rerun one: `mutator rerun {(selected_ids or ['ID'])[0]} --run {folder.path} --trace`"
     if not ids_with_data:
@@ -94,12 +94,12 @@ class ExperimentFileBuilder:
         return {experiment.id: experiment for experiment in plan_file.load_experiments(self._folder.path)}
 
     def has_data(self, experiment_id: str) -> bool:
-        return self._series.has_series(experiment_id) or self._kept_traces(experiment_id) is not None
+        return self._series.has_series(experiment_id) or self._stored_traces(experiment_id) is not None
 
     def file_bytes(self, experiment_id: str) -> bytes:
         """Return an experiment's file, from its exact traces if kept, else from its series."""
         experiment, record = self._experiments[experiment_id], self._records[experiment_id]
-        if (traces := self._kept_traces(experiment_id)) is not None:
+        if (traces := self._stored_traces(experiment_id)) is not None:
             assert self._traces is not None
             manifest = self._traces.manifest
             golden, faulty = (list(_trace_topics(trace, manifest)) for trace in traces)
@@ -113,7 +113,7 @@ class ExperimentFileBuilder:
         writer.add_events(_record_events(record))
         return writer.finish()
 
-    def _kept_traces(self, experiment_id: str) -> tuple[Trace, Trace] | None:
+    def _stored_traces(self, experiment_id: str) -> tuple[Trace, Trace] | None:
         """Return the kept traces, if both runs have one. MutatorError if a trace does not match its record:
         using the coarser series instead would hide the mismatch.
         """
@@ -149,7 +149,7 @@ class ExperimentFileBuilder:
                     *_timed_values(points.t[is_of_channel], more[is_of_channel]),
                 ]
                 topics_of_run.append(
-                    Topic(name=about["name"], about=_topic_metadata(about), values=sorted(pairs))
+                    Topic(name=about["name"], metadata=_topic_metadata(about), values=sorted(pairs))
                 )
         return topics
 
@@ -191,8 +191,8 @@ class _McapWriter:
         self._writer.add_metadata(name, facts)
 
     def add_topic(self, run: str, topic: Topic) -> None:
-        unit = topic.about["unit"]
-        text = f"{topic.about['about'] or topic.name} [{unit}]"
+        unit = topic.metadata["unit"]
+        text = f"{topic.metadata['about'] or topic.name} [{unit}]"
         schema = self._register_schema(
             f"{topic.name} [{unit}]", {"value": {**_VALUE_SCHEMA, "description": text}}
         )
@@ -200,7 +200,7 @@ class _McapWriter:
             topic=f"/{run}/{topic.name}",
             message_encoding="json",
             schema_id=schema,
-            metadata=dict(topic.about),
+            metadata=dict(topic.metadata),
         )
         for t, value in topic.values:
             self._add_message(number, t, {"value": value if math.isfinite(value) else None})
@@ -250,7 +250,7 @@ def _trace_topics(trace: Trace, manifest: TargetManifest) -> Iterator[Topic]:
             time = trace[clock if clock in trace else manifest.time_channel]
             about = {"unit": channel.unit, "role": channel.role.value}
             about |= {"component": channel.component, "about": channel.about}
-            yield Topic(name=channel.name, about=about, values=_timed_values(time, trace[channel.name]))
+            yield Topic(name=channel.name, metadata=about, values=_timed_values(time, trace[channel.name]))
 
 
 def _topic_metadata(about: Mapping[str, Any]) -> dict[str, str]:

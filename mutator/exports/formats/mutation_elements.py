@@ -26,7 +26,7 @@ from mutator.targets.manifest import TargetManifest
 SCHEMA_VERSION = "2.0"
 
 
-def _content(request: ExportRequest) -> bytes:
+def _report_json(request: ExportRequest) -> bytes:
     workspace = request.workspace
     assert workspace is not None
     manifest = single_run.manifest_of_unchanged_target(workspace, request.folder)
@@ -45,7 +45,7 @@ def mutation_report(folder: RunFolder, manifest: TargetManifest, models: FaultMo
         file = parsed_file(manifest.tree, fault.injections[0].location.path)
         source = file.data.decode(file.encoding)
         entry = files.setdefault(file.path, {"language": "python", "source": source, "mutants": []})
-        entry["mutants"].append(_mutant(manifest, models, fault, experiments, records))
+        entry["mutants"].append(_mutant_as_json(manifest, models, fault, experiments, records))
     head = folder.head
     config = {
         "campaign": head.campaign,
@@ -62,11 +62,11 @@ def mutation_report(folder: RunFolder, manifest: TargetManifest, models: FaultMo
         "framework": {"name": "mutator", "version": VERSION},
         "config": config,
         "files": dict(sorted(files.items())),
-        "testFiles": _test_files([e for group in experiments_by_fault.values() for e in group]),
+        "testFiles": _test_files_as_json([e for group in experiments_by_fault.values() for e in group]),
     }
 
 
-def _mutant(
+def _mutant_as_json(
     manifest: TargetManifest,
     models: FaultModels,
     fault: Fault,
@@ -82,7 +82,7 @@ def _mutant(
         "mutatorName": fault.fault_type if fault.module == OPERATOR_FAULTS_MODULE else first.model,
         "description": description,
         **_replacement_of(manifest, models, fault),
-        **mutant_status(experiments, records),
+        **mutant_status_as_json(experiments, records),
     }
 
 
@@ -140,7 +140,7 @@ def _replacement_of_lines(
     return _replacement_at(file, (first, 0), (last - 1, len(lines[-1].rstrip(b"\r\n"))), replacement)
 
 
-def mutant_status(experiments: Sequence[Experiment], records: Mapping[str, Record]) -> dict[str, Any]:
+def mutant_status_as_json(experiments: Sequence[Experiment], records: Mapping[str, Record]) -> dict[str, Any]:
     """Return a fault's status over its runs, its reason, and the runs that activated it or had a hazard."""
     record_by_experiment = {e: records[e.id] for e in experiments if e.id in records}
     records_by_status = {
@@ -179,7 +179,7 @@ def mutant_status(experiments: Sequence[Experiment], records: Mapping[str, Recor
     }
 
 
-def _test_files(experiments: Sequence[Experiment]) -> dict[str, Any]:
+def _test_files_as_json(experiments: Sequence[Experiment]) -> dict[str, Any]:
     files: dict[str, Any] = {}
     for scenario, name in sorted({(e.scenario, e.drive_label) for e in experiments}):
         files.setdefault(scenario, {"tests": []})["tests"].append({"id": name, "name": name})
@@ -189,6 +189,6 @@ def _test_files(experiments: Sequence[Experiment]) -> dict[str, Any]:
 EXPORT = Export(
     about="JSON for viewers of mutation reports",
     file="mutation-elements.json",
-    write=_content,
+    write=_report_json,
     needs_library=True,
 )

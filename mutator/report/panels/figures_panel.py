@@ -39,7 +39,7 @@ def _build_panel(drawings: tuple[Drawing, ...]) -> Panel | None:
     parts = ["## Figures"]
     for drawing in drawings:
         parts += [f"### {drawing.title}", drawing.note]
-        parts += [f"{what}: `{code}`" for what, code in drawing.codes]
+        parts += [f"{what}: `{code}`" for what, code in drawing.described_code_lines]
         if drawing.figure is not None:
             parts.append(f"![{drawing.title}]({drawing.file_name('svg')})")
     html = rendered(

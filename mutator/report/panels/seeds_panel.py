@@ -25,7 +25,7 @@ def build_seeds_panel(run: ReportedRun) -> Panel | None:
     seeds = seeds_of(run.frame)
     if len(seeds) < 2:
         return None
-    sheets = (seeds_sheet(run.frame, alerts=run.folder.has_alerts), seeds_by_fault_type_sheet(run.frame))
+    sheets = (seeds_sheet(run.frame, has_alerts=run.folder.has_alerts), seeds_by_fault_type_sheet(run.frame))
     about = f"{len(seeds)} seeds ({seeds[0]} to {seeds[-1]}). Each seed repeats the campaign with new draws."
     markdown = "\n\n".join(["## Seeds", about, *(f"#{sheet.as_markdown().rstrip()}" for sheet in sheets)])
     html = rendered(_HTML_TEMPLATE, about=about, sheets=sheets)

@@ -139,7 +139,7 @@ def _statistic_sheets(run: ReportedRun, published: PublishedCounts | None) -> tu
 def _distribution_sheets(run: ReportedRun) -> tuple[Sheet, ...]:
     sheets = (
         severity_sheet(run.frame),
-        fault_tolerant_times_sheet(run.frame, alerts=run.folder.has_alerts),
+        fault_tolerant_times_sheet(run.frame, has_alerts=run.folder.has_alerts),
         metrics_sheet(run.frame, run.folder.head.metrics),
     )
     return tuple(sheet for sheet in sheets if sheet.lines)

@@ -3,7 +3,7 @@
 import pytest
 
 from mutator._common.message_text import operator_hint
-from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.row_filters import compile_filter
 from mutator.errors import MutatorError
 from mutator.triggers.conditions import canonical_condition
 

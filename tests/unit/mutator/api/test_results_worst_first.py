@@ -7,8 +7,8 @@ import pytest
 
 from mutator.api import results_worst_first as module
 from mutator.api.results_worst_first import worst_results
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Outcome, Record
 from mutator.store.checksummed_lines import line_file_bytes
 from mutator.store.records import SCHEMA, record_as_json

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.chunks import PendingChunk, chunk_lengths, pending_chunks_of
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Record, Status
 from mutator.store.plan_file import load_chunk, load_faults
 from mutator.store.run_folder import RunFolder
@@ -36,7 +36,7 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 def test_all_experiments_are_pending_at_first(folder: RunFolder) -> None:
     left = pending_chunks_of(folder, {})
     assert [item.chunk_index for item in left] == list(range(8))
-    assert sum(len(item.positions) for item in left) == 24
+    assert sum(len(item.pending_positions) for item in left) == 24
 
 
 def test_experiments_without_a_valid_record_are_pending(

@@ -8,9 +8,9 @@ import pytest
 
 from mutator._common import doors
 from mutator._common.doors import STUDIES
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.installed_studies import load_installed_study
 from mutator.campaigns.plan import build_plan, load_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
 from mutator.report import report_builder

@@ -9,8 +9,8 @@ import pytest
 
 from mutator.campaigns import operator_faults
 from mutator.campaigns.campaign_files import load_campaign
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import Plan, build_plan, load_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
 from mutator.model import Hold, Limits, Method
 from mutator.operators.executed_lines import ExecutedLines, GoldenRunInputs

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import Plan, SeedBySeedPlan, build_plan, load_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
 from mutator.store import plan_file
 from mutator.store.plan_choices import Choices

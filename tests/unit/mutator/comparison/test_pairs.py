@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mutator.comparison.compared_runs import ComparedRun
-from mutator.comparison.pairs import ExperimentPair, ResultChange, match_experiments
+from mutator.comparison.pairs import ExperimentPair, ResultChangeKind, match_experiments
 from mutator.model import Experiment, Method, Outcome, Status
 from mutator.results.result_rows import ResultRow
 from mutator.store.run_folder import RunFolder
@@ -134,5 +134,5 @@ def test_each_kind_of_change_is_reported(
     """Times are compared relative to the activation."""
     e = experiment()
     pair = ExperimentPair(e, e, row(**a), row(**b))
-    assert pair.changes == {ResultChange(name) for name in changes.split()}
+    assert pair.change_kinds == {ResultChangeKind(name) for name in changes.split()}
     assert pair.is_usable == (not {"harness-error", "mended"} & set(changes.split()) and a != BROKEN)

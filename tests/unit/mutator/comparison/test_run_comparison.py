@@ -12,7 +12,7 @@ import pytest
 
 from mutator.comparison import comparison_files
 from mutator.comparison.compared_runs import load_compared_run
-from mutator.comparison.input_differences import input_facts, pair_remarks
+from mutator.comparison.input_differences import differing_pairs_remarks, input_facts
 from mutator.comparison.run_comparison import Comparison, Gate, compare_runs, findings_of_gates
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import AfterHazard, Experiment, Outcome, Status
@@ -56,14 +56,14 @@ def lanes(found: Comparison) -> int:
 
 def test_a_changed_source_file_is_named(found: Comparison) -> None:
     assert [fact.name for fact in found.facts if fact.is_different] == ["digest of target"]
-    assert comparison_files.files_text(found) == "Files of the target changed: toycar/driver.py."
+    assert comparison_files.differing_files_text(found) == "Files of the target changed: toycar/driver.py."
     assert found.remarks == ()
 
 
 def test_pairs_in_which_one_run_stops_get_a_remark(found: Comparison) -> None:
     first, *rest = found.pairs
     stopped = replace(first, b=replace(first.b, after_hazard=AfterHazard.STOP))
-    (remark,) = pair_remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
+    (remark,) = differing_pairs_remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
     assert remark.startswith("Pairs that end at a terminal hazard in only one run, where")
     assert remark.endswith(f": 1 of {len(found.pairs)}.")
 
@@ -149,7 +149,9 @@ def test_missing_results_do_not_affect_rates(toycar: Workspace, tmp_path: Path, 
     found = compare_runs(a, b)
     kinds = [e.fault.fault_type for e in found.b.experiments]
     assert found.missing_result_count == kinds.count("lane") + kinds.count("silence") > 0
-    assert dict(comparison_files.count_by_reason(found)) == {"without a result in b": kinds.count("silence")}
+    assert dict(comparison_files.unmatched_count_by_reason(found)) == {
+        "without a result in b": kinds.count("silence")
+    }
     assert len(findings_of_gates(found, [Gate.HARNESS_ERROR])) == kinds.count("lane")
     rates = found.sheets[2]
     assert {line[1] for line in rates.lines} == {kinds.count("distance")}

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mutator.comparison.comparison_files import pair_cells, summary_text
-from mutator.comparison.pairs import ResultChange
+from mutator.comparison.pairs import ResultChangeKind
 from mutator.comparison.run_comparison import Comparison, Gate, compare_runs, findings_of_gates
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Method, Outcome
@@ -78,16 +78,16 @@ def found(runs: tuple[Path, ...]) -> Comparison:
     return compare_runs(runs[0], runs[1])
 
 
-def kinds(found: Comparison, change: ResultChange) -> set[tuple[str, str]]:
-    pairs = found.pairs_with(change)
+def kinds(found: Comparison, change: ResultChangeKind) -> set[tuple[str, str]]:
+    pairs = found.pairs_with_change(change)
     return {(p.b.fault.fault_type, f"{p.row_a.severity}>{p.row_b.severity}") for p in pairs}
 
 
 def test_each_change_of_severity_is_listed(found: Comparison) -> None:
-    assert kinds(found, ResultChange.HIGHER_SEVERITY) == {("lane", "S1>S3"), ("distance", ">S2")}
-    assert kinds(found, ResultChange.LOWER_SEVERITY) == {("lane", "S1>")}
+    assert kinds(found, ResultChangeKind.HIGHER_SEVERITY) == {("lane", "S1>S3"), ("distance", ">S2")}
+    assert kinds(found, ResultChangeKind.LOWER_SEVERITY) == {("lane", "S1>")}
     assert "higher-severity" in summary_text(found)
-    line = pair_cells(found.pairs_with(ResultChange.HIGHER_SEVERITY)[0])
+    line = pair_cells(found.pairs_with_change(ResultChangeKind.HIGHER_SEVERITY)[0])
     assert (line["delta_v_b"], line["severity_b"]) in {(12.0, "S3"), (5.0, "S2")}
 
 
@@ -137,7 +137,9 @@ def test_without_severity_classes_no_change_of_severity_is_reported(
     runs: tuple[Path, ...], order: tuple[int, int]
 ) -> None:
     found = compare_runs(*(runs[i] for i in order))
-    assert not found.pairs_with(ResultChange.HIGHER_SEVERITY) + found.pairs_with(ResultChange.LOWER_SEVERITY)
+    assert not found.pairs_with_change(ResultChangeKind.HIGHER_SEVERITY) + found.pairs_with_change(
+        ResultChangeKind.LOWER_SEVERITY
+    )
     assert "Severity is not compared: without has no severity classes." in found.remarks
     with pytest.raises(MutatorError, match="without has no severity classes"):
         findings_of_gates(found, [Gate.SEVERITY_S1])

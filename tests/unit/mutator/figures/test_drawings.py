@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 import pandas as pd
 import pytest
 
-from mutator.figures import hazards_by_fault_type, heat_map, propagation_times
+from mutator.figures import hazard_heat_map, hazards_by_fault_type, propagation_times
 from mutator.figures.drawings import draw_figures, drawing_files
 
 from ..statistics.results_frame import results
@@ -46,7 +46,7 @@ def test_hazard_bars_show_counts(frame: pd.DataFrame) -> None:
 
 
 def test_the_heat_map_shows_hazards_per_activated_fault(frame: pd.DataFrame) -> None:
-    guided = heat_map.draw(frame).axes[0]
+    guided = hazard_heat_map.draw(frame).axes[0]
     assert sorted(text.get_text() for text in guided.texts) == ["0/0", "2/3"]
     cells = guided.images[0].get_array()
     assert cells[0, 0] == pytest.approx(200 / 3)

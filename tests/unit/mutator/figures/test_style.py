@@ -9,8 +9,8 @@ import matplotlib
 import pandas as pd
 import pytest
 
-from mutator.figures import heat_map
-from mutator.figures.run_plot import save_figure
+from mutator.figures import hazard_heat_map
+from mutator.figures.golden_and_faulty_plot import save_figure
 from mutator.figures.style import with_page_theme
 
 _HOSTILE = "axes.facecolor: red\nfont.size: 30\nlines.linewidth: 9\nsvg.fonttype: path\ntext.usetex: True\n"
@@ -18,12 +18,12 @@ _DRAW = """
 import sys
 from pathlib import Path
 import pandas as pd
-from mutator.figures import heat_map
-from mutator.figures.run_plot import save
+from mutator.figures import hazard_heat_map
+from mutator.figures.golden_and_faulty_plot import save_figure
 line = {"kind": "a/b", "scenario": "$1", "method": "guided", "is_activated": True, "is_hazard": True}
 line |= dict.fromkeys(("t_activation", "t_manifest", "t_hazard"), 1.0)
 line |= {"is_manifested": True, "is_alert": False}
-save(heat_map.draw(pd.DataFrame([line])), [Path("a.svg")])
+save_figure(hazard_heat_map.draw(pd.DataFrame([line])), [Path("a.svg")])
 """
 
 
@@ -31,7 +31,7 @@ def _draw(path: Path) -> bytes:
     line = {"kind": "a/b", "scenario": "S1", "method": "guided", "is_activated": True, "is_hazard": True}
     times = dict.fromkeys(("t_activation", "t_manifest", "t_hazard"), 1.0)
     flags = {"is_manifested": True, "is_alert": False}
-    save_figure(heat_map.draw(pd.DataFrame([line | times | flags])), [path])
+    save_figure(hazard_heat_map.draw(pd.DataFrame([line | times | flags])), [path])
     return path.read_bytes()
 
 

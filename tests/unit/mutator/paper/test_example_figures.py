@@ -67,7 +67,10 @@ def edit_target(place: Path) -> None:
 def test_an_experiment_is_found_and_drawn_without_a_run(driven: Path) -> None:
     drawing = drawn(driven, BRAKE)
     [name] = [name for name in RunFolder.open(driven / "run").records() if name in drawing.note]
-    assert [code for _, code in drawing.codes] == [BRAKE.query, f"mutator show {name} --run DIR"]
+    assert [code for _, code in drawing.described_code_lines] == [
+        BRAKE.query,
+        f"mutator show {name} --run DIR",
+    ]
     assert not (driven / "run" / "traces").exists()
     assert drawing.figure is not None
     brake, gap = drawing.figure.axes

@@ -7,8 +7,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.paper.observations_panel import build_observations_panel
 from mutator.paper.published_numbers import load_published_numbers
 from mutator.report.reported_run import ReportedRun

@@ -109,9 +109,9 @@ def test_within_fault_types_guided_faults_are_ahead_only_per_activated_fault(pap
         )
         for whole in guided_against_random.RATE_BASES
     )
-    assert activated.strata == injected.strata == 17
+    assert activated.stratum_count == injected.stratum_count == 17
     assert injected.high < 1
-    assert injected.p < 1e-6
+    assert injected.p_of_odds_ratio_1 < 1e-6
     assert activated.low > 1
 
 

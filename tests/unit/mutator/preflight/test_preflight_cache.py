@@ -10,8 +10,8 @@ import pytest
 
 from mutator._common import cached_folders
 from mutator._common.files import json_bytes
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.preflight import preflight_cache

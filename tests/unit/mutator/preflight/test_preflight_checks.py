@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns import run_environment
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan, load_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.preflight.canary import run_until_hazard

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Experiment, Trigger
 from mutator.preflight.preflight_checks import describe_unreached_triggers, run_checks
 from mutator.preflight.unreached_triggers import describe_unreached, load_observations, save_observations

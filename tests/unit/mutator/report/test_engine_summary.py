@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.report import engine_summary, report_builder, report_digests
 from mutator.report.experiment_facts import timings_frame

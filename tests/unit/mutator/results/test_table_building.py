@@ -15,8 +15,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from mutator._common.files import writing_temporary_path
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Record
 from mutator.outcomes.fault_paths import fault_paths_of

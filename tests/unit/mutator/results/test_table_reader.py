@@ -19,7 +19,7 @@ from mutator.comparison.compared_runs import load_compared_run
 from mutator.errors import MutatorError
 from mutator.execution.single_run import run_single
 from mutator.exports import Format
-from mutator.exports.write import export
+from mutator.exports.run_export import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.report import report_builder
 from mutator.results import table_building

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from mutator._common.version import VERSION
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import Plan, build_plan, load_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import CheckFailed
 from mutator.execution.campaign_running import run_campaign
 from mutator.review import approval_gate

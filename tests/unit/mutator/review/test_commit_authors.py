@@ -69,7 +69,7 @@ def test_the_last_author_cannot_approve(toycar: Workspace, root: Path) -> None:
         with pytest.raises(MutatorError, match=r"changed group \w{12} last \(commit .*Git Smith") as caught:
             say(toycar, author)
     assert git(root, "rev-parse", "HEAD")[:12] in str(caught.value)
-    assert load_review(toycar, "toycar").entries == {}
+    assert load_review(toycar, "toycar").entry_by_group == {}
     review = say(toycar, "Jane Doe")
     assert review.state(lane(toycar)) is ReviewState.APPROVED
     assert load_review(toycar, "toycar").four_eyes

@@ -20,8 +20,8 @@ from mutator.review.decisions import (
     load_review,
     record_actions,
 )
-from mutator.review.entries import BasisDigests
 from mutator.review.mutant_groups import Group
+from mutator.review.review_entries import BasisDigests
 from mutator.review.reviewed_texts import diff_from_reviewed_text, render_reviewed_text, write_reviewed_text
 from mutator.workspace import Workspace
 
@@ -64,8 +64,8 @@ def test_decisions_and_remarks_round_trip(toycar: Workspace) -> None:
     written = say(toycar, ReviewActionKind.FLAG, "0", by="Joe")
     read = load_review(toycar, "toycar")
     assert read == written
-    assert [read.revision(name) for name in read.entries] == [
-        written.revision(name) for name in written.entries
+    assert [read.revision(name) for name in read.entry_by_group] == [
+        written.revision(name) for name in written.entry_by_group
     ]
     decision = read.decision("b" * 12)
     assert decision is not None
@@ -83,11 +83,11 @@ def test_a_group_is_new_decided_or_changed(toycar: Workspace) -> None:
     assert states == list(ReviewState)
     assert found.in_list_order([group("a"), group("b"), group("c")]) == [group("c"), group("b"), group("a")]
     assert found.stale_parts(group("a", other)) == ["template", "target function", "called code"]
-    assert found.describe(group("a", other)).endswith(
+    assert found.describe_decision(group("a", other)).endswith(
         " (changed since: template, target function, called code)"
     )
-    assert found.describe(group("b")).startswith("rejected by Jane Doe on 20")
-    assert found.describe(group("c")) == ""
+    assert found.describe_decision(group("b")).startswith("rejected by Jane Doe on 20")
+    assert found.describe_decision(group("c")) == ""
 
 
 @pytest.mark.parametrize(
@@ -113,9 +113,9 @@ def test_values_must_lie_within_the_approved_ones(
 def test_a_new_decision_replaces_the_old_one(toycar: Workspace) -> None:
     say(toycar, ReviewActionKind.APPROVE, "a", text="fine")
     found = say(toycar, ReviewActionKind.REJECT, "a", by="Joe", text="no")
-    assert found.describe(group("a")).startswith("rejected by Joe")
+    assert found.describe_decision(group("a")).startswith("rejected by Joe")
     assert [one.text for one in found.remarks("a" * 12)] == ["fine", "no"]
-    assert len(found.entries) == 1
+    assert len(found.entry_by_group) == 1
 
 
 def test_a_cleared_decision_is_deleted(toycar: Workspace) -> None:
@@ -123,7 +123,7 @@ def test_a_cleared_decision_is_deleted(toycar: Workspace) -> None:
     say(toycar, ReviewActionKind.FLAG, "c")
     found = say(toycar, ReviewActionKind.CLEAR, "a")
     assert found.state(group("a")) is ReviewState.NEW and found.remarks("a" * 12)
-    assert "c" * 12 not in say(toycar, ReviewActionKind.UNFLAG, "c").entries
+    assert "c" * 12 not in say(toycar, ReviewActionKind.UNFLAG, "c").entry_by_group
     assert found.revision("c" * 12) and load_review(toycar, "toycar").revision("c" * 12) == ""
 
 
@@ -181,7 +181,7 @@ def test_two_writers_at_once_lose_nothing(toycar: Workspace) -> None:
         writer.stdin.close()
         writer.stdout.close()
     found = load_review(toycar, "toycar")
-    assert {name[0]: found.entries[name].decision.by for name in found.entries} == {  # type: ignore[union-attr]
+    assert {name[0]: found.entry_by_group[name].decision.by for name in found.entry_by_group} == {  # type: ignore[union-attr]
         name: by for by, names in shares.items() for name in names
     }
 

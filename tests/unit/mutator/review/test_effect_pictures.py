@@ -60,26 +60,26 @@ def grey(jpeg: bytes) -> float:
 def test_an_effect_is_shown_at_three_levels(lit: Lit) -> None:
     workspace, group = lit()
     found = drawn(workspace, group)
-    assert grey(found.before) == pytest.approx(90, abs=1)
+    assert grey(found.before_jpeg) == pytest.approx(90, abs=1)
     assert [(one.name, one.label) for one in found.levels] == [
         ("least", "amount 10"),
         ("middle", "amount 40"),
         ("most", "amount 160"),
     ]
-    assert [grey(one.after) for one in found.levels] == pytest.approx([100, 130, 250], abs=1)
+    assert [grey(one.after_jpeg) for one in found.levels] == pytest.approx([100, 130, 250], abs=1)
 
 
 def test_each_level_has_a_pair_of_images(lit: Lit) -> None:
     workspace, group = lit(values="[10, 50]")
     manifest = workspace.manifest("toycar")
     pairs = [
-        effect_pictures.pictures_at_level(workspace, manifest, group, level)
+        effect_pictures.jpegs_before_and_after(workspace, manifest, group, level)
         for level in (*LEVEL_NAMES, "utmost")
     ]
     assert [pair and round(grey(pair[1])) for pair in pairs] == [100, None, 140, None]
     probe = groups_of(workspace)[-1]
-    assert not effect_pictures.has_pictures(probe)
-    assert effect_pictures.pictures_at_level(workspace, manifest, probe, "most") is None
+    assert not effect_pictures.can_have_pictures(probe)
+    assert effect_pictures.jpegs_before_and_after(workspace, manifest, probe, "most") is None
 
 
 def test_images_are_cached_until_an_effect_changes(lit: Lit, runs: list[str]) -> None:
@@ -93,7 +93,7 @@ def test_images_are_cached_until_an_effect_changes(lit: Lit, runs: list[str]) ->
     assert drawn(workspace, group) == first
     lens = workspace.library.parent / "tree/toycar/lens.py"
     lens.write_text(lens.read_text().replace("picture + ", "picture - "))
-    assert grey(drawn(workspace, group).levels[-1].after) == pytest.approx(0, abs=1)
+    assert grey(drawn(workspace, group).levels[-1].after_jpeg) == pytest.approx(0, abs=1)
     assert runs == ["pictures-0"] * 2
 
 
@@ -113,7 +113,7 @@ def test_one_run_of_the_target_draws_all_groups_of_a_place(lit: Lit, runs: list[
 
 def test_each_value_is_applied_to_the_original_image(lit: Lit) -> None:
     workspace, group = lit(values="[10, 20, 30]", target="self.picture", place="self.picture")
-    assert [round(grey(one.after)) for one in drawn(workspace, group).levels] == [100, 110, 120]
+    assert [round(grey(one.after_jpeg)) for one in drawn(workspace, group).levels] == [100, 110, 120]
 
 
 def test_amounts_are_ordered_by_their_effect_on_the_image() -> None:
@@ -155,8 +155,10 @@ def test_a_place_that_no_run_reaches_is_reported(lit: Lit) -> None:
 def test_every_image_effect_of_the_library_has_pictures(clone: Workspace, tmp_path: Path) -> None:
     manifest = clone.manifest("openpilot")
     wanted = [
-        g for g in groups_of_library(clone, manifest, specs=["vision_*/*"]) if effect_pictures.has_pictures(g)
+        g
+        for g in groups_of_library(clone, manifest, specs=["vision_*/*"])
+        if effect_pictures.can_have_pictures(g)
     ]
     found = effect_pictures.pictures_of_groups(clone, manifest, wanted)
     assert len(found) == len(wanted) >= 20
-    assert all(level.after != made.before for made in found.values() for level in made.levels)
+    assert all(level.after_jpeg != made.before_jpeg for made in found.values() for level in made.levels)

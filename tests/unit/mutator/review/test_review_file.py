@@ -7,7 +7,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.review import review_file
-from mutator.review.entries import BasisDigests, Decision, DecisionVerdict, Flag, Remark, ReviewEntry
+from mutator.review.review_entries import BasisDigests, Decision, DecisionVerdict, Flag, Remark, ReviewEntry
 from mutator.review.review_file import ReviewFileContent
 
 BOUND = BasisDigests(diff="d" * 16, function="f" * 16, template="0" * 16, calls="c" * 16)
@@ -34,7 +34,7 @@ def entry(name: str) -> ReviewEntry:
 def written(path: Path, *names: str) -> Path:
     entries = {name * 12: entry(name) for name in names}
     path.write_text(
-        review_file.render_review_file("toycar", ReviewFileContent(entries=entries, four_eyes=True))
+        review_file.render_review_file("toycar", ReviewFileContent(entry_by_group=entries, four_eyes=True))
     )
     return path
 
@@ -42,7 +42,9 @@ def written(path: Path, *names: str) -> Path:
 def test_a_review_file_round_trips(tmp_path: Path) -> None:
     path = written(tmp_path / "toycar.yaml", "b", "a")
     found = review_file.load_review_file(path, "toycar")
-    assert found == ReviewFileContent(entries={name * 12: entry(name) for name in "ab"}, four_eyes=True)
+    assert found == ReviewFileContent(
+        entry_by_group={name * 12: entry(name) for name in "ab"}, four_eyes=True
+    )
     text = path.read_text()
     path.write_text(review_file.render_review_file("toycar", found))
     assert path.read_text() == text
@@ -52,7 +54,7 @@ def test_decisions_about_different_groups_merge(tmp_path: Path) -> None:
     files = [written(tmp_path / f"{i}", *names) for i, names in enumerate(("018f", "08f", "08ef"))]
     merged = subprocess.run(["git", "merge-file", "-p", *files], capture_output=True, check=True).stdout
     (path := tmp_path / "toycar.yaml").write_bytes(merged)
-    assert "".join(name[0] for name in review_file.load_review_file(path, "toycar").entries) == "018ef"
+    assert "".join(name[0] for name in review_file.load_review_file(path, "toycar").entry_by_group) == "018ef"
 
 
 @pytest.mark.parametrize(

@@ -118,7 +118,7 @@ def original(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Pa
         ReviewAction(group=group, kind=ReviewActionKind.APPROVE, by="Jane") for group in groups(toycar)
     ]
     review = record_actions(toycar, "toycar", changes, {})
-    assert len(review.entries) == len(IN_SENSE) + 1
+    assert len(review.entry_by_group) == len(IN_SENSE) + 1
     return toycar.library.parent
 
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
 from mutator.serve.job_requests import JobCommand, RequestChecker
 from mutator.serve.served_runs import ServedRuns

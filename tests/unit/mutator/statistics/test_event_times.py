@@ -6,7 +6,12 @@ from typing import Any
 import pytest
 
 from mutator.statistics import event_times
-from mutator.statistics.event_time_tables import alerts_sheet, orders_sheet, propagation_sheet, reaction_sheet
+from mutator.statistics.event_time_tables import (
+    alert_to_hazard_sheet,
+    alerts_before_hazards_sheet,
+    hazard_orders_sheet,
+    propagation_sheet,
+)
 
 from .results_frame import results
 
@@ -25,7 +30,7 @@ def run(alert: float = nan, hazard: float = nan, **more: Any) -> dict[str, Any]:
 
 
 def test_times_are_measured_from_the_activation() -> None:
-    found = event_times.propagation_times(
+    found = event_times.propagation_spreads_by_step(
         results(run(7.0, 9.0, t_manifest=5.5), run(6.0, nan), run(nan, nan), {})
     )
     assert (found["activation to manifest"].n, found["activation to manifest"].mean) == (1, 0.5)
@@ -36,8 +41,8 @@ def test_times_are_measured_from_the_activation() -> None:
 
 def test_a_reaction_time_needs_an_earlier_alert() -> None:
     frame = results(run(9.0, 9.0), run(9.5, 9.0), run(nan, 9.0))
-    assert event_times.propagation_times(frame)["alert to hazard"].n == 0
-    found = event_times.reaction_times(frame, ENDS, DRIVER_S)
+    assert event_times.propagation_spreads_by_step(frame)["alert to hazard"].n == 0
+    found = event_times.alert_to_hazard_times(frame, ENDS, DRIVER_S)
     assert (found.runs_alerted_first, found.hazards_after_alert, found.runs_alerted_too_late) == (0, 0, 2)
     assert isnan(found.no_hazard_share)
 
@@ -48,10 +53,10 @@ def test_kaplan_meier_of_a_textbook_sample() -> None:
         run(17.0, nan, scenario="S2"),
         run(nan, 8.0),
     )
-    found = event_times.reaction_times(frame, ENDS, DRIVER_S)
+    found = event_times.alert_to_hazard_times(frame, ENDS, DRIVER_S)
     assert (found.runs_alerted_first, found.hazards_after_alert) == (5, 4)
-    assert found.median == 2.5
-    assert found.median_low <= 2.5 <= found.median_high
+    assert found.median_s == 2.5
+    assert found.median_low_s <= 2.5 <= found.median_high_s
     assert found.no_hazard_share == pytest.approx(0.8)
     assert (found.late_hazard_share.count, found.late_hazard_share.of) == (3, 4)
 
@@ -59,22 +64,22 @@ def test_kaplan_meier_of_a_textbook_sample() -> None:
 def test_censored_times_raise_the_median() -> None:
     """A curve that never reaches one half has no median."""
     few = [run(10.0, 11.0 + i) for i in range(3)]
-    assert event_times.reaction_times(results(*few), ENDS, DRIVER_S).median == pytest.approx(2.0)
-    many = event_times.reaction_times(results(*few, *[run(10.0, nan)] * 7), ENDS, DRIVER_S)
-    assert isnan(many.median)
+    assert event_times.alert_to_hazard_times(results(*few), ENDS, DRIVER_S).median_s == pytest.approx(2.0)
+    many = event_times.alert_to_hazard_times(results(*few, *[run(10.0, nan)] * 7), ENDS, DRIVER_S)
+    assert isnan(many.median_s)
     assert many.no_hazard_share == pytest.approx(0.9)
 
 
 def test_alerts_without_any_hazard_have_no_median() -> None:
-    found = event_times.reaction_times(results(run(10.0, nan)), ENDS, DRIVER_S)
+    found = event_times.alert_to_hazard_times(results(run(10.0, nan)), ENDS, DRIVER_S)
     assert (found.no_hazard_share, found.runs_alerted_first, found.hazards_after_alert) == (1.0, 1, 0)
-    assert isnan(found.median)
+    assert isnan(found.median_s)
 
 
 def test_crashed_runs_are_left_out_of_censored_times() -> None:
     """How long they would have been observed is unknown."""
     assert (
-        event_times.reaction_times(
+        event_times.alert_to_hazard_times(
             results(run(10.0, nan, status="crashed")), ENDS, DRIVER_S
         ).runs_alerted_first
         == 0
@@ -83,7 +88,10 @@ def test_crashed_runs_are_left_out_of_censored_times() -> None:
 
 def test_a_reaction_time_equal_to_the_drivers_is_not_longer() -> None:
     """11.8 - 10.0 is 1.8000000000000007 in floating point and counts as 1.8 s."""
-    assert event_times.reaction_times(results(run(10.0, 11.8)), ENDS, DRIVER_S).late_hazard_share.count == 0
+    assert (
+        event_times.alert_to_hazard_times(results(run(10.0, 11.8)), ENDS, DRIVER_S).late_hazard_share.count
+        == 0
+    )
 
 
 def test_alerts_are_counted_before_each_hazard() -> None:
@@ -94,7 +102,7 @@ def test_alerts_are_counted_before_each_hazard() -> None:
         "2": (),
         "3": (),
     }
-    found = event_times.alerts_before_hazards(frame, alerts)
+    found = event_times.alert_first_share_by_hazard_and_alert(frame, alerts)
     assert {key: (share.count, share.of) for key, share in found.items()} == {
         ("H1", "fcw"): (2, 3),
         ("H1", "steer_saturated"): (1, 3),
@@ -107,16 +115,16 @@ def test_alerts_are_counted_before_each_hazard() -> None:
 
 def test_the_orders_of_hazards_are_counted() -> None:
     frame = results(run(nan, 9.0), run(nan, 9.0, t_h3=7.0), run(nan, 9.0, t_h3=9.0), run())
-    assert event_times.hazard_orders(frame) == {"H1": 1, "H1 with H3": 1, "H3 then H1": 1}
+    assert event_times.run_count_by_hazard_order(frame) == {"H1": 1, "H1 with H3": 1, "H3 then H1": 1}
 
 
 def test_sheets_have_lines_for_each_method_and_scenario() -> None:
     frame = results(run(8.0, 9.0), run(8.0, nan, scenario="S2"), run(nan, 7.0, method="random"))
     sheets = (
         propagation_sheet(frame, None),
-        reaction_sheet(frame, ENDS, DRIVER_S),
-        alerts_sheet(frame, {"0": (("fcw", 8.0),), "1": (("fcw", 8.0),), "2": ()}),
-        orders_sheet(frame),
+        alert_to_hazard_sheet(frame, ENDS, DRIVER_S),
+        alerts_before_hazards_sheet(frame, {"0": (("fcw", 8.0),), "1": (("fcw", 8.0),), "2": ()}),
+        hazard_orders_sheet(frame),
     )
     assert all(len(line) == len(sheet.heads) for sheet in sheets for line in sheet.lines)
     groups = [line[:2] for line in sheets[1].lines]

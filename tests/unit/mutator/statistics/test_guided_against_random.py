@@ -39,7 +39,11 @@ def frame() -> pd.DataFrame:
 
 def stratum(guided: tuple[int, int], random: tuple[int, int]) -> FaultTypeStratum:
     return FaultTypeStratum(
-        fault_type="k", guided_hazards=guided[0], guided=guided[1], random_hazards=random[0], random=random[1]
+        fault_type="k",
+        guided_hazards=guided[0],
+        guided_runs=guided[1],
+        random_hazards=random[0],
+        random_runs=random[1],
     )
 
 
@@ -49,7 +53,7 @@ def test_the_pooled_odds_ratio_follows_the_textbook() -> None:
     pooled = guided_against_random.pool_odds_ratios([stratum((10, 20), (5, 20)), stratum((4, 20), (2, 20))])
     assert pooled.odds_ratio == pytest.approx((150 + 72) / (50 + 32))
     assert pooled.low < 1 < pooled.odds_ratio < pooled.high
-    assert 0.05 < pooled.p < 1
+    assert 0.05 < pooled.p_of_odds_ratio_1 < 1
 
 
 def test_strata_without_hazards_do_not_affect_the_odds_ratio() -> None:

@@ -73,7 +73,7 @@ def test_times_to_a_hazard_need_an_earlier_event() -> None:
         ("a/x", "manifestation to hazard", 3, 0.5, 1.75, 3.0),
         ("a/x", "alert to hazard", 2, 1.0, 1.75, 2.5),
     ]
-    assert len(fault_tolerant_times_sheet(FRAME, alerts=False).lines) == 2
+    assert len(fault_tolerant_times_sheet(FRAME, has_alerts=False).lines) == 2
 
 
 @pytest.mark.parametrize("pairs", [False, True])
@@ -82,7 +82,7 @@ def test_the_interval_of_a_median_resamples_whole_faults(
 ) -> None:
     """A simple loop that copies the runs of each drawn fault gives the same interval."""
     monkeypatch.setattr(median_intervals, "RESAMPLES", 40)
-    monkeypatch.setattr(median_intervals, "_MOST_CELLS", 300)  # the draws need several batches
+    monkeypatch.setattr(median_intervals, "_MOST_BATCH_CELLS", 300)  # the draws need several batches
     rng = np.random.default_rng(3)
     cluster = pd.Series(rng.integers(0, 6, 30))
     first, second = pd.Series(rng.normal(0, 1, 30)), pd.Series(rng.normal(1, 1, 30).round(1))

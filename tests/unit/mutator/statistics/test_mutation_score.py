@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mutator.model import OPERATOR_FAULTS_MODULE, Experiment, Fault
-from mutator.statistics.mutation_score import mutant_drives, mutation_score_sheet
+from mutator.statistics.mutation_score import mutant_effect_flags, mutation_score_sheet
 from mutator.statistics.shares import share
 
 from .results_frame import results
@@ -80,7 +80,7 @@ def test_alerts_of_the_fault_free_run_are_not_attributed_to_a_mutant(faults: dic
     assert lines(unknown)["all", "mutants", "permanent"]["new alert"] is None
     assert "alerts are not compared" in unknown.note
     of_a_seed = {("S1", "1"): frozenset({"own", "brake"})}
-    assert not mutant_drives(frame, faults, of_a_seed)["new alert"].any()
+    assert not mutant_effect_flags(frame, faults, of_a_seed)["new alert"].any()
 
 
 def test_harness_errors_are_excluded_from_all_shares(faults: dict[str, Fault]) -> None:

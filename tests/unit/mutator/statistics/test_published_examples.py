@@ -17,7 +17,9 @@ from .results_frame import results
 
 def stratum(a: int, b: int, c: int, d: int) -> FaultTypeStratum:
     """Guided with and without hazard, random with and without hazard."""
-    return FaultTypeStratum(fault_type="k", guided_hazards=a, guided=a + b, random_hazards=c, random=c + d)
+    return FaultTypeStratum(
+        fault_type="k", guided_hazards=a, guided_runs=a + b, random_hazards=c, random_runs=c + d
+    )
 
 
 @pytest.mark.parametrize(
@@ -42,7 +44,7 @@ def test_mantel_haenszel() -> None:
     found = guided_against_random.pool_odds_ratios([stratum(*table) for table in BERKELEY])
     assert found.odds_ratio == pytest.approx(0.9046968, abs=1e-7)
     assert (found.low, found.high) == pytest.approx((0.7719074, 1.0603298), abs=1e-7)
-    assert found.strata == 6
+    assert found.stratum_count == 6
 
 
 @pytest.mark.parametrize(
@@ -56,7 +58,7 @@ def test_mantel_haenszel() -> None:
 def test_breslow_day(tables: list[tuple[int, int, int, int]], p: float) -> None:
     """The results equal those of DescTools' BreslowDayTest in the course P8120 of Columbia University."""
     found = guided_against_random.pool_odds_ratios([stratum(*table) for table in tables])
-    assert found.p_equal == pytest.approx(p, rel=2e-4)
+    assert found.p_of_equal_odds_ratios == pytest.approx(p, rel=2e-4)
 
 
 @pytest.mark.parametrize(

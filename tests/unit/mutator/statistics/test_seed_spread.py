@@ -66,7 +66,7 @@ def test_each_method_and_fault_type_has_separate_lines() -> None:
     frame = results(
         *seed(1, 2), *seed(2, 3), *seed(1, 8, method="random"), *seed(2, 9, method="random", fault_type="fog")
     )
-    sheet = seeds_sheet(frame, alerts=False)
+    sheet = seeds_sheet(frame, has_alerts=False)
     assert {line[0] for line in sheet.lines} == {"all", "guided", "random"}
     assert not [line for line in sheet.lines if "alert" in str(line[1])]
     assert cells(sheet, "random", "hazards", "injected")["largest"] == 0.9

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from mutator._common.doors import EXPORTS
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
 from mutator.exports import ExportTable, find_export
 from mutator.store.allowed_contents import ALLOWED_FILE_GLOBS

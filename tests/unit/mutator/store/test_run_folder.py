@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from mutator._common import folder_locks
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
 from mutator.store.cleaning import delete_run
 from mutator.store.run_folder import RunFolder

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError, UnsafePath
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import RunHead, load_head

@@ -6,7 +6,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.row_filters import compile_filter
 from mutator.errors import MutatorError
 from mutator.stpa.context_coverage import measure_coverage
 from mutator.triggers import temporal_logic

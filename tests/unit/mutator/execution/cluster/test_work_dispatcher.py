@@ -15,8 +15,8 @@ import pytest
 from distributed.client import FutureCancelledError
 
 from mutator.campaigns.chunks import pending_chunks_of
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.campaigns.run_provenance import append_stretch
 from mutator.errors import MutatorWarning
 from mutator.execution.cluster import cluster_distributor

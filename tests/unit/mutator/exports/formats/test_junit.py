@@ -9,7 +9,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.exports import ExportSelection, Format
-from mutator.exports.write import export
+from mutator.exports.run_export import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.workspace import Workspace
 
@@ -72,7 +72,9 @@ def test_hazards_pass_by_default_and_harness_errors_are_errors(run: Path) -> Non
 
 
 def test_hazards_can_be_selected_as_failures(run: Path, tmp_path: Path) -> None:
-    found = cases(export(run, Format.JUNIT, tmp_path / "j.xml", parts=ExportSelection(failures=["hazard"])))
+    found = cases(
+        export(run, Format.JUNIT, tmp_path / "j.xml", selection=ExportSelection(failures=["hazard"]))
+    )
     assert {c.find("failure").get("message") for c in found["lane"]} == {"H3 at 4.00 s"}  # type: ignore[union-attr]
     assert not any(list(c.iter("failure")) for c in found["distance"])
 
@@ -80,7 +82,7 @@ def test_hazards_can_be_selected_as_failures(run: Path, tmp_path: Path) -> None:
 def test_a_harness_error_cannot_be_selected_as_a_failure(run: Path) -> None:
     """Harness errors say nothing about the controller."""
     with pytest.raises(MutatorError, match="harness_error"):
-        export(run, Format.JUNIT, parts=ExportSelection(failures=["harness_error"]))
+        export(run, Format.JUNIT, selection=ExportSelection(failures=["harness_error"]))
 
 
 def test_csv_and_parquet_exports_are_copies_of_the_runs_tables(run: Path, tmp_path: Path) -> None:

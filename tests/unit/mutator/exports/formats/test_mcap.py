@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.exports import ExportSelection, ExportTable, Format
-from mutator.exports.write import export
+from mutator.exports.run_export import export
 from mutator.model import Activation, Experiment, Outcome
 from mutator.store.cleaning import list_deletable_files
 from mutator.store.run_folder import RunFolder
@@ -95,7 +95,7 @@ def hazardous(run: Path) -> list[str]:
 
 def test_golden_run_faulty_run_and_events_are_read_back(run: Path, tmp_path: Path) -> None:
     only = 'outcome == "hazard" and fault_type == "lane"'
-    out = export(run, Format.MCAP, tmp_path / "out", parts=ExportSelection(only=only))
+    out = export(run, Format.MCAP, tmp_path / "out", selection=ExportSelection(only=only))
     assert sorted(path.stem for path in out.iterdir()) == sorted(hazardous(run))
     name = hazardous(run)[0]
     messages: dict[str, list[tuple[int, Any]]] = defaultdict(list)
@@ -140,7 +140,7 @@ def test_negative_times_are_shifted(run: Path, tmp_path: Path) -> None:
     faulty = replace(FAULTY, t=FAULTY.t - 0.5, facts=about)
     write_kept_series(SeriesFolder(copy).kept_path(name), encode_series(early), encode_series(faulty, early))
     only = f'experiment_id == "{name}"'
-    [file] = export(copy, Format.MCAP, tmp_path / "out", parts=ExportSelection(only=only)).iterdir()
+    [file] = export(copy, Format.MCAP, tmp_path / "out", selection=ExportSelection(only=only)).iterdir()
     times = defaultdict(list)
     with file.open("rb") as opened:
         reader = make_reader(opened)
@@ -166,13 +166,13 @@ def test_a_damaged_trace_is_refused(
     with pytest.raises(
         MutatorError, match=rf"log.npz: the kept trace of {name}.*mutator rerun {name} --trace"
     ):
-        export(copy, Format.MCAP, tmp_path / "out", workspace=copy_toycar(tmp_path), parts=parts)
+        export(copy, Format.MCAP, tmp_path / "out", workspace=copy_toycar(tmp_path), selection=parts)
     assert list((tmp_path / "out").iterdir()) == []
 
 
 def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
     parts = ExportSelection(only=f'experiment_id == "{hazardous(run)[0]}"')
-    first, again = (next(export(run, Format.MCAP, tmp_path / x, parts=parts).iterdir()) for x in "ab")
+    first, again = (next(export(run, Format.MCAP, tmp_path / x, selection=parts).iterdir()) for x in "ab")
     assert first.read_bytes() == again.read_bytes()
 
 
@@ -184,9 +184,9 @@ def test_experiments_without_a_series_are_reported(run: Path, tmp_path: Path) ->
         out = export(run, Format.MCAP, tmp_path / "out")
     assert len(list(out.iterdir())) == len(hazardous(run))
     with pytest.raises(MutatorError, match=r"none with a series.*mutator rerun"):
-        export(run, Format.MCAP, tmp_path / "none", parts=ExportSelection(only='outcome == "masked"'))
+        export(run, Format.MCAP, tmp_path / "none", selection=ExportSelection(only='outcome == "masked"'))
     with pytest.raises(MutatorError, match=r"0 experiments.*widen `only`"):
-        export(run, Format.MCAP, tmp_path / "none", parts=ExportSelection(only='scenario == "Z"'))
+        export(run, Format.MCAP, tmp_path / "none", selection=ExportSelection(only='scenario == "Z"'))
     assert not (tmp_path / "none").exists()
 
 
@@ -202,19 +202,19 @@ def test_an_option_that_a_format_does_not_use_is_refused(
     run: Path, tmp_path: Path, format: Format, parts: ExportSelection, name: str
 ) -> None:
     with pytest.raises(MutatorError, match=f"leave `{name}` out"):
-        export(run, format, tmp_path / "x", parts=parts)
+        export(run, format, tmp_path / "x", selection=parts)
 
 
 def test_the_tables_of_propagation_and_timings_are_exported(run: Path, tmp_path: Path) -> None:
     parts = ExportSelection(table=ExportTable.PROPAGATION)
-    written = export(run, Format.CSV, tmp_path / "p.csv", parts=parts)
+    written = export(run, Format.CSV, tmp_path / "p.csv", selection=parts)
     rows = pd.read_csv(written)
     assert list(rows["experiment_id"]) == sorted(hazardous(run))
     assert rows[["channel", "t_first", "max_dev"]].values.tolist() == [["gas", 0.35, 0.875]] * len(rows)
-    assert export(run, Format.PARQUET, None, parts=parts).name == "propagation.parquet"
+    assert export(run, Format.PARQUET, None, selection=parts).name == "propagation.parquet"
     kept = (run / "exports" / "propagation.parquet").read_bytes()
     assert kept == (run / "propagation.parquet").read_bytes()
-    timings = export(run, Format.CSV, None, parts=ExportSelection(table=ExportTable.TIMINGS))
+    timings = export(run, Format.CSV, None, selection=ExportSelection(table=ExportTable.TIMINGS))
     assert timings == run / "exports" / "timings.csv"
     kept_timings = pd.read_parquet(run / "timings.parquet")
     pd.testing.assert_frame_equal(pd.read_csv(timings), kept_timings, check_dtype=False)
@@ -222,7 +222,7 @@ def test_the_tables_of_propagation_and_timings_are_exported(run: Path, tmp_path:
 
 def test_a_run_folder_with_exports_can_be_cleaned(run: Path) -> None:
     for table in ExportTable:
-        export(run, Format.CSV, None, parts=ExportSelection(table=table))
-        export(run, Format.PARQUET, None, parts=ExportSelection(table=table))
+        export(run, Format.CSV, None, selection=ExportSelection(table=table))
+        export(run, Format.PARQUET, None, selection=ExportSelection(table=table))
     written = export(run, Format.MCAP, None)
     assert {*written.iterdir()} <= {*list_deletable_files(run)}

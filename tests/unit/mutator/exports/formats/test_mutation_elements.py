@@ -12,8 +12,8 @@ import pytest
 from mutator.campaigns.plan import Plan
 from mutator.errors import MutatorError
 from mutator.exports import Format
-from mutator.exports.formats.mutation_elements import mutant_status
-from mutator.exports.write import export
+from mutator.exports.formats.mutation_elements import mutant_status_as_json
+from mutator.exports.run_export import export
 from mutator.model import Anchor, AnchorKind, Experiment, Injection, Outcome, Record, Status
 from mutator.workspace import Workspace
 
@@ -171,6 +171,6 @@ def test_the_status_of_a_mutant_follows_from_its_experiments(
     records = {
         e.id: record(e.id, **fields) for e, fields in zip(drives, became, strict=True) if fields is not None
     }
-    found = mutant_status(drives, records)
+    found = mutant_status_as_json(drives, records)
     assert found["status"] == status
     assert found["testsCompleted"] == sum(r.status is Status.OK for r in records.values())

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 GOLDEN_COLOUR = "#0072b2"  # blue and vermilion are distinct in greyscale and to colour-blind people
 FAULTY_COLOUR = "#d55e00"
-LATER_COLOUR = "#999999"  # for data after the end of the drive
+AFTER_END_COLOUR = "#999999"  # for data after the end of the drive
 PANEL_HEIGHT_INCHES = 1.1  # inches
 FIGURE_WIDTH_INCHES = 9.0
 PNG_DPI = 110
@@ -59,23 +59,23 @@ MARK_LINE_STYLES = {
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EventMark:
     kind: EventKind
-    t: float
+    t_s: float
     label: str
 
 
 def event_marks(record: Record) -> tuple[EventMark, ...]:
     marks = []
     if record.activation is not None:
-        marks.append(EventMark(kind=EventKind.TRIGGER, t=record.activation.first, label="activated"))
+        marks.append(EventMark(kind=EventKind.TRIGGER, t_s=record.activation.first, label="activated"))
     if record.t_manifest is not None:
-        marks.append(EventMark(kind=EventKind.MANIFEST, t=record.t_manifest, label="manifested"))
-    marks += [EventMark(kind=EventKind.ALERT, t=t, label=name) for name, t in record.alerts]
-    marks += [EventMark(kind=EventKind.HAZARD, t=t, label=name) for name, t in record.hazards]
-    return tuple(sorted(marks, key=lambda m: m.t))
+        marks.append(EventMark(kind=EventKind.MANIFEST, t_s=record.t_manifest, label="manifested"))
+    marks += [EventMark(kind=EventKind.ALERT, t_s=t, label=name) for name, t in record.alerts]
+    marks += [EventMark(kind=EventKind.HAZARD, t_s=t, label=name) for name, t in record.hazards]
+    return tuple(sorted(marks, key=lambda m: m.t_s))
 
 
 @shipped_style()
-def draw_run(
+def draw_golden_and_faulty(
     golden: Trace,
     faulty: Trace,
     manifest: TargetManifest,
@@ -139,7 +139,7 @@ def _draw_channel(
     for (time, values), _, width, alpha, _ in looks:
         if (time > end).any():
             later = np.where(time >= end, infinities_as_gaps(values), np.nan)
-            axis.plot(time, later, color=LATER_COLOUR, linewidth=width, alpha=alpha)
+            axis.plot(time, later, color=AFTER_END_COLOUR, linewidth=width, alpha=alpha)
     unit = f"\n[{channel.unit}]" if channel.unit not in ("", "-") else ""
     axis.set_ylabel(channel.name + unit, fontsize=8)
     axis.tick_params(labelsize=8)
@@ -149,20 +149,20 @@ def _draw_channel(
 def _draw_marks(
     figure: "Figure", axes: list["Axes"], title: str, marks: tuple[EventMark, ...], end: float | None
 ) -> None:
-    colours = [LATER_COLOUR if end is not None and m.t > end else MARK_COLOURS[m.kind] for m in marks]
+    colours = [AFTER_END_COLOUR if end is not None and m.t_s > end else MARK_COLOURS[m.kind] for m in marks]
     left, right = axes[0].get_xlim()
     for axis in axes:
         for mark, colour in zip(marks, colours, strict=True):
-            axis.axvline(mark.t, color=colour, linestyle=MARK_LINE_STYLES[mark.kind], linewidth=1.0)
+            axis.axvline(mark.t_s, color=colour, linestyle=MARK_LINE_STYLES[mark.kind], linewidth=1.0)
         if end is not None:
-            axis.axvspan(end, right, color=LATER_COLOUR, alpha=0.15, linewidth=0)
+            axis.axvspan(end, right, color=AFTER_END_COLOUR, alpha=0.15, linewidth=0)
     axes[0].set_xlim(left, right)
     top = axes[0]
     # Labels rotate through three heights, so that those of close marks do not overlap.
     for i, (mark, colour) in enumerate(zip(marks, colours, strict=True)):
         top.annotate(
-            f"{mark.label} {mark.t:.2f}",
-            (mark.t, 1.0),
+            f"{mark.label} {mark.t_s:.2f}",
+            (mark.t_s, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(2, 2 + 9 * (i % 3)),
             textcoords="offset points",

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.row_filters import compile_filter
 from mutator.errors import MutatorError
 
 ROW = {"fault_type": "ghost_vehicle", "scenario": "S2", "value": 120, "unit": None, "method": "guided"}

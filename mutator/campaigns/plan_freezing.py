@@ -18,7 +18,7 @@ from mutator._common.folder_locks import owning_run_folder
 from mutator._common.hashing import as_json_types, digest
 from mutator._common.version import VERSION
 from mutator.campaigns.plan import Plan, SeedBySeedPlan
-from mutator.campaigns.plan_parts import PlanDigestBuilder, PlanPart, PlanTally
+from mutator.campaigns.plan_tally import PlanDigestBuilder, PlanPart, PlanTally
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.errors import MutatorError
@@ -94,7 +94,7 @@ def freeze_plan_in_owned_folder(
     """Like `freeze_plan_with_tally`, for a caller that owns the folder."""
     if RunFolder.exists(out):
         folder = RunFolder.open(out)
-        tally, plan_digest = _count_parts(plan)
+        tally, plan_digest = _tally_and_digest(plan)
         if folder.head.plan != plan_digest:
             raise MutatorError(
                 "this folder holds another plan",
@@ -112,7 +112,7 @@ def freeze_plan_in_owned_folder(
     return RunFolder.open(out), tally
 
 
-def _count_parts(
+def _tally_and_digest(
     plan: Plan | SeedBySeedPlan, on_part: Callable[[PlanPart], None] = lambda part: None
 ) -> tuple[PlanTally, str]:
     tally, digest_builder = plan.empty_tally(), PlanDigestBuilder()
@@ -144,9 +144,9 @@ def _write_plan_files(
 
         def write(part: PlanPart) -> None:
             rows.write(plan_csv_lines(part.experiments))
-            writer.append(part.experiments, part.chunks)
+            writer.append(part.experiments, part.chunk_lengths)
 
-        tally, plan_digest = _count_parts(plan, write)
+        tally, plan_digest = _tally_and_digest(plan, write)
     files = {
         CAMPAIGN_FILE: FileDigest.of_bytes(plan.campaign.file_bytes),
         PLAN_CSV: rows.digest,

@@ -23,8 +23,8 @@ class PlanPart:
     """
 
     experiments: Sequence[Experiment]
-    chunks: Sequence[int]
-    runs: int
+    chunk_lengths: Sequence[int]
+    run_count: int
 
 
 @dataclass(slots=True, kw_only=True)
@@ -32,27 +32,29 @@ class PlanTally:
     """The totals of the plan parts added so far."""
 
     canary: Experiment
-    several_seeds: bool  # each seed has its own golden runs
+    has_several_seeds: bool  # each seed has its own golden runs
     experiment_count: int = 0
     run_count: int = 0
     chunk_lengths: list[int] = field(default_factory=list)
     count_by_type_and_method: Counter[FaultTypeAndMethod] = field(default_factory=Counter)
-    goldens: dict[GoldenRun, None] = field(default_factory=dict)
-    fault_by_variant: dict[str, Fault] = field(default_factory=dict)  # one fault per variant
+    goldens_without_canary: dict[GoldenRun, None] = field(default_factory=dict)
+    example_fault_by_variant: dict[str, Fault] = field(default_factory=dict)  # one fault per variant
 
     def add(self, part: PlanPart) -> None:
         self.experiment_count += len(part.experiments)
-        self.run_count += part.runs
-        self.chunk_lengths += part.chunks
+        self.run_count += part.run_count
+        self.chunk_lengths += part.chunk_lengths
         for experiment in part.experiments:
             fault = experiment.fault
             self.count_by_type_and_method[fault.module, fault.fault_type, experiment.method.value] += 1
-            self.goldens.setdefault(GoldenRun.for_experiment(experiment, several_seeds=self.several_seeds))
-            self.fault_by_variant[fault.spec] = fault
+            self.goldens_without_canary.setdefault(
+                GoldenRun.for_experiment(experiment, several_seeds=self.has_several_seeds)
+            )
+            self.example_fault_by_variant[fault.spec] = fault
 
     def golden_runs(self) -> tuple[GoldenRun, ...]:
-        canary_golden = GoldenRun.for_experiment(self.canary, several_seeds=self.several_seeds)
-        return tuple(dict.fromkeys((*self.goldens, canary_golden)))
+        canary_golden = GoldenRun.for_experiment(self.canary, several_seeds=self.has_several_seeds)
+        return tuple(dict.fromkeys((*self.goldens_without_canary, canary_golden)))
 
 
 class PlanDigestBuilder:
@@ -68,14 +70,14 @@ class PlanDigestBuilder:
             self._hash.update((self._separator + ",".join(f'"{name}"' for name in ids)).encode())
             self._separator = ","
 
-    def finish(self, chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
+    def finish(self, chunk_lengths: Sequence[int], canary_id: str, campaign: Campaign) -> str:
         # without its opening bracket, because it continues the list that began with the ids
-        rest = [chunks, canary, as_json_types(campaign.canary), as_json_types(campaign.limits)]
+        rest = [chunk_lengths, canary_id, as_json_types(campaign.canary), as_json_types(campaign.limits)]
         self._hash.update(f"],{canonical_json(rest)[1:]}".encode())
         return self._hash.hexdigest()
 
 
-def plan_digest(ids: Sequence[str], chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
+def plan_digest(ids: Sequence[str], chunk_lengths: Sequence[int], canary_id: str, campaign: Campaign) -> str:
     digest_builder = PlanDigestBuilder()
     digest_builder.add(ids)
-    return digest_builder.finish(chunks, canary, campaign)
+    return digest_builder.finish(chunk_lengths, canary_id, campaign)

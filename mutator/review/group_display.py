@@ -4,19 +4,19 @@ import re
 from collections.abc import Sequence
 
 from mutator.model import Trigger
-from mutator.review.entries import describe_ranges
 from mutator.review.mutant_groups import Group
 from mutator.review.patch_shapes import PatchShape
+from mutator.review.review_entries import describe_ranges
 
 # the condition of a random time: thousands of them become one range
 _TIME_CONDITION_PATTERN = re.compile(r"t >= ([0-9.e+-]+)\Z")
 _ID_HOLE_PATTERN = re.compile(r"id(_\d+)?\Z")  # readers do not need ids
 
 
-def value_table(group: Group) -> tuple[list[str], list[list[str]]]:
+def fault_value_table(group: Group) -> tuple[list[str], list[list[str]]]:
     """Return the headings, and a row for each fault with the values of its holes, except ids."""
     faults = {fault.id: fault for fault in group.faults}
-    names = list(dict.fromkeys(name for shape in group.shapes for name in _displayed_holes(shape)))
+    names = list(dict.fromkeys(name for shape in group.shapes for name in _hole_names_without_ids(shape)))
     rows = []
     for shape in group.shapes:
         for member, filled in zip(shape.member_ids, shape.values_by_member, strict=True):
@@ -27,7 +27,7 @@ def value_table(group: Group) -> tuple[list[str], list[list[str]]]:
     return ["fault", "reading", *names], rows
 
 
-def _displayed_holes(shape: PatchShape) -> list[str]:
+def _hole_names_without_ids(shape: PatchShape) -> list[str]:
     return [name for name in shape.hole_names if not _ID_HOLE_PATTERN.match(name)]
 
 
@@ -36,7 +36,7 @@ def describe_value_ranges(group: Group) -> str:
     return describe_ranges(group.value_ranges)
 
 
-def condition_lines(triggers: Sequence[Trigger]) -> list[str]:
+def trigger_condition_lines(triggers: Sequence[Trigger]) -> list[str]:
     """Each condition once, with the names of its triggers; random times as one range."""
     named: dict[str, list[str]] = {}
     times: list[float] = []

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.freezing import freeze_plan
 from mutator.campaigns.plan import build_plan, load_plan
+from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace

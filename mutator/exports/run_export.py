@@ -19,7 +19,7 @@ def export(
     out: Path | None = None,
     *,
     workspace: Workspace | None = None,
-    parts: ExportSelection = WHOLE_RUN,
+    selection: ExportSelection = WHOLE_RUN,
 ) -> Path:
     """Write the run folder `run` as `format` to `out` (default: RUN/exports/); return the file or folder.
 
@@ -28,12 +28,12 @@ def export(
     """
     chosen_format = find_export(format)
     folder = RunFolder.open(run)
-    check_options(format, chosen_format, parts)
+    check_options(format, chosen_format, selection)
     with EXPORTS.blaming_package(format):
-        name = chosen_format.file.format(table=parts.table.value)
+        name = chosen_format.file.format(table=selection.table.value)
         path = out or path_below(folder.path / EXPORTS_FOLDER, name)
         content = chosen_format.write(
-            ExportRequest(folder=folder, out=path, workspace=workspace, parts=parts)
+            ExportRequest(folder=folder, out=path, workspace=workspace, selection=selection)
         )
         if not isinstance(content, bytes | None):
             raise TypeError(f"`write` returns {type(content).__name__}, not bytes")
