@@ -41,12 +41,12 @@ class AlertToHazardTimes:
     `runs_alerted_first` is the number of runs with an alert before any hazard. Of these,
     `hazards_after_alert` then had a hazard; the others are censored at their end. `median_s` is the time at
     which the Kaplan-Meier curve crosses one half. If the curve is flat at one half, `median_s` is the middle
-    of the flat section, as in R's `survfit` and SAS; if the flat section reaches the end of the
-    curve, `median_s` is the section's beginning. From `median_low_s` to `median_high_s`, the curve's log-log transformed
-    interval contains one half (Brookmeyer and Crowley 1982). A bound is infinite if the runs do not reach it.
-    `no_hazard_share` is the Kaplan-Meier share of alerts without a hazard within the driver's reaction time;
-    `late_hazard_share` is the share, among the hazards after an alert, of those that came later than this
-    reaction time.
+    of the flat section, as in R's `survfit` and SAS; if the flat section reaches the end of the curve,
+    `median_s` is the section's beginning. From `median_low_s` to `median_high_s`, the curve's log-log
+    transformed interval contains one half (Brookmeyer and Crowley 1982). A bound is infinite if the runs do
+    not reach it. `no_hazard_share` is the Kaplan-Meier share of alerts without a hazard within the driver's
+    reaction time; `late_hazard_share` is the share, among the hazards after an alert, of those that came
+    later than this reaction time.
     """
 
     runs_alerted_first: int
