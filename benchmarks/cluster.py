@@ -40,7 +40,7 @@ from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.patch_files import pack_patches
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import EXPERIMENT_BLOCK
-from mutator.store.work_stretches import Stretch
+from mutator.store.work_stretches import SessionEnvironment
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -155,7 +155,7 @@ def intake() -> None:
     for fake in (machine_facts, deliver_bundle, attend_run, leave_run, run_piece):
         setattr(worker_tasks, fake.__name__, fake)
     with planned() as (workspace, folder, left):
-        folder = append_stretch(folder, Stretch(python="", packages={}, platform=""))
+        folder = append_stretch(folder, SessionEnvironment(python="", packages={}, platform=""))
         session: Any = SimpleNamespace(
             workspace=workspace,
             folder=folder,

@@ -51,7 +51,7 @@ def last_difference(golden: Series, faulty: Series) -> float:
         differs = np.flatnonzero(one.view("<u4") != other.view("<u4"))
         if differs.size:
             last = max(last, float(times[differs[-1]]))
-    points = faulty.points
+    points = faulty.extra_points
     differs = np.flatnonzero(points.golden_values.view("<u4") != points.faulty_values.view("<u4"))
     return max(last, float(points.t[differs].max(initial=-math.inf)))
 

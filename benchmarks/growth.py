@@ -26,11 +26,11 @@ from mutator.mutants.mutant_building import build
 from mutator.results import table_building
 from mutator.statistics.results_frame import load_usable_results
 from mutator.store import file_digests, plan_file
-from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import CHECKS_FILE as CHECKS
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.file_digests import FileDigest
 from mutator.store.patch_files import PatchWriter
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -108,7 +108,7 @@ def working(size: int, out: Path) -> dict[str, float]:
     workspace = Workspace.find(root=ROOT)
     folder = RunFolder.open(out)
     manifest, models = workspace.manifest(folder.head.target), workspace.fault_models()
-    lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": folder.head.plan})
+    lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": folder.head.plan})
     began = process_time()
     faults = plan_file.load_faults(out)
     number = 0
@@ -128,7 +128,7 @@ def written_run(size: int, out: Path, patch: bytes = b"") -> RunFolder:
     more = (replace(e, seed=e.seed + k) for k in range(size) for e in plan.experiments)
     experiments = tuple(next(more) for _ in range(size))
     folder = freeze_plan(replace(plan, experiments=experiments, chunks=(size,)), out, workspace)
-    lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
+    lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": plan.digest})
     patches = PatchWriter(out, "0001-main")
     for number, experiment in enumerate(experiments):
         if patch:
@@ -148,14 +148,14 @@ def opening(size: int, out: Path) -> dict[str, float]:
     paths = [golden / name for golden in goldens for name in head.golden_files]
     names = [path.relative_to(folder.path).as_posix() for path in paths]
     checks = b'{"schema": "checks/1", "results": []}'
-    with file_digests.rewriting_files(
+    with file_digests.announcing_rewrites(
         out, dict.fromkeys(names, FileDigest.of_bytes(data)) | {CHECKS: FileDigest.of_bytes(checks)}
     ):
         for path in paths:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
         (out / CHECKS).write_bytes(checks)
-    file_digests.close_segments(out, finished=True)
+    file_digests.add_segments_to_ledger(out, finished=True)
     opened, sealed = [], []
     for _ in range(3):
         start = process_time()

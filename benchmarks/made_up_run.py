@@ -35,18 +35,18 @@ from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.preflight import equivalence_check
 from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store import file_digests, plan_file
-from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import CHECKS_FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.file_digests import FileDigest
 from mutator.store.patch_files import _PatchPacker
-from mutator.store.records import PROOF_FOLDER, SCHEMA, record_as_json
+from mutator.store.records import PROOF_FOLDER, RECORDS_SCHEMA, record_as_json
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.series_folder import INDEX_NAME, SeriesIndex, save_index
 from mutator.store.series_format import encode_series
 from mutator.store.series_script import script_name_of, write_script
 from mutator.store.timings import TIMINGS_SCHEMA
-from mutator.store.work_stretches import Stretch
+from mutator.store.work_stretches import SessionEnvironment
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -65,7 +65,7 @@ def make(size: int, out: Path) -> str:
     folder = planned(workspace, size, out)
     first = tuple(islice(_experiments(folder), SEED))
     goldens(workspace, folder, first)
-    ids = list(plan_file.ids(out))
+    ids = list(plan_file.experiment_ids(out))
     patches = patches_of(workspace, first)
     records = made_up_records(workspace, first)
     write_segments(folder, ids, records, patches)
@@ -74,7 +74,7 @@ def make(size: int, out: Path) -> str:
     write_series(workspace, folder, ids, first)
     append_stretch(
         folder,
-        Stretch(
+        SessionEnvironment(
             python=run_environment.python_version(),
             packages={
                 name: version
@@ -87,7 +87,7 @@ def make(size: int, out: Path) -> str:
             records="0001-*",
         ),
     )
-    file_digests.close_segments(out, finished=True)
+    file_digests.add_segments_to_ledger(out, finished=True)
     return seals_of(RunFolder(out)).seal or ""
 
 
@@ -143,7 +143,7 @@ def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Exper
     data = json.dumps(checks | {"packages": [], "run_cpu_s": 1.0}).encode()
     files = [path for path in (run / "golden").rglob("*") if path.is_file()]
     coming = {path.relative_to(run).as_posix(): FileDigest.of_bytes(path.read_bytes()) for path in files}
-    with file_digests.rewriting_files(run, coming | {CHECKS: FileDigest.of_bytes(data)}):
+    with file_digests.announcing_rewrites(run, coming | {CHECKS: FileDigest.of_bytes(data)}):
         (run / CHECKS).write_bytes(data)
 
 
@@ -192,7 +192,7 @@ def write_segments(
     for worker in range(WORKERS):
         name = f"0001-gw{worker}"
         head = {"plan": folder.head.plan}
-        record_lines = Lines(folder.path / "records" / f"{name}.jsonl", head | {"schema": SCHEMA})
+        record_lines = Lines(folder.path / "records" / f"{name}.jsonl", head | {"schema": RECORDS_SCHEMA})
         timing_lines = Lines(folder.path / "timings" / f"{name}.jsonl", head | {"schema": TIMINGS_SCHEMA})
         (folder.path / "patches").mkdir(exist_ok=True)
         with (folder.path / "patches" / f"{name}.blocks").open("wb", buffering=1 << 20) as packed:
@@ -240,7 +240,7 @@ def write_proof(
     lines = _bodies(records, patches)
     proof = Lines(
         folder.path / PROOF_FOLDER / "0001-gw0.jsonl",
-        {"plan": folder.head.plan, "schema": SCHEMA},
+        {"plan": folder.head.plan, "schema": RECORDS_SCHEMA},
     )
     wanted = set(equivalence_check.sample_ids_in_folder(folder))
     counts = [0] * WORKERS
@@ -278,10 +278,10 @@ def write_series(
     key, kept = first.key, ids[:SERIES_MOST]
     index = SeriesIndex(
         plan=folder.head.plan,
-        chunks=((script_name_of(data), len(made)),),
+        chunk_entry_counts=((script_name_of(data), len(made)),),
         entry_sizes=tuple(map(len, made)),
-        golden_entries={key: 0},
-        experiment_entries={name: 1 + number % SERIES for number, name in enumerate(kept)},
+        entry_number_by_golden={key: 0},
+        entry_number_by_experiment={name: 1 + number % SERIES for number, name in enumerate(kept)},
         golden_by_experiment=dict.fromkeys(kept, key),
         left_out_count=len(ids) - len(kept),
         budget_mb=500,

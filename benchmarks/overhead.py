@@ -34,7 +34,7 @@ from mutator.model import Experiment, Hold, Trigger  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.store.checksummed_lines import LineWriter  # noqa: E402
 from mutator.store.plan_choices import Choices  # noqa: E402
-from mutator.store.records import SCHEMA, record_as_json  # noqa: E402
+from mutator.store.records import RECORDS_SCHEMA, record_as_json  # noqa: E402
 from mutator.triggers.trigger_kinds import always_trigger  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
@@ -91,7 +91,7 @@ class Bench:
         engine = ForkEngine(*self.common, null_mutant=null)
         goldens = LoadedGoldens(self.manifest, lambda experiment: self.folder / "golden" / "out")
         runner = ExperimentRunner(self.manifest, self.models, engine, goldens, self.workspace.scenario)
-        records = LineWriter(self.folder / "records.jsonl", {"schema": SCHEMA})
+        records = LineWriter(self.folder / "records.jsonl", {"schema": RECORDS_SCHEMA})
 
         def run(some: Sequence[Experiment]) -> float:
             children = 0.0

@@ -22,10 +22,10 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.preflight import check_run_problems, preflight_cache, preflight_checks
-from mutator.store.check_results import FILE
+from mutator.store.check_results import CHECKS_FILE
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -80,7 +80,7 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
     said = {"schema": CHECKS_SCHEMA, "digest": looked_at.digest, "results": [], "goldens": goldens}
     looked_at._store_in_run_folder(json_bytes(said | {"run_cpu_s": 1.0}))
     preflight_cache.store_passed_checks(
-        preflight_cache.cached_checks_path(looked_at.digest), folder.path, FILE, looked_at.pending_folder
+        preflight_cache.cached_checks_path(looked_at.digest), folder.path, CHECKS_FILE, looked_at.pending_folder
     )
 
 
@@ -114,7 +114,7 @@ def main() -> None:
         new = out.with_name("new")
         table.add("new, first run", until_the_first_run(workspace, new))
         table.add("frozen, first run", until_the_first_run(workspace, new))
-        lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
+        lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": plan.digest})
         for experiment in plan.experiments:
             lines.append(asdict(masked(experiment)))
         lines.close()

@@ -37,10 +37,10 @@ from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.panels.fault_paths_panel import build_fault_paths_panel
 from mutator.report.reported_run import ReportedRun
 from mutator.results import table_building
-from mutator.results.outcome_counting import count_endings
+from mutator.results.outcome_counting import count_by_outcome_or_status
 from mutator.review.patch_shapes import shapes_of_patches
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series
@@ -88,7 +88,7 @@ def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
     known = plan.experiments
     experiments = [replace(known[i % len(known)], seed=1 + i // len(known)) for i in range(size)]
     freeze_plan(replace(plan, experiments=tuple(experiments), chunks=(size,)), out, workspace)
-    lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
+    lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": plan.digest})
     draw = np.random.default_rng(1)
     names = [metric.name for metric in workspace.manifest("openpilot").all_metrics]
     for number, experiment in enumerate(experiments):
@@ -167,7 +167,7 @@ def write(size: int, out: Path) -> dict[str, float]:
     content = ReportContent(
         title=f"{size} experiments",
         alarm="",
-        outcome_counts=count_endings(run.results),
+        outcome_counts=count_by_outcome_or_status(run.results),
         plan_text="",
         glossary=glossary_of(run),
         study_citation="",

@@ -62,7 +62,7 @@ def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
     assert index is not None
     sizes = {name: size_of(out / name) for name in GROWING}
     results = sum(size_of(path) for path in out.glob("*.parquet")) + size_of(out / "results.csv")
-    goldens = sum(index.entry_sizes[number] for number in {*index.golden_entries.values()})
+    goldens = sum(index.entry_sizes[number] for number in {*index.entry_number_by_golden.values()})
     each = {**sizes, "series": sizes["series"] - goldens, "results": results}
     del each["report"]  # its page is measured by report_page.py
     rest = size_of(out) - sum(each.values())

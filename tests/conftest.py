@@ -36,10 +36,10 @@ from mutator.store.checksummed_lines import LineWriter, read_segment
 from mutator.store.file_digests import FileDigest
 from mutator.store.patch_files import PatchFolder, PatchWriter, rewrite_patch_file
 from mutator.store.plan_choices import Choices
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA
-from mutator.store.work_stretches import Stretch
+from mutator.store.work_stretches import SessionEnvironment
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
@@ -308,7 +308,7 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         freeze_plan(plan, out, workspace)
         compared = workspace.manifest(plan.campaign.target).compared_channels
         unchanged = {"max_dev": tuple((channel.name, 0.0) for channel in compared)}
-        lines = LineWriter(out / "records" / "0001-a.jsonl", {"schema": SCHEMA, "plan": plan.digest})
+        lines = LineWriter(out / "records" / "0001-a.jsonl", {"schema": RECORDS_SCHEMA, "plan": plan.digest})
         for experiment in plan.experiments:
             fields = became(experiment)
             if fields is not None:
@@ -373,12 +373,12 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
         patch = b"diff --git a/a.py b/a.py\n"
         write_run(workspace, out, lambda experiment: {"patch": file_digests.digest(patch)}, **given)
         folder = RunFolder.open_unverified(out)
-        lines = [line for _, line in read_segment(out / "records" / "0001-a.jsonl").numbered_objects(SCHEMA)]
+        lines = [line for _, line in read_segment(out / "records" / "0001-a.jsonl").numbered_objects(RECORDS_SCHEMA)]
         patches = PatchWriter(out, "0001-a")
         for line in lines:
             patches.append(line["experiment_id"], patch)
         patches.close()
-        for kind, schema, some in (("proof", SCHEMA, lines[:3]), ("timings", TIMINGS_SCHEMA, lines)):
+        for kind, schema, some in (("proof", RECORDS_SCHEMA, lines[:3]), ("timings", TIMINGS_SCHEMA, lines)):
             writer = LineWriter(out / kind / "0001-a.jsonl", {"schema": schema, "plan": folder.head.plan})
             for line in some:
                 cost = {"experiment_id": line["experiment_id"], "cpu_s": 1.0, "wall_s": 2.0, "host": "h"}
@@ -390,16 +390,16 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
         for scenario, changes in folder.head.goldens:
             place = folder.golden_folder(scenario, tuple(changes)).relative_to(folder.path)
             new |= {f"{place}/{name}": name.encode() for name in folder.head.golden_files}
-        with file_digests.rewriting_files(
+        with file_digests.announcing_rewrites(
             out, {name: FileDigest.of_bytes(data) for name, data in new.items()}
         ):
             for name, data in new.items():
                 (out / name).parent.mkdir(parents=True, exist_ok=True)
                 (out / name).write_bytes(data)
         append_stretch(
-            folder, Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform="Linux")
+            folder, SessionEnvironment(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform="Linux")
         )
-        file_digests.close_segments(out, finished=True)
+        file_digests.add_segments_to_ledger(out, finished=True)
         return out
 
     return write
@@ -422,6 +422,6 @@ def reseal() -> Callable[..., None]:
         names = [name for name, one in known.files.items() if one.lines is None and (run / name).exists()]
         files = {name: FileDigest.of_bytes((run / name).read_bytes()) for name in names}
         file_digests.save_ledger(run, dataclasses.replace(known, files=files))
-        file_digests.close_segments(run, finished=finished)
+        file_digests.add_segments_to_ledger(run, finished=finished)
 
     return compute

@@ -4,10 +4,10 @@ from typing import Any
 
 from mutator.model import Limits
 from mutator.store.plan_choices import Choices
-from mutator.store.run_head import SCHEMA, Provenance, RunHead
+from mutator.store.run_head import RUN_SCHEMA, Provenance, RunHead
 
 HEAD = RunHead(
-    schema=SCHEMA,
+    schema=RUN_SCHEMA,
     plan="ab" * 32,
     campaign="made_up",
     campaign_digest="ef" * 32,

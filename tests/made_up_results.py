@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from pyarrow import parquet
 
-from mutator.results.table_files import CsvTable, ParquetTable, TableColumn, csv_lines, parquet_batch
+from mutator.results.table_files import CsvTableWriter, ParquetTableWriter, TableColumn, csv_lines, parquet_batch
 
 _TYPES = {"text": str, "flag": int, "count": int, "number": float}
 
@@ -15,9 +15,9 @@ _TYPES = {"text": str, "flag": int, "count": int, "number": float}
 def write_results(run: Path, columns: Sequence[TableColumn], lines: Iterable[Mapping[str, object]]) -> None:
     """Write results.parquet and results.csv of a run folder. A missing or empty cell has no value."""
     cells = cells_of(columns, lines)
-    with ParquetTable(run / "results.parquet", columns) as file:
+    with ParquetTableWriter(run / "results.parquet", columns) as file:
         file.append(parquet_batch(columns, cells))
-    with CsvTable(run / "results.csv", columns) as csv:
+    with CsvTableWriter(run / "results.csv", columns) as csv:
         csv.append(csv_lines(zip(*cells, strict=True)))
 
 

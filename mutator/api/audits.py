@@ -14,13 +14,13 @@ from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.audit.run_audit import AuditCheck, run_audit_checks
 from mutator.audit.run_repair import repair_run as put_aside
 from mutator.audit.seal import Seals, seals_of, unsealed_facts
-from mutator.audit.signatures import sign as write_signature
+from mutator.audit.signatures import sign_seal as write_signature
 from mutator.audit.signatures import verified_signer
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import draw_experiment_ids, rerun_and_compare
 from mutator.report.report_audit import audit_report
 from mutator.store.run_folder import RunFolder
-from mutator.store.work_stretches import describe_stretches, package_versions
+from mutator.store.work_stretches import describe_environments, version_texts_by_package
 from mutator.workspace import Workspace
 
 MOST_LISTED_DIFFERENCES = 20  # in the text of an audit, to fit on a screen; `differences` has all
@@ -48,7 +48,7 @@ class Audit:
 
     def __str__(self) -> str:
         width = max(map(len, (*self.facts, *self.not_sealed)))
-        rows = [(check.what, str(check.count), str(len(check.differences))) for check in self.checks]
+        rows = [(check.checked_parts, str(check.checked_count), str(len(check.differences))) for check in self.checks]
         table = TextTable(heads=("checked", "count", "differences"), rows=rows, right_aligned=(1, 2))
         difference_texts = [
             str(difference).replace(f"{self.run}/", "")
@@ -190,7 +190,7 @@ def _expected_digest_check(folder: RunFolder, seals: Seals, expected: str) -> Au
 def _digest_check(folder: RunFolder, digest_name: str, actual: str | None, expected: str) -> AuditCheck:
     wrong = MutatorError(f"{digest_name} {actual or 'none'}", where=folder.path, expected=expected)
     return AuditCheck(
-        what=f"{digest_name} as expected", count=1, differences=() if actual == expected else (wrong,)
+        checked_parts=f"{digest_name} as expected", checked_count=1, differences=() if actual == expected else (wrong,)
     )
 
 
@@ -212,7 +212,7 @@ def _rerun_check(
     try:
         ids = draw_experiment_ids(folder, count)
     except MutatorError as err:
-        return AuditCheck(what=check_name, count=0, differences=(err,))
+        return AuditCheck(checked_parts=check_name, checked_count=0, differences=(err,))
     facts["drawn at random"] = ", ".join(ids)
     return AuditCheck.from_problems(check_name, len(ids), rerun_and_compare(workspace, folder, ids))
 
@@ -221,8 +221,8 @@ def _signature_check(folder: RunFolder, seals: Seals, allowed_signers: Path) -> 
     try:
         identity = verified_signer(folder, seals, allowed_signers)
     except CheckFailed as err:
-        return AuditCheck(what="digests as signed", count=1, differences=(err,)), None
-    return AuditCheck(what="digests as signed", count=1), identity
+        return AuditCheck(checked_parts="digests as signed", checked_count=1, differences=(err,)), None
+    return AuditCheck(checked_parts="digests as signed", checked_count=1), identity
 
 
 def _seals_if_undamaged(folder: RunFolder, checks: list[AuditCheck]) -> Seals:
@@ -236,14 +236,14 @@ def _seals_if_undamaged(folder: RunFolder, checks: list[AuditCheck]) -> Seals:
 
 def _run_facts(folder: RunFolder) -> dict[str, str]:
     head = folder.head
-    packages = package_versions(folder.stretches)
+    packages = version_texts_by_package(folder.session_environments)
     return {
         "run": folder.path.name,
         "campaign": f"{head.campaign} of {head.target}, {head.reading}, seed {head.seed}",
-        "experiments": f"{folder.planned_count}{f' of shard {folder.shard}' if folder.shard else ''}",
+        "experiments": f"{folder.planned_experiment_count}{f' of shard {folder.shard}' if folder.shard else ''}",
         "plan": head.plan,
         **{f"digest of {name}": value for name, value in head.sources.items()},
         "mutator": head.provenance.mutator,
-        "python": describe_stretches(folder.stretches).get("python", "none"),
+        "python": describe_environments(folder.session_environments).get("python", "none"),
         **({"packages": f"{len(packages)}, with digest {digest(packages)}"} if packages else {}),
     }

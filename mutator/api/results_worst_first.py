@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mutator.campaigns.row_filters import compile_filter
-from mutator.results.ranking import ranks_of_rows
+from mutator.results.ranking import worst_first_ranks
 from mutator.results.result_rows import ResultRow, cells_by_row, rows_of
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
@@ -20,7 +20,7 @@ def worst_results(
     """
     frame = Results.up_to_date(run).frame()
     row_indices = (
-        ranks_of_rows(frame).argsort().tolist()
+        worst_first_ranks(frame).argsort().tolist()
     )  # sort all rows first, because filtering keeps the order
     if only is not None:
         accepts = compile_filter(only, list(frame.columns))

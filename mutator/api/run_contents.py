@@ -56,7 +56,7 @@ class RunContents(StoredRun):
     @property
     def endings(self) -> dict[str, int]:
         """Number of experiments by ending: the outcome of runs that ended normally, the status of others."""
-        return outcome_counting.count_endings(self._results_frame)
+        return outcome_counting.count_by_outcome_or_status(self._results_frame)
 
     @property
     def harness_errors(self) -> dict[str, str]:

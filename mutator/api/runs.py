@@ -24,7 +24,7 @@ from mutator.exports.run_export import export
 from mutator.model import OPERATOR_FAULTS_MODULE
 from mutator.outcomes.fault_free_runs import (
     FaultFreeRun,
-    alerts_by_drive,
+    alerts_by_scenario_and_seed,
     fault_free_alerts_note,
     load_fault_free_runs,
 )
@@ -76,7 +76,7 @@ class Run(RunContents):
 
     def __repr__(self) -> str:
         head = self.folder.head
-        progress = f"{sum(self.endings.values())} of {self.folder.planned_count} experiments"
+        progress = f"{sum(self.endings.values())} of {self.folder.planned_experiment_count} experiments"
         failed = len(self.harness_errors)
         errors = f", {failed} with a HARNESS ERROR" if failed else ""
         return f"<Run {self.path.name}: {progress} of {head.campaign}, {head.reading}{errors}>"
@@ -100,8 +100,8 @@ class Run(RunContents):
         """Count how the experiments of each fault type ended."""
         frame = self._results_frame
         hazards, counts = (
-            outcome_counting.hazard_names(frame),
-            outcome_counting.count_outcomes(frame, outcome_counting.fault_types_of(frame)),
+            outcome_counting.checked_hazard_names(frame),
+            outcome_counting.count_outcomes_by_group(frame, outcome_counting.fault_types_of(frame)),
         )
         heads, rows = outcome_counting.count_table(
             counts, "fault type", hazards, alerts=self.folder.has_alerts
@@ -117,7 +117,7 @@ class Run(RunContents):
         if not (frame["module"] == OPERATOR_FAULTS_MODULE).any():
             return mutation_score_sheet(prepare_results(frame), {}, None)
         try:
-            alerts = alerts_by_drive(self.fault_free())
+            alerts = alerts_by_scenario_and_seed(self.fault_free())
         except (MutatorError, KeyError):  # without target or golden runs, alerts cannot be compared
             alerts = None
         return mutation_score_sheet(prepare_results(frame), self.faults, alerts, self.folder.head.operators)

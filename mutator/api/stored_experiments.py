@@ -19,7 +19,7 @@ from mutator.outcomes.series_sampling import traces_of_series
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, rerun_command
-from mutator.store.work_stretches import Stretch
+from mutator.store.work_stretches import SessionEnvironment
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import ChannelFacts
@@ -121,9 +121,9 @@ class StoredExperiment(ExperimentResult):
         return self.run.folder.severity_scale
 
     @property
-    def stretch(self) -> Stretch | None:
+    def stretch(self) -> SessionEnvironment | None:
         """The versions and the machine of the experiment's run; None until it has run."""
-        return self.run.folder.stretch_of(self.id)
+        return self.run.folder.environment_of(self.id)
 
     @property
     def plot_file(self) -> Path:

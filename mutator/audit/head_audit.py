@@ -15,7 +15,7 @@ from mutator.errors import MutatorError
 from mutator.model import Outcome
 from mutator.outcomes.golden_comparison import trace_digest
 from mutator.store import file_digests, plan_file
-from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import CHECKS_FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
@@ -32,9 +32,9 @@ def target_fact_problems(folder: RunFolder, workspace: Workspace, manifest: Targ
     expected_head = replace(folder.head, runs=len(keys), **vars(collect_target_facts(workspace, manifest)))
     for key, stored, value in folder.head.differences(expected_head):
         yield MutatorError(
-            f"{key} {shortened(stored)}",
+            f"{key} {shortened_text(stored)}",
             where=folder.path / HEAD,
-            expected=f"{shortened(value)}, as in the library",
+            expected=f"{shortened_text(value)}, as in the library",
             remedy=_REMEDY,
         )
 
@@ -56,7 +56,7 @@ def seed_and_session_problems(folder: RunFolder) -> Problems:
     if folder.head.choices.reading not in (None, folder.head.reading):
         got = f"choice of the reading {folder.head.choices.reading}"
         yield MutatorError(got, where=folder.path / HEAD, expected=_expected_as_in_head(folder, "reading"))
-    patterns = [stretch.records for stretch in folder.stretches]
+    patterns = [stretch.records for stretch in folder.session_environments]
     for name in file_digests.list_segments(folder.path):
         stem = name.partition("/")[2].removesuffix(".jsonl")
         if not any(fnmatchcase(stem, pattern) for pattern in patterns):
@@ -69,7 +69,7 @@ def seed_and_session_problems(folder: RunFolder) -> Problems:
 
 def recomputed_chunks(folder: RunFolder) -> tuple[plan_file.Chunk, ...]:
     """Return the offset, length and number of experiments of each chunk, for the numbers in run.json."""
-    lines = plan_file.read_lines(folder.path / plan_file.EXPERIMENTS_FILE)
+    lines = plan_file.read_plan_lines(folder.path / plan_file.EXPERIMENTS_FILE)
     chunks, offset = [], 0
     for *_, count in folder.head.chunks:
         length = sum(map(len, islice(lines, count)))
@@ -99,8 +99,8 @@ def check_result_problems(folder: RunFolder) -> Problems:
             where=path,
             expected=f"those of {HEAD}, {', '.join(keys)}",
         )
-    versions = {name for stretch in folder.stretches for name in stretch.packages}
-    if folder.stretches and (unversioned := sorted({*stored.get("packages", ())} - versions)):
+    versions = {name for stretch in folder.session_environments for name in stretch.packages}
+    if folder.session_environments and (unversioned := sorted({*stored.get("packages", ())} - versions)):
         yield MutatorError(
             f"the golden runs loaded {unversioned[0]}",
             where=path,
@@ -108,7 +108,7 @@ def check_result_problems(folder: RunFolder) -> Problems:
         )
 
 
-def idle_run_problems(
+def not_activated_run_problems(
     folder: RunFolder, manifest: TargetManifest, records: Sequence[StoredRecord]
 ) -> Problems:
     """Yield golden runs with other bytes than the runs in which no fault was active, which do the same."""
@@ -134,7 +134,7 @@ def idle_run_problems(
             )
 
 
-def unproven_engine_problem(folder: RunFolder, records: Sequence[StoredRecord]) -> Problems:
+def unknown_engine_problem(folder: RunFolder, records: Sequence[StoredRecord]) -> Problems:
     """Yield an experiment of which nothing says how it ran, if there is no proof."""
     if not folder.is_finished or (folder.path / "proof").is_dir():
         return
@@ -151,7 +151,7 @@ def _expected_as_in_head(folder: RunFolder, key: str) -> str:
     return f"{key} {getattr(folder.head, key)}, as in {HEAD}"
 
 
-def shortened(value: Any) -> str:
+def shortened_text(value: Any) -> str:
     """Return the beginning of a value, as text for a message."""
     text = ", ".join(value) if isinstance(value, Mapping) else str(value)
     return text if len(text) <= 80 else f"{text[:80]}..."

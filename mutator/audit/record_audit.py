@@ -44,7 +44,7 @@ def load_stored_records(folder: RunFolder, kind: str) -> list[StoredRecord]:
         segment = read_segment(path)
         for number in segment.lines:
             try:
-                record = record_from_json(segment.content(number))
+                record = record_from_json(segment.parse_line(number))
             except (
                 MutatorError,
                 KeyError,
@@ -70,7 +70,7 @@ def mutant_problems(
             continue
         key = (experiment.fault.id, experiment.trigger)
         if key not in built:
-            built[key] = _rebuilt_digests(manifest, models, experiment.fault, experiment.trigger)
+            built[key] = _rebuilt_tree_and_patch_digests(manifest, models, experiment.fault, experiment.trigger)
         tree, patch = built[key]
         if recorded.record.tree != tree:
             yield recorded.difference_error(
@@ -89,7 +89,7 @@ def mutant_problems(
                 if stored_digest
                 else f"no patch of {name}"
             )
-            where = folder.patches.file_of(recorded.record.experiment_id)
+            where = folder.patches.expected_file_of(recorded.record.experiment_id)
             none = "no patch, because the mutant cannot be built"
             expected = f"the mutant's patch, {patch[:16]}" if patch else none
             yield MutatorError(got, where=where, expected=expected)
@@ -98,12 +98,12 @@ def mutant_problems(
         if name not in recorded_ids:
             got, where = (
                 f"a patch of {name}, which is not an experiment of this run",
-                folder.patches.file_of(name),
+                folder.patches.expected_file_of(name),
             )
             yield MutatorError(got, where=where, expected="patches only of experiments that ran")
 
 
-def _rebuilt_digests(
+def _rebuilt_tree_and_patch_digests(
     manifest: TargetManifest, models: FaultModels, fault: Fault, trigger: Trigger
 ) -> tuple[str, str]:
     """Digests of a mutant's tree and patch; empty if it cannot be built."""

@@ -10,12 +10,12 @@ from mutator._common.files import read_json
 from mutator._common.hashing import digest
 from mutator.audit.head_audit import check_result_problems as checks_of
 from mutator.audit.head_audit import (
-    idle_run_problems,
+    not_activated_run_problems,
     recomputed_chunks,
     seed_and_session_problems,
-    shortened,
+    shortened_text,
     target_fact_problems,
-    unproven_engine_problem,
+    unknown_engine_problem,
 )
 from mutator.audit.record_audit import load_stored_records, mutant_problems, proof_problems, verdict_problems
 from mutator.audit.seal import golden_digests
@@ -27,7 +27,7 @@ from mutator.campaigns.plan_tally import plan_digest
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.store import file_digests, plan_file
-from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import CHECKS_FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.file_digests import FileDigest
@@ -42,8 +42,8 @@ Problems = Iterator[MutatorError]
 class AuditCheck:
     """One step of an audit. `what` describes the `count` parts of the run that were checked."""
 
-    what: str
-    count: int
+    checked_parts: str
+    checked_count: int
     differences: tuple[MutatorError, ...] = ()
 
     @classmethod
@@ -78,7 +78,7 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
     )
     manifest = workspace.manifest(head.target) if workspace and not source_check.differences else None
     records, proven = load_stored_records(folder, "records"), load_stored_records(folder, "proof")
-    idle = idle_run_problems(folder, manifest, records) if manifest else ()
+    idle = not_activated_run_problems(folder, manifest, records) if manifest else ()
     checks = [
         AuditCheck.from_problems(
             "files, lines and ids that are unchanged", _digested_file_count(folder), _content_problems(folder)
@@ -115,7 +115,7 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
         AuditCheck.from_problems(
             "records of the proof that match those of the run",
             len(proven),
-            chain(proof_problems(folder, records, proven), unproven_engine_problem(folder, records)),
+            chain(proof_problems(folder, records, proven), unknown_engine_problem(folder, records)),
         ),
         AuditCheck.from_problems("series that are unchanged", *audit_series(folder, manifest)),
         AuditCheck.from_problems("tables that follow from the records", *audit_tables(folder)),
@@ -165,8 +165,8 @@ def _plan_problems(folder: RunFolder) -> Problems:
         canary_hazard=campaign.canary.hazard,
     )
     for key, stored, value in head.differences(expected_head):
-        expected = f"{shortened(value)}, which follows from {plan_file.EXPERIMENTS_FILE} and {CAMPAIGN_FILE}"
-        yield MutatorError(f"{key} {shortened(stored)}", where=run / HEAD, expected=expected)
+        expected = f"{shortened_text(value)}, which follows from {plan_file.EXPERIMENTS_FILE} and {CAMPAIGN_FILE}"
+        yield MutatorError(f"{key} {shortened_text(stored)}", where=run / HEAD, expected=expected)
     if FileDigest.of_file(run / PLAN_CSV) != FileDigest.of_bytes(plan_csv_bytes(plan)):
         yield MutatorError(
             "differs from the plan",

@@ -73,16 +73,16 @@ def _renew_damaged_ledger(folder: RunFolder) -> Iterator[str]:
         raise  # somebody wrote this on purpose
     except MutatorError:
         plan_and_golden_paths = (path for name in ("plan", "golden") for path in (run / name).rglob("*"))
-        names = [*integrity.TOP_FILES, *(path.relative_to(run).as_posix() for path in plan_and_golden_paths)]
+        names = [*integrity.DIGESTED_TOP_FILES, *(path.relative_to(run).as_posix() for path in plan_and_golden_paths)]
         digests = file_digests.digests_of_files(
-            run, [name for name in names if file_digests.is_ledger_name(name)]
+            run, [name for name in names if file_digests.can_be_in_ledger(name)]
         )
-        _set_aside(run, file_digests.FILE)
+        _set_aside(run, file_digests.DIGESTS_FILE)
         file_digests.save_ledger(
             run,
             DigestLedger(files={name: file_digest for name, file_digest in digests.items() if file_digest}),
         )
-        yield f"{file_digests.FILE} rebuilt from the current files: only an earlier seal can confirm them"
+        yield f"{file_digests.DIGESTS_FILE} rebuilt from the current files: only an earlier seal can confirm them"
 
 
 def _file_changes(folder: RunFolder, ledger: DigestLedger) -> Iterator[_FileChange]:
@@ -168,7 +168,7 @@ def _segment_changes(folder: RunFolder, ledger: DigestLedger, lost: Collection[s
             dropped_count = max(0, data.count(b"\n") - 1 - len(remaining))
             if (
                 dropped_count
-                or segment.damaged_lines
+                or segment.damaged_line_numbers
                 or not _is_intact_in_place(segment, schema, file_digest, data)
             ):
                 head = {"schema": schema, "plan": folder.head.plan}
@@ -195,7 +195,7 @@ def _trusted_lines(segment: Segment, file_digest: FileDigest | None, data: bytes
     """
     numbers = list(segment.lines)
     is_trusted = (
-        segment.damaged_lines or file_digest is None or file_digest.has_same_bytes(FileDigest.of_bytes(data))
+        segment.damaged_line_numbers or file_digest is None or file_digest.has_same_bytes(FileDigest.of_bytes(data))
     )
     if (
         not is_trusted
@@ -206,7 +206,7 @@ def _trusted_lines(segment: Segment, file_digest: FileDigest | None, data: bytes
         numbers = numbers[: file_digest.lines]
         old_bytes = b"".join(segment.lines[number] + b"\n" for number in numbers)
         numbers = numbers if file_digest.has_same_bytes(FileDigest.of_bytes(old_bytes)) else []
-    return [segment.content(number) for number in numbers if number > 1]
+    return [segment.parse_line(number) for number in numbers if number > 1]
 
 
 def _remaining_lines(
@@ -256,10 +256,10 @@ def _apply_changes(run: Path, changes: list[_FileChange], ledger: DigestLedger) 
         if not name.startswith("timings/")
     }
     finished = ledger.finished and {*new_digests} <= {PLAN_CSV}
-    with file_digests.rewriting_files(run, new_digests, finished=finished):
+    with file_digests.announcing_rewrites(run, new_digests, finished=finished):
         for name, data, _ in changes:
             if data is None:
                 unlink_below(run, name)
             else:
                 write_below(run, name, data)
-    file_digests.close_segments(run)
+    file_digests.add_segments_to_ledger(run)

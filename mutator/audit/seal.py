@@ -23,22 +23,22 @@ from mutator._common.hashing import canonical_json, digest
 from mutator.campaigns.plan_freezing import PLAN_CSV
 from mutator.store import file_digests, plan_file
 from mutator.store.approvals import review_digest
-from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import CHECKS_FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.checksummed_lines import bare_segment, intact_lines
+from mutator.store.checksummed_lines import unread_segment, intact_lines
 from mutator.store.records import PROOF_FOLDER, parse_ending
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD
-from mutator.store.work_stretches import describe_stretches
+from mutator.store.work_stretches import describe_environments
 
-SCHEMA, RESULTS_SCHEMA = "seal/2", "results-digest/2"
+SEAL_SCHEMA, RESULTS_DIGEST_SCHEMA = "seal/2", "results-digest/2"
 _RUNS_SCHEMA = "results-digest/1"  # of the plan and its runs, as the seal includes them
 # Everything else in these files is sealed, including keys that later versions add.
-UNSEALED_KEYS = {
+UNSEALED_KEYS_BY_FILE = {
     HEAD: ("stretches", "choices.shard", "choices.series_mb"),
     CHECKS: ("digest", "run_cpu_s"),  # the key of a cache, which depends on the machine; a cost
 }
-KEYS_OUTSIDE_RESULTS_DIGEST = ("schema", "provenance", *UNSEALED_KEYS[HEAD])  # of run.json
+KEYS_OUTSIDE_RESULTS_DIGEST = ("schema", "provenance", *UNSEALED_KEYS_BY_FILE[HEAD])  # of run.json
 _SEALED_FILES = (CAMPAIGN_FILE, PLAN_CSV, plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE)
 _EXCEPTION_TEXT_KEYS, _EMPTY_EXCEPTION_TEXTS = ("detail", "error.message"), (b'"detail":""', b'"error":null')
 _UNSEALED_FILES_NOTE = (
@@ -75,20 +75,20 @@ def seals_of(folder: RunFolder) -> Seals:
     runs = digest([_RUNS_SCHEMA, folder.head.plan, goldens, _record_digests(folder, "records")])
     results = digest(
         [
-            RESULTS_SCHEMA,
+            RESULTS_DIGEST_SCHEMA,
             without_keys(head, KEYS_OUTSIDE_RESULTS_DIGEST),
             goldens,
             _record_digests(folder, "records", _without_exception_texts),
         ]
     )
     facts = {
-        HEAD: without_keys(head, UNSEALED_KEYS[HEAD]),
-        CHECKS: without_keys(read_json(folder.path / CHECKS, CHECKS_SCHEMA), UNSEALED_KEYS[CHECKS]),
+        HEAD: without_keys(head, UNSEALED_KEYS_BY_FILE[HEAD]),
+        CHECKS: without_keys(read_json(folder.path / CHECKS, CHECKS_SCHEMA), UNSEALED_KEYS_BY_FILE[CHECKS]),
         "versions": _version_texts(folder),
         "files": _sha256_by_name(folder, _SEALED_FILES),
         PROOF_FOLDER: _record_digests(folder, PROOF_FOLDER),
     }
-    return Seals(seal=digest([SCHEMA, runs, facts]), results_digest=results, review_digest=review)
+    return Seals(seal=digest([SEAL_SCHEMA, runs, facts]), results_digest=results, review_digest=review)
 
 
 def digests_or_why_no_seal(folder: RunFolder) -> dict[str, str]:
@@ -96,10 +96,10 @@ def digests_or_why_no_seal(folder: RunFolder) -> dict[str, str]:
     return {"seal": "none: the run is not finished"} | seals_of(folder).digest_by_name()
 
 
-def without_keys(content: Mapping[str, Any], paths: Iterable[str]) -> dict[str, Any]:
+def without_keys(content: Mapping[str, Any], key_paths: Iterable[str]) -> dict[str, Any]:
     """Copy JSON content without the keys at `paths`, such as `choices.shard`."""
     rest_of_content = dict(content)
-    for path in paths:
+    for path in key_paths:
         key, _, rest = path.partition(".")
         if rest and isinstance(rest_of_content.get(key), Mapping):
             rest_of_content[key] = without_keys(rest_of_content[key], [rest])
@@ -115,7 +115,7 @@ def unsealed_facts(folder: RunFolder) -> dict[str, str]:
     choices = folder.head.choices
     chosen = {"chosen: shard": choices.shard, "chosen: series_mb": choices.series_mb}
     environment = {
-        name: text for name, text in describe_stretches(folder.stretches).items() if name != "python"
+        name: text for name, text in describe_environments(folder.session_environments).items() if name != "python"
     }
     approvals = {"approvals": _APPROVALS_NOTE} if review_digest(folder.path) else {}
     choice_texts = {name: str(value) for name, value in chosen.items() if value}
@@ -145,7 +145,7 @@ def _sha256_by_name(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
 
 def _version_texts(folder: RunFolder) -> list[str]:
     """Return the distinct sets of versions that computed anything, as canonical text."""
-    return sorted({canonical_json([stretch.python, stretch.packages]) for stretch in folder.stretches})
+    return sorted({canonical_json([stretch.python, stretch.packages]) for stretch in folder.session_environments})
 
 
 def _record_digests(
@@ -154,7 +154,7 @@ def _record_digests(
     """Digest of the `sealed_part` of each valid record's line without its checksum, by experiment id."""
     digests = {}
     for path in sorted(path_below(folder.path, kind).glob("*.jsonl")):
-        segment = bare_segment(path)
+        segment = unread_segment(path)
         for number, line in intact_lines(path):
             if number > 1 and (ending := parse_ending(line)).is_final:
                 digests[ending.experiment_id] = digest(sealed_part(segment.without_checksum(line)))

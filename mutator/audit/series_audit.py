@@ -17,12 +17,12 @@ from mutator.store.series_folder import (
     SeriesFolder,
     SeriesIndex,
     check_same_run,
-    load_kept_series,
+    load_rerun_series,
     repair_remedy,
     rerun_command,
 )
 from mutator.store.series_format import Series, decode_series
-from mutator.store.series_packing import list_worker_files
+from mutator.store.series_packing import list_unpacked_worker_files
 from mutator.targets.manifest import TargetManifest
 
 _RELATIVE_ROUNDING = 1e-5  # relative; values have six digits
@@ -46,7 +46,7 @@ def _series_problems(
     run = folder.path
     yield from _packed_series_problems(folder, series_folder, manifest)
     yield from _kept_series_problems(folder, series_folder, manifest)
-    for path in list_worker_files(run):
+    for path in list_unpacked_worker_files(run):
         if read_blocks(path).is_damaged:
             yield MutatorError(
                 "damaged blocks",
@@ -59,16 +59,16 @@ def _series_problems(
 def _kept_series_problems(
     folder: RunFolder, series_folder: SeriesFolder, manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
-    names, records = series_folder.kept_ids(), folder.records()
+    names, records = series_folder.rerun_ids(), folder.records()
     planned = (
         {experiment.id: experiment for experiment in plan_file.load_experiments(folder.path)}
         if names and manifest
         else {}
     )
     for name in names:
-        path = series_folder.kept_path(name)
+        path = series_folder.rerun_series_path(name)
         try:
-            golden, faulty = load_kept_series(path)
+            golden, faulty = load_rerun_series(path)
             if (record := records.get(name)) is not None:
                 check_same_run(faulty.facts, record, path)
                 check_deviations(golden, faulty, record, path)
@@ -95,7 +95,7 @@ def _packed_series_problems(
         return
     if index is None:
         # if segments are left, the run was killed before it wrote the index
-        if any(series_folder.path.glob("*.js")) and not list_worker_files(run):
+        if any(series_folder.path.glob("*.js")) and not list_unpacked_worker_files(run):
             what = "the index of the chunks beside it"
             yield MutatorError("missing", where=path, expected=what, remedy=repair_remedy(run))
         return
@@ -104,7 +104,7 @@ def _packed_series_problems(
         yield MutatorError(got, where=path, expected=expected, remedy=repair_remedy(run))
         return
     damaged = set()
-    for name, _ in index.chunks:
+    for name, _ in index.chunk_entry_counts:
         try:
             series_folder.read_chunk(name)
         except MutatorError as err:
@@ -112,7 +112,7 @@ def _packed_series_problems(
             ids = [
                 experiment_id
                 for experiment_id in _experiments_using(index, name)
-                if not series_folder.kept_path(experiment_id).is_file()
+                if not series_folder.rerun_series_path(experiment_id).is_file()
             ]
             more = f" and {len(ids) - 1} more" if len(ids) > 1 else ""
             got = f"{err.got}; the series of {ids[0]}{more} cannot be read" if ids else err.got
@@ -127,12 +127,12 @@ def _other_run_problems(
 ) -> Iterator[MutatorError]:
     """Series that do not belong to the records. Those in `damaged` chunks are reported with their chunk."""
     records = folder.records()
-    for name, number in index.experiment_entries.items():
+    for name, number in index.entry_number_by_experiment.items():
         if (record := records.get(name)) is None:  # lost; its series is not shown until it runs again
             continue
         chunk, golden_chunk = (
             index.entry_places[entry][0]
-            for entry in (number, index.golden_entries[index.golden_by_experiment[name]])
+            for entry in (number, index.entry_number_by_golden[index.golden_by_experiment[name]])
         )
         if damaged & {chunk, golden_chunk}:
             continue
@@ -149,7 +149,7 @@ def _other_run_problems(
 def _other_golden_problems(
     folder: RunFolder, series_folder: SeriesFolder, index: SeriesIndex, manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
-    for key, number in index.golden_entries.items() if manifest else ():
+    for key, number in index.entry_number_by_golden.items() if manifest else ():
         assert manifest is not None
         path = path_below(series_folder.path, f"{index.entry_places[number][0]}.js")
         try:
@@ -190,9 +190,9 @@ def _error_with_remedy(err: MutatorError, got: str, remedy: str) -> MutatorError
 def _experiments_using(index: SeriesIndex, chunk: str) -> list[str]:
     """Return the experiments that need a chunk for their own series or for that of their golden run."""
     inside = {number for number, (name, _) in enumerate(index.entry_places) if name == chunk}
-    goldens = {key for key, number in index.golden_entries.items() if number in inside}
+    goldens = {key for key, number in index.entry_number_by_golden.items() if number in inside}
     return [
         name
-        for name, number in index.experiment_entries.items()
+        for name, number in index.entry_number_by_experiment.items()
         if number in inside or index.golden_by_experiment[name] in goldens
     ]

@@ -14,7 +14,7 @@ from mutator.outcomes.hazards_and_metrics import load_manifest_channels
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import INDEX_NAME, SeriesFolder, SeriesIndex, rerun_command
-from mutator.store.series_packing import SUFFIX, repack_series
+from mutator.store.series_packing import WORKER_FILE_SUFFIX, repack_series
 from mutator.store.series_script import script_bytes, script_name_of
 from mutator.workspace import Workspace
 
@@ -38,7 +38,7 @@ def repair_series(
         checked_relative_path(name, run)
         what_happened = "set aside" if os.path.lexists(path) else "is gone"
         set_aside(name)
-        if path.suffix == SUFFIX:
+        if path.suffix == WORKER_FILE_SUFFIX:
             yield f"{name}: damaged blocks set aside; `mutator run` packs the others"
         elif index and (data := _rebuilt_golden_chunk(folder, workspace, index, path.stem)):
             write_below(run, name, script_bytes(path.stem, data))
@@ -54,7 +54,7 @@ def _rebuilt_golden_chunk(
     folder: RunFolder, workspace: Workspace | None, index: SeriesIndex, name: str
 ) -> bytes | None:
     """Return the rebuilt content of a chunk of golden series, if that is still possible."""
-    keys = {number: key for key, number in index.golden_entries.items()}
+    keys = {number: key for key, number in index.entry_number_by_golden.items()}
     numbers = [number for number, (chunk, _) in enumerate(index.entry_places) if chunk == name]
     if workspace is None or not keys.keys() >= {*numbers}:
         return None

@@ -18,7 +18,7 @@ from mutator.audit.seal import Seals
 from mutator.errors import CheckFailed, MutatorError
 from mutator.store.run_folder import RunFolder
 
-SCHEMA = "signed-seal/1"
+SIGNED_SEAL_SCHEMA = "signed-seal/1"
 SEAL_FILE, SIGNATURE_FILE = "seal.json", "seal.json.sig"
 SIGNATURE_NAMESPACE = "mutator-seal"  # signatures for other purposes do not count
 _SSH_KEYGEN_TIMEOUT_S = 60.0  # somebody may have to type a passphrase or to touch a key
@@ -36,7 +36,7 @@ def signed_statement(folder: RunFolder, seals: Seals) -> bytes:
             remedy="finish it with the command that started it",
         )
     facts = {
-        "schema": SCHEMA,
+        "schema": SIGNED_SEAL_SCHEMA,
         "seal": seals.seal,
         "results_digest": seals.results_digest,
         "review_digest": seals.review_digest,
@@ -46,7 +46,7 @@ def signed_statement(folder: RunFolder, seals: Seals) -> bytes:
     return canonical_json(facts).encode() + b"\n"
 
 
-def sign(folder: RunFolder, seals: Seals, key: Path) -> None:
+def sign_seal(folder: RunFolder, seals: Seals, key: Path) -> None:
     """Sign the digests of a run with an SSH key: the file of a private key, or of a public key in ssh-agent.
 
     MutatorError if the key cannot sign.

@@ -46,7 +46,7 @@ def pending_chunks_of(folder: RunFolder, records: Mapping[str, Record]) -> tuple
     """
     finished_ids = {record.experiment_id for record in endings_of(records) if record.is_final}
     # the ids of a large plan take long to read; a new run needs none of them
-    names = plan_file.ids(folder.path) if finished_ids else None
+    names = plan_file.experiment_ids(folder.path) if finished_ids else None
     shard = folder.shard
     pending_chunks: list[PendingChunk] = []
     for index, (_, _, count) in enumerate(folder.head.chunks):

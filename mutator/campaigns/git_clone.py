@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory, TemporaryFile
 
 from mutator._common.confined_files import open_below
 from mutator.errors import MutatorError
-from mutator.store.work_stretches import CloneState
+from mutator.store.work_stretches import GitCloneState
 
 _MOST_GIT_TIME_S = 10.0  # for one answer; a clone on a stalled network folder must not stop a run
 _MOST_OUTPUT_BYTES = 32 << 20  # bytes of an answer; a tiny repository can list billions of files
@@ -217,11 +217,11 @@ class GitClone:
             return _git_output(folder, *arguments, variables=variables, input_bytes=input_bytes)
 
 
-def find_clone_state(folder: Path) -> CloneState | None:
+def find_clone_state(folder: Path) -> GitCloneState | None:
     """Return the git commit of a folder, and whether the folder has changed since; None if unknown."""
     clone = GitClone.find(folder)
     changed = None if clone is None else clone.differs_from_commit(folder)
-    return None if clone is None or changed is None else CloneState(commit=clone.commit, changed=changed)
+    return None if clone is None or changed is None else GitCloneState(commit=clone.commit, changed=changed)
 
 
 def find_user_name(folder: Path) -> str | None:

@@ -24,7 +24,7 @@ from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.store import plan_file
-from mutator.store.check_results import measured_cpu_s
+from mutator.store.check_results import mean_golden_run_cpu_s
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
@@ -299,14 +299,14 @@ def load_plan(folder: RunFolder, tally: PlanTally | None = None) -> Plan:
         choices=head.choices,
         seed=head.seed,
         reading=head.reading,
-        experiments=plan_file.ExperimentsInOrder(folder.path, head.chunks)
+        experiments=plan_file.ExperimentsReadOnAccess(folder.path, head.chunks)
         if large
         else plan_file.load_experiments(folder.path),
         chunks=tuple(count for _, _, count in head.chunks),
         canary=folder.canary,
         runs=head.runs,
         digest=head.plan,
-        run_cpu_s=measured_cpu_s(folder),
+        run_cpu_s=mean_golden_run_cpu_s(folder),
         operator_notes=head.operators,
     )
     if tally is not None:

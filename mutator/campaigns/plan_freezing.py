@@ -25,10 +25,10 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.store import file_digests, plan_file
-from mutator.store.allowed_contents import check_contents
+from mutator.store.allowed_contents import check_plain_contents
 from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import CAMPAIGN_FILE, HEAD, SCHEMA, Provenance, RunHead
+from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RUN_SCHEMA, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import TargetFacts, channel_facts, hazard_facts, metric_facts
 from mutator.workspace import Workspace
@@ -40,7 +40,7 @@ _FILES_OF_KILLED_FREEZE = (
     "plan",
     PLAN_CSV,
     CAMPAIGN_FILE,
-    file_digests.FILE,
+    file_digests.DIGESTS_FILE,
 )  # files that a killed freeze can leave
 
 
@@ -71,7 +71,7 @@ def freeze_plan_with_tally(
 def make_run_folder(out: Path) -> None:
     """Create `out` unless it is a run folder; MutatorError if it contains anything else, such as links."""
     if out.is_dir():
-        check_contents(out.resolve())
+        check_plain_contents(out.resolve())
     if out.exists() and not RunFolder.exists(out):
         names = [path.name for path in out.iterdir()] if out.is_dir() else [out.name]
         foreign_names = [
@@ -173,7 +173,7 @@ def _build_head(
     manifest = workspace.manifest(plan.campaign.target)
     canary = plan_file.experiment_as_json(plan.canary) | {"fault": as_json_types(plan.canary.fault)}
     return RunHead(
-        schema=SCHEMA,
+        schema=RUN_SCHEMA,
         plan=plan_digest,
         campaign=plan.campaign.name,
         campaign_digest=digest(plan.campaign.file_bytes),

@@ -14,10 +14,10 @@ from mutator.campaigns import run_environment
 from mutator.campaigns.git_clone import find_clone_state
 from mutator.errors import MutatorError
 from mutator.store import file_digests
-from mutator.store.check_results import loaded_packages
+from mutator.store.check_results import packages_loaded_by_golden_runs
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import HEAD, SCHEMA
-from mutator.store.work_stretches import Machine, Stretch, version_differences
+from mutator.store.run_head import HEAD, RUN_SCHEMA
+from mutator.store.work_stretches import WorkerMachine, SessionEnvironment, version_differences
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -44,9 +44,9 @@ def check_version(folder: RunFolder) -> None:
     """
     if (version := folder.head.provenance.mutator) != VERSION:
         raise MutatorError(
-            f"this run was planned by mutator {version} ({SCHEMA})",
+            f"this run was planned by mutator {version} ({RUN_SCHEMA})",
             where=folder.path,
-            expected=f"mutator {VERSION} ({SCHEMA})",
+            expected=f"mutator {VERSION} ({RUN_SCHEMA})",
             remedy="finish the run with that version, or use another folder; this run can still be read",
         )
 
@@ -56,10 +56,10 @@ def accepted_version_differences(folder: RunFolder, *, accept: bool = False) -> 
 
     MutatorError for any difference that is not accepted.
     """
-    if not folder.stretches:
+    if not folder.session_environments:
         return ()
     changes = version_differences(
-        folder.stretches[-1], run_environment.python_version(), _versions_to_record(folder)
+        folder.session_environments[-1], run_environment.python_version(), _versions_to_record(folder)
     )
     if changes and not accept:
         raise version_error(folder.path, "this run used", changes)
@@ -79,9 +79,9 @@ def version_error(run: Path, beginning: str, version_differences: Iterable[str])
 
 def _versions_to_record(folder: RunFolder, more_packages: Iterable[str] = ()) -> dict[str, str | None]:
     """Return the versions of the harness's requirements, packages that golden runs loaded, and `more`."""
-    before = (name for stretch in folder.stretches[-1:] for name in stretch.packages)
+    before = (name for stretch in folder.session_environments[-1:] for name in stretch.packages)
     return run_environment.package_versions(
-        {*run_environment.required_packages(), *loaded_packages(folder), *before, *more_packages}
+        {*run_environment.required_packages(), *packages_loaded_by_golden_runs(folder), *before, *more_packages}
     )
 
 
@@ -115,7 +115,7 @@ def begin_stretch(
     }
     return append_stretch(
         folder,
-        Stretch(
+        SessionEnvironment(
             accepted=accepted_version_differences(folder, accept=accept_versions),
             python=run_environment.python_version(),
             packages={name: version for name, version in versions.items() if version},
@@ -129,16 +129,16 @@ def begin_stretch(
     )
 
 
-def append_stretch(folder: RunFolder, stretch: Stretch) -> RunFolder:
-    return _write_stretches(folder, (*folder.stretches, stretch))
+def append_stretch(folder: RunFolder, stretch: SessionEnvironment) -> RunFolder:
+    return _write_stretches(folder, (*folder.session_environments, stretch))
 
 
-def append_machine(folder: RunFolder, machine: Machine) -> RunFolder:
-    *before, last = folder.stretches
+def append_machine(folder: RunFolder, machine: WorkerMachine) -> RunFolder:
+    *before, last = folder.session_environments
     return _write_stretches(folder, (*before, replace(last, machines=(*last.machines, machine))))
 
 
-def _write_stretches(folder: RunFolder, stretches: tuple[Stretch, ...]) -> RunFolder:
+def _write_stretches(folder: RunFolder, stretches: tuple[SessionEnvironment, ...]) -> RunFolder:
     """Write run.json with these stretches of work, and return the folder as it is then."""
     file_digests.rewrite_file(folder.path, HEAD, replace(folder.head, stretches=stretches).file_bytes())
     return RunFolder(folder.path)

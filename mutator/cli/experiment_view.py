@@ -170,8 +170,8 @@ def _describe_component(component: "PathComponent") -> str:
     state_text = f"{component.name}: {component.state.value}"
     if component.state.value == "injected":
         return state_text
-    if component.t_by is not None:
-        return f"{state_text} by {component.t_by:.2f} s"
+    if component.t_changed_by is not None:
+        return f"{state_text} by {component.t_changed_by:.2f} s"
     return state_text if component.t_first is None else f"{state_text} at {component.t_first:.2f} s"
 
 

@@ -38,8 +38,8 @@ def print_outcome_counts(terminal: Terminal, run: "Run") -> None:
     with suppress(MutatorError):  # the note needs the library
         if note := run.alerts_note():
             terminal.print_text(note)
-    if run.folder.stop_note:
-        terminal.print_text(run.folder.stop_note)
+    if run.folder.stop_at_hazard_note:
+        terminal.print_text(run.folder.stop_at_hazard_note)
     terminal.print_result(f"outcomes: {', '.join(f'{name} {n}' for name, n in run.endings.items())}")
 
 
@@ -66,7 +66,7 @@ def merge(
     with terminal.show_spinner("merging"):
         merged = mutator.merge_runs(shards, out, accept_versions=accept_versions)
         # computing the digests takes time, too
-        planned, seals = merged.folder.planned_count, merged.seals
+        planned, seals = merged.folder.planned_experiment_count, merged.seals
     if as_json:
         counts = {"run": str(out), "shards": len(shards), "experiments": planned}
         terminal.print_json(counts | asdict(seals))

@@ -8,8 +8,8 @@ from mutator._common.hashing import as_json_types
 from mutator.comparison.compared_runs import ComparedRun
 from mutator.comparison.pairs import ExperimentMatching, ExperimentPair
 from mutator.store.run_folder import RunFolder
-from mutator.store.work_stretches import describe_stretches as ran_with
-from mutator.store.work_stretches import package_versions
+from mutator.store.work_stretches import describe_environments as ran_with
+from mutator.store.work_stretches import version_texts_by_package
 
 _SHOWN_DIGEST_DIGITS = 12  # shown digits of a digest
 _COMPARED_HEAD_FIELDS = ("campaign", "target", "seed", "reading")
@@ -46,7 +46,7 @@ def input_facts(a: ComparedRun, b: ComparedRun) -> tuple[InputFact, ...]:
 
 
 def _facts_of_run(run: ComparedRun) -> dict[str, str]:
-    head, stretches = run.folder.head, run.folder.stretches
+    head, stretches = run.folder.head, run.folder.session_environments
     values = {name: str(getattr(head, name)) for name in _COMPARED_HEAD_FIELDS}
     if len(seeds := run.folder.seeds) > 1:
         values["seed"] = f"{seeds[0]} to {seeds[-1]}"
@@ -60,7 +60,7 @@ def _facts_of_run(run: ComparedRun) -> dict[str, str]:
         values["scale of severity"] = f"{scale.name}: {bounds}"
     values["digest of plan"] = head.plan[:_SHOWN_DIGEST_DIGITS]
     values["mutator"] = head.provenance.mutator
-    return values | ran_with(stretches) | {f"package {k}": v for k, v in package_versions(stretches).items()}
+    return values | ran_with(stretches) | {f"package {k}": v for k, v in version_texts_by_package(stretches).items()}
 
 
 def differing_target_files(a: RunFolder, b: RunFolder) -> DifferingTargetFiles:

@@ -295,7 +295,7 @@ class ExperimentRunner:
             trace_digest=golden_comparison.trace_digest(self.manifest, execution.out),
             patch=digest(mutant.patch_bytes),
             t_end=judged.t_end,
-            dev=() if judged.t_end is None else difference.dev,
+            dev=() if judged.t_end is None else difference.max_dev_in_drive,
             metrics=judged.metrics,
             left=departures_from_golden(reference, faulty, self.manifest.channels, time, judged.t_end),
         )

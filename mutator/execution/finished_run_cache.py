@@ -19,7 +19,7 @@ class FinishedRunOutcome:
 
 
 def remember_finished_run(folder: RunFolder, outcome: FinishedRunOutcome) -> None:
-    if key := integrity.verified_content_key(folder.path):
+    if key := integrity.verified_cache_key(folder.path):
         proof = outcome.proof and {"sampled": outcome.proof.sampled, "same": outcome.proof.same}
         outcome_as_json = {"outcomes": dict(outcome.outcomes), "proof": proof, "seals": asdict(outcome.seals)}
         verified_runs_cache.remember_facts(key, ended=outcome_as_json)
@@ -27,7 +27,7 @@ def remember_finished_run(folder: RunFolder, outcome: FinishedRunOutcome) -> Non
 
 def find_finished_run(folder: RunFolder) -> FinishedRunOutcome | None:
     """Return the stored outcome of a finished run whose verified bytes have not changed; else None."""
-    if not folder.is_finished or not (key := integrity.verified_content_key(folder.path)):
+    if not folder.is_finished or not (key := integrity.verified_cache_key(folder.path)):
         return None
     remembered = verified_runs_cache.recall_facts(key)
     if not remembered.get("verified") or "ended" not in remembered:

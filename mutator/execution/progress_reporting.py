@@ -35,7 +35,7 @@ def reporting_progress(session: Session) -> Iterator[None]:
 def _progress_stages(session: Session) -> Iterator[Progress]:
     """Yield the current progress: of the experiments until all have a record, then of the proof."""
     folder = session.folder
-    experiments = RecordTail("experiments", folder.path / "records", folder.planned_count)
+    experiments = RecordTail("experiments", folder.path / "records", folder.planned_experiment_count)
     while (progress := experiments.poll()).done < progress.total:
         yield progress
     yield progress

@@ -41,7 +41,7 @@ from mutator.preflight.preflight_checks import (
     run_checks,
 )
 from mutator.results import table_building
-from mutator.results.ranking import rank_by_experiment
+from mutator.results.ranking import worst_first_rank_by_ok_experiment
 from mutator.results.table_reader import Results
 from mutator.store import file_digests
 from mutator.store.check_results import golden_digests
@@ -49,8 +49,8 @@ from mutator.store.plan_choices import Choices
 from mutator.store.records import LINE_SCHEMA_BY_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress, progress_label
-from mutator.store.series_packing import list_worker_files, pack_series
-from mutator.store.work_stretches import Machine
+from mutator.store.series_packing import list_unpacked_worker_files, pack_series
+from mutator.store.work_stretches import WorkerMachine
 from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
 
@@ -145,7 +145,7 @@ class Session:
         """
         self._earlier_outcome = find_finished_run(self.folder)
         if self._earlier_outcome and checks_and_goldens_exist(self.folder):
-            self._finished_count_before = self.folder.planned_count
+            self._finished_count_before = self.folder.planned_experiment_count
             return
         self._earlier_outcome = None
         records = self.folder.records()
@@ -172,7 +172,7 @@ class Session:
         self.pending = pending_chunks
         self._records = None if pending_chunks else records
 
-    def note_machine(self, machine: Machine) -> None:
+    def note_machine(self, machine: WorkerMachine) -> None:
         self.folder = append_machine(self.folder, machine)
         self._ledger_at_start = file_digests.load_ledger(self.folder.path)
 
@@ -221,13 +221,13 @@ class Session:
         not_forked = "" if proven else self._not_forked
         if (
             proven
-            and finished_count == self.folder.planned_count
+            and finished_count == self.folder.planned_experiment_count
             and (why := equivalence_check.reason_check_not_needed(self.folder)) is not None
         ):
             proven, not_forked = None, why
             with self._noting_full_disk():
                 equivalence_check.remove_proof(self.folder)
-        if finished_count == self.folder.planned_count and (proven is None or proven.is_complete):
+        if finished_count == self.folder.planned_experiment_count and (proven is None or proven.is_complete):
             with self._noting_full_disk():
                 self._close_segments(finished=True)
         outcomes = Counter[str]()
@@ -239,7 +239,7 @@ class Session:
                 self.folder, FinishedRunOutcome(outcomes=outcomes, proof=proven, seals=seals)
             )
         return Summary(
-            planned=self.folder.planned_count,
+            planned=self.folder.planned_experiment_count,
             done=finished_count,
             ran=finished_count - self._finished_count_before,
             outcomes=outcomes,
@@ -262,7 +262,7 @@ class Session:
             changed = []
             if not file_digests.is_ledger_unchanged(run, self._ledger_at_start):
                 file_digests.save_ledger(run, self._ledger_at_start)
-                changed.append(file_digests.FILE)
+                changed.append(file_digests.DIGESTS_FILE)
             changed += self.written.set_unreported_aside(run)
             if changed and not self.problem:
                 self.problem = (
@@ -276,8 +276,8 @@ class Session:
             results_path = table_building.ensure_tables(self.folder.path)
             self._pack_series()
         return Summary(
-            planned=self.folder.planned_count,
-            done=self.folder.planned_count,
+            planned=self.folder.planned_experiment_count,
+            done=self.folder.planned_experiment_count,
             ran=0,
             outcomes=outcome.outcomes,
             harness_errors=(),
@@ -300,13 +300,13 @@ class Session:
 
     def _close_segments(self, *, finished: bool | None = None) -> None:
         if not wait_for_workers(self.folder.path):
-            file_digests.close_segments(self.folder.path, finished=finished)
+            file_digests.add_segments_to_ledger(self.folder.path, finished=finished)
 
     def _pack_series(self) -> None:
         """Pack the workers' series. While a worker is still running, leave this to the next session."""
         folder = self.folder
-        if list_worker_files(folder.path) and not wait_for_workers(folder.path):
-            ranks = rank_by_experiment(Results(folder.path).frame())
+        if list_unpacked_worker_files(folder.path) and not wait_for_workers(folder.path):
+            ranks = worst_first_rank_by_ok_experiment(Results(folder.path).frame())
             pack_series(folder.path, folder.head.plan, ranks, folder.series_budget_mb)
 
 
@@ -338,7 +338,7 @@ def open_session(
             if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is worth keeping
                 shutil.rmtree(out, ignore_errors=True)
             raise
-        file_digests.close_segments(folder.path)
+        file_digests.add_segments_to_ledger(folder.path)
         remove_anything_at(folder.scratch_folder)
         # where files get their names only when they are complete
         folders = ("plan", "report", "series", "patches")

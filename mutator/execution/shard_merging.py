@@ -11,18 +11,18 @@ from mutator._common.confined_files import open_below, path_below
 from mutator._common.files import raising_disk_full, read_json, write_atomic, writing_atomic
 from mutator._common.folder_locks import owning_run_folder
 from mutator._common.message_text import counted
-from mutator.audit.seal import UNSEALED_KEYS, without_keys
+from mutator.audit.seal import UNSEALED_KEYS_BY_FILE, without_keys
 from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.run_provenance import version_error
 from mutator.errors import CheckFailed, MutatorError
 from mutator.preflight import equivalence_check
 from mutator.results import table_building
-from mutator.results.ranking import rank_by_experiment
+from mutator.results.ranking import worst_first_rank_by_ok_experiment
 from mutator.results.table_reader import frame_of_experiments
 from mutator.store import cleaning, file_digests, integrity, plan_file
-from mutator.store.allowed_contents import check_contents
-from mutator.store.approvals import FILE as REVIEWED
-from mutator.store.check_results import FILE as CHECKS
+from mutator.store.allowed_contents import check_plain_contents
+from mutator.store.approvals import APPROVALS_FILE as REVIEWED
+from mutator.store.check_results import CHECKS_FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.patch_files import PatchWriter
@@ -30,9 +30,9 @@ from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.store.run_writer import copy_line_files
-from mutator.store.series_folder import FOLDER as SERIES
+from mutator.store.series_folder import SERIES_FOLDER as SERIES
 from mutator.store.series_packing import pack_series
-from mutator.store.work_stretches import Stretch, version_differences
+from mutator.store.work_stretches import SessionEnvironment, version_differences
 
 _UNFINISHED_MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
 _SHARDS_REMEDY = "give the folder of each shard of one plan exactly once"
@@ -79,7 +79,7 @@ def merge_shards(shards: Sequence[Path], out: Path, *, accept_versions: bool = F
 def _make_empty_folder(out: Path) -> None:
     """Make the folder to merge into. Delete files that a killed merge left there."""
     if out.is_dir():
-        check_contents(out.resolve())
+        check_plain_contents(out.resolve())
     if any(out.glob(f"{_UNFINISHED_MARK}*")):
         with owning_run_folder(out, patience_s=0.0):
             cleaning.delete_unfinished_run(out)
@@ -102,7 +102,7 @@ def _check_same_plan(folders: Sequence[RunFolder]) -> None:
                     remedy=_SHARDS_REMEDY,
                 )
         first_content, content = (
-            without_keys(shard.head.as_json(), UNSEALED_KEYS[HEAD]) for shard in (first, folder)
+            without_keys(shard.head.as_json(), UNSEALED_KEYS_BY_FILE[HEAD]) for shard in (first, folder)
         )
         if differ := [
             key for key in {**first_content, **content} if first_content.get(key) != content.get(key)
@@ -153,9 +153,9 @@ def _check_shard_numbers(folders: Sequence[RunFolder]) -> None:
 def _check_shard_finished(folder: RunFolder) -> None:
     records = folder.records()
     finished_count = sum(ending.is_final for ending in endings_of(records))
-    if finished_count < folder.planned_count:
+    if finished_count < folder.planned_experiment_count:
         raise MutatorError(
-            f"unfinished: {finished_count} of {folder.planned_count} experiments are done",
+            f"unfinished: {finished_count} of {folder.planned_experiment_count} experiments are done",
             where=folder.path,
             expected="a finished shard",
             remedy="resume it with the command that started it",
@@ -183,11 +183,11 @@ def _check_same_goldens(folders: Sequence[RunFolder]) -> None:
             )
 
 
-def _merged_stretches(folders: Sequence[RunFolder], *, accept_versions: bool) -> Iterator[Stretch]:
+def _merged_stretches(folders: Sequence[RunFolder], *, accept_versions: bool) -> Iterator[SessionEnvironment]:
     """Yield all stretches. Unless `accept_versions`, all must have the versions of the first shard."""
     first = folders[0]
     for folder in folders:
-        ends = zip(first.stretches[-1:], folder.stretches[-1:], strict=False)
+        ends = zip(first.session_environments[-1:], folder.session_environments[-1:], strict=False)
         differing_versions = [
             text
             for first_stretch, stretch in ends
@@ -196,7 +196,7 @@ def _merged_stretches(folders: Sequence[RunFolder], *, accept_versions: bool) ->
         if differing_versions and not accept_versions:
             raise version_error(folder.path, f"unlike {first.path}, this shard used", differing_versions)
         assert folder.shard is not None
-        for i, stretch in enumerate(folder.stretches):
+        for i, stretch in enumerate(folder.session_environments):
             yield replace(
                 stretch,
                 records=f"{stretch.records}-shard{folder.shard.number}",
@@ -204,7 +204,7 @@ def _merged_stretches(folders: Sequence[RunFolder], *, accept_versions: bool) ->
             )
 
 
-def _copy_shards(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Stretch]) -> None:
+def _copy_shards(folders: Sequence[RunFolder], out: Path, stretches: Sequence[SessionEnvironment]) -> None:
     """Copy all content. The head is written last, so that an unfinished copy is not a run folder."""
     first = folders[0]
     ledger = file_digests.settled_ledger(first.path)
@@ -227,7 +227,7 @@ def _copy_shards(folders: Sequence[RunFolder], out: Path, stretches: Sequence[St
     choices = replace(first.head.choices, shard=None)
     head = replace(first.head, choices=choices, stretches=tuple(stretches)).file_bytes()
     file_digests.save_ledger(out, DigestLedger(files=files | {HEAD: FileDigest.of_bytes(head)}))
-    file_digests.close_segments(out, finished=True)
+    file_digests.add_segments_to_ledger(out, finished=True)
     write_atomic(out / HEAD, head)
 
 
@@ -235,7 +235,7 @@ def _copy_patches(folder: RunFolder, out: Path) -> None:
     assert folder.shard is not None
     writer = PatchWriter(out, f"0001-shard{folder.shard.number}")
     for record in endings_of(folder.records()):
-        name, patch_digest = record.experiment_id, record.patch
+        name, patch_digest = record.experiment_id, record.patch_digest
         for problem in integrity.patch_problems(folder.patches, name, patch_digest):
             raise problem
         if patch_digest and (data := folder.patches.read_patch(name)) is not None:
@@ -253,5 +253,5 @@ def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
         frames = [
             frame_of_experiments(folder, plan_file.iterate_experiments(folder.path)) for folder in folders
         ]
-        ranks = rank_by_experiment(pd.concat(frames, ignore_index=True))
+        ranks = worst_first_rank_by_ok_experiment(pd.concat(frames, ignore_index=True))
         pack_series(out, first.head.plan, ranks, first.series_budget_mb, other_runs=shards)

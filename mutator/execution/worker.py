@@ -120,7 +120,7 @@ class Worker:
     @property
     def file_digests(self) -> FileDigests:
         """The digests of the files whose lines count."""
-        return self._writer.sha256_by_file
+        return self._writer.sha256_by_segment
 
     def close(self) -> None:
         self._runner.engine.close()

@@ -37,7 +37,7 @@ class _ChangedFiles:
         file, line = self._lines.get(position[0], ()), position[1]
         return tag_of(file[line - 1]) if 0 < line <= len(file) else None
 
-    def injections_at(self, position: _Position, tag: Tag, in_probe: bool) -> Sequence[str]:
+    def injection_ids_at(self, position: _Position, tag: Tag, in_probe: bool) -> Sequence[str]:
         """Return the ids of the injections whose code is at this position. There can be none, because a
         changed line also has unchanged parts.
         """
@@ -49,21 +49,21 @@ class _ChangedFiles:
 
 
 def judge_failure(
-    execution: JobResult, changed_files: Mapping[str, bytes], raising_ids: Collection[str]
+    job_result: JobResult, changed_files: Mapping[str, bytes], raising_injection_ids: Collection[str]
 ) -> tuple[Status, str]:
     """Return the status and detail of a mutant's run. `changed_files` are those of the mutant.
 
     `raising_ids` has the ids of injections whose fault models raise exceptions on purpose.
     """
-    status, detail, raised = execution.status, execution.detail, execution.exception
+    status, detail, raised = job_result.status, job_result.detail, job_result.exception
     if status not in (Status.CRASHED, Status.TIMEOUT):
         return status, detail
     cause = _exception_cause(raised, _ChangedFiles(changed_files)) if raised else None
-    if (cause and not cause.tag) or (raised and execution.probe_report is None):
+    if (cause and not cause.tag) or (raised and job_result.probe_report is None):
         return Status.HARNESS_ERROR, f"the probe failed: {detail}"
-    if not execution.was_fault_active:
+    if not job_result.was_fault_active:
         return Status.HARNESS_ERROR, f"{detail}, before the fault was active"
-    if cause and cause.tag and not any(name in raising_ids for name in cause.injection_ids):
+    if cause and cause.tag and not any(name in raising_injection_ids for name in cause.injection_ids):
         code = cause.tag.line_without_tag.decode("utf-8", "replace").strip()
         return Status.INVALID_MUTANT, f"{cause.place}: the injected `{code}` ended the run: {detail}"
     return status, detail
@@ -97,7 +97,7 @@ def _cause_on_stack(stack: TargetStack, files: _ChangedFiles) -> _ExceptionCause
             in_probe = True
         elif tag and tag.replaced_line is not None and in_target:
             continue
-        elif tag and (ids := files.injections_at(position, tag, in_probe)):
+        elif tag and (ids := files.injection_ids_at(position, tag, in_probe)):
             return _ExceptionCause(place=place, tag=tag, injection_ids=ids)
         elif in_probe or (tag and tag.replaced_line is None):
             return _ExceptionCause(place=place)

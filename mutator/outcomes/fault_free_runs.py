@@ -74,7 +74,7 @@ def fault_free_alerts_note(runs: Iterable[FaultFreeRun]) -> str:
     return f"Not every alert is caused by a fault: fault-free runs raise {alert_texts}."
 
 
-def alerts_by_drive(runs: Iterable[FaultFreeRun]) -> dict[tuple[str, str], frozenset[str]]:
+def alerts_by_scenario_and_seed(runs: Iterable[FaultFreeRun]) -> dict[tuple[str, str], frozenset[str]]:
     """Return the alerts that fault-free runs raise, by scenario and seed ('': the run folder's seed).
 
     Runs of a scenario with and without changes are combined.

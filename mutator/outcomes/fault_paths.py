@@ -23,7 +23,7 @@ from mutator.outcomes.fault_routes import (
     studied_links,
 )
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import HEAD, REMEDY
+from mutator.store.run_head import HEAD, DAMAGED_RUN_REMEDY
 from mutator.stpa.analysis_files import ComponentKind, ControlStructureModel
 from mutator.targets.channels import Role
 from mutator.targets.stored_target_facts import ChannelFacts
@@ -60,7 +60,7 @@ class PathComponent:
     name: str
     state: ComponentState
     channels: tuple[Departure, ...]
-    t_by: float | None = None
+    t_changed_by: float | None = None
 
     @property
     def t_first(self) -> float | None:
@@ -104,11 +104,11 @@ class UntimedPath:
     """
 
     state_by_component: Mapping[str, ComponentState]  # in causal order
-    late_ranks: Mapping[str, int]
+    inferred_ranks: Mapping[str, int]
     links: tuple[PathLink, ...]
     reached: str
     stopped_at: tuple[str, ...]
-    entry_link: PathLink | None
+    link_to_first_actuator: PathLink | None
 
     @property
     def injected(self) -> tuple[str, ...]:
@@ -147,7 +147,7 @@ class FaultPaths:
         self._injected_by_fault: dict[str, frozenset[str]] = {}  # the components of each fault, by fault id
 
     @property
-    def processes(self) -> frozenset[str]:
+    def process_components(self) -> frozenset[str]:
         if self.structure is None:
             return frozenset(
                 name for name, role in self._role_by_component.items() if role == Role.TRUTH.value
@@ -183,7 +183,7 @@ class FaultPaths:
                 name=name,
                 state=state,
                 channels=tuple(departures_by_component.get(name, ())),
-                t_by=times[untimed_path.late_ranks[name]] if name in untimed_path.late_ranks else None,
+                t_changed_by=times[untimed_path.inferred_ranks[name]] if name in untimed_path.inferred_ranks else None,
             )
             for name, state in untimed_path.state_by_component.items()
         ]
@@ -241,11 +241,11 @@ class FaultPaths:
         through = [c for c in links if c.tip in self._actuators and c.state is LinkState.THROUGH]
         return UntimedPath(
             state_by_component=states,
-            late_ranks={name: int(place) for name, place in late.items() if place is not None},
+            inferred_ranks={name: int(place) for name, place in late.items() if place is not None},
             links=links,
             reached=min(reversed(changed), key=route.steps_to_process.__getitem__, default=""),
             stopped_at=_holding_components(route, states, arrived) if masked else (),
-            entry_link=min(through, key=lambda c: ranks.get(c.tip, inf), default=None),
+            link_to_first_actuator=min(through, key=lambda c: ranks.get(c.tip, inf), default=None),
         )
 
     def _component_states(
@@ -261,7 +261,7 @@ class FaultPaths:
         arrived: set[str] = set()
         for name in route.components:
             has_arrived = name in route.entry_components or bool(route.feeders_on_route(name) & arrived)
-            if route.is_injection_known and name in route.entry_components:
+            if route.is_injection_place_known and name in route.entry_components:
                 states[name] = ComponentState.INJECTED
             elif name not in self._role_by_component:
                 states[name] = ComponentState.UNRECORDED
@@ -284,7 +284,7 @@ class FaultPaths:
 
     def _process_rank(self, ranks: Mapping[str, float]) -> float:
         """Return the rank of the time at which the process left golden; infinite if it did not."""
-        return min((ranks[name] for name in self.processes if name in ranks), default=inf)
+        return min((ranks[name] for name in self.process_components if name in ranks), default=inf)
 
     def _latest_ranks(self, route: PossibleRoute, ranks: Mapping[str, float]) -> dict[str, float]:
         """Return the rank of the time by which each component left golden.
@@ -293,7 +293,7 @@ class FaultPaths:
         feedback could have reached the other. If the place of injection is unknown, nothing is inferred.
         """
         process_rank, times = self._process_rank(ranks), dict(ranks)
-        for name in reversed(route.components if route.is_injection_known else ()):
+        for name in reversed(route.components if route.is_injection_place_known else ()):
             feeders = route.feeders_on_route(name) | route.feeders_off_route.get(name, frozenset())
             if name in times and len(feeders) == 1 and name not in route.entry_components:
                 (feeder,) = feeders
@@ -303,8 +303,8 @@ class FaultPaths:
 
     def _route_of(self, injected: frozenset[str]) -> PossibleRoute:
         if self.structure is None:
-            return chain_route(self._role_by_component, self.processes)
-        return structure_route(self.structure.components, self._links, self.processes, injected)
+            return chain_route(self._role_by_component, self.process_components)
+        return structure_route(self.structure.components, self._links, self.process_components, injected)
 
     def _earliest_feedback_rank(self, names: Collection[str], ranks: Mapping[str, float]) -> float:
         """Return the rank of the earliest time of feedback through one of these components, or infinity.
@@ -326,7 +326,7 @@ def fault_paths_of(folder: RunFolder) -> FaultPaths | None:
     try:
         structure = ControlStructureModel.model_validate(head.structure) if head.structure else None
     except ValueError:
-        raise MutatorError("damaged at 'structure'", where=folder.path / HEAD, remedy=REMEDY) from None
+        raise MutatorError("damaged at 'structure'", where=folder.path / HEAD, remedy=DAMAGED_RUN_REMEDY) from None
     return FaultPaths(head.channels, structure)
 
 

@@ -15,7 +15,7 @@ class PossibleRoute:
     components: tuple[str, ...]
     links: Mapping[str, tuple[str, str]]
     entry_components: frozenset[str]  # components at which the fault enters
-    is_injection_known: bool  # whether the sources are known to be the place of injection
+    is_injection_place_known: bool  # whether the sources are known to be the place of injection
     feeders_off_route: Mapping[
         str, frozenset[str]
     ]  # by component: the components not on the route that lead to it
@@ -35,7 +35,7 @@ def chain_route(roles: Mapping[str, str], processes: frozenset[str]) -> Possible
         components=tuple(chain),
         links=links,
         entry_components=frozenset(chain[:1]),
-        is_injection_known=False,
+        is_injection_place_known=False,
         feeders_off_route=dict.fromkeys(chain[:1], processes),
         steps_to_process={name: len(chain) - place for place, name in enumerate(chain)},
     )
@@ -60,7 +60,7 @@ def structure_route(
         components=_in_causal_order([name for name in components if name in on_route], route_links, steps),
         links=route_links,
         entry_components=injected,
-        is_injection_known=True,
+        is_injection_place_known=True,
         feeders_off_route=off_route,
         steps_to_process={name: steps.get(name, len(on_route)) for name in on_route},
     )

@@ -35,7 +35,7 @@ class TraceDifference:
 
     t_first: float | None  # time (s) of the first difference beyond tolerance
     max_dev: tuple[tuple[str, float], ...]  # largest difference of each compared channel in the whole run
-    dev: tuple[tuple[str, float], ...]  # the same up to the end of the drive
+    max_dev_in_drive: tuple[tuple[str, float], ...]  # the same up to the end of the drive
 
 
 def trace_digest(manifest: TargetManifest, out: Path) -> str:
@@ -230,7 +230,7 @@ def compare_traces(
         max_dev.append((channel.name, channel_difference.largest()))
         dev.append((channel.name, channel_difference.largest(end)))
     t_first = None if first == np.inf else first
-    return TraceDifference(t_first=t_first, max_dev=tuple(max_dev), dev=tuple(dev))
+    return TraceDifference(t_first=t_first, max_dev=tuple(max_dev), max_dev_in_drive=tuple(dev))
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,11 +238,11 @@ class ChannelDeviation:
     """The absolute difference |faulty - golden| of a channel at the times of both runs."""
 
     common_times: np.ndarray
-    values: np.ndarray
+    absolute_differences: np.ndarray
     t_first: float  # when it first exceeds the tolerance or the times differ; infinite if never
 
     def largest(self, end: float = np.inf) -> float:
-        return float(self.values[self.common_times <= end].max(initial=0.0))
+        return float(self.absolute_differences[self.common_times <= end].max(initial=0.0))
 
 
 def channel_deviation(golden: Trace, faulty: Trace, channel: Channel, time_channel: str) -> ChannelDeviation:

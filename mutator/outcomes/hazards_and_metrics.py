@@ -65,9 +65,9 @@ def judge_run(
     """Judge a run. Its trace and that of its golden run must have the channels that the manifest needs for
     judging. Without a golden run (this is one), metrics that use it have no value.
     """
-    values = formula_values(manifest, trace)
+    values = formula_variables(manifest, trace)
     if golden is not None and any(metric.uses_golden for metric in manifest.metrics):
-        values = {**values, **_golden_values(formula_values(manifest, golden), values[TIME])}
+        values = {**values, **_golden_values(formula_variables(manifest, golden), values[TIME])}
     hazards, metrics = [], []
     ends: dict[str, float] = {}
     for hazard in manifest.hazard_rules:
@@ -102,7 +102,7 @@ def judge_run(
     )
 
 
-def formula_values(manifest: TargetManifest, trace: Trace) -> ValuesByName:
+def formula_variables(manifest: TargetManifest, trace: Trace) -> ValuesByName:
     """Return the variables of the manifest's formulas, with a number for each step.
 
     A channel with its own times keeps its newest value. Before its first value it is NaN.

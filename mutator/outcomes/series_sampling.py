@@ -15,7 +15,7 @@ import numpy as np
 from mutator.model import Record
 from mutator.outcomes.golden_comparison import Trace, values_on_steps
 from mutator.outcomes.trace_files import own_times
-from mutator.store.series_folder import SeriesFolder, run_facts, write_kept_series
+from mutator.store.series_folder import SeriesFolder, run_facts_for_series, write_rerun_series
 from mutator.store.series_format import ExtraPoints, Series, encode_series
 from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
@@ -74,8 +74,8 @@ class SeriesSampler:
             t=time[steps],
             channel_values=self._sampled_rows(values[:, steps]),
             sample_every=self._sample_every,
-            facts=run_facts(record) | {"end": float(max(self._time[-1], last))},
-            points=_extra_points(
+            facts=run_facts_for_series(record) | {"end": float(max(self._time[-1], last))},
+            extra_points=_extra_points(
                 time,
                 golden[:, :compared],
                 values[:, :compared],
@@ -262,4 +262,4 @@ def write_sampled_series(
 ) -> None:
     sampler = SeriesSampler(manifest, golden)
     data = encode_series(sampler.faulty_series(faulty, record), sampler.golden)
-    write_kept_series(SeriesFolder(run).kept_path(record.experiment_id), sampler.encoded_golden, data)
+    write_rerun_series(SeriesFolder(run).rerun_series_path(record.experiment_id), sampler.encoded_golden, data)

@@ -69,7 +69,7 @@ def _importer_for(name: str) -> Importer:
     return importer
 
 
-def check_size(size: int) -> None:
+def check_trace_size(size: int) -> None:
     """Raise BadTrace if a trace unpacks to too many bytes."""
     if size > MOST_TRACE_BYTES:
         raise BadTrace(f"{size:,} bytes when unpacked", f"at most {MOST_TRACE_BYTES:,}")

@@ -132,7 +132,7 @@ def _mixture_gaps(run: ReportedRun, missing: list[str]) -> Iterator[str]:
 
 
 def _describe_coverage(run: ReportedRun, fault_type_count: int, missing: list[str]) -> str:
-    text = f"Based on {len(run.frame)} of {run.folder.planned_count} experiments, which cover "
+    text = f"Based on {len(run.frame)} of {run.folder.planned_experiment_count} experiments, which cover "
     text += f"{fault_type_count - len(missing)} of the paper's {fault_type_count} fault types."
     text += f" Missing: {', '.join(missing)}." if missing else ""
     return " ".join(filter(None, (text, fault_free_alerts_note(run.fault_free_runs()))))

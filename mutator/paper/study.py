@@ -21,7 +21,7 @@ def published_counts_for(run: ReportedRun) -> PublishedCounts | None:
 
 def example_drawings_for(run: ReportedRun) -> tuple[Drawing, ...]:
     """Return the figures of unsafe control actions, only for finished runs with published fault types."""
-    if published_counts_for(run) is None or len(run.results) != run.folder.planned_count:
+    if published_counts_for(run) is None or len(run.results) != run.folder.planned_experiment_count:
         return ()
     return build_example_drawings(run.folder, run.frame, run.workspace)
 

@@ -126,7 +126,7 @@ def remove_proof(folder: RunFolder) -> None:
     removed = {
         name: None for name in file_digests.list_segments(folder.path) if name.startswith(f"{PROOF_FOLDER}/")
     }
-    with file_digests.rewriting_files(folder.path, removed):
+    with file_digests.announcing_rewrites(folder.path, removed):
         remove_folder(folder.path / PROOF_FOLDER)
 
 

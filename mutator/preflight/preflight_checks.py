@@ -33,7 +33,7 @@ from mutator.preflight.preflight_runs import (
     OnProgress,
 )
 from mutator.store import file_digests, plan_file
-from mutator.store.check_results import FILE, SCHEMA, CheckResult
+from mutator.store.check_results import CHECKS_FILE, SCHEMA, CheckResult
 from mutator.store.file_digests import FileDigest
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -62,12 +62,12 @@ def run_checks(
         text = "; ".join(f"{result.name}: {result.detail}" for result in failed[:3])
         raise CheckFailed(
             f"{len(failed)} of {len(results)} checks before the campaign failed: {text}",
-            where=folder.path / FILE,
+            where=folder.path / CHECKS_FILE,
             remedy="fix target, templates or canary (`mutator check --drive` shows details); the campaign "
             "starts only if all pass",
         )
     preflight_cache.store_passed_checks(
-        preflight_cache.cached_checks_path(checks.digest), folder.path, FILE, checks.pending_folder
+        preflight_cache.cached_checks_path(checks.digest), folder.path, CHECKS_FILE, checks.pending_folder
     )
     return results
 
@@ -87,7 +87,7 @@ def describe_unreached_triggers(workspace: Workspace, folder: RunFolder) -> list
 def checks_and_goldens_exist(folder: RunFolder) -> bool:
     folders = (folder.golden_folder(*golden_run) for golden_run in folder.golden_runs)
     goldens = (path_below(place, name) for place in folders for name in folder.head.golden_files)
-    return all(path.is_file() for path in (folder.path / FILE, *goldens))
+    return all(path.is_file() for path in (folder.path / CHECKS_FILE, *goldens))
 
 
 def _pending_folder(folder: RunFolder) -> Path:
@@ -130,7 +130,7 @@ class _PreflightChecks:
         try:
             with raising_disk_full(copy):
                 cached_folders.copy_from_cache(preflight_cache.cached_checks_path(self.digest), copy)
-            stored = read_json(copy / FILE, SCHEMA)
+            stored = read_json(copy / CHECKS_FILE, SCHEMA)
             results = self._passed_results(stored, copy)
         except DiskFull:
             raise
@@ -143,7 +143,7 @@ class _PreflightChecks:
             ):
                 return None  # forged, or no longer true
             self._check_goldens_same_as_before(stored["goldens"])
-            self._store_in_run_folder(read_bounded(copy / FILE))
+            self._store_in_run_folder(read_bounded(copy / CHECKS_FILE))
         return results
 
     def _passed_results(self, stored: dict[str, Any] | None, folder: Path) -> tuple[CheckResult, ...] | None:
@@ -195,13 +195,13 @@ class _PreflightChecks:
             name: FileDigest.of_bytes(read_bounded(path)) for name, path in files.items() if path.is_file()
         }
         removed = {name: None for name in file_digests.load_ledger(run).names if name.startswith("golden/")}
-        with file_digests.rewriting_files(run, {**removed, **new, FILE: FileDigest.of_bytes(checks)}):
+        with file_digests.announcing_rewrites(run, {**removed, **new, CHECKS_FILE: FileDigest.of_bytes(checks)}):
             shutil.rmtree(run / "golden", ignore_errors=True)
             golden.rename(run / "golden")
-            write_atomic(run / FILE, checks)
+            write_atomic(run / CHECKS_FILE, checks)
 
     def _stored_checks(self) -> dict[str, Any] | None:
-        path = self.folder.path / FILE
+        path = self.folder.path / CHECKS_FILE
         return read_json(path, SCHEMA) if path.is_file() else None
 
     def _check_goldens_same_as_before(self, goldens: dict[str, str]) -> None:

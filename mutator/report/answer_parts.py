@@ -9,7 +9,7 @@ from urllib.parse import quote
 import numpy as np
 import pandas as pd
 
-from mutator.results.outcome_counting import hazard_times
+from mutator.results.outcome_counting import first_hazard_times
 
 ALERT_BEFORE_HAZARD = "alert before the hazard"
 NO_ALERT, ALERT_AFTER_HAZARD = "no alert at all", "alert only after the hazard"
@@ -105,4 +105,4 @@ def warning_filter_values(frame: pd.DataFrame) -> np.ndarray:
     """
     late = np.where(frame["reaction_time"].isna(), ALERT_AFTER_HAZARD, ALERT_BEFORE_HAZARD)
     hazard = np.where(frame["alerts"] == "", NO_ALERT, late)
-    return np.where(hazard_times(frame).notna().any(axis=1), hazard, "")
+    return np.where(first_hazard_times(frame).notna().any(axis=1), hazard, "")

@@ -9,7 +9,7 @@ import numpy as np
 from mutator._common.helper_processes import map_in_processes, process_count_for
 from mutator.model import Fault, Record
 from mutator.outcomes.fault_paths import FaultPaths, PathInputs, UntimedPath
-from mutator.results.ranking import ranks_of_rows
+from mutator.results.ranking import worst_first_ranks
 from mutator.statistics.event_times import FirstAlertsByHazardRun
 from mutator.store.run_folder import RunFolder
 
@@ -61,7 +61,7 @@ class ExperimentFacts:
                     if code == len(untimed_paths):
                         untimed_paths.append(untimed_path)
         return cls(
-            worst_first_ranks=ranks_of_rows(results),
+            worst_first_ranks=worst_first_ranks(results),
             untimed_path_indices=path_numbers,
             distinct_untimed_paths=tuple(untimed_paths),
             alerts_by_hazardous_id=alerts,

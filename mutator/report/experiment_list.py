@@ -28,11 +28,11 @@ from mutator.report.panel import REPORT_FOLDER
 from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines import SourceLines
 from mutator.results.outcome_counting import (
-    endings_of_rows,
+    outcome_or_status_of_rows,
     fault_types_of,
-    hazard_names,
-    hazard_times,
-    joined_hazards,
+    checked_hazard_names,
+    first_hazard_times,
+    joined_occurred_hazards,
 )
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.review.patch_shapes import PatchShape, shapes_of_patches
@@ -161,19 +161,19 @@ def results_table_data(
     columns["kind"] = fault_types_of(results)
     rows = rows_of(results, faults)
     columns["fault"] = [row.fault for row in rows]
-    columns["ending"] = endings_of_rows(results)
-    columns["hazards"] = joined_hazards(results)
+    columns["ending"] = outcome_or_status_of_rows(results)
+    columns["hazards"] = joined_occurred_hazards(results)
     if has_alerts:
         columns["warning"] = warning_filter_values(results)
     columns["rank"] = results[RANK_COLUMN] + 1
-    columns["t_hazard"] = hazard_times(results).min(axis=1)
+    columns["t_hazard"] = first_hazard_times(results).min(axis=1)
     if paths:
         columns["through"] = paths.joined_passed_links(results[UNTIMED_PATH_COLUMN])
     if source:
         columns |= _operator_columns(source, results, rows)
     columns_data = [{"name": name, **column_data(name, values)} for name, values in columns.items()]
     labels = {name: facts["label"] for name, facts in paths.components.items()} if paths else {}
-    checked_hazards = list(hazard_names(results))
+    checked_hazards = list(checked_hazard_names(results))
     return {
         "schema": TABLE_SCHEMA,
         "count": len(results),

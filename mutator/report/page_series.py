@@ -21,7 +21,7 @@ def series_facts_for_page(folder: RunFolder) -> dict[str, Any]:
     """
     series = SeriesFolder(folder.path)
     columns = dict(deviation_column_by_channel(folder.head.compared))
-    return {"packed": series.is_packed, "kept": series.kept_ids(), "deviations": columns}
+    return {"packed": series.is_packed, "kept": series.rerun_ids(), "deviations": columns}
 
 
 def write_missing_series_of_traces(folder: RunFolder, workspace: "Workspace") -> None:

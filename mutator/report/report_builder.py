@@ -25,7 +25,7 @@ from mutator.report.panels import PANELS, build_study_panels
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.report_digests import inputs_digest, is_current, write_report_files
 from mutator.report.reported_run import ReportedRun
-from mutator.results.outcome_counting import count_endings
+from mutator.results.outcome_counting import count_by_outcome_or_status
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -107,7 +107,7 @@ def _build_content(run: ReportedRun, wait_for_list_data: Callable[[], Experiment
         alarm=run.engine_summary.equivalence_text
         if run.engine_summary and run.engine_summary.has_failed_equivalence
         else "",
-        outcome_counts=count_endings(run.results),
+        outcome_counts=count_by_outcome_or_status(run.results),
         plan_text=_describe_plan(run.folder),
         glossary=glossary_of(run),
         study_citation=run.published_work.about if run.published_work and run.has_study_page else "",
@@ -121,9 +121,9 @@ def _describe_plan(folder: RunFolder) -> str:
     experiments, runs = folder.head.experiments, folder.head.runs
     text = f"Planned: {counted(experiments, 'experiment')}"
     if folder.shard:
-        text += f", {folder.planned_count} of them in shard {folder.shard}"
+        text += f", {folder.planned_experiment_count} of them in shard {folder.shard}"
     if runs == experiments:
         text += "; each needs its own run"
     else:
         text += f", in {counted(runs, 'run')}, because experiments with identical runs share one run"
-    return " ".join(filter(None, (f"{text}.", folder.stop_note)))
+    return " ".join(filter(None, (f"{text}.", folder.stop_at_hazard_note)))

@@ -25,7 +25,7 @@ from mutator.store.allowed_contents import (
     SCRATCH_FOLDER,
     SIGNATURE_FILES,
     TRACES_FOLDER,
-    is_allowed_name,
+    is_allowed_top_name,
 )
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -35,7 +35,7 @@ STAMP_FILE = f"{REPORT_FOLDER}/made_from.json"
 _TOP_NAMES_NOT_READ = {
     REPORT_FOLDER,
     "exports",
-    series_store.FOLDER,
+    series_store.SERIES_FOLDER,
     TRACES_FOLDER,
     DAMAGED_FOLDER,
     SCRATCH_FOLDER,
@@ -51,7 +51,7 @@ def inputs_digest(folder: RunFolder, workspace: Workspace | None) -> str:
     run = folder.path
     series = [
         series_facts_for_page(folder),
-        file_digests.sha256_of_file(run / series_store.FOLDER / f"{series_store.INDEX_NAME}.js"),
+        file_digests.sha256_of_file(run / series_store.SERIES_FOLDER / f"{series_store.INDEX_NAME}.js"),
     ]
     return digest(
         [
@@ -122,7 +122,7 @@ def _input_file_digests(run: Path) -> Iterator[tuple[str, str]]:
     tops = [
         top
         for top in sorted(run.iterdir())
-        if top.name not in _TOP_NAMES_NOT_READ and is_allowed_name(top.name)
+        if top.name not in _TOP_NAMES_NOT_READ and is_allowed_top_name(top.name)
     ]
     for top in tops:
         inside = sorted(top.rglob("*")) if top.is_dir() else [top]

@@ -101,7 +101,7 @@ def _past_run(path: Path) -> PastRun:
     files = [*(path / "records").glob("*.jsonl"), Results(path).path]
     # the records of equal runs are equal, so they have no date; the files do
     last = max(file.stat().st_mtime for file in files if file.exists())
-    git = folder.stretches[-1].git or {}
+    git = folder.session_environments[-1].git or {}
     state = git.get("target")
     commit = f"{state.commit[:8]}{' with changes' if state.changed else ''}" if state else "-"
     cpu_s = sum(float(line["cpu_s"]) for line in folder.timings().values())
@@ -128,7 +128,7 @@ def _table_cells(run: PastRun) -> list[str]:
     return [
         f"{run.date:%Y-%m-%d %H:%M}",
         run.target_commit,
-        f"{len(run.rows_by_id)} of {run.folder.planned_count}",
+        f"{len(run.rows_by_id)} of {run.folder.planned_experiment_count}",
         f"{len(hazards)} of {run.activated_count} activated",
         severity_text if run.folder.severity_scale and hazards else "-",
         f"{silent} of {len(hazards)}" if run.folder.has_alerts else "-",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mutator.errors import MutatorError
 from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Outcome, Status
 from mutator.mutants.anchors import ParsedFile, parsed_file
-from mutator.results.outcome_counting import endings_of_rows
+from mutator.results.outcome_counting import outcome_or_status_of_rows
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -145,7 +145,7 @@ def _line_marks(
     """
     ranks_by_line: dict[tuple[tuple[str, int], str], dict[str, int]] = {}
     for name, trigger, ending in zip(
-        results["fault_id"], results["trigger"], endings_of_rows(results), strict=True
+        results["fault_id"], results["trigger"], outcome_or_status_of_rows(results), strict=True
     ):
         if name in line_by_fault and ending in ENDINGS_WORST_FIRST:
             ranks = ranks_by_line.setdefault(

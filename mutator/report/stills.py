@@ -11,7 +11,7 @@ from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
 from mutator.report.film import ExperimentFilmer, Shot
-from mutator.results.ranking import ranks_of_rows
+from mutator.results.ranking import worst_first_ranks
 from mutator.results.table_reader import Results
 from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import GoldenRun, RunFolder
@@ -90,11 +90,11 @@ def _missing_stills_by_id(
     change_names = set(pictures)
     frame = Results(folder.path).frame()
     is_manifested = ((frame["status"] == Status.OK.value) & frame["t_manifest"].notna()).to_numpy()
-    order = [row for row in ranks_of_rows(frame).argsort() if is_manifested[row]]
+    order = [row for row in worst_first_ranks(frame).argsort() if is_manifested[row]]
     ids = (str(frame["experiment_id"].iloc[row]) for row in order)
     with_pictures = (name for name in ids if change_names & set(experiments[name].changes))
     worst_ids = islice(
-        with_pictures, min(MOST_FILMED_EXPERIMENTS, folder.planned_count // PLANNED_PER_FILMED_EXPERIMENT)
+        with_pictures, min(MOST_FILMED_EXPERIMENTS, folder.planned_experiment_count // PLANNED_PER_FILMED_EXPERIMENT)
     )
     stills_by_id = {name: _missing_stills(folder, name, records[name]) for name in worst_ids}
     return {name: shots for name, shots in stills_by_id.items() if shots}

@@ -157,7 +157,7 @@ def _component_that_passed_most(
     passed: Counter[str] = Counter()
     links: dict[str, set[str]] = {}
     for untimed_path, count in _untimed_path_counts(hazards, paths):
-        if link := untimed_path.entry_link:
+        if link := untimed_path.link_to_first_actuator:
             passed[link.tail] += count
             links.setdefault(link.tail, set()).add(link_name(link.tail, link.tip))
     if not passed:

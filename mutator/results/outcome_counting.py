@@ -9,7 +9,7 @@ from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Outcome, Status
-from mutator.results.table_columns import hazards_of_frame
+from mutator.results.table_columns import hazard_names_of_frame
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,29 +34,29 @@ class GroupCount:
     unusable: int
 
 
-def endings_of_rows(frame: "pd.DataFrame") -> "pd.Series[str]":
+def outcome_or_status_of_rows(frame: "pd.DataFrame") -> "pd.Series[str]":
     """Return the outcome of each row, or the status if the run failed."""
     worked = (frame["status"] == Status.OK.value) & (frame["outcome"] != "")
     return frame["outcome"].where(worked, frame["status"])
 
 
-def count_endings(frame: "pd.DataFrame") -> dict[str, int]:
-    count_by_ending = endings_of_rows(frame).value_counts()
+def count_by_outcome_or_status(frame: "pd.DataFrame") -> dict[str, int]:
+    count_by_ending = outcome_or_status_of_rows(frame).value_counts()
     order = [o.value for o in Outcome] + [s.value for s in Status if s is not Status.OK]
     return {name: int(count_by_ending[name]) for name in order if name in count_by_ending}
 
 
-def hazard_names(frame: "pd.DataFrame") -> tuple[str, ...]:
+def checked_hazard_names(frame: "pd.DataFrame") -> tuple[str, ...]:
     """Return the hazards that were checked, including those that never occurred."""
-    return tuple(sorted(name for name in hazards_of_frame(frame) if frame[name.lower()].notna().any()))
+    return tuple(sorted(name for name in hazard_names_of_frame(frame) if frame[name.lower()].notna().any()))
 
 
-def hazard_times(frame: "pd.DataFrame") -> "pd.DataFrame":
+def first_hazard_times(frame: "pd.DataFrame") -> "pd.DataFrame":
     """Return the first time of each hazard, a column for each. NaN if it did not occur or the run failed."""
     import pandas as pd
 
     columns = {
-        name: (frame[f"t_{name.lower()}"], frame[name.lower()].notna()) for name in hazards_of_frame(frame)
+        name: (frame[f"t_{name.lower()}"], frame[name.lower()].notna()) for name in hazard_names_of_frame(frame)
     }
     times = {name: time.where(is_checked) for name, (time, is_checked) in columns.items()}
     return pd.DataFrame(times, index=frame.index, dtype=float)
@@ -68,19 +68,19 @@ def hazard_margins(frame: "pd.DataFrame") -> "pd.DataFrame":
     """
     import pandas as pd
 
-    occurred = hazard_times(frame).notna()
+    occurred = first_hazard_times(frame).notna()
     none_occurred = ~occurred.any(axis=1)
     margins = {}
-    for name in hazards_of_frame(frame):
+    for name in hazard_names_of_frame(frame):
         if (column := f"margin_{name.lower()}") in frame:
             margins[name] = frame[column].where(occurred[name] | none_occurred & frame[name.lower()].notna())
     return pd.DataFrame(margins, index=frame.index, dtype=float)
 
 
-def joined_hazards(frame: "pd.DataFrame") -> list[str]:
+def joined_occurred_hazards(frame: "pd.DataFrame") -> list[str]:
     """Return the names of the hazards that occurred in each row, sorted and joined by `;`."""
-    occurred = hazard_times(frame).notna()
-    names = sorted(hazards_of_frame(frame))
+    occurred = first_hazard_times(frame).notna()
+    names = sorted(hazard_names_of_frame(frame))
     return [";".join(compress(names, row)) for row in occurred[names].to_numpy()]
 
 
@@ -89,13 +89,13 @@ def fault_types_of(frame: "pd.DataFrame") -> "pd.Series[str]":
     return frame["module"] + "/" + frame["fault_type"]
 
 
-def count_outcomes(frame: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[GroupCount, ...]:
+def count_outcomes_by_group(frame: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[GroupCount, ...]:
     """Return a count for each of the `groups`, sorted by name, then the total."""
     import pandas as pd
 
-    hazards = hazard_names(frame)
+    hazards = checked_hazard_names(frame)
     usable = ~frame["status"].isin([status.value for status in UNUSABLE_STATUSES])
-    occurred = hazard_times(frame).notna()
+    occurred = first_hazard_times(frame).notna()
     any_hazard, alert = occurred.any(axis=1), frame["alerts"] != ""
     flags = {
         "injected": usable,

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
-from mutator.results.outcome_counting import endings_of_rows, hazard_margins
+from mutator.results.outcome_counting import outcome_or_status_of_rows, hazard_margins
 from mutator.targets.contact_severity import DELTA_V_NAME, SEVERITY_CLASSES
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ _ENDINGS_WORST_FIRST = (  # worst first
 )
 
 
-def ranks_of_rows(frame: "pd.DataFrame") -> "np.ndarray":
+def worst_first_ranks(frame: "pd.DataFrame") -> "np.ndarray":
     """Return the rank (from 0: the worst) of each row of a frame of results, whatever the order of the rows.
 
     Rows with a severity class come first, by class and then by delta-v. The others follow by outcome and then
@@ -32,7 +32,7 @@ def ranks_of_rows(frame: "pd.DataFrame") -> "np.ndarray":
     import numpy as np
     import pandas as pd
 
-    ending_rank = pd.Index(_ENDINGS_WORST_FIRST).get_indexer(pd.Index(endings_of_rows(frame)))
+    ending_rank = pd.Index(_ENDINGS_WORST_FIRST).get_indexer(pd.Index(outcome_or_status_of_rows(frame)))
     severity = frame["severity"] if "severity" in frame else pd.Series("", frame.index)
     severity_rank = pd.Index(SEVERITY_CLASSES).get_indexer(pd.Index(severity))
     has_class = severity_rank >= 0
@@ -68,10 +68,10 @@ def _margin_ranks(
     return margin_rank
 
 
-def rank_by_experiment(frame: "pd.DataFrame") -> dict[str, int]:
+def worst_first_rank_by_ok_experiment(frame: "pd.DataFrame") -> dict[str, int]:
     """Return the rank of each experiment with status `ok` (0 is the worst). If there is no room for all
     series, those of the worst experiments are kept.
     """
-    ranks = ranks_of_rows(frame)
+    ranks = worst_first_ranks(frame)
     ended = (frame["status"] == Status.OK.value).to_numpy()
     return dict(zip(frame["experiment_id"][ended], ranks[ended].tolist(), strict=True))

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from mutator.model import Fault, Outcome, Status, Value, fault_label
 from mutator.results.outcome_counting import (
     UNUSABLE_STATUSES,
-    endings_of_rows,
+    outcome_or_status_of_rows,
     fault_types_of,
     hazard_margins,
-    hazard_times,
+    first_hazard_times,
 )
 from mutator.results.plan_columns import numeric_value_of
 from mutator.results.table_columns import alert_names_in
@@ -73,8 +73,8 @@ def rows_of(frame: "pd.DataFrame", faults: Mapping[str, Fault]) -> list[ResultRo
     """Return the rows of a frame of results. `faults` are those of the plan, by id, which has the digits of
     each value (35), while the table has a float.
     """
-    lines = cells_by_row(frame.assign(kind=fault_types_of(frame), ending=endings_of_rows(frame)))
-    hazards, margins = _cells_with_value(hazard_times(frame)), _cells_with_value(hazard_margins(frame))
+    lines = cells_by_row(frame.assign(kind=fault_types_of(frame), ending=outcome_or_status_of_rows(frame)))
+    hazards, margins = _cells_with_value(first_hazard_times(frame)), _cells_with_value(hazard_margins(frame))
     rows = zip(lines, hazards, margins, strict=True)
     return [
         _build_row(cells, row_hazards, row_margins, faults.get(cells["fault_id"]))

@@ -15,8 +15,8 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.results import propagation_columns
-from mutator.results.table_columns import TIMING_COLUMNS, FinishedExperiment, cells_of, result_columns_of
-from mutator.results.table_files import CsvTable, ParquetTable, csv_lines, parquet_batch
+from mutator.results.table_columns import TIMING_COLUMNS, FinishedExperiment, cells_by_column, result_columns_of
+from mutator.results.table_files import CsvTableWriter, ParquetTableWriter, csv_lines, parquet_batch
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import FileDigest
 from mutator.store.planned_experiments import PlannedExperiments
@@ -25,7 +25,7 @@ from mutator.store.run_folder import RunFolder
 CSV_FILE, PARQUET_FILE, TIMINGS_FILE = "results.csv", "results.parquet", "timings.parquet"
 PROPAGATION_FILE = "propagation.parquet"
 TABLE_FILES = (CSV_FILE, PARQUET_FILE, PROPAGATION_FILE, TIMINGS_FILE)
-SCHEMA, STAMP_FILE = "results/1", "results.json"
+STAMP_SCHEMA, STAMP_FILE = "results/1", "results.json"
 _EXPERIMENTS_PER_BATCH = 2_000  # read at a time; a million records as objects take 5 GB
 
 
@@ -33,7 +33,7 @@ def ensure_tables(run: Path) -> Path:
     """Return the path of a run folder's results.csv. Rebuild the tables if any is out of date."""
     folder = RunFolder.open_unverified(run)
     stamp = _load_stamp(folder)
-    if stamp.get("made_from") == _inputs_digest(folder) and stamp["tables"] == _current_digests(folder):
+    if stamp.get("made_from") == _inputs_digest(folder) and stamp["tables"] == _current_table_digests(folder):
         return folder.path / CSV_FILE
     return build_tables(run)
 
@@ -60,7 +60,7 @@ def build_tables(run: Path) -> Path:
         # Record old and new digests before the tables are replaced at the end of the block. Otherwise a kill
         # could leave tables that look edited.
         before = _unedited_digests(folder, new_digests)
-        stamp = {"schema": SCHEMA, "made_from": inputs_digest, "tables": new_digests, "before": before}
+        stamp = {"schema": STAMP_SCHEMA, "made_from": inputs_digest, "tables": new_digests, "before": before}
         write_json(folder.path / STAMP_FILE, stamp)
     return folder.path / CSV_FILE
 
@@ -72,7 +72,7 @@ def write_tables(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     large run, two processes build the batches.
     """
     with computing_in_background(
-        lambda: _write_timings(folder, paths[TIMINGS_FILE]), process_count_for(folder.planned_count)
+        lambda: _write_timings(folder, paths[TIMINGS_FILE]), process_count_for(folder.planned_experiment_count)
     ) as end:
         _write_result_tables(folder, paths)
         end()
@@ -88,7 +88,7 @@ def _write_result_tables(folder: RunFolder, paths: Mapping[str, Path]) -> None:
 
     def build_batch(batch: Sequence[str]) -> tuple[bytes, Any, Any]:
         finished = [FinishedExperiment(planned[name], records[name], scale, fault_paths) for name in batch]
-        cells = cells_of(columns, finished)
+        cells = cells_by_column(columns, finished)
         lines, table = csv_lines(zip(*cells, strict=True)), parquet_batch(columns, cells)
         departure_cells = propagation_columns.propagation_cells(
             (experiment.record for experiment in finished), folder.head.channels
@@ -101,10 +101,10 @@ def _write_result_tables(folder: RunFolder, paths: Mapping[str, Path]) -> None:
 
     with ExitStack() as stack:
         stack.enter_context(_without_garbage_collection())
-        csv = stack.enter_context(CsvTable(paths[CSV_FILE], columns))
-        parquet = stack.enter_context(ParquetTable(paths[PARQUET_FILE], columns))
+        csv = stack.enter_context(CsvTableWriter(paths[CSV_FILE], columns))
+        parquet = stack.enter_context(ParquetTableWriter(paths[PARQUET_FILE], columns))
         propagated = stack.enter_context(
-            ParquetTable(paths[PROPAGATION_FILE], propagation_columns.PROPAGATION_COLUMNS)
+            ParquetTableWriter(paths[PROPAGATION_FILE], propagation_columns.PROPAGATION_COLUMNS)
         )
         batches = _batches(name for name in sorted(planned) if name in records)
         for lines, table, departures in map_in_processes(
@@ -151,17 +151,17 @@ def _inputs_digest(folder: RunFolder) -> str:
         (column.name, column.type)
         for column in (*result_columns_of(head), *propagation_columns.PROPAGATION_COLUMNS, *TIMING_COLUMNS)
     ]
-    return digest([SCHEMA, VERSION, *head_facts, columns, input_digests])
+    return digest([STAMP_SCHEMA, VERSION, *head_facts, columns, input_digests])
 
 
-def _current_digests(folder: RunFolder) -> dict[str, str | None]:
+def _current_table_digests(folder: RunFolder) -> dict[str, str | None]:
     digests = file_digests.digests_of_files(folder.path, TABLE_FILES)
     return {name: file_digest.sha256 if file_digest else None for name, file_digest in digests.items()}
 
 
 def _load_stamp(folder: RunFolder) -> dict[str, Any]:
     try:
-        stamp = read_json(folder.path / STAMP_FILE, SCHEMA)
+        stamp = read_json(folder.path / STAMP_FILE, STAMP_SCHEMA)
         if all(isinstance(stamp[key], dict) for key in ("tables", "before")):
             return stamp
     except (MutatorError, KeyError):
@@ -174,7 +174,7 @@ def _unedited_digests(folder: RunFolder, new_digests: Mapping[str, str]) -> dict
     stamp = _load_stamp(folder)
     current = {
         name: table_digest
-        for name, table_digest in _current_digests(folder).items()
+        for name, table_digest in _current_table_digests(folder).items()
         if table_digest is not None
     }
     built = {
@@ -196,6 +196,6 @@ def _write_timings(folder: RunFolder, path: Path) -> None:
             TIMING_COLUMNS, [[line.get(column.name) for line in lines] for column in TIMING_COLUMNS]
         )
 
-    with ParquetTable(path, TIMING_COLUMNS) as file:
+    with ParquetTableWriter(path, TIMING_COLUMNS) as file:
         for batch in _batches(sorted(newest)):
             file.append(build_batch(batch))

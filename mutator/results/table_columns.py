@@ -217,8 +217,8 @@ def result_columns(
         *(_deviation_column(name, column) for name, column in deviation_column_by_channel(compared).items()),
         *map(_metric_column, metrics),
         *(
-            _driven_deviation_column(name, column)
-            for name, column in driven_column_by_channel(compared).items()
+            _drive_deviation_column(name, column)
+            for name, column in drive_deviation_column_by_channel(compared).items()
             if ends
         ),
         *severity,
@@ -231,11 +231,11 @@ def result_columns(
 def result_columns_of(head: "RunHead") -> tuple[PlanColumn | ResultColumn, ...]:
     """Return the columns of a run's results.csv, in order."""
     paths = any(channel.component for channel in head.channels)
-    severity = severity_columns(has_classes=head.severity is not None)
+    severity = severity_and_time_columns(has_classes=head.severity is not None)
     return result_columns(head.hazards, head.compared, head.metrics, severity, paths=paths)
 
 
-def cells_of(
+def cells_by_column(
     columns: Iterable[PlanColumn | ResultColumn], finished: Sequence[FinishedExperiment]
 ) -> list[list[object]]:
     """Return the cells of each column, with a row for each finished experiment."""
@@ -248,7 +248,7 @@ def cells_of(
     ]
 
 
-def severity_columns(*, has_classes: bool) -> tuple[ResultColumn, ...]:
+def severity_and_time_columns(*, has_classes: bool) -> tuple[ResultColumn, ...]:
     """Return the columns of a target whose contacts have classes of severity, or have none."""
     return (SEVERITY_COLUMN, *TIME_TO_HAZARD_COLUMNS) if has_classes else TIME_TO_HAZARD_COLUMNS
 
@@ -258,7 +258,7 @@ def _deviation_column(channel: str, column: str) -> ResultColumn:
     return ResultColumn(column, "number", UNIT_OF_CHANNEL, about, lambda f: f.max_dev.get(channel))
 
 
-def _driven_deviation_column(channel: str, column: str) -> ResultColumn:
+def _drive_deviation_column(channel: str, column: str) -> ResultColumn:
     about = f"largest difference of `{channel}` from golden, up to `{DRIVE_END_COLUMN}`"
     return ResultColumn(column, "number", UNIT_OF_CHANNEL, about, lambda f: f.dev.get(channel))
 
@@ -299,7 +299,7 @@ def alert_names_in(cell: str) -> tuple[str, ...]:
     return tuple(filter(None, cell.split(";")))
 
 
-def hazards_of_frame(frame: "pd.DataFrame") -> tuple[str, ...]:
+def hazard_names_of_frame(frame: "pd.DataFrame") -> tuple[str, ...]:
     """Return the hazards of a frame that `Results` read, in the order of run.json. MutatorError for a frame
     without them.
     """
@@ -329,7 +329,7 @@ def _cached_deviation_columns(channels: tuple[str, ...]) -> Mapping[str, str]:
     }
 
 
-def driven_column_by_channel(channels: Sequence[str]) -> dict[str, str]:
+def drive_deviation_column_by_channel(channels: Sequence[str]) -> dict[str, str]:
     """Map each compared channel to its `dev_` column, which exists if a hazard can end the drive."""
     return {
         name: column.removeprefix("max_") for name, column in deviation_column_by_channel(channels).items()
@@ -343,7 +343,7 @@ def check_column_names(manifest: TargetManifest) -> None:
     compared = [channel.name for channel in manifest.compared_channels]
     used_names = {column.name for column in result_columns((), compared, paths=True)}
     used_names |= {SEVERITY_COLUMN.name, *(column.name for column in TIME_TO_HAZARD_COLUMNS)}
-    used_names |= {*DERIVED_COLUMN_NAMES, DRIVE_END_COLUMN, *driven_column_by_channel(compared).values()}
+    used_names |= {*DERIVED_COLUMN_NAMES, DRIVE_END_COLUMN, *drive_deviation_column_by_channel(compared).values()}
     is_mapping = isinstance(manifest.source.data.get("hazards"), dict)
     for i, hazard in enumerate(manifest.hazard_names):
         names = {column.name for column in hazard_columns(hazard)}

@@ -14,7 +14,7 @@ _MOST_GROUP_ROWS = 1 << 20  # maximum number of rows in a row group (pyarrow's d
 _MOST_GROUP_CELLS = 1 << 23  # maximum number of cells in a row group, because a whole group is in memory
 
 ColumnType = Literal["text", "flag", "count", "number"]
-ARROW_TYPES = {"text": "string", "flag": "int8", "count": "int64", "number": "double"}
+ARROW_TYPE_BY_COLUMN_TYPE = {"text": "string", "flag": "int8", "count": "int64", "number": "double"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,17 +49,17 @@ def parquet_schema(columns: Sequence[TableColumn]) -> Any:
     """Return the Parquet schema of columns."""
     import pyarrow as pa
 
-    return pa.schema([(c.name, pa.type_for_alias(ARROW_TYPES[c.type])) for c in columns])
+    return pa.schema([(c.name, pa.type_for_alias(ARROW_TYPE_BY_COLUMN_TYPE[c.type])) for c in columns])
 
 
-class CsvTable:
+class CsvTableWriter:
     """A CSV file that begins with its column names."""
 
     def __init__(self, path: Path, columns: Sequence[TableColumn]) -> None:
         self._file = path.open("wb")
         self.append(csv_lines([[column.name for column in columns]]))
 
-    def __enter__(self) -> "CsvTable":
+    def __enter__(self) -> "CsvTableWriter":
         return self
 
     def append(self, lines: bytes) -> None:
@@ -69,7 +69,7 @@ class CsvTable:
         self._file.close()
 
 
-class ParquetTable:
+class ParquetTableWriter:
     """A Parquet file. Equal rows give equal bytes, regardless of the batches."""
 
     def __init__(self, path: Path, columns: Sequence[TableColumn]) -> None:
@@ -84,7 +84,7 @@ class ParquetTable:
         self._pending_rows = 0  # number of rows not yet written
         self._is_empty = True
 
-    def __enter__(self) -> "ParquetTable":
+    def __enter__(self) -> "ParquetTableWriter":
         return self
 
     def append(self, batch: Any) -> None:

@@ -15,7 +15,7 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
 from mutator.results import table_building
 from mutator.results.result_rows import ResultRow, rows_of
-from mutator.results.table_columns import FinishedExperiment, cells_of, result_columns_of
+from mutator.results.table_columns import FinishedExperiment, cells_by_column, result_columns_of
 from mutator.results.table_files import TableColumn, parquet_batch, parquet_schema
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
@@ -197,7 +197,7 @@ def frame_of_experiments(folder: RunFolder, experiments: Iterable[Experiment]) -
         if experiment.id in records
     )
     pieces = iter(lambda: list(islice(finished, _EXPERIMENTS_PER_BATCH)), [])
-    batches = [parquet_batch(columns, cells_of(columns, piece)) for piece in pieces]
+    batches = [parquet_batch(columns, cells_by_column(columns, piece)) for piece in pieces]
     return typed_frame(pa.Table.from_batches(batches, parquet_schema(columns)), folder.head.hazards)
 
 

@@ -10,7 +10,7 @@ from mutator.campaigns.plan import Plan
 from mutator.errors import CheckFailed
 from mutator.review.decisions import Review, ReviewState, load_review
 from mutator.review.mutant_groups import Group, groups_of_plan
-from mutator.store.approvals import SCHEMA
+from mutator.store.approvals import APPROVALS_SCHEMA
 from mutator.workspace import Workspace
 
 _MOST_PRINTED_IDS = 10  # maximum number of ids in one printed command
@@ -29,7 +29,7 @@ def require_approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
     if refused:
         raise _unapproved_error(workspace, plan, review, refused)
     decisions = [_approval_as_json(review, group) for group in groups]
-    return {"schema": SCHEMA, "target": manifest.name, "groups": decisions}
+    return {"schema": APPROVALS_SCHEMA, "target": manifest.name, "groups": decisions}
 
 
 def _approval_as_json(review: Review, group: Group) -> dict[str, Any]:

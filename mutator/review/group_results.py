@@ -8,8 +8,8 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from mutator.model import Fault, Outcome, Status
-from mutator.results.outcome_counting import UNUSABLE_STATUSES, endings_of_rows
-from mutator.results.ranking import ranks_of_rows
+from mutator.results.outcome_counting import UNUSABLE_STATUSES, outcome_or_status_of_rows
+from mutator.results.ranking import worst_first_ranks
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import Results
 from mutator.review.mutant_groups import Group
@@ -71,9 +71,9 @@ def _results_by_label(path: Path, table_mtime_ns: int) -> dict[str, GroupResults
     labels = {name: group_label(fault) for name, fault in faults.items()}
     label_by_row = [labels.get(name, "") for name in frame["fault_id"]]
     rows: dict[str, list[int]] = {}
-    for row in np.argsort(ranks_of_rows(frame)).tolist():  # worst first
+    for row in np.argsort(worst_first_ranks(frame)).tolist():  # worst first
         rows.setdefault(label_by_row[row], []).append(row)
-    ended = endings_of_rows(frame).tolist()
+    ended = outcome_or_status_of_rows(frame).tolist()
     return {
         label: _build_results(frame, ended, group_rows, about, faults)
         for label, group_rows in rows.items()

@@ -142,7 +142,7 @@ class RequestChecker:
         self, request: RerunRequest | FilmRequest | StillRequest, what: str, *arguments: str
     ) -> JobCommand:
         folder = self._existing_run_folder(request.run)
-        if request.experiment not in plan_file.ids(folder):
+        if request.experiment not in plan_file.experiment_ids(folder):
             raise MutatorError(
                 f"no experiment '{request.experiment}'",
                 where=request.run,

@@ -11,7 +11,7 @@ from urllib.parse import quote
 from mutator._common.confined_files import open_below
 from mutator._common.folder_search import RUN_HEAD_FILE
 from mutator.errors import MutatorError, NotServed, UnsafePath
-from mutator.results.outcome_counting import count_endings
+from mutator.results.outcome_counting import count_by_outcome_or_status
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 
@@ -84,7 +84,7 @@ def summarize_run(key: str, path: Path) -> dict[str, Any]:
         folder = RunFolder.open_unverified(path)
         facts |= {"campaign": folder.head.campaign, "target": folder.head.target}
         facts |= {
-            "planned": folder.planned_count,
+            "planned": folder.planned_experiment_count,
             "state": "finished" if folder.is_finished else "unfinished",
         }
         with suppress(FileNotFoundError):
@@ -101,7 +101,7 @@ def summarize_run(key: str, path: Path) -> dict[str, Any]:
 @lru_cache(maxsize=1000)
 def _count_outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
     """Count how the experiments ended. `mtime_ns` and `size` of the table are only keys of the cache."""
-    return count_endings(Results(run).frame("status", "outcome"))
+    return count_by_outcome_or_status(Results(run).frame("status", "outcome"))
 
 
 def open_served_file(run: Path, name: str) -> BinaryIO:

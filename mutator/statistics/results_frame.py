@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from mutator.results.outcome_counting import UNUSABLE_STATUSES
-from mutator.results.table_columns import hazards_of_frame
+from mutator.results.table_columns import hazard_names_of_frame
 from mutator.results.table_reader import Results
 
 _RANDOM_PREFIX = "random/"  # prefix of a random run's trigger: random/C1
@@ -70,4 +70,4 @@ def select_common_columns(frame: pd.DataFrame, *more_columns: str) -> pd.DataFra
 
 def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:
     """Return the hazards in the table, sorted. A hazard NEAR has a flag `near` and a time `t_near`."""
-    return tuple(sorted(hazards_of_frame(frame)))
+    return tuple(sorted(hazard_names_of_frame(frame)))

@@ -21,7 +21,7 @@ SCRATCH_FOLDER, DAMAGED_FOLDER, TRACES_FOLDER = "work", "damaged", "traces"
 SIGNATURE_FILES = ("seal.json", "seal.json.sig")
 _EXPORTED_TABLES = ("results", "propagation", "timings")
 ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any text, including folders
-    *(HEAD, file_digests.FILE, CAMPAIGN_FILE, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
+    *(HEAD, file_digests.DIGESTS_FILE, CAMPAIGN_FILE, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *SIGNATURE_FILES,
     *("golden/*/*", "patches/*.blocks"),
     *("records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
@@ -36,14 +36,14 @@ ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any
     ),
     *(f"{DAMAGED_FOLDER}/*", "owner.lock", "workers/*", f"{SCRATCH_FOLDER}/*"),
 )
-TOP_FOLDERS = {pattern.partition("/")[0] for pattern in ALLOWED_FILE_GLOBS if "/" in pattern}
-_ALL_FOLDERS = TOP_FOLDERS | {f"report/{name}" for name in ("series", "tables", "figures")}
+ALLOWED_TOP_FOLDERS = {pattern.partition("/")[0] for pattern in ALLOWED_FILE_GLOBS if "/" in pattern}
+_ALL_FOLDERS = ALLOWED_TOP_FOLDERS | {f"report/{name}" for name in ("series", "tables", "figures")}
 _ALL_FOLDERS |= {"series/kept", "exports/mcap"}
 # what targets wrote, and what `verify --repair` set aside; nothing in them is reached by its name
 _UNCHECKED_FOLDERS = (SCRATCH_FOLDER, DAMAGED_FOLDER, f"{TRACES_FOLDER}/*/{SCRATCH_FOLDER}")
 
 
-def check_contents(run: Path) -> None:
+def check_plain_contents(run: Path) -> None:
     """Raise UnsafePath for a link, a special file, an unprintable name, a file in place of a folder, folders
     nested too deeply, or two names that differ only in case.
 
@@ -63,9 +63,9 @@ def check_contents(run: Path) -> None:
             raise _outside_error(f"both {before!a} and {name!a}", run, "names that differ not only in case")
 
 
-def is_allowed_name(name: str) -> bool:
+def is_allowed_top_name(name: str) -> bool:
     """Whether a run folder can contain a folder or file of this name, which is not a path."""
-    return name in TOP_FOLDERS or any(
+    return name in ALLOWED_TOP_FOLDERS or any(
         fnmatchcase(name, pattern) for pattern in ALLOWED_FILE_GLOBS if "/" not in pattern
     )
 

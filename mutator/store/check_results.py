@@ -6,7 +6,7 @@ from mutator._common.files import read_json
 from mutator.store.run_folder import RunFolder
 
 SCHEMA = "checks/1"
-FILE = "checks.json"
+CHECKS_FILE = "checks.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,17 +18,17 @@ class CheckResult:
     detail: str
 
 
-def loaded_packages(folder: RunFolder) -> tuple[str, ...]:
-    path = folder.path / FILE
+def packages_loaded_by_golden_runs(folder: RunFolder) -> tuple[str, ...]:
+    path = folder.path / CHECKS_FILE
     return tuple(read_json(path, SCHEMA).get("packages", ())) if path.is_file() else ()
 
 
 def golden_digests(folder: RunFolder) -> dict[str, str]:
     """Return the digest of each golden run, by its key."""
-    return dict(read_json(folder.path / FILE, SCHEMA)["goldens"])
+    return dict(read_json(folder.path / CHECKS_FILE, SCHEMA)["goldens"])
 
 
-def measured_cpu_s(folder: RunFolder) -> float | None:
-    path = folder.path / FILE
+def mean_golden_run_cpu_s(folder: RunFolder) -> float | None:
+    path = folder.path / CHECKS_FILE
     run_cpu_s = read_json(path, SCHEMA).get("run_cpu_s") if path.is_file() else None
     return run_cpu_s if isinstance(run_cpu_s, int | float) else None

@@ -113,8 +113,8 @@ class Segment:
 
     path: Path
     lines: Mapping[int, bytes]
-    damaged_lines: tuple[int, ...]
-    end_offset: int
+    damaged_line_numbers: tuple[int, ...]
+    complete_lines_end: int
 
     def damage_error(self, number: int) -> MutatorError:
         run = self.path.parent.parent
@@ -127,7 +127,7 @@ class Segment:
             remedy=mend,
         )
 
-    def content(self, number: int) -> dict[str, Any]:
+    def parse_line(self, number: int) -> dict[str, Any]:
         """Return the object on a line, without its checksum; MutatorError if the line is not an object."""
         try:
             value = json.loads(self.lines[number])
@@ -145,7 +145,7 @@ class Segment:
         """Raise MutatorError for another schema, or a file that was written under another name."""
         if 1 not in self.lines:
             return
-        head = self.content(1)
+        head = self.parse_line(1)
         check_schema(head.get("schema"), expected_schema, self.path)
         if head.get("file") != _name_with_folder(self.path):
             raise MutatorError(
@@ -160,10 +160,10 @@ class Segment:
 
         MutatorError for damage, or another schema or file name.
         """
-        if self.damaged_lines:
-            raise self.damage_error(self.damaged_lines[0])
+        if self.damaged_line_numbers:
+            raise self.damage_error(self.damaged_line_numbers[0])
         self.check_head(schema)
-        yield from ((number, self.content(number)) for number in self.lines if number > 1)
+        yield from ((number, self.parse_line(number)) for number in self.lines if number > 1)
 
 
 def read_segment(path: Path, data: bytes | None = None) -> Segment:
@@ -181,7 +181,7 @@ def read_segment(path: Path, data: bytes | None = None) -> Segment:
         else:
             damaged.append(number)
         last_checksum = line[_CHECKSUM_SLICE]
-    return Segment(path=path, lines=lines, damaged_lines=tuple(damaged), end_offset=end)
+    return Segment(path=path, lines=lines, damaged_line_numbers=tuple(damaged), complete_lines_end=end)
 
 
 def verified_lines(path: Path, schema: str) -> Iterator[tuple[int, int, bytes]]:
@@ -196,9 +196,9 @@ def verified_lines(path: Path, schema: str) -> Iterator[tuple[int, int, bytes]]:
                 return
             data = line[:-1]
             if not _is_intact(last_checksum, data):
-                raise bare_segment(path).damage_error(number)
+                raise unread_segment(path).damage_error(number)
             if number == 1:
-                bare_segment(path, {1: data}).check_head(schema)
+                unread_segment(path, {1: data}).check_head(schema)
             else:
                 yield number, offset, data
             last_checksum = line[_CHECKSUM_SLICE]
@@ -216,8 +216,8 @@ def intact_lines(path: Path) -> Iterator[tuple[int, bytes]]:
             last_checksum = line[_CHECKSUM_SLICE]
 
 
-def bare_segment(path: Path, lines: Mapping[int, bytes] | None = None) -> Segment:
-    return Segment(path=path, lines=lines or {}, damaged_lines=(), end_offset=0)
+def unread_segment(path: Path, lines: Mapping[int, bytes] | None = None) -> Segment:
+    return Segment(path=path, lines=lines or {}, damaged_line_numbers=(), complete_lines_end=0)
 
 
 def _is_intact(last_checksum: bytes, line: bytes) -> bool:
@@ -249,7 +249,7 @@ def line_file_bytes(path: Path, head: Mapping[str, Any], values: Iterable[Mappin
     return b"".join(lines)
 
 
-def write_with_new_head(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> None:
+def write_lines_with_new_head(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> None:
     """Write a file with a new head, then lines of other files, with new checksums."""
     head_line = _checksummed_line(b"", canonical_json(_head_with_file_name(path, head)).encode()[1:])
     with writing_atomic(path) as file:

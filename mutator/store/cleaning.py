@@ -14,12 +14,12 @@ from mutator._common.folder_locks import owning_run_folder
 from mutator.errors import MutatorError
 from mutator.store.allowed_contents import (
     ALLOWED_FILE_GLOBS,
-    TOP_FOLDERS,
-    check_contents,
+    ALLOWED_TOP_FOLDERS,
+    check_plain_contents,
     is_unchecked_folder,
 )
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import HEAD, SCHEMA
+from mutator.store.run_head import HEAD, RUN_SCHEMA
 
 _MOST_NAMES_SHOWN = 3
 _DELETION_TRIES, _RETRY_PAUSE_S = 50, 0.1  # 5 s in all: a large run has thousands of files
@@ -94,8 +94,8 @@ def list_deletable_files(path: Path) -> list[Path]:
             expected="a run folder",
             remedy="delete it yourself",
         )
-    check_contents(path)
-    read_json(path / HEAD, SCHEMA)
+    check_plain_contents(path)
+    read_json(path / HEAD, RUN_SCHEMA)
     run_files, other_entries = _split_by_origin(path)
     if other_entries:
         names = [str(entry.relative_to(path)) for entry in sorted(other_entries)]
@@ -137,7 +137,7 @@ def _split_by_origin(path: Path) -> tuple[list[Path], list[Path]]:
             if (
                 is_folder
                 and not is_unchecked_folder(relative_name)
-                and relative_name.partition("/")[0] in TOP_FOLDERS
+                and relative_name.partition("/")[0] in ALLOWED_TOP_FOLDERS
             ):
                 continue
             if (

@@ -31,7 +31,7 @@ from mutator._common.hashing import digest
 from mutator.errors import MutatorError, UnsafePath
 from mutator.store.checksummed_lines import read_segment
 
-SCHEMA, FILE = "digests/1", "digests.json"
+DIGESTS_SCHEMA, DIGESTS_FILE = "digests/1", "digests.json"
 _MIN_BYTES_FOR_THREADS = 20_000_000  # the least number of bytes for which threads save time
 # folders of append-only files; digests are added when the files are closed
 SEGMENT_FOLDERS = ("records", "proof")
@@ -159,11 +159,11 @@ class DigestLedger:
 
 def load_ledger(run: Path) -> DigestLedger:
     """Read the ledger of a run folder; MutatorError if it is missing or changed."""
-    path = run / FILE
+    path = run / DIGESTS_FILE
     remedy = "restore it from a copy of the run folder; without it, changed results cannot be detected"
     if not path.is_file():
         raise MutatorError("missing", where=path, expected="the digests of all files", remedy=remedy)
-    data = read_json(path, SCHEMA)
+    data = read_json(path, DIGESTS_SCHEMA)
     as_written = read_bounded(path, MOST_JSON_BYTES) == json_bytes(data)
     if data.pop("sum", None) != digest(data) or not as_written:
         raise MutatorError(
@@ -174,7 +174,7 @@ def load_ledger(run: Path) -> DigestLedger:
         )
     try:
         for name in (*data["files"], *data["rewriting"]):
-            if not is_ledger_name(checked_relative_path(name, path)):
+            if not can_be_in_ledger(checked_relative_path(name, path)):
                 raise UnsafePath(f"names {name!a}", where=path, expected="files of a run", remedy=remedy)
         return DigestLedger(
             files={name: FileDigest(**value) for name, value in data["files"].items()},
@@ -185,7 +185,7 @@ def load_ledger(run: Path) -> DigestLedger:
         raise MutatorError(f"not a list of digests ({err})", where=path, remedy=remedy) from None
 
 
-def is_ledger_name(name: str) -> bool:
+def can_be_in_ledger(name: str) -> bool:
     """Whether the ledger has the digest of the file of this name in a run folder."""
     return bool(_LEDGER_NAME_PATTERN.fullmatch(name))
 
@@ -200,14 +200,14 @@ def is_ledger_unchanged(run: Path, ledger: DigestLedger) -> bool:
 
 def save_ledger(run: Path, ledger: DigestLedger) -> None:
     data: dict[str, Any] = {
-        "schema": SCHEMA,
+        "schema": DIGESTS_SCHEMA,
         "finished": ledger.finished,
         "files": {name: _as_json(ledger.files[name]) for name in sorted(ledger.files)},
         "rewriting": {
             name: new_digest and _as_json(new_digest) for name, new_digest in sorted(ledger.rewriting.items())
         },
     }
-    write_json(run / FILE, {"schema": SCHEMA, "sum": digest(data), **data})
+    write_json(run / DIGESTS_FILE, {"schema": DIGESTS_SCHEMA, "sum": digest(data), **data})
 
 
 def _as_json(file_digest: FileDigest) -> dict[str, Any]:
@@ -215,7 +215,7 @@ def _as_json(file_digest: FileDigest) -> dict[str, Any]:
 
 
 @contextmanager
-def rewriting_files(
+def announcing_rewrites(
     run: Path, new_digests: Mapping[str, FileDigest | None], *, finished: bool | None = None
 ) -> Iterator[None]:
     """Announce that the `with` block changes files (None: deletes them); confirm the changes at its end.
@@ -237,7 +237,7 @@ def rewriting_files(
 
 
 def rewrite_file(run: Path, name: str, data: bytes) -> None:
-    with rewriting_files(run, {name: FileDigest.of_bytes(data)}):
+    with announcing_rewrites(run, {name: FileDigest.of_bytes(data)}):
         write_below(run, name, data)
 
 
@@ -254,7 +254,7 @@ def settled_ledger(run: Path) -> DigestLedger:
     return replace(ledger, files=files, rewriting={})
 
 
-def close_segments(run: Path, *, finished: bool | None = None) -> None:
+def add_segments_to_ledger(run: Path, *, finished: bool | None = None) -> None:
     """Cut a torn last line off each new segment, and add the segment's digest to the ledger.
 
     `finished`: whether the run is now finished (None: unchanged). MutatorError for a damaged line.
@@ -263,7 +263,7 @@ def close_segments(run: Path, *, finished: bool | None = None) -> None:
     files = dict(before.files)
     for name in list_segments(run):
         if name not in files:
-            files[name] = _close_segment(run, name)
+            files[name] = _trim_segment(run, name)
     after = replace(before, files=files, finished=before.finished if finished is None else finished)
     if after != load_ledger(run):
         save_ledger(run, after)
@@ -273,13 +273,13 @@ def list_segments(run: Path) -> list[str]:
     return sorted(f"{kind}/{path.name}" for kind in SEGMENT_FOLDERS for path in (run / kind).glob("*.jsonl"))
 
 
-def _close_segment(run: Path, name: str) -> FileDigest:
+def _trim_segment(run: Path, name: str) -> FileDigest:
     with open_below(run, name) as file:
         data = read_open_file(file, path_below(run, name), MOST_EXPERIMENT_DATA_BYTES)
         os.fsync(file.fileno())  # the ledger must not name bytes that a power cut can still take
     segment = read_segment(path_below(run, name), data)
-    if segment.damaged_lines:
-        raise segment.damage_error(segment.damaged_lines[0])
-    if segment.end_offset < len(data):  # not cut in place: the file can have a second name elsewhere
-        write_below(run, name, data[: segment.end_offset])
-    return FileDigest.of_bytes(data[: segment.end_offset], lines=len(segment.lines))
+    if segment.damaged_line_numbers:
+        raise segment.damage_error(segment.damaged_line_numbers[0])
+    if segment.complete_lines_end < len(data):  # not cut in place: the file can have a second name elsewhere
+        write_below(run, name, data[: segment.complete_lines_end])
+    return FileDigest.of_bytes(data[: segment.complete_lines_end], lines=len(segment.lines))

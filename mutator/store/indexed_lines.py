@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 from mutator._common.hashing import parse_json
 from mutator.errors import MutatorError
-from mutator.store.checksummed_lines import bare_segment, verified_lines
+from mutator.store.checksummed_lines import unread_segment, verified_lines
 
 _MOST_OPEN_FILES = 16  # each worker of each session wrote a file: all open could exceed a process's limit
 # In a line of canonical JSON, this matches once: quotation marks inside a string are escaped.
@@ -59,12 +59,12 @@ class IndexedLines(Mapping[str, T], Generic[T]):
             if place == len(self._offsets):
                 for column in (self._file_numbers, self._line_numbers, self._offsets, self._lengths):
                     column.append(0)
-            elif not replaces(IndexedLine(path, number, data), self.line_of(name)):
+            elif not replaces(IndexedLine(path, number, data), self.read_line(name)):
                 continue
             self._file_numbers[place], self._line_numbers[place] = file, number
             self._offsets[place], self._lengths[place] = offset, len(data)
 
-    def line_of(self, experiment_id: str) -> "IndexedLine":
+    def read_line(self, experiment_id: str) -> "IndexedLine":
         at = self._index[experiment_id]
         file = self._file_numbers[at]
         data = self._files.read_part(file, self._offsets[at], self._lengths[at])
@@ -73,11 +73,11 @@ class IndexedLines(Mapping[str, T], Generic[T]):
     def __getitem__(self, name: str) -> T:
         last = self._last_parsed  # another thread can replace it in the meantime
         if last is None or last[0] != name:
-            self._last_parsed = last = name, self._parse_line_of(name)
+            self._last_parsed = last = name, self._read_and_parse_line(name)
         return last[1]
 
-    def _parse_line_of(self, experiment_id: str) -> T:
-        line = self.line_of(experiment_id)
+    def _read_and_parse_line(self, experiment_id: str) -> T:
+        line = self.read_line(experiment_id)
         try:
             return self._parse(line.content())
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
@@ -96,7 +96,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         return self._damage_error(line.path, line.number)
 
     def _damage_error(self, path: Path, number: int) -> MutatorError:
-        return bare_segment(path).damage_error(number)
+        return unread_segment(path).damage_error(number)
 
 
 class IndexedLine:

@@ -14,18 +14,18 @@ from mutator._common.hashing import digest
 from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.store import file_digests, plan_file, verified_runs_cache
-from mutator.store.checksummed_lines import Segment, bare_segment, intact_lines, read_segment
+from mutator.store.checksummed_lines import Segment, unread_segment, intact_lines, read_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.patch_files import PatchFolder
-from mutator.store.records import SCHEMA, parse_ending, second_record_error
+from mutator.store.records import RECORDS_SCHEMA, parse_ending, second_record_error
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RunHead
 from mutator.store.shards import Shard
 
 # folders in which a finished run has no unknown files
-CLOSED_FOLDERS = ("plan", "golden", *file_digests.SEGMENT_FOLDERS)
+FULLY_DIGESTED_FOLDERS = ("plan", "golden", *file_digests.SEGMENT_FOLDERS)
 # files that cannot be recreated
 IRREPLACEABLE_FILES = (HEAD, CAMPAIGN_FILE, plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE)
-TOP_FILES = (HEAD, CAMPAIGN_FILE, "plan.csv", "checks.json", "reviewed.json")
+DIGESTED_TOP_FILES = (HEAD, CAMPAIGN_FILE, "plan.csv", "checks.json", "reviewed.json")
 _MOST_NAMED_EXPERIMENTS = 5  # in one message: the ids of a million experiments would fill it
 
 
@@ -44,7 +44,7 @@ def run_problems(
     if ledger.finished:
         unexpected = [
             MutatorError(
-                f"not named in {file_digests.FILE}",
+                f"not named in {file_digests.DIGESTS_FILE}",
                 where=path,
                 expected="only files that the finished run wrote",
                 remedy=_remedy(run, ""),
@@ -69,7 +69,7 @@ def run_problems(
         verified_runs_cache.remember_facts(key, verified=True)
 
 
-def verified_content_key(run: Path) -> str:
+def verified_cache_key(run: Path) -> str:
     """Return the key of a finished run folder's verified content in the cache `verified_runs`.
 
     The key is empty if the run is not finished or does not match its digests.
@@ -91,8 +91,8 @@ def current_digests_of(run: Path, ledger: DigestLedger) -> dict[str, FileDigest 
 
 def cache_key_of(run: Path, current_digests: Mapping[str, FileDigest | None]) -> str:
     """Return the `verified_runs_cache.key_of` of these files and the ledger."""
-    ledger = FileDigest.of_file(run / file_digests.FILE)
-    with_ledger = {**current_digests, file_digests.FILE: ledger}
+    ledger = FileDigest.of_file(run / file_digests.DIGESTS_FILE)
+    with_ledger = {**current_digests, file_digests.DIGESTS_FILE: ledger}
     return verified_runs_cache.cache_key(
         {name: file_digest.sha256 if file_digest else None for name, file_digest in with_ledger.items()}
     )
@@ -105,7 +105,7 @@ def planned_positions(run: Path, head: RunHead, shard: Shard | None) -> dict[str
     """
     path = run / plan_file.EXPERIMENTS_FILE
     positions: dict[str, int] = {}
-    for place, name in enumerate(plan_file.ids(run)):
+    for place, name in enumerate(plan_file.experiment_ids(run)):
         if positions.setdefault(name, place) != place:
             raise MutatorError(
                 f"duplicate experiment {name}", where=path, line=place + 1, remedy=_remedy(run, HEAD)
@@ -135,7 +135,7 @@ def file_problems(
             yield MutatorError(
                 "missing",
                 where=path_below(run, name),
-                expected=f"the file named in {file_digests.FILE}",
+                expected=f"the file named in {file_digests.DIGESTS_FILE}",
                 remedy=_remedy(run, name),
             )
         else:
@@ -148,8 +148,8 @@ def _changed_file_problems(
     path = path_below(run, name)
     if expected.lines is not None:
         segment = read_segment(path)
-        if segment.damaged_lines:
-            yield from map(segment.damage_error, segment.damaged_lines)
+        if segment.damaged_line_numbers:
+            yield from map(segment.damage_error, segment.damaged_line_numbers)
             return
         got = f"{counted(len(segment.lines), 'line')}, all with their checksums"
         yield MutatorError(
@@ -195,14 +195,14 @@ def _open_segment_problems(run: Path, ledger: DigestLedger) -> Iterator[MutatorE
             except MutatorError as err:
                 yield err
                 continue
-            yield from map(segment.damage_error, segment.damaged_lines)
+            yield from map(segment.damage_error, segment.damaged_line_numbers)
 
 
 def unexpected_files(run: Path, ledger: DigestLedger) -> Iterator[Path]:
     """Yield files that a finished run's ledger does not name, in folders where it must name all."""
     ledger_names = {*ledger.files, *ledger.rewriting}
-    paths = [run / name for name in TOP_FILES]
-    paths += [path for folder in CLOSED_FOLDERS for path in sorted((run / folder).rglob("*"))]
+    paths = [run / name for name in DIGESTED_TOP_FILES]
+    paths += [path for folder in FULLY_DIGESTED_FOLDERS for path in sorted((run / folder).rglob("*"))]
     for path in paths:
         is_expected = path.relative_to(run).as_posix() in ledger_names or is_half_written(path.name)
         if path.is_file() and not is_expected:
@@ -214,11 +214,11 @@ def record_problems(
 ) -> Iterator[MutatorError]:
     """Yield a problem for each unplanned, duplicate or missing record."""
     patches = PatchFolder(run)
-    patch_digests = dict(patches.digests())
+    patch_digests = dict(patches.experiment_digest_pairs())
     for kind in file_digests.SEGMENT_FOLDERS:
         finals: dict[str, int] = {}  # id -> hash of its final record
         for path in sorted((run / kind).glob("*.jsonl")):
-            segment, lines = bare_segment(path), intact_lines(path)
+            segment, lines = unread_segment(path), intact_lines(path)
             try:
                 yield from _segment_head_problem(segment, lines, head.plan)
                 for number, name, patch, content in _final_records(segment, lines, planned):
@@ -257,8 +257,8 @@ def _segment_head_problem(segment: Segment, lines: _NumberedLines, plan: str) ->
         return
     with_head = replace(segment, lines={1: line})
     try:
-        with_head.check_head(SCHEMA)
-        if (head_plan := with_head.content(1).get("plan")) != plan:
+        with_head.check_head(RECORDS_SCHEMA)
+        if (head_plan := with_head.parse_line(1).get("plan")) != plan:
             yield MutatorError(
                 f"records of plan {str(head_plan)[:16]}",
                 where=segment.path,
@@ -291,7 +291,7 @@ def _final_records(
             yield number, problem, "", 0
         elif ending.is_final:
             # a hash of 8 bytes is enough to tell two records of this process apart, for a million of them
-            yield number, ending.experiment_id, ending.patch, hash(segment.without_checksum(line))
+            yield number, ending.experiment_id, ending.patch_digest, hash(segment.without_checksum(line))
 
 
 def patch_problems(
@@ -307,7 +307,7 @@ def patch_problems(
             f"the patch of {experiment_id} is not the one that was run: SHA-256 {stored_digest[:16]}"
             if stored_digest
             else f"no patch of {experiment_id}",
-            where=patches.file_of(experiment_id, worker),
+            where=patches.expected_file_of(experiment_id, worker),
             expected=f"SHA-256 {recorded_digest[:16]}, as in the record",
             remedy=_remedy(patches.run, ""),
         )

@@ -15,7 +15,7 @@ from mutator._common.files import write_atomic
 from mutator._common.hashing import digest
 from mutator.store.checksummed_blocks import Block, BlockWriter, block_bytes, intact_blocks, read_blocks
 
-FOLDER, SUFFIX = "patches", ".blocks"
+PATCHES_FOLDER, PATCH_FILE_SUFFIX = "patches", ".blocks"
 # kinds of blocks: a complete patch, or a difference from the last complete one
 COMPLETE_BLOCK, DELTA_BLOCK = 0, 1
 _DEFLATE_WINDOW_BYTES = 32_768  # window size of deflate, in bytes
@@ -46,7 +46,7 @@ class PatchWriter:
     """Append the patches of a worker."""
 
     def __init__(self, run: Path, worker: str) -> None:
-        self._path = path_below(run / FOLDER, f"{worker}{SUFFIX}")
+        self._path = path_below(run / PATCHES_FOLDER, f"{worker}{PATCH_FILE_SUFFIX}")
         self._blocks: BlockWriter | None = None  # nothing appended yet
         self._packer = _PatchPacker()
 
@@ -82,7 +82,7 @@ class _CompletePatch:
         return decompress_bounded(self._block.data, MOST_PATCH_BYTES)
 
     @cached_property
-    def shared_end(self) -> bytes:
+    def delta_dictionary(self) -> bytes:
         """The part to which other patches refer."""
         return self.data[-_DEFLATE_WINDOW_BYTES:]
 
@@ -101,7 +101,7 @@ def _unpack_patch(block: Block, complete: _CompletePatch | None) -> bytes | None
     try:
         if block.kind == COMPLETE_BLOCK or complete is None:
             return decompress_bounded(block.data, MOST_PATCH_BYTES)
-        return decompress_bounded(block.data, MOST_PATCH_BYTES, complete.shared_end)
+        return decompress_bounded(block.data, MOST_PATCH_BYTES, complete.delta_dictionary)
     except (zlib.error, ValueError):
         return None
 
@@ -118,7 +118,7 @@ class PatchFolder:
         patch = self._patches_by_experiment.get(experiment_id)
         return None if patch is None else _unpack_patch(patch.block, patch.complete)
 
-    def digests(self) -> Iterator[tuple[str, str]]:
+    def experiment_digest_pairs(self) -> Iterator[tuple[str, str]]:
         """Yield each experiment that has a packed patch, and its SHA-256 (empty if damaged), oldest first."""
         for path in filter(Path.is_file, self.block_files()):
             complete: _CompletePatch | None = None
@@ -127,7 +127,7 @@ class PatchFolder:
                 data = _unpack_patch(block, complete)
                 yield block.key, "" if data is None else digest(data)
 
-    def file_of(self, experiment_id: str, worker: str = "") -> Path:
+    def expected_file_of(self, experiment_id: str, worker: str = "") -> Path:
         """Return the file that contains, or should contain, an experiment's patch.
 
         If the patch is not stored, return a damaged file; if none is damaged, the file of `worker`, if given,
@@ -137,12 +137,12 @@ class PatchFolder:
         if patch is not None:
             return patch.path
         damaged = (path for path in self.block_files() if not path.is_file() or read_blocks(path).is_damaged)
-        expected_path = path_below(self.run / FOLDER, f"{worker}{SUFFIX}") if worker else self.run / FOLDER
+        expected_path = path_below(self.run / PATCHES_FOLDER, f"{worker}{PATCH_FILE_SUFFIX}") if worker else self.run / PATCHES_FOLDER
         return next(damaged, expected_path)
 
     def block_files(self) -> list[Path]:
         """Return the block files, oldest session first. A folder with such a name is included."""
-        return sorted((self.run / FOLDER).glob(f"*{SUFFIX}"))
+        return sorted((self.run / PATCHES_FOLDER).glob(f"*{PATCH_FILE_SUFFIX}"))
 
     @cached_property
     def _patches_by_experiment(self) -> dict[str, _StoredPatch]:

@@ -15,13 +15,13 @@ from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.store.plan_lines import (
-    REMEDY,
+    DAMAGED_PLAN_REMEDY,
     experiment_from_json,
     fault_from_json,
     id_on_line,
     parse_experiment,
     parse_fault,
-    values_behind_id,
+    values_hashed_into_id,
 )
 
 EXPERIMENTS_FILE = "plan/experiments.jsonl"
@@ -80,7 +80,7 @@ _NumberedLines = Iterable[tuple[int | None, bytes]]  # line number, if known, an
 
 
 def _numbered_lines(path: Path) -> _NumberedLines:
-    return enumerate(read_lines(path), start=1)
+    return enumerate(read_plan_lines(path), start=1)
 
 
 def _parse_lines(path: Path, lines: _NumberedLines, parse: Callable[[bytes], _T]) -> Iterator[_T]:
@@ -112,13 +112,13 @@ def load_faults(run: Path) -> dict[str, Fault]:
 
 def fault_line_by_id(run: Path) -> dict[str, bytes]:
     """Return the unparsed lines of the plan's faults by id, which is the digest of the line."""
-    lines = (line.rstrip(b"\n") for line in read_lines(run / FAULTS_FILE))
+    lines = (line.rstrip(b"\n") for line in read_plan_lines(run / FAULTS_FILE))
     return {sha256(line).hexdigest()[:16]: line for line in lines}
 
 
-def experiment_lines(run: Path, selected_ids: Container[str]) -> Iterator[bytes]:
-    lines = read_lines(run / EXPERIMENTS_FILE)
-    return (line.rstrip(b"\n") for name, line in zip(ids(run), lines, strict=True) if name in selected_ids)
+def selected_experiment_lines(run: Path, selected_ids: Container[str]) -> Iterator[bytes]:
+    lines = read_plan_lines(run / EXPERIMENTS_FILE)
+    return (line.rstrip(b"\n") for name, line in zip(experiment_ids(run), lines, strict=True) if name in selected_ids)
 
 
 def read_chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
@@ -136,7 +136,7 @@ def load_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> 
     )
     if len(experiments) != count:
         got = f"{counted(len(experiments), 'experiment')} in a chunk of {count}"
-        raise MutatorError(got, where=path, remedy=REMEDY)
+        raise MutatorError(got, where=path, remedy=DAMAGED_PLAN_REMEDY)
     return experiments
 
 
@@ -144,7 +144,7 @@ def load_experiments(run: Path) -> tuple[Experiment, ...]:
     return tuple(iterate_experiments(run))
 
 
-class ExperimentsInOrder(Sequence[Experiment]):
+class ExperimentsReadOnAccess(Sequence[Experiment]):
     """Every experiment in plan order, read on access, because a plan can have a million experiments."""
 
     def __init__(self, run: Path, chunks: Sequence[Chunk]) -> None:
@@ -179,12 +179,12 @@ def iterate_experiments(run: Path) -> Iterator[Experiment]:
     yield from _parse_experiments(path, _numbered_lines(path), load_faults(run))
 
 
-def read_lines(path: Path) -> Iterator[bytes]:
+def read_plan_lines(path: Path) -> Iterator[bytes]:
     try:
         with open_regular(path) as file:
             yield from read_bounded_lines(file, path)
     except OSError as err:
-        raise MutatorError(f"cannot be read ({err.strerror})", where=path, remedy=REMEDY) from None
+        raise MutatorError(f"cannot be read ({err.strerror})", where=path, remedy=DAMAGED_PLAN_REMEDY) from None
 
 
 def parse_experiment_line(path: Path, number: int, line: bytes, faults: Mapping[str, Fault]) -> Experiment:
@@ -198,7 +198,7 @@ def _parse_experiments(
     return _parse_lines(path, lines, partial(parse_experiment, faults=faults))
 
 
-def ids(run: Path) -> Iterator[str]:
+def experiment_ids(run: Path) -> Iterator[str]:
     path = run / EXPERIMENTS_FILE
     return _parse_lines(path, _numbered_lines(path), id_on_line)
 
@@ -208,13 +208,13 @@ def plan_problems(run: Path) -> Iterator[MutatorError]:
     experiments_path, faults_path = run / EXPERIMENTS_FILE, run / FAULTS_FILE
     faults_or_errors = list(_parsed_or_error(faults_path, parse_fault))
     faults = {fault.id: fault for fault in faults_or_errors if isinstance(fault, Fault)}
-    used = set(_parsed_or_error(experiments_path, lambda line: values_behind_id(line)["fault"]))
+    used = set(_parsed_or_error(experiments_path, lambda line: values_hashed_into_id(line)["fault"]))
     for number, fault in enumerate(faults_or_errors, start=1):
         if isinstance(fault, MutatorError):
             yield fault
         elif fault.id not in used:
             got = f"fault {fault.id}, which no experiment uses"
-            yield MutatorError(got, where=faults_path, line=number, remedy=REMEDY)
+            yield MutatorError(got, where=faults_path, line=number, remedy=DAMAGED_PLAN_REMEDY)
     experiments = _parsed_or_error(experiments_path, partial(parse_experiment, faults=faults))
     yield from (experiment for experiment in experiments if isinstance(experiment, MutatorError))
 
@@ -244,4 +244,4 @@ def canary_from_json(head_path: Path, data: Mapping[str, Any]) -> Experiment:
         fault = fault_from_json(data["fault"])
         return experiment_from_json({**data, "fault": fault.id}, {fault.id: fault})
     except (MutatorError, ValueError, LookupError, TypeError, AttributeError) as err:
-        raise MutatorError(f"damaged at 'canary' ({err})", where=head_path, remedy=REMEDY) from None
+        raise MutatorError(f"damaged at 'canary' ({err})", where=head_path, remedy=DAMAGED_PLAN_REMEDY) from None

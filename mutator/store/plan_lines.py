@@ -27,7 +27,7 @@ from mutator.model import (
     Trigger,
 )
 
-REMEDY = "the plan is damaged: restore the file from a copy of the run folder, or plan into a new one"
+DAMAGED_PLAN_REMEDY = "the plan is damaged: restore the file from a copy of the run folder, or plan into a new one"
 _PARSE_ERRORS = (ValueError, LookupError, TypeError, AttributeError, RecursionError)
 
 # A plan can have a million lines. Patterns read a line in canonical JSON in a third of the time that a JSON
@@ -52,7 +52,7 @@ def id_on_line(line: bytes) -> str:
     return _parse_json_line(line, lambda data: _checked_id(data["id"]))
 
 
-def values_behind_id(line: bytes) -> dict[str, Any]:
+def values_hashed_into_id(line: bytes) -> dict[str, Any]:
     """Return the values on a line that determine its id, as JSON types. They are not compared with the id."""
     return _parse_json_line(line, lambda data: {name: data[name] for name in _ID_FIELDS})
 
@@ -75,7 +75,7 @@ def _parse_json_line(line: bytes, convert: Callable[[dict[str, Any]], _T]) -> _T
     try:
         return convert(json.loads(line))
     except _PARSE_ERRORS:
-        raise MutatorError("a damaged line", remedy=REMEDY) from None
+        raise MutatorError("a damaged line", remedy=DAMAGED_PLAN_REMEDY) from None
 
 
 def _checked_id(name: object) -> str:
@@ -144,7 +144,7 @@ def experiment_from_json(data: Mapping[str, Any], faults: Mapping[str, Fault]) -
     """Read the experiment on a line; MutatorError if its id does not match, or for an unknown field."""
     if data["fault"] not in faults:
         raise MutatorError(
-            f"fault {data['fault']} is missing from plan/faults.jsonl, or was changed there", remedy=REMEDY
+            f"fault {data['fault']} is missing from plan/faults.jsonl, or was changed there", remedy=DAMAGED_PLAN_REMEDY
         )
     checked_name_not_path(str(data["scenario"]), "plan")
     trigger = data["trigger"]
@@ -162,7 +162,7 @@ def experiment_from_json(data: Mapping[str, Any], faults: Mapping[str, Fault]) -
         raise MutatorError(
             f"experiment {data['id']} has the content of {experiment.id}",
             expected="the content from which the id was made",
-            remedy=REMEDY,
+            remedy=DAMAGED_PLAN_REMEDY,
         )
     return experiment
 

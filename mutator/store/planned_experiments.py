@@ -24,7 +24,7 @@ class PlannedExperiments(Mapping[str, Experiment]):
         self._index: dict[str, int] = {}
         self._offsets = array("Q", [0])
         offset = 0
-        for number, line in enumerate(plan_file.read_lines(self._path)):
+        for number, line in enumerate(plan_file.read_plan_lines(self._path)):
             self._offsets.append(offset := offset + len(line))
             try:
                 name = id_on_line(line)

@@ -13,9 +13,9 @@ from mutator.model import Activation, Outcome, Record, RunError, Status
 from mutator.store.indexed_lines import IndexedLine, IndexedLines
 from mutator.store.timings import TIMINGS_FOLDER, TIMINGS_SCHEMA
 
-SCHEMA = "records/2"
+RECORDS_SCHEMA = "records/2"
 RECORDS_FOLDER, PROOF_FOLDER = "records", "proof"  # folders of files of lines
-LINE_SCHEMA_BY_FOLDER = {RECORDS_FOLDER: SCHEMA, TIMINGS_FOLDER: TIMINGS_SCHEMA, PROOF_FOLDER: SCHEMA}
+LINE_SCHEMA_BY_FOLDER = {RECORDS_FOLDER: RECORDS_SCHEMA, TIMINGS_FOLDER: TIMINGS_SCHEMA, PROOF_FOLDER: RECORDS_SCHEMA}
 _RECORD_FIELDS = tuple(field.name for field in fields(Record))
 _DATACLASS_FIELDS = ("activation", "error")  # fields that contain dataclasses
 
@@ -59,7 +59,7 @@ class RecordEnding(NamedTuple):
     experiment_id: str
     status: str
     outcome: str | None
-    patch: str
+    patch_digest: str
 
     @property
     def is_final(self) -> bool:
@@ -94,7 +94,7 @@ def parse_ending(line: bytes) -> RecordEnding:
 def endings_of(records: Mapping[str, Record]) -> Iterator[RecordEnding]:
     for name in records:
         if isinstance(records, IndexedLines):
-            line = records.line_of(name)
+            line = records.read_line(name)
             try:
                 yield parse_ending(line.data)
             except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
@@ -113,7 +113,7 @@ def load_records(run: Path, folder: str = "records") -> IndexedLines[Record]:
     for a second final record of an experiment; CheckFailed if the two differ.
     """
     paths = sorted(path_below(run, folder).glob("*.jsonl"))
-    return IndexedLines(paths, SCHEMA, record_from_json, _replaces)
+    return IndexedLines(paths, RECORDS_SCHEMA, record_from_json, _replaces)
 
 
 def _replaces(line: IndexedLine, earlier: IndexedLine) -> bool:

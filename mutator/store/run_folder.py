@@ -17,17 +17,17 @@ from mutator._common.hashing import as_json_types
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import file_digests, integrity, plan_file
-from mutator.store.allowed_contents import SCRATCH_FOLDER, TRACES_FOLDER, check_contents
+from mutator.store.allowed_contents import SCRATCH_FOLDER, TRACES_FOLDER, check_plain_contents
 from mutator.store.patch_files import PatchFolder
 from mutator.store.records import load_records
 from mutator.store.run_head import HEAD, RunHead, StoredGolden, load_head
 from mutator.store.shards import Shard
 from mutator.store.timings import load_timings
-from mutator.store.work_stretches import Stretch
+from mutator.store.work_stretches import SessionEnvironment
 from mutator.targets.contact_severity import SeverityScale
 
-STOP_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
-DEFAULT_SERIES_MB = 500  # budget of a run's series, unless the plan sets another: some 80,000 of 6 kB
+STOP_AT_HAZARD_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
+DEFAULT_SERIES_BUDGET_MB = 500  # budget of a run's series, unless the plan sets another: some 80,000 of 6 kB
 _MOST_READS = 3  # attempts to read a folder that its owner is writing
 
 
@@ -90,7 +90,7 @@ class RunFolder:
             )
         folder = cls(path.resolve())
         check_path_encodable(folder.path)
-        check_contents(folder.path)
+        check_plain_contents(folder.path)
         _ = folder.head  # read it here, so that a wrong schema fails early
         return folder
 
@@ -138,23 +138,23 @@ class RunFolder:
         }
 
     @property
-    def stretches(self) -> tuple[Stretch, ...]:
+    def session_environments(self) -> tuple[SessionEnvironment, ...]:
         """The software and machine of each session that ran anything, oldest first."""
         return self.head.stretches
 
-    def stretch_of(self, experiment_id: str) -> Stretch | None:
+    def environment_of(self, experiment_id: str) -> SessionEnvironment | None:
         """Return the newest stretch of work that has a record of an experiment."""
         files = sorted((self.path / "records").glob("*.jsonl"))
-        for stretch in reversed(self.stretches):
+        for environment in reversed(self.session_environments):
             for path in files:
-                if fnmatchcase(path.stem, stretch.records) and experiment_id.encode() in read_bounded(
+                if fnmatchcase(path.stem, environment.records) and experiment_id.encode() in read_bounded(
                     path, MOST_EXPERIMENT_DATA_BYTES
                 ):
-                    return stretch
+                    return environment
         return None
 
     @property
-    def planned_count(self) -> int:
+    def planned_experiment_count(self) -> int:
         shard = self.shard
         if shard is None:
             return self.head.experiments
@@ -178,7 +178,7 @@ class RunFolder:
     @property
     def series_budget_mb(self) -> int:
         chosen = self.head.choices.series_mb
-        return DEFAULT_SERIES_MB if chosen is None else chosen
+        return DEFAULT_SERIES_BUDGET_MB if chosen is None else chosen
 
     @property
     def has_alerts(self) -> bool:
@@ -186,9 +186,9 @@ class RunFolder:
         return bool(self.head.alerts)
 
     @property
-    def stop_note(self) -> str:
+    def stop_at_hazard_note(self) -> str:
         stops = self.head.canary.get("after_hazard") == AfterHazard.STOP
-        return STOP_NOTE if stops else ""
+        return STOP_AT_HAZARD_NOTE if stops else ""
 
     @property
     def seeds(self) -> range:
@@ -254,7 +254,7 @@ class RunFolder:
 
     def experiment_id_from(self, prefix: str) -> str:
         """Return the only planned experiment whose id starts with `prefix`; MutatorError if not unique."""
-        hits = [name for name in plan_file.ids(self.path) if name.startswith(prefix)]
+        hits = [name for name in plan_file.experiment_ids(self.path) if name.startswith(prefix)]
         if len(hits) != 1 or not prefix:
             got = f"{len(hits)} experiments start with '{prefix}'" if hits else f"no experiment '{prefix}'"
             raise MutatorError(

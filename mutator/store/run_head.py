@@ -14,12 +14,12 @@ from mutator.errors import MutatorError, TypeMisfit
 from mutator.model import Limits
 from mutator.store.plan_choices import Choices
 from mutator.store.plan_file import Chunk
-from mutator.store.work_stretches import Stretch
+from mutator.store.work_stretches import SessionEnvironment
 from mutator.targets.stored_target_facts import TargetFacts
 
-SCHEMA = "run/3"
+RUN_SCHEMA = "run/3"
 HEAD, CAMPAIGN_FILE = RUN_HEAD_FILE, "campaign.yaml"
-REMEDY = "the run folder is damaged: restore the file from a copy of it"
+DAMAGED_RUN_REMEDY = "the run folder is damaged: restore the file from a copy of it"
 NameTuple = tuple[str, ...]
 # scenario, changes; seed, if the plan has several
 StoredGolden = tuple[str, NameTuple] | tuple[str, NameTuple, int]
@@ -63,7 +63,7 @@ class RunHead(TargetFacts, PlanFacts):
     canary_hazard: str
     sources: Mapping[str, str]
     provenance: Provenance
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[SessionEnvironment, ...]
     chunks: tuple[Chunk, ...]
     later: Mapping[str, Any] = field(default_factory=dict)  # keys that a later version adds: kept, and sealed
 
@@ -90,7 +90,7 @@ def load_head(run: Path) -> RunHead:
     """Read the head of a run folder; MutatorError if it is damaged or has another schema."""
     path = run / HEAD
     try:
-        head = from_json_types(RunHead, _with_unknown_keys_apart(read_json(path, SCHEMA)))
+        head = from_json_types(RunHead, _with_unknown_keys_apart(read_json(path, RUN_SCHEMA)))
     except TypeMisfit as err:
         raise _damage_error(path, err) from None
     for name in head.golden_files:
@@ -108,8 +108,8 @@ def _with_unknown_keys_apart(content: dict[str, Any]) -> dict[str, Any]:
 
 def _damage_error(path: Path, misfit: TypeMisfit) -> MutatorError:
     if not misfit.path:
-        return MutatorError(misfit.got, where=path, expected="a complete run.json", remedy=REMEDY)
+        return MutatorError(misfit.got, where=path, expected="a complete run.json", remedy=DAMAGED_RUN_REMEDY)
     key, *below = misfit.path
     place_below = "".join(f"[{key_below!a}]" for key_below in below)
     got = f"damaged at '{key}' ({place_below + ': ' if place_below else ''}{misfit.got})"
-    return MutatorError(got, where=path, expected=misfit.expected, remedy=REMEDY)
+    return MutatorError(got, where=path, expected=misfit.expected, remedy=DAMAGED_RUN_REMEDY)

@@ -6,7 +6,7 @@ from typing import Any
 
 from mutator._common.confined_files import path_below
 from mutator.model import Record
-from mutator.store.checksummed_lines import LineWriter, verified_lines, write_with_new_head
+from mutator.store.checksummed_lines import LineWriter, verified_lines, write_lines_with_new_head
 from mutator.store.patch_files import PatchWriter
 from mutator.store.records import LINE_SCHEMA_BY_FOLDER, PROOF_FOLDER, RECORDS_FOLDER, record_as_json
 from mutator.store.run_folder import RunFolder
@@ -65,7 +65,7 @@ class RunWriter:
         self._proof_file().extend(records)
 
     @property
-    def sha256_by_file(self) -> dict[str, str]:
+    def sha256_by_segment(self) -> dict[str, str]:
         """The SHA-256 of each file whose lines count, by its name in the run folder."""
         writers = [self._records, *([self._proof] if self._proof else [])]
         return {writer.path.relative_to(self._run).as_posix(): writer.sha256 for writer in writers}
@@ -99,4 +99,4 @@ def copy_line_files(folder: RunFolder, out: Path, suffix: str) -> None:
             copy_path = path_below(out / kind, f"{path.stem}{suffix}.jsonl")
             lines = verified_lines(path, schema)
             head = {"schema": schema, "plan": folder.head.plan}
-            write_with_new_head(copy_path, head, (line for _, _, line in lines))
+            write_lines_with_new_head(copy_path, head, (line for _, _, line in lines))

@@ -23,7 +23,7 @@ def check_deviations(golden: Series, faulty: Series, record: Record, where: Path
     if not np.array_equal(golden.t[:shared], faulty.t[:shared]):
         raise MutatorError("other times than those of the golden run", where=where)
     try:
-        for name, low, high, largest in _recorded_deviations(golden, faulty, record):
+        for name, low, high, largest in _deviation_bounds_and_recorded(golden, faulty, record):
             if low > largest or high < largest:
                 raise MutatorError(
                     f"the series of another run: {name} deviates by up to {high:.6g}",
@@ -34,7 +34,7 @@ def check_deviations(golden: Series, faulty: Series, record: Record, where: Path
         raise MutatorError(f"a damaged series ({err!r})", where=where) from None
 
 
-def _recorded_deviations(
+def _deviation_bounds_and_recorded(
     golden: Series, faulty: Series, record: Record
 ) -> Iterator[tuple[str, float, float, float]]:
     """Yield channels with the bounds of their largest deviation, and the recorded one: those of compared
@@ -81,6 +81,6 @@ def _paired_values(
     golden_row, faulty_row = golden.channel_values[channel], faulty.channel_values[channel]
     shared = min(len(golden_row), len(faulty_row))
     yield golden.times_of(channel)[:shared], golden_row[:shared], faulty_row[:shared]
-    points = faulty.points
+    points = faulty.extra_points
     is_of_channel = points.channel_numbers == channel
     yield points.t[is_of_channel], points.golden_values[is_of_channel], points.faulty_values[is_of_channel]

@@ -21,7 +21,7 @@ from mutator.store.series_check import check_deviations
 from mutator.store.series_format import Series, decode_series
 from mutator.store.series_script import read_script, script_name_of, write_script
 
-SCHEMA, FOLDER, KEPT_FOLDER = "series/1", "series", "kept"
+SERIES_SCHEMA, SERIES_FOLDER, RERUN_SERIES_FOLDER = "series/1", "series", "kept"
 INDEX_NAME = "index"
 # An index unpacks to at most this many times its size, and bytes: a forged one could fill the memory.
 _MOST_INDEX_RATIO, _MOST_INDEX_BYTES = 30, 1_000_000
@@ -39,28 +39,28 @@ class SeriesIndex:
     """
 
     plan: str
-    chunks: tuple[tuple[str, int], ...]
+    chunk_entry_counts: tuple[tuple[str, int], ...]
     entry_sizes: tuple[int, ...]
-    golden_entries: Mapping[str, int]
-    experiment_entries: Mapping[str, int]
+    entry_number_by_golden: Mapping[str, int]
+    entry_number_by_experiment: Mapping[str, int]
     golden_by_experiment: Mapping[str, str]
     left_out_count: int
     budget_mb: int
 
     def as_json(self) -> dict[str, Any]:
         """Convert to JSON types: ids joined into one text; entries as differences from the previous one."""
-        names, numbers = list(self.golden_entries), [*self.experiment_entries.values()]
+        names, numbers = list(self.entry_number_by_golden), [*self.entry_number_by_experiment.values()]
         return {
-            "schema": SCHEMA,
+            "schema": SERIES_SCHEMA,
             "plan": self.plan,
             "budget_mb": self.budget_mb,
             "left_out": self.left_out_count,
-            "chunks": [list(chunk) for chunk in self.chunks],
+            "chunks": [list(chunk) for chunk in self.chunk_entry_counts],
             "sizes": self.entry_sizes,
-            "goldens": self.golden_entries,
-            "ids": "".join(self.experiment_entries),
+            "goldens": self.entry_number_by_golden,
+            "ids": "".join(self.entry_number_by_experiment),
             "entries": [b - a for a, b in zip([0, *numbers], numbers, strict=False)],
-            "golden_of": [names.index(self.golden_by_experiment[name]) for name in self.experiment_entries],
+            "golden_of": [names.index(self.golden_by_experiment[name]) for name in self.entry_number_by_experiment],
         }
 
     @classmethod
@@ -85,7 +85,7 @@ class SeriesIndex:
     def entry_places(self) -> list[tuple[str, int]]:
         """The chunk of each entry, and the offset of the entry in it."""
         places, number = [], 0
-        for name, count in self.chunks:
+        for name, count in self.chunk_entry_counts:
             sizes = self.entry_sizes[number : number + count]
             places += [(name, at) for at in accumulate(sizes[:-1], initial=0)]
             number += count
@@ -94,7 +94,7 @@ class SeriesIndex:
 
 class SeriesFolder:
     def __init__(self, run: Path) -> None:
-        self.path = run / FOLDER
+        self.path = run / SERIES_FOLDER
         self._chunk: tuple[str, bytes] = ("", b"")
         self._goldens: dict[str, Series] = {}
 
@@ -108,9 +108,9 @@ class SeriesFolder:
         return (self.path / f"{INDEX_NAME}.js").is_file()
 
     def has_series(self, experiment_id: str) -> bool:
-        if self.kept_path(experiment_id).is_file():
+        if self.rerun_series_path(experiment_id).is_file():
             return True
-        return self.index is not None and experiment_id in self.index.experiment_entries
+        return self.index is not None and experiment_id in self.index.entry_number_by_experiment
 
     def is_readable(self, experiment_id: str, record: Record) -> bool:
         try:
@@ -118,8 +118,8 @@ class SeriesFolder:
         except MutatorError:
             return False
 
-    def kept_ids(self) -> list[str]:
-        return sorted(path.stem for path in (self.path / KEPT_FOLDER).glob("*.js"))
+    def rerun_ids(self) -> list[str]:
+        return sorted(path.stem for path in (self.path / RERUN_SERIES_FOLDER).glob("*.js"))
 
     def load_series(self, experiment_id: str, record: Record) -> tuple[Series, Series] | None:
         """Return the golden and the faulty series of an experiment with this record, or None.
@@ -139,11 +139,11 @@ class SeriesFolder:
 
     def _load_series(self, experiment_id: str) -> tuple[Series, Series] | None:
         if (
-            path := self.kept_path(experiment_id)
+            path := self.rerun_series_path(experiment_id)
         ).exists():  # from a rerun; the packed series might be damaged
-            return load_kept_series(path)
+            return load_rerun_series(path)
         index = self.index
-        if index is None or experiment_id not in index.experiment_entries:
+        if index is None or experiment_id not in index.entry_number_by_experiment:
             return None
         return self.load_packed_series(index, experiment_id)
 
@@ -151,9 +151,9 @@ class SeriesFolder:
         """Return the golden and the faulty series in the chunks; MutatorError for damage."""
         key = index.golden_by_experiment[experiment_id]
         if key not in self._goldens:
-            self._goldens[key] = decode_series(self.read_entry(index.golden_entries[key]))
+            self._goldens[key] = decode_series(self.read_entry(index.entry_number_by_golden[key]))
         golden = self._goldens[key]
-        return golden, decode_series(self.read_entry(index.experiment_entries[experiment_id]), golden)
+        return golden, decode_series(self.read_entry(index.entry_number_by_experiment[experiment_id]), golden)
 
     def read_entry(self, number: int) -> bytes:
         """Return the bytes of an entry of the index; MutatorError if its chunk is damaged."""
@@ -171,11 +171,11 @@ class SeriesFolder:
             raise MutatorError("damaged", where=path, expected="content that matches its name")
         return data
 
-    def kept_path(self, experiment_id: str) -> Path:
-        return path_below(self.path / KEPT_FOLDER, f"{experiment_id}.js")
+    def rerun_series_path(self, experiment_id: str) -> Path:
+        return path_below(self.path / RERUN_SERIES_FOLDER, f"{experiment_id}.js")
 
 
-def run_facts(record: Record) -> dict[str, Any]:
+def run_facts_for_series(record: Record) -> dict[str, Any]:
     """Return what a faulty series says about its run: the digest of its trace, and its events."""
     active = record.activation
     return {
@@ -190,7 +190,7 @@ def run_facts(record: Record) -> dict[str, Any]:
 
 def check_same_run(series_facts: Mapping[str, Any], record: Record, where: Path | None = None) -> None:
     """Raise MutatorError if a faulty series belongs to another run than the record."""
-    for name, value in run_facts(record).items():
+    for name, value in run_facts_for_series(record).items():
         if series_facts.get(name) != value:
             raise MutatorError(
                 f"the series of another run: {name} {series_facts.get(name)}",
@@ -217,12 +217,12 @@ def load_index(path: Path) -> SeriesIndex:
         data = json.loads(
             decompress_bounded(packed, _MOST_INDEX_RATIO * len(packed) + _MOST_INDEX_BYTES, gzip=True)
         )
-        if data["schema"] != SCHEMA:
-            raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SCHEMA, remedy=remedy)
+        if data["schema"] != SERIES_SCHEMA:
+            raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SERIES_SCHEMA, remedy=remedy)
         index = SeriesIndex.from_json(data)
-        for name in (*(name for name, _ in index.chunks), *index.golden_entries):
+        for name in (*(name for name, _ in index.chunk_entry_counts), *index.entry_number_by_golden):
             checked_relative_path(name, path)
-        for number in (*index.golden_entries.values(), *index.experiment_entries.values()):
+        for number in (*index.entry_number_by_golden.values(), *index.entry_number_by_experiment.values()):
             if number not in range(len(index.entry_places)):
                 raise ValueError(f"no entry {number}")
         return index
@@ -235,12 +235,12 @@ def save_index(path: Path, index: SeriesIndex) -> None:
     write_script(path, gzip.compress(text, compresslevel=9, mtime=0))  # with a time, equal runs would differ
 
 
-def write_kept_series(path: Path, golden: bytes, faulty: bytes) -> None:
+def write_rerun_series(path: Path, golden: bytes, faulty: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     write_script(path, b"".join((_LENGTH_STRUCT.pack(len(golden)), golden, faulty)))
 
 
-def load_kept_series(path: Path) -> tuple[Series, Series]:
+def load_rerun_series(path: Path) -> tuple[Series, Series]:
     """Read the golden and the faulty series of a rerun; MutatorError if the file is damaged."""
     data = read_script(path)
     try:

@@ -50,7 +50,7 @@ class Series:
     channel_values: Sequence[np.ndarray]
     sample_every: Sequence[int]
     facts: Mapping[str, Any]
-    points: ExtraPoints = field(default_factory=ExtraPoints)
+    extra_points: ExtraPoints = field(default_factory=ExtraPoints)
 
     def times_of(self, channel: int) -> np.ndarray:
         """Return the times (s) at which a channel has values."""
@@ -74,7 +74,7 @@ def encode_series(series: Series, golden: Series | None = None) -> bytes:
         )
     ]
     changed = [channel for channel, row in enumerate(differences) if golden is None or row.any()]
-    points = series.points
+    points = series.extra_points
     head = {
         **series.facts,
         "known": shared_steps,
@@ -84,7 +84,7 @@ def encode_series(series: Series, golden: Series | None = None) -> bytes:
         **({"every": list(series.sample_every)} if golden is None else {}),
     }
     words = [
-        *(_difference_words(differences[channel]) for channel in changed),
+        *(_second_difference_words(differences[channel]) for channel in changed),
         points.golden_values,
         points.faulty_values,
     ]
@@ -136,7 +136,7 @@ def _decode_unpacked(raw: bytes, golden: Series | None) -> Series:
         golden_values=point_values[0],
         faulty_values=point_values[1],
     )
-    return Series(t=t, channel_values=rows, sample_every=every, facts=about, points=points)
+    return Series(t=t, channel_values=rows, sample_every=every, facts=about, extra_points=points)
 
 
 def _reference_values(
@@ -163,7 +163,7 @@ def _floats_of_ordered(numbers: np.ndarray) -> np.ndarray:
     return words.view("<f4")
 
 
-def _difference_words(numbers: np.ndarray) -> np.ndarray:
+def _second_difference_words(numbers: np.ndarray) -> np.ndarray:
     """Return the second differences (modulo 2^32) as words that are small for small values of either sign."""
     steps = np.diff(numbers, n=2, prepend=np.zeros(2, dtype="<i4"))
     return ((steps << 1) ^ (steps >> 31)).view("<u4")

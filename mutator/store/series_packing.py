@@ -12,10 +12,10 @@ from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
 from mutator.store.checksummed_blocks import BlockWriter, read_blocks
-from mutator.store.series_folder import FOLDER, INDEX_NAME, SeriesFolder, SeriesIndex, save_index
+from mutator.store.series_folder import SERIES_FOLDER, INDEX_NAME, SeriesFolder, SeriesIndex, save_index
 from mutator.store.series_script import script_name_of, size_in_script, write_script
 
-SUFFIX = ".blocks"  # suffix of the workers' files in series/
+WORKER_FILE_SUFFIX = ".blocks"  # suffix of the workers' files in series/
 GOLDEN_BLOCK, EXPERIMENT_BLOCK = 0, 1  # kinds of blocks
 CHUNK_BYTES = 256_000  # size at which a chunk is complete; a page loads it in about 30 ms
 _MB = 1_000_000
@@ -34,7 +34,7 @@ class SeriesWriter:
     """Append a worker's series, and each golden run once."""
 
     def __init__(self, run: Path, worker: str) -> None:
-        self._path = path_below(run / FOLDER, f"{worker}{SUFFIX}")
+        self._path = path_below(run / SERIES_FOLDER, f"{worker}{WORKER_FILE_SUFFIX}")
         self._blocks: BlockWriter | None = None  # nothing appended yet
         self._written_golden_keys: set[str] = set()
 
@@ -94,9 +94,9 @@ class _SeriesToPack:
         self.experiments.update(other.experiments)
 
 
-def list_worker_files(run: Path) -> list[Path]:
+def list_unpacked_worker_files(run: Path) -> list[Path]:
     """Return the workers' files that are not packed yet."""
-    return [path for path in sorted((run / FOLDER).glob(f"*{SUFFIX}")) if path.is_file()]
+    return [path for path in sorted((run / SERIES_FOLDER).glob(f"*{WORKER_FILE_SUFFIX}")) if path.is_file()]
 
 
 def pack_series(
@@ -107,17 +107,17 @@ def pack_series(
     `ranks` ranks all experiments that ended normally. Damaged series are left out. Packing can be repeated
     after a kill.
     """
-    appended = list_worker_files(run)
+    appended = list_unpacked_worker_files(run)
     if not appended and not other_runs:
         return
     to_pack = _SeriesToPack({}, {})
     for folder in (run, *other_runs):
         to_pack.add(_packed_series(SeriesFolder(folder)))
-        for path in list_worker_files(folder):
+        for path in list_unpacked_worker_files(folder):
             to_pack.add(_worker_series(path))
     with raising_disk_full(run):
-        (run / FOLDER).mkdir(exist_ok=True)
-    index = _write_packed_files(run / FOLDER, plan, to_pack, ranks, budget_mb, len(ranks))
+        (run / SERIES_FOLDER).mkdir(exist_ok=True)
+    index = _write_packed_files(run / SERIES_FOLDER, plan, to_pack, ranks, budget_mb, len(ranks))
     _remove_unindexed_files(run, index)
     for path in appended:
         path.unlink()
@@ -125,17 +125,17 @@ def pack_series(
 
 def repack_series(run: Path, index: SeriesIndex) -> None:
     """Repack the content of `index`, without damaged and missing parts. The workers' files are kept."""
-    ranks = {name: place for place, name in enumerate(index.experiment_entries)}
+    ranks = {name: place for place, name in enumerate(index.entry_number_by_experiment)}
     to_pack = _packed_series(SeriesFolder(run))
     ended = len(ranks) + index.left_out_count
     _remove_unindexed_files(
-        run, _write_packed_files(run / FOLDER, index.plan, to_pack, ranks, index.budget_mb, ended)
+        run, _write_packed_files(run / SERIES_FOLDER, index.plan, to_pack, ranks, index.budget_mb, ended)
     )
 
 
 def _remove_unindexed_files(run: Path, index: SeriesIndex) -> None:
-    indexed = {name for name, _ in index.chunks} | {INDEX_NAME}
-    for path in (run / FOLDER).glob("*.js"):
+    indexed = {name for name, _ in index.chunk_entry_counts} | {INDEX_NAME}
+    for path in (run / SERIES_FOLDER).glob("*.js"):
         if path.stem not in indexed:
             path.unlink()
 
@@ -148,8 +148,8 @@ def _packed_series(folder: SeriesFolder) -> _SeriesToPack:
         return to_pack
     if index is None:
         return to_pack
-    goldens = _names_by_entry(index.golden_entries)
-    users = _names_by_entry(index.experiment_entries)
+    goldens = _names_by_entry(index.entry_number_by_golden)
+    users = _names_by_entry(index.entry_number_by_experiment)
     for number in range(len(index.entry_sizes)):
         try:
             entry = _build_entry(folder.read_entry(number), lambda number=number: folder.read_entry(number))  # type: ignore[misc]
@@ -217,10 +217,10 @@ def _write_packed_files(
     }
     index = SeriesIndex(
         plan=plan,
-        chunks=tuple((name, len(sizes)) for name, sizes in chunks),
+        chunk_entry_counts=tuple((name, len(sizes)) for name, sizes in chunks),
         entry_sizes=tuple(size for _, sizes in chunks for size in sizes),
-        golden_entries={name: golden_numbers[entry.digest] for name, entry in goldens.items()},
-        experiment_entries={name: experiment_numbers[to_pack.experiments[name][1].digest] for name in chosen},
+        entry_number_by_golden={name: golden_numbers[entry.digest] for name, entry in goldens.items()},
+        entry_number_by_experiment={name: experiment_numbers[to_pack.experiments[name][1].digest] for name in chosen},
         golden_by_experiment=golden_of,
         left_out_count=ended_count - len(chosen),
         budget_mb=budget_mb,

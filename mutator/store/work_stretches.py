@@ -21,7 +21,7 @@ class Blas:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CloneState:
+class GitCloneState:
     """The commit of a git clone, and whether the folder in it had changed since."""
 
     commit: str
@@ -29,7 +29,7 @@ class CloneState:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Machine:
+class WorkerMachine:
     """A worker on another machine."""
 
     worker: str
@@ -43,7 +43,7 @@ class Machine:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stretch:
+class SessionEnvironment:
     """The software and machine that one session used.
 
     `python` and `packages` must stay the same during a run, unless the user accepts other versions
@@ -57,16 +57,16 @@ class Stretch:
     cpu: str | None = None  # the processor's model
     blas: tuple[Blas, ...] = ()
     threads: Mapping[str, str] = field(default_factory=dict)  # thread settings in the target's environment
-    git: Mapping[str, CloneState] | None = None  # the clones of mutator, library, templates and target
+    git: Mapping[str, GitCloneState] | None = None  # the clones of mutator, library, templates and target
     records: str = "*"  # glob of the session's files in records/, timings/ and proof/, without suffix
     accepted: tuple[str, ...] = ()  # differences of Python and packages from the previous stretch
-    machines: tuple[Machine, ...] = added_field(())
+    machines: tuple[WorkerMachine, ...] = added_field(())
 
     def __str__(self) -> str:
         return ", ".join(filter(None, (self.python, self.platform, self.cpu)))
 
 
-def version_differences(before: Stretch, python: str, packages: Mapping[str, str | None]) -> tuple[str, ...]:
+def version_differences(before: SessionEnvironment, python: str, packages: Mapping[str, str | None]) -> tuple[str, ...]:
     """List the differences between a stretch and the current versions: `numpy 1.26.4, here 2.1.0`."""
     texts = [] if before.python == python else [f"{before.python}, here {python}"]
     for name in sorted(before.packages.keys() | packages):
@@ -76,31 +76,31 @@ def version_differences(before: Stretch, python: str, packages: Mapping[str, str
     return tuple(texts)
 
 
-def describe_stretches(stretches: Iterable[Stretch]) -> dict[str, str]:
+def describe_environments(environments: Iterable[SessionEnvironment]) -> dict[str, str]:
     """Describe the software and machines of stretches; several values are listed, oldest first."""
     texts_by_name: dict[str, dict[str, None]] = {}
-    for stretch in stretches:
-        for name, text in _describe_stretch(stretch).items():
+    for environment in environments:
+        for name, text in _describe_environment(environment).items():
             texts_by_name.setdefault(name, {})[text] = None
     return {name: ", ".join(texts) for name, texts in texts_by_name.items()}
 
 
-def _describe_stretch(stretch: Stretch) -> dict[str, str]:
-    texts = {"python": stretch.python, "platform": stretch.platform}
-    if stretch.cpu:
-        texts["processor"] = stretch.cpu
-    if stretch.blas:
-        texts["BLAS"] = " and ".join(map(str, stretch.blas))
-    for place, state in (stretch.git or {}).items():
+def _describe_environment(environment: SessionEnvironment) -> dict[str, str]:
+    texts = {"python": environment.python, "platform": environment.platform}
+    if environment.cpu:
+        texts["processor"] = environment.cpu
+    if environment.blas:
+        texts["BLAS"] = " and ".join(map(str, environment.blas))
+    for place, state in (environment.git or {}).items():
         texts[f"git commit of {place}"] = state.commit + (" with changes" if state.changed else "")
-    if stretch.accepted:
-        texts["other versions accepted"] = "; ".join(stretch.accepted)
+    if environment.accepted:
+        texts["other versions accepted"] = "; ".join(environment.accepted)
     return texts
 
 
-def package_versions(stretches: Iterable[Stretch]) -> dict[str, str]:
+def version_texts_by_package(environments: Iterable[SessionEnvironment]) -> dict[str, str]:
     versions_by_package: dict[str, dict[str, None]] = {}
-    for stretch in stretches:
-        for name, version in stretch.packages.items():
+    for environment in environments:
+        for name, version in environment.packages.items():
             versions_by_package.setdefault(name, {})[version] = None
     return {name: ", ".join(versions) for name, versions in sorted(versions_by_package.items())}

@@ -25,7 +25,7 @@ from mutator.report.panels import figures_panel
 from mutator.results import table_building
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.patch_files import PatchWriter
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series
 from mutator.workspace import Workspace
@@ -87,7 +87,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     plan = build_plan(workspace, "toy")
     out = freeze_plan(plan, folder / "run", workspace)
     manifest, models = workspace.manifest("toycar"), workspace.fault_models()
-    lines = LineWriter(out.path / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
+    lines = LineWriter(out.path / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": plan.digest})
     patches = PatchWriter(out.path, "0001-main")
     for number, experiment in enumerate(plan.experiments):
         data = build(manifest, models, experiment.fault, experiment.trigger).patch_bytes

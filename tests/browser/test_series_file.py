@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, write_kept_series
+from mutator.store.series_folder import SeriesFolder, write_rerun_series
 from mutator.store.series_format import ExtraPoints, Series, encode_series
 from mutator.web import asset_text
 
@@ -32,7 +32,7 @@ LOADED = """async ([id, known]) => {
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
     shutil.copytree(FIXTURE / "small" / "series", tmp_path / "series")
-    facts = {"series": {"packed": True, "kept": SeriesFolder(tmp_path).kept_ids()}}
+    facts = {"series": {"packed": True, "kept": SeriesFolder(tmp_path).rerun_ids()}}
     (tmp_path / "report").mkdir()
     told = f'<script type="application/json" id="facts">{json.dumps(facts)}</script>'
     page = (
@@ -60,10 +60,10 @@ def as_read(run: Path, name: str) -> list[dict[str, Any]]:
     golden, faulty = read
     found = []
     for number, channel in enumerate(golden.facts["channels"]):
-        mine = faulty.points.channel_numbers == number
-        t = np.concatenate((golden.times_of(number), faulty.points.t[mine]))
+        mine = faulty.extra_points.channel_numbers == number
+        t = np.concatenate((golden.times_of(number), faulty.extra_points.t[mine]))
         order = np.argsort(t, kind="stable")
-        runs = ((golden, faulty.points.golden_values), (faulty, faulty.points.faulty_values))
+        runs = ((golden, faulty.extra_points.golden_values), (faulty, faulty.extra_points.faulty_values))
         one, other = (
             np.concatenate((run.channel_values[number], points[mine]))[order] for run, points in runs
         )
@@ -106,9 +106,9 @@ def test_the_page_reads_the_points_between_the_values(browser: Any, run: Path) -
         "t_end": None,
         "end": 0.4,
     }
-    faulty = Series(t=t, channel_values=longer, sample_every=[1, 2], facts=happened, points=points)
-    name = SeriesFolder(run).kept_ids()[0]
-    write_kept_series(SeriesFolder(run).kept_path(name), encode_series(golden), encode_series(faulty, golden))
+    faulty = Series(t=t, channel_values=longer, sample_every=[1, 2], facts=happened, extra_points=points)
+    name = SeriesFolder(run).rerun_ids()[0]
+    write_rerun_series(SeriesFolder(run).rerun_series_path(name), encode_series(golden), encode_series(faulty, golden))
     (run / "series" / "index.js").unlink()
     page = run / "report" / "index.html"
     page.write_text(page.read_text().replace('"packed": true', '"packed": false'))
@@ -135,8 +135,8 @@ def test_curves_that_deviate_otherwise_than_the_record_says_are_not_shown(browse
         found = SeriesFolder(run).load_series(name, record)
         if found and any(by for _, by in record.max_dev):
             golden, faulty = found
-            write_kept_series(
-                SeriesFolder(run).kept_path(name),
+            write_rerun_series(
+                SeriesFolder(run).rerun_series_path(name),
                 encode_series(golden),
                 encode_series(replace(golden, facts=faulty.facts), golden),
             )

@@ -19,7 +19,7 @@ from mutator.cli import campaigns
 from mutator.errors import MutatorError
 from mutator.store import approvals
 from mutator.store.allowed_contents import ALLOWED_FILE_GLOBS
-from mutator.store.series_folder import SeriesFolder, load_kept_series
+from mutator.store.series_folder import SeriesFolder, load_rerun_series
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 Reseal = Callable[..., None]  # recomputes every checksum and digest of a run folder
@@ -223,7 +223,7 @@ def test_show_prints_diff_times_verdict_and_plot(cli: Cli, run: Path) -> None:
         assert wanted in answer.out
     [plot] = [line.removeprefix("plot: ") for line in answer.out.splitlines() if line.startswith("plot: ")]
     assert ET.parse(plot).getroot().tag.endswith("svg")
-    assert load_kept_series(SeriesFolder(run).kept_path(name))[1].facts["hazards"]
+    assert load_rerun_series(SeriesFolder(run).rerun_series_path(name))[1].facts["hazards"]
     page = Path(cli("report", run, "--json").json["page"]).read_text()
     assert f'"series": {{"packed": true, "kept": ["{name}"]' in page
 
@@ -367,7 +367,7 @@ def test_clean_deletes_everything_that_commands_wrote_into_a_run(cli: Cli, run: 
         ["compare", other, copy],
     ):
         assert cli(*words).code == 0, words
-    approvals.write_approvals(copy, {"schema": approvals.SCHEMA, "target": "toycar", "groups": []})
+    approvals.write_approvals(copy, {"schema": approvals.APPROVALS_SCHEMA, "target": "toycar", "groups": []})
     for file in (next((copy / "records").iterdir()), next((copy / "patches").iterdir())):
         file.write_bytes(file.read_bytes()[:-9])
     assert cli("verify", copy, "--repair").code == 1

@@ -93,7 +93,7 @@ def test_a_run_takes_stills_of_its_worst_experiments(
     run = load_run("runs/a")
     seen = [e for e in run.experiments.values() if "alone" in e.changes and run.records[e.id].t_manifest]
     [*chosen] = {name.partition("-")[0] for name in taken}
-    assert 0 < len(chosen) <= run.folder.planned_count // 2
+    assert 0 < len(chosen) <= run.folder.planned_experiment_count // 2
     assert set(chosen) <= {e.id for e in seen}
     record = run.records[chosen[0]]
     assert f"{chosen[0]}-{record.activation.first:.2f}s.jpg" in taken

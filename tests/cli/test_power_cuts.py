@@ -11,14 +11,14 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.execution.session import Session
-from mutator.results.ranking import rank_by_experiment
+from mutator.results.ranking import worst_first_rank_by_ok_experiment
 from mutator.results.table_reader import Results
 from mutator.store import checksummed_blocks, checksummed_lines
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.checksummed_lines import read_segment
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder
-from mutator.store.series_packing import list_worker_files, pack_series
+from mutator.store.series_packing import list_unpacked_worker_files, pack_series
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 WORDS = ("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "reference")
@@ -80,7 +80,7 @@ def test_files_are_synced_before_the_records_that_refer_to_them(
         if path.parent.name != "records":
             return
         segment = read_segment(path)
-        names = {segment.content(number)["experiment_id"] for number in segment.lines if number > 1}
+        names = {segment.parse_line(number)["experiment_id"] for number in segment.lines if number > 1}
         for kind in ("patches", "series"):
             there = path.parents[1] / kind / f"{path.stem}.blocks"
             size = synced.get(f"{kind}.blocks", 0)
@@ -122,7 +122,7 @@ def test_a_record_without_its_patch_is_refused(cli: Cli, cut: Path, seal: str, r
 
 @pytest.mark.slow
 def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
-    [path] = list_worker_files(cut)
+    [path] = list_unpacked_worker_files(cut)
     data = path.read_bytes()
     names = [block.key.split()[0] for block in read_blocks(path).blocks if block.kind]
     records = RunFolder.open_unverified(cut).records()
@@ -139,7 +139,7 @@ def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
     ran = cli(*WORDS)
     assert ran.code == 0, ran.err
     assert [
-        one for one in rank_by_experiment(Results(cut).frame()) if not SeriesFolder(cut).has_series(one)
+        one for one in worst_first_rank_by_ok_experiment(Results(cut).frame()) if not SeriesFolder(cut).has_series(one)
     ] == names[-1:]
     assert cli("verify", "run").code == 0
     assert cli("rerun", names[-1], "--trace", "--run", "run").code == 0

@@ -13,7 +13,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, SeriesIndex, write_kept_series
+from mutator.store.series_folder import SeriesFolder, SeriesIndex, write_rerun_series
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series
 
@@ -115,7 +115,7 @@ def packed() -> SeriesIndex:
 
 
 def chunks() -> dict[str, str]:
-    (goldens, _), (experiments, _) = packed().chunks
+    (goldens, _), (experiments, _) = packed().chunk_entry_counts
     return {"goldens": f"{goldens}.js", "experiments": f"{experiments}.js", "index": "index.js"}
 
 
@@ -127,7 +127,7 @@ def test_rerun_restores_damaged_series(
     cli: Cli, sealed: str, what: str, damage: Callable[[Path], None]
 ) -> None:
     before = {path.name: path.read_bytes() for path in Path("run/series").iterdir()}
-    name, *others = packed().experiment_entries
+    name, *others = packed().entry_number_by_experiment
     file = Path("run/series") / chunks()[what]
     damage(file)
     found = cli("verify", "run")
@@ -162,9 +162,9 @@ def test_rerun_restores_damaged_series(
 
 
 def test_the_audit_names_the_command_that_restores_a_series(cli: Cli, sealed: str) -> None:
-    name = next(iter(packed().experiment_entries))
+    name = next(iter(packed().entry_number_by_experiment))
     assert cli("show", name, "--run", "run", "--plot").code == 0
-    kept = SeriesFolder(Path("run")).kept_path(name)
+    kept = SeriesFolder(Path("run")).rerun_series_path(name)
     assert cli("rerun", name, "--trace", "--run", "run").code == 0
     data = kept.read_bytes()
     flip(kept)
@@ -180,7 +180,7 @@ def test_the_series_of_another_run_is_not_used(cli: Cli, sealed: str) -> None:
     """The audit names it, and commands refuse it."""
     one, other, *_ = RunFolder.open(Path("run")).records()
     assert cli("rerun", one, "--trace", "--run", "run").code == 0
-    kept = SeriesFolder(Path("run")).kept_path(one)
+    kept = SeriesFolder(Path("run")).rerun_series_path(one)
     script = kept.read_bytes().replace(one.encode(), other.encode(), 1)
     kept.with_name(f"{other}.js").write_bytes(script)
     with pytest.raises(MutatorError, match="the series of another run"):
@@ -210,10 +210,10 @@ def pack_with(name: str, forged: bytes) -> None:
     """Pack the series again, under new names and with an index, with another series of one experiment."""
     there, index = SeriesFolder(Path("run")), packed()
     writer = SeriesWriter(Path("run"), "forged")
-    for one in index.experiment_entries:
+    for one in index.entry_number_by_experiment:
         key = index.golden_by_experiment[one]
         golden, faulty = [
-            there.read_entry(number) for number in (index.golden_entries[key], index.experiment_entries[one])
+            there.read_entry(number) for number in (index.entry_number_by_golden[key], index.entry_number_by_experiment[one])
         ]
         writer.append(
             one,
@@ -227,7 +227,7 @@ def pack_with(name: str, forged: bytes) -> None:
     pack_series(
         Path("run"),
         index.plan,
-        {one: place for place, one in enumerate(index.experiment_entries)},
+        {one: place for place, one in enumerate(index.entry_number_by_experiment)},
         index.budget_mb,
     )
 
@@ -236,12 +236,12 @@ def test_curves_of_the_golden_run_are_not_shown_as_those_of_a_fault(cli: Cli, se
     """Whether they are in a rerun's file or in a chunk with a new name and index."""
     name, there = deviating(), SeriesFolder(Path("run"))
     golden, forged = curves_of_golden(name)
-    write_kept_series(there.kept_path(name), golden, forged)
+    write_rerun_series(there.rerun_series_path(name), golden, forged)
     found = cli("verify", "run")
     assert found.code == 1 and f"- series/kept/{name}.js: the series of another run: " in found.out
     with pytest.raises(MutatorError, match="the series of another run"):
         series_of(name)
-    there.kept_path(name).unlink()
+    there.rerun_series_path(name).unlink()
     pack_with(name, forged)
     found = cli("verify", "run")
     assert found.code == 1 and f"{name}: the series of another run: " in found.out
@@ -266,7 +266,7 @@ def test_a_rerun_s_golden_curves_must_be_those_of_the_golden_run(cli: Cli, seale
     golden, faulty = (
         replace(one, channel_values=[row + np.float32(1e-3) for row in one.channel_values]) for one in found
     )
-    write_kept_series(there.kept_path(name), encode_series(golden), encode_series(faulty, golden))
+    write_rerun_series(there.rerun_series_path(name), encode_series(golden), encode_series(faulty, golden))
     audit = cli("verify", "run")
     assert audit.code == 1 and f"series/kept/{name}.js: differs; expected the series of golden/" in audit.out
 

@@ -73,7 +73,7 @@ def test_two_workers_give_the_same_bytes(
     assert (results(out), summary.seal) == undisturbed
     assert summary.proof is not None and summary.proof.is_complete
     folder = RunFolder.open(out)
-    assert len(folder.stretches[-1].machines) == 2
+    assert len(folder.session_environments[-1].machines) == 2
     assert two.children() == []
     assert not [*two.folder.glob("*/dask/**/mutator-*")]
 
@@ -228,7 +228,7 @@ def test_other_workers_do_the_work_of_a_refused_one(
         )
     assert (summary.exit_code, summary.problem) == (0, "")
     assert (results(tmp_path / "run"), summary.seal) == whole_toy
-    [machine] = RunFolder.open(tmp_path / "run").stretches[-1].machines
+    [machine] = RunFolder.open(tmp_path / "run").session_environments[-1].machines
     assert machine.worker.startswith("alpha")
 
 

@@ -40,7 +40,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path],
         choices = Choices(shard=None if shard == "whole" else shard)
         summary = run_campaign(toy, "small", out, choices=choices)
         assert summary.exit_code == 0
-        assert summary.done == summary.planned == RunFolder.open(out).planned_count
+        assert summary.done == summary.planned == RunFolder.open(out).planned_experiment_count
     return made
 
 
@@ -97,12 +97,12 @@ def test_merged_shards_have_the_seal_of_the_single_run(runs: Runs, tmp_path: Pat
 def test_the_whole_plan_decides_the_engine_of_a_shard(
     runs: Runs, toy: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine_choice, "MIN_EXPERIMENTS_TO_FORK", RunFolder.open(runs["whole"]).planned_count)
+    monkeypatch.setattr(engine_choice, "MIN_EXPERIMENTS_TO_FORK", RunFolder.open(runs["whole"]).planned_experiment_count)
     assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
 
 def test_an_approval_is_merged_if_every_shard_has_it(copies: Runs, tmp_path: Path) -> None:
-    said = {"schema": approvals.SCHEMA, "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane Doe"}]}
+    said = {"schema": approvals.APPROVALS_SCHEMA, "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane Doe"}]}
     shards = [copies["1/2"], copies["2/2"]]
     approvals.write_approvals(shards[0], said)
     merge_shards(shards, tmp_path / "half")
@@ -121,7 +121,7 @@ def test_each_experiment_is_in_exactly_one_shard(runs: Runs) -> None:
 
 def test_a_shard_resumes_without_its_option(copies: Runs, toy: Workspace) -> None:
     summary = run_campaign(toy, "small", copies["1/2"])
-    assert (summary.ran, summary.done) == (0, RunFolder.open(copies["1/2"]).planned_count)
+    assert (summary.ran, summary.done) == (0, RunFolder.open(copies["1/2"]).planned_experiment_count)
     with pytest.raises(MutatorError, match="shard 2/2"):
         run_campaign(toy, "small", copies["1/2"], choices=Choices(shard="2/2"))
 
@@ -270,7 +270,7 @@ def test_merged_shards_of_the_shipped_controller_equal_its_single_run(tmp_path: 
     shards = [ran(f"shard{k}", 2, f"{k}/3") for k in (1, 2, 3)]
     merge_shards(shards, tmp_path / "merged")
     assert len((one / "results.csv").read_text().splitlines()) == 1 + 40
-    assert sum(RunFolder.open(shard).planned_count for shard in shards) == 40
+    assert sum(RunFolder.open(shard).planned_experiment_count for shard in shards) == 40
     for name in DERIVED:
         whole = (one / name).read_bytes()
         assert (two / name).read_bytes() == whole

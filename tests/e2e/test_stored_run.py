@@ -19,7 +19,7 @@ from mutator.execution.campaign_running import run_campaign
 from mutator.exports import Format
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import SCHEMA
+from mutator.store.run_head import RUN_SCHEMA
 from mutator.workspace import Workspace
 
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "run"
@@ -57,7 +57,7 @@ def cli(place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixtu
 
 def test_it_opens_and_its_ids_still_follow_from_its_content(place: Path) -> None:
     run = load_run(place / "small", workspace=place / "toy")
-    assert [*run.experiments] == [*plan_file.ids(run.path)]
+    assert [*run.experiments] == [*plan_file.experiment_ids(run.path)]
     assert {e.fault.id for e in run.experiments.values()} == {*run.faults}
     assert len(run.results) == EXPERIMENTS == len(run.experiments)
     assert {*run.results.index} == {*run.folder.records()} == {*run.folder.records("proof")}
@@ -69,7 +69,7 @@ def test_it_opens_and_its_ids_still_follow_from_its_content(place: Path) -> None
 def test_a_fresh_run_has_the_same_plan_and_results(place: Path, fresh: Path) -> None:
     old, new = RunFolder.open(place / "small"), RunFolder.open(fresh)
     assert new.head.plan == old.head.plan
-    assert [*plan_file.ids(new.path)] == [*plan_file.ids(old.path)]
+    assert [*plan_file.experiment_ids(new.path)] == [*plan_file.experiment_ids(old.path)]
     assert (fresh / "results.csv").read_bytes() == (old.path / "results.csv").read_bytes()
     assert {name: record.trace_digest for name, record in new.records().items()} == {
         name: record.trace_digest for name, record in old.records().items()
@@ -80,13 +80,13 @@ def test_a_fresh_run_has_the_same_plan_and_results(place: Path, fresh: Path) -> 
 def test_a_folder_of_another_schema_is_refused_in_a_sentence(cli: Cli, place: Path, schema: str) -> None:
     shutil.copytree(place / "small", copy := place / schema.replace("/", "-"))
     head = copy / "run.json"
-    head.write_text(head.read_text().replace(SCHEMA, schema))
+    head.write_text(head.read_text().replace(RUN_SCHEMA, schema))
     newer = "use a newer version of mutator"
     older = "use the version of mutator that wrote it, or write it anew with this one"
-    remedy = newer if schema > SCHEMA else older
+    remedy = newer if schema > RUN_SCHEMA else older
     with pytest.raises(MutatorError) as caught:
         load_run(copy)
-    assert str(caught.value) == f"{head}: schema '{schema}'; expected {SCHEMA}; {remedy}"
+    assert str(caught.value) == f"{head}: schema '{schema}'; expected {RUN_SCHEMA}; {remedy}"
     for words in (
         ("show", KEPT, "--run", copy),
         ("compare", place / "small", copy),

@@ -160,7 +160,7 @@ def test_pytest_refuses_and_accepts_versions_like_the_command(
     assert pytest.main(words) == 2
     assert PYTHONS in capfd.readouterr().err
     assert pytest.main([*words, "--accept-versions"]) == 0
-    assert len(RunFolder.open(half).stretches) == 2
+    assert len(RunFolder.open(half).session_environments) == 2
 
 
 @pytest.mark.slow
@@ -175,7 +175,7 @@ def test_another_machine_repeats_the_golden_runs(
     monkeypatch.setattr(run_environment, "processor_name", lambda: "another")
     assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 6
     assert len(executed) == 8
-    assert [stretch.cpu == "another" for stretch in RunFolder.open(out).stretches] == [False, False, True]
+    assert [stretch.cpu == "another" for stretch in RunFolder.open(out).session_environments] == [False, False, True]
 
     monkeypatch.setattr(run_environment, "processor_name", lambda: "a third")
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
@@ -211,8 +211,8 @@ def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: S
     code, _, err = cli(*words, "--accept-versions")
     assert code == 0, err
     merged = RunFolder.open(tmp_path / "out")
-    assert [s.python for s in merged.stretches] == ["CPython 3.11.7", "CPython 3.12.1"]
-    assert [list(s.accepted) for s in merged.stretches] == [[], [PYTHONS]]
+    assert [s.python for s in merged.session_environments] == ["CPython 3.11.7", "CPython 3.12.1"]
+    assert [list(s.accepted) for s in merged.session_environments] == [[], [PYTHONS]]
     run = load_run(tmp_path / "out")
     cpus = [stretch.cpu for e in run.records if (stretch := run.experiment(e).stretch)]
     assert sorted(cpus) == ["machine 1"] * 6 + ["machine 2"] * 6
@@ -266,4 +266,4 @@ def test_another_installed_python_resumes_only_if_accepted(toy: Workspace, tmp_p
     accepted = run("--accept-versions")
     assert accepted.returncode == 0, accepted.stderr
     assert "12 of 12 experiments done, 10 now" in accepted.stderr + accepted.stdout
-    assert len({stretch.python for stretch in RunFolder.open(out).stretches}) == 2
+    assert len({stretch.python for stretch in RunFolder.open(out).session_environments}) == 2

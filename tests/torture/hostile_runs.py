@@ -148,7 +148,7 @@ def _named(name: bytes) -> Trick:
 
 def _reseal(run: Path) -> None:
     """Recompute the digests of the files that the ledger has."""
-    path = run / file_digests.FILE
+    path = run / file_digests.DIGESTS_FILE
     data = json.loads(path.read_bytes())
     for name, one in data["files"].items():
         content = (run / name).read_bytes() if (run / name).is_file() else None
@@ -164,7 +164,7 @@ def _write_ledger(path: Path, data: dict[str, Any]) -> None:
 
 def _in_ledger(key: str, name: str) -> Trick:
     def put(sent: Sent) -> None:
-        path = sent.run / file_digests.FILE
+        path = sent.run / file_digests.DIGESTS_FILE
         data = json.loads(path.read_bytes())
         mine = FileDigest.of_bytes((sent.home / "mine").read_bytes())
         data[key][_filled(name, sent)] = {"size": mine.size, "sha256": mine.sha256}
@@ -268,10 +268,10 @@ def _an_index_of_series_with_a_name_outside(sent: Sent) -> None:
     (sent.run / "series").mkdir(exist_ok=True)
     index = SeriesIndex(
         plan=json.loads((sent.run / "run.json").read_bytes())["plan"],
-        chunks=((f"../{UP}", 2),),
+        chunk_entry_counts=((f"../{UP}", 2),),
         entry_sizes=(4, 4),
-        golden_entries={f"../{UP}": 0},
-        experiment_entries={sent.experiment: 1},
+        entry_number_by_golden={f"../{UP}": 0},
+        entry_number_by_experiment={sent.experiment: 1},
         golden_by_experiment={sent.experiment: f"../{UP}"},
         left_out_count=0,
         budget_mb=1,
@@ -310,9 +310,9 @@ def _checks_of_any_shape(sent: Sent) -> None:
 
 def _approvals_of_any_shape(sent: Sent) -> None:
     (sent.run / "reviewed.json").write_bytes(json_bytes({"schema": "reviewed/1", "groups": [UP]}))
-    ledger = json.loads((sent.run / file_digests.FILE).read_bytes())
+    ledger = json.loads((sent.run / file_digests.DIGESTS_FILE).read_bytes())
     ledger["files"]["reviewed.json"] = {"size": 0, "sha256": ""}
-    _write_ledger(sent.run / file_digests.FILE, ledger)
+    _write_ledger(sent.run / file_digests.DIGESTS_FILE, ledger)
     _reseal(sent.run)
 
 

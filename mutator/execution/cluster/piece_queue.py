@@ -73,7 +73,7 @@ class PieceQueue:
         self._sampled_ids = {sample.id for sample in proof}
         self._proof_pieces = [
             self._build_proof_piece(line)
-            for line in plan_file.experiment_lines(folder.path, self._sampled_ids)
+            for line in plan_file.selected_experiment_lines(folder.path, self._sampled_ids)
         ]
         self._pieces_in_progress: dict[int, _PieceInProgress] = {}
         self._worker_by_sampled: dict[str, str] = {}  # the worker that ran each experiment of the sample

@@ -51,7 +51,7 @@ class ResultIntake:
     def close(self) -> FileDigests:
         """Close the files; return the digests of those whose lines count."""
         self._writer.close()
-        return self._writer.sha256_by_file
+        return self._writer.sha256_by_segment
 
     def _golden_series(self, key: str) -> bytes:
         golden = next(golden_run for golden_run in self._folder.golden_runs if golden_run.key == key)

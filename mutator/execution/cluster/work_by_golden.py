@@ -9,7 +9,7 @@ from typing import Any
 from mutator.campaigns.chunks import PendingChunk
 from mutator.execution.cluster.pieces import Piece
 from mutator.store import plan_file
-from mutator.store.plan_lines import id_on_line, parse_experiment, parse_fault, values_behind_id
+from mutator.store.plan_lines import id_on_line, parse_experiment, parse_fault, values_hashed_into_id
 from mutator.store.run_folder import RunFolder
 
 _FIELDS_OF_SHARED_RUN = ("fault", "trigger", "seed")  # equal for experiments that share a run
@@ -60,14 +60,14 @@ def _list_runs(folder: RunFolder, pending: Sequence[PendingChunk]) -> Iterator[P
 
 
 def _shared_run_key(line: bytes) -> list[Any]:
-    data = values_behind_id(line)
+    data = values_hashed_into_id(line)
     return [data[name] for name in _FIELDS_OF_SHARED_RUN]
 
 
 def golden_key_of(folder: RunFolder, line: bytes, faults: FaultLineById) -> str:
-    fault = parse_fault(faults[values_behind_id(line)["fault"]])
+    fault = parse_fault(faults[values_hashed_into_id(line)["fault"]])
     return folder.golden_run_of(parse_experiment(line, {fault.id: fault})).key
 
 
 def fault_lines_of(lines: PlanLinesOfRun, faults: FaultLineById) -> tuple[bytes, ...]:
-    return tuple(dict.fromkeys(faults[values_behind_id(line)["fault"]] for line in lines.values()))
+    return tuple(dict.fromkeys(faults[values_hashed_into_id(line)["fault"]] for line in lines.values()))

@@ -25,7 +25,7 @@ from mutator.execution.cluster.worker_calls import await_answer, call_on_worker,
 from mutator.execution.cluster.worker_roster import WorkerRoster, describe_worker
 from mutator.execution.session import Session
 from mutator.preflight import equivalence_check
-from mutator.store.work_stretches import Machine
+from mutator.store.work_stretches import WorkerMachine
 
 _WORKER_CHECK_INTERVAL_S = 0.5  # between two checks of the present workers
 _WORKERLESS_TIMEOUT_S = 60.0  # time without any worker after which the command gives up
@@ -71,7 +71,7 @@ class WorkDispatcher:
         self._bundle = Bundle.pack_for_run(session.workspace, folder, session.engine)
         self._queue = PieceQueue(folder, session.pending, session.proof)
         self._intake = ResultIntake(folder, session.manifest, session.new_worker_name("cluster"))
-        self._roster = WorkerRoster(folder.stretches[-1], accept=session.accept_versions)
+        self._roster = WorkerRoster(folder.session_environments[-1], accept=session.accept_versions)
         self._run_id = f"mutator-{uuid.uuid4().hex}"
         self._workers_by_key: dict[str, _PresentWorker] = {}
         self._queue_changed = asyncio.Event()  # set when idle workers might find work
@@ -292,7 +292,7 @@ class WorkDispatcher:
             worker.unstored_machine_facts
         ):  # before its first results are written, run.json must name the worker
             self._session.note_machine(
-                from_json_types(Machine, {"worker": worker.name, **worker.unstored_machine_facts})
+                from_json_types(WorkerMachine, {"worker": worker.name, **worker.unstored_machine_facts})
             )
             worker.unstored_machine_facts = {}
         for (

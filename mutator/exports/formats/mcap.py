@@ -138,7 +138,7 @@ class ExperimentFileBuilder:
         stored_series = self._series.load_series(record.experiment_id, record)
         assert stored_series is not None  # `has` was checked
         golden, faulty = stored_series
-        points = faulty.points
+        points = faulty.extra_points
         topics: tuple[list[Topic], list[Topic]] = ([], [])
         for row, about in enumerate(golden.facts["channels"]):
             is_of_channel = points.channel_numbers == row

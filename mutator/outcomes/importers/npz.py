@@ -14,7 +14,7 @@ from mutator.outcomes.trace_files import (
     Importer,
     TraceRequest,
     by_channel,
-    check_size,
+    check_trace_size,
 )
 
 
@@ -28,7 +28,7 @@ def _read_columns(request: TraceRequest) -> Arrays:
     if data.count(npz_reader.ENTRY_MAGIC) > MOST_COLUMNS:
         raise BadTrace(f"{data.count(npz_reader.ENTRY_MAGIC)} members", f"at most {MOST_COLUMNS}")
     with np.load(io.BytesIO(data), allow_pickle=False) as file:
-        check_size(sum(member.file_size for member in file.zip.infolist()))
+        check_trace_size(sum(member.file_size for member in file.zip.infolist()))
         return {name: np.asarray(file[name]) for name in request.choose_names(file.files)}
 
 

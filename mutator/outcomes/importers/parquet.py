@@ -10,7 +10,7 @@ from mutator.outcomes.trace_files import (
     Importer,
     TraceRequest,
     by_channel,
-    check_size,
+    check_trace_size,
     frame_columns,
 )
 
@@ -25,7 +25,7 @@ def _read_parquet(request: TraceRequest) -> Arrays:
     # reading ahead starts threads of pyarrow, and one of them could abort the process at its exit
     file = parquet.ParquetFile(io.BytesIO(data), pre_buffer=False)
     names = list(request.choose_names(file.schema_arrow.names))
-    check_size(file.metadata.num_rows * min(len(names), file.metadata.num_columns) * 8)
+    check_trace_size(file.metadata.num_rows * min(len(names), file.metadata.num_columns) * 8)
     for column in file.schema:
         if column.name in names and column.physical_type not in _NUMERIC_TYPES:
             raise BadTrace(f"channel {column.name} is not numeric", "a number in each row")

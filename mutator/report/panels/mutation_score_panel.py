@@ -5,7 +5,7 @@ operators have no such panel.
 from dataclasses import replace
 
 from mutator.model import OPERATOR_FAULTS_MODULE
-from mutator.outcomes.fault_free_runs import alerts_by_drive
+from mutator.outcomes.fault_free_runs import alerts_by_scenario_and_seed
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import sheet_csv_and_markdown_files
 from mutator.report.reported_run import ReportedRun
@@ -32,7 +32,7 @@ def build_mutation_score_panel(run: ReportedRun) -> Panel | None:
     score = mutation_score_sheet(
         run.frame,
         plan_file.load_faults(run.folder.path),
-        alerts_by_drive(runs) if runs else None,
+        alerts_by_scenario_and_seed(runs) if runs else None,
         run.folder.head.operators,
     )
     html = rendered(

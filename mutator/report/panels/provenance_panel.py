@@ -1,13 +1,13 @@
 """The provenance panel: how the experiments were executed, and what is needed to reproduce them."""
 
 from mutator._common.table_rendering import TextTable
-from mutator.audit.seal import UNSEALED_KEYS, digests_or_why_no_seal, unsealed_facts, without_keys
+from mutator.audit.seal import UNSEALED_KEYS_BY_FILE, digests_or_why_no_seal, unsealed_facts, without_keys
 from mutator.campaigns.installed_studies import study_problems
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.store.approvals import approval_summary
 from mutator.store.run_head import HEAD
-from mutator.store.work_stretches import describe_stretches, package_versions
+from mutator.store.work_stretches import describe_environments, version_texts_by_package
 
 LISTED_PACKAGES = (
     "jinja2",
@@ -57,10 +57,10 @@ def build_provenance_panel(run: ReportedRun) -> Panel:
 def _provenance_facts(run: ReportedRun) -> list[tuple[str, str]]:
     folder = run.folder
     reviewed = approval_summary(folder.path)
-    head, packages = folder.head, package_versions(folder.stretches)
-    chosen = without_keys(head.as_json(), UNSEALED_KEYS[HEAD])["choices"]
+    head, packages = folder.head, version_texts_by_package(folder.session_environments)
+    chosen = without_keys(head.as_json(), UNSEALED_KEYS_BY_FILE[HEAD])["choices"]
     facts = {
-        "experiments": f"{len(run.results)} of {folder.planned_count} planned",
+        "experiments": f"{len(run.results)} of {folder.planned_experiment_count} planned",
         **({"proof": run.engine_summary.equivalence_in_brief} if run.engine_summary else {}),
         **({"reviewed": reviewed} if reviewed else {}),
         **digests_or_why_no_seal(folder),
@@ -74,7 +74,7 @@ def _provenance_facts(run: ReportedRun) -> list[tuple[str, str]]:
         **{f"chosen: {name}": value for name, value in chosen.items() if value is not None},
         **{f"digest of {name}": value for name, value in head.sources.items()},
         "mutator": head.provenance.mutator,
-        **{name: text for name, text in describe_stretches(folder.stretches).items() if name == "python"},
+        **{name: text for name, text in describe_environments(folder.session_environments).items() if name == "python"},
         **{name: packages[name] for name in LISTED_PACKAGES if name in packages},
     }
     return [(name, str(value)) for name, value in facts.items()]

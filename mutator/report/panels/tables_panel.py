@@ -8,7 +8,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note, fault_free_table
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
-from mutator.results.outcome_counting import count_outcomes, count_table, fault_types_of, hazard_names
+from mutator.results.outcome_counting import count_outcomes_by_group, count_table, fault_types_of, checked_hazard_names
 from mutator.statistics.metric_tables import fault_tolerant_times_sheet, metrics_sheet, severity_sheet
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.sheet_selection import run_sheets
@@ -57,7 +57,7 @@ _HTML_TEMPLATE = """\
 
 
 def counts_note(folder: RunFolder) -> str:
-    note = f" {folder.stop_note}" if folder.stop_note else ""
+    note = f" {folder.stop_at_hazard_note}" if folder.stop_at_hazard_note else ""
     return COUNTS_NOTE + (NO_ALERT_NOTE + note if folder.has_alerts else "")
 
 
@@ -122,10 +122,10 @@ def build_published_comparison_panel(run: ReportedRun) -> Panel | None:
 
 
 def _count_tables(run: ReportedRun) -> list[tuple[str, TextTable]]:
-    hazards = hazard_names(run.results)
+    hazards = checked_hazard_names(run.results)
     tables = []
     for title, head, groups in _GROUPINGS:
-        counts = count_outcomes(run.results, groups(run.results))
+        counts = count_outcomes_by_group(run.results, groups(run.results))
         heads, lines = count_table(counts, head, hazards, alerts=run.folder.has_alerts)
         tables.append((title, TextTable(heads=heads, rows=lines, right_aligned=range(1, len(heads)))))
     return tables

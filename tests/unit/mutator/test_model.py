@@ -9,7 +9,7 @@ import pytest
 import mutator
 from mutator.model import Experiment, Method, Record, Value, fault_label
 from mutator.results.result_rows import rows_of
-from mutator.results.table_columns import FinishedExperiment, cells_of, result_columns
+from mutator.results.table_columns import FinishedExperiment, cells_by_column, result_columns
 from mutator.results.table_files import parquet_batch
 from mutator.results.table_reader import typed_frame
 
@@ -42,7 +42,7 @@ def test_a_fault_and_its_row_of_the_results_have_the_same_label(
     """The table has 35.0 for both 35 and 35.0."""
     one = experiment(value=value)
     columns = result_columns((), ())
-    cells = parquet_batch(columns, cells_of(columns, [FinishedExperiment(one, record(one.id))]))
+    cells = parquet_batch(columns, cells_by_column(columns, [FinishedExperiment(one, record(one.id))]))
     frame = typed_frame(pa.Table.from_batches([cells]), ())
     assert [row.fault for row in rows_of(frame, {one.fault.id: one.fault})] == [one.fault.label]
 

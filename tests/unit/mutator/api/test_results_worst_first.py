@@ -11,7 +11,7 @@ from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Outcome, Record
 from mutator.store.checksummed_lines import line_file_bytes
-from mutator.store.records import SCHEMA, record_as_json
+from mutator.store.records import RECORDS_SCHEMA, record_as_json
 from mutator.workspace import Workspace
 
 
@@ -25,7 +25,7 @@ def test_filtered_results_are_sorted_by_severity(
     path = run / "records" / "0001-main.jsonl"
     path.parent.mkdir()
     path.write_bytes(
-        line_file_bytes(path, {"schema": SCHEMA, "plan": plan.digest}, map(record_as_json, made))
+        line_file_bytes(path, {"schema": RECORDS_SCHEMA, "plan": plan.digest}, map(record_as_json, made))
     )
     monkeypatch.setattr(module, "_ROWS_PER_BATCH", 7)
     rows, count = worst_results(run)

@@ -24,7 +24,7 @@ from mutator.model import Experiment, Outcome, Status
 from mutator.store import plan_file
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.patch_files import PatchWriter
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder
 from mutator.workspace import Workspace
@@ -92,7 +92,7 @@ def test_a_run_has_a_one_line_repr_faults_and_provenance(run: Run) -> None:
     assert run.provenance["campaign"] == "toy"
     assert {"sources", "seed", "stretches", "choices"} <= set(run.provenance)
     assert set(run.results["fault_id"]) == set(run.faults)
-    assert list(run.experiments) == list(plan_file.ids(run.path))
+    assert list(run.experiments) == list(plan_file.experiment_ids(run.path))
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +115,7 @@ def driven_once(
     patches = PatchWriter(folder.path, "0002-a")
     patches.append(experiment.id, (root / "single" / "mutant.patch").read_bytes())
     patches.close()
-    lines = LineWriter(folder.path / "records" / "0002-a.jsonl", {"schema": SCHEMA, "plan": folder.head.plan})
+    lines = LineWriter(folder.path / "records" / "0002-a.jsonl", {"schema": RECORDS_SCHEMA, "plan": folder.head.plan})
     lines.append(dataclasses.asdict(single.record))
     lines.close()
     return folder.path
@@ -172,7 +172,7 @@ def test_only_a_rerun_that_equals_the_record_is_kept(driven: Run) -> None:
     assert len(trial.traces().faulty) == 120
     assert not (driven.path / "traces").exists()
     assert not experiment.is_drawn
-    kept = SeriesFolder(driven.path).kept_path(experiment.id)
+    kept = SeriesFolder(driven.path).rerun_series_path(experiment.id)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             run_experiments,

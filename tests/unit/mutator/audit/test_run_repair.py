@@ -14,7 +14,7 @@ from mutator.store import file_digests, plan_file
 from mutator.store.checksummed_lines import line_file_bytes, read_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.patch_files import PatchFolder
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesIndex, save_index
 from mutator.workspace import Workspace
@@ -45,7 +45,7 @@ def edit(path: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
 
 
 RECORDS = "records/0001-a.jsonl"
-NO_FILES = [RECORDS, "timings/0001-a.jsonl", "golden/A/said.json", "plan.csv", file_digests.FILE]
+NO_FILES = [RECORDS, "timings/0001-a.jsonl", "golden/A/said.json", "plan.csv", file_digests.DIGESTS_FILE]
 LOSSES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], int]] = {
     "a changed line": (lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]], 1),
     "a dropped line": (lambda x: [*x[:3], *x[4:]], 2),  # the line after it cannot be verified
@@ -99,7 +99,7 @@ def test_a_missing_segment_loses_its_records(run: Path) -> None:
 
 
 def test_a_lost_patch_removes_its_record(run: Path, put_patches: Callable[..., None]) -> None:
-    one, other = list(plan_file.ids(run))[:2]
+    one, other = list(plan_file.experiment_ids(run))[:2]
     [file] = PatchFolder(run).block_files()
     put_patches(run, {one: b"other", other: None})
     before = file.read_bytes()
@@ -128,7 +128,7 @@ def test_files_that_run_can_rebuild_are_moved_aside(run: Path, name: str) -> Non
     assert not folder.is_finished and not (run / name).exists()
     assert (run / "damaged" / name).read_bytes() == b"other"
     (run / name).write_bytes(b"again")
-    file_digests.close_segments(run, finished=True)
+    file_digests.add_segments_to_ledger(run, finished=True)
     repaired(run)
     assert (run / "damaged" / f"{name}.2").read_bytes() == b"again"
 
@@ -157,7 +157,7 @@ def test_damaged_timings_are_removed(run: Path) -> None:
 
 @pytest.mark.parametrize("content", [None, b"{", b"{}"])
 def test_a_damaged_ledger_is_rebuilt_from_the_files(run: Path, content: bytes | None) -> None:
-    path = run / file_digests.FILE
+    path = run / file_digests.DIGESTS_FILE
     path.unlink() if content is None else path.write_bytes(content)
     said, folder = repaired(run)
     assert said == ["digests.json rebuilt from the current files: only an earlier seal can confirm them"]
@@ -175,9 +175,9 @@ def test_a_damaged_campaign_file_or_plan_is_not_repaired(run: Path) -> None:
 
 
 def test_an_intact_run_is_not_changed(run: Path) -> None:
-    before = (run / file_digests.FILE).stat().st_mtime_ns
+    before = (run / file_digests.DIGESTS_FILE).stat().st_mtime_ns
     assert repair_run(RunFolder.open_unverified(run)) == []
-    assert (run / file_digests.FILE).stat().st_mtime_ns == before and not (run / "damaged").exists()
+    assert (run / file_digests.DIGESTS_FILE).stat().st_mtime_ns == before and not (run / "damaged").exists()
 
 
 def test_a_run_resumes_after_a_killed_repair(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -244,10 +244,10 @@ def test_a_file_outside_that_a_record_names_stays(run: Path) -> None:
     mine = run.parent / "setup.patch"
     mine.write_text("mine")
     segment = read_segment(run / RECORDS)
-    lines = [segment.content(number) for number in segment.lines if number > 1]
+    lines = [segment.parse_line(number) for number in segment.lines if number > 1]
     lines[0] |= {"experiment_id": name, "patch": "ab" * 32}
     plan = RunFolder.open_unverified(run).head.plan
-    (run / RECORDS).write_bytes(line_file_bytes(run / RECORDS, {"schema": SCHEMA, "plan": plan}, lines))
+    (run / RECORDS).write_bytes(line_file_bytes(run / RECORDS, {"schema": RECORDS_SCHEMA, "plan": plan}, lines))
     repaired(run)
     assert mine.read_text() == "mine"
 
@@ -259,10 +259,10 @@ def test_a_file_outside_that_an_index_of_series_names_stays(run: Path, name: str
     (run / "series").mkdir()
     index = SeriesIndex(
         plan=RunFolder.open_unverified(run).head.plan,
-        chunks=((name, 1),),
+        chunk_entry_counts=((name, 1),),
         entry_sizes=(4,),
-        golden_entries={},
-        experiment_entries={},
+        entry_number_by_golden={},
+        entry_number_by_experiment={},
         golden_by_experiment={},
         left_out_count=0,
         budget_mb=1,

@@ -13,7 +13,7 @@ from mutator.audit.seal import digests_or_why_no_seal, seals_of, unsealed_facts
 from mutator.store import file_digests
 from mutator.store.approvals import write_approvals
 from mutator.store.checksummed_lines import line_file_bytes
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -60,11 +60,11 @@ def test_the_seal_does_not_depend_on_workers_or_order(made: Path, run: Path, res
 def test_a_retried_harness_error_does_not_affect_the_seal(made: Path, run: Path) -> None:
     folder = RunFolder.open(run)
     name = next(iter(folder.planned_positions()))
-    head = {"schema": SCHEMA, "plan": folder.head.plan}
+    head = {"schema": RECORDS_SCHEMA, "plan": folder.head.plan}
     path = run / "records" / "0002-a.jsonl"
-    file_digests.close_segments(run, finished=False)
+    file_digests.add_segments_to_ledger(run, finished=False)
     path.write_bytes(line_file_bytes(path, head, [{"experiment_id": name, "status": "harness_error"}]))
-    file_digests.close_segments(run, finished=True)
+    file_digests.add_segments_to_ledger(run, finished=True)
     assert sealed(run) == sealed(made)
 
 
@@ -140,7 +140,7 @@ def test_any_change_of_the_result_changes_the_seal(
 
 
 def test_an_unfinished_run_has_no_seal(run: Path) -> None:
-    file_digests.close_segments(run, finished=False)
+    file_digests.add_segments_to_ledger(run, finished=False)
     folder = RunFolder.open(run)
     none = {"seal": "none: the run is not finished"}
     assert (seals_of(folder).seal, digests_or_why_no_seal(folder)) == (None, none)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mutator.audit.seal import Seals, seals_of
-from mutator.audit.signatures import sign, verified_signer
+from mutator.audit.signatures import sign_seal, verified_signer
 from mutator.errors import CheckFailed
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -31,7 +31,7 @@ def signed(
         public[name] = key.with_suffix(".pub").read_text().strip()
     folder = RunFolder.open(write_finished(copy_toycar(place), place / "run"))
     seals = seals_of(folder)
-    sign(folder, seals, place / "jane")
+    sign_seal(folder, seals, place / "jane")
     return folder, seals, public
 
 

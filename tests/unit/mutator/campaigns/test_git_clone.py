@@ -12,7 +12,7 @@ import pytest
 
 from mutator.campaigns import git_clone
 from mutator.campaigns.git_clone import GitClone, find_clone_state, find_user_name
-from mutator.store.work_stretches import CloneState
+from mutator.store.work_stretches import GitCloneState
 
 IDENTITY = ("-c", "user.name=x", "-c", "user.email=x@example.org", "-c", "commit.gpgsign=false")
 
@@ -108,7 +108,7 @@ def test_changes_are_those_that_git_status_lists(
     CHANGES[change](library)
     state = find_clone_state(library)
     expected = bool(git(library, "status", "--porcelain", "--", "."))
-    assert state == CloneState(commit=git(clone, "rev-parse", "HEAD").strip(), changed=expected)
+    assert state == GitCloneState(commit=git(clone, "rev-parse", "HEAD").strip(), changed=expected)
 
 
 @pytest.mark.parametrize("hash_name", ["sha1", "sha256"])
@@ -129,7 +129,7 @@ def test_worktrees_shallow_clones_and_submodules_are_clones(tmp_path: Path, hash
     for top in (tmp_path / "tree", tmp_path / "shallow", outer / "inner"):
         library = top / "library"
         state = find_clone_state(library)
-        assert state == CloneState(commit=git(root, "rev-parse", "HEAD").strip(), changed=False)
+        assert state == GitCloneState(commit=git(root, "rev-parse", "HEAD").strip(), changed=False)
         found = GitClone.find(library)
         assert found is not None and found.hash_name == hash_name
         assert found.describe_last_change([library / "b.yaml"], "--format=%H") == state.commit + "\n"

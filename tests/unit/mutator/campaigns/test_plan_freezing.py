@@ -55,7 +55,7 @@ def test_an_interrupted_freeze_can_be_repeated(toycar: Workspace, tmp_path: Path
     plan = build_plan(toycar, "toy")
     freeze_plan(plan, tmp_path / "run", toycar)
     (tmp_path / "run" / "run.json").rename(tmp_path / "run" / ".run.json.4711")
-    assert freeze_plan(plan, tmp_path / "run", toycar).planned_count == 24
+    assert freeze_plan(plan, tmp_path / "run", toycar).planned_experiment_count == 24
 
 
 def test_a_disk_limit_at_its_default_does_not_change_the_plan(toycar: Workspace, tmp_path: Path) -> None:

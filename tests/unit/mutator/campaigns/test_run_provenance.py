@@ -16,7 +16,7 @@ from mutator.errors import EXIT_WRONG_INPUT, MutatorError
 from mutator.execution.distributor_choice import choose_distributor, packages_of_distributor
 from mutator.store.check_results import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.work_stretches import CloneState
+from mutator.store.work_stretches import GitCloneState
 from mutator.workspace import Workspace
 
 
@@ -42,8 +42,8 @@ def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
 
 def test_a_session_records_everything_that_affects_results(folder: RunFolder, toycar: Workspace) -> None:
     folder = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False)
-    (stretch,) = RunFolder.open(folder.path).stretches
-    assert stretch == folder.stretches[0]
+    (stretch,) = RunFolder.open(folder.path).session_environments
+    assert stretch == folder.session_environments[0]
     assert (
         stretch.python == run_environment.python_version() and stretch.cpu == run_environment.processor_name()
     )
@@ -54,7 +54,7 @@ def test_a_session_records_everything_that_affects_results(folder: RunFolder, to
     assert stretch.blas and stretch.threads and stretch.platform
 
 
-def _clone() -> dict[str, CloneState] | None:
+def _clone() -> dict[str, GitCloneState] | None:
     """Return the git state of the harness; the toy is outside any clone."""
     state = find_clone_state(Path(run_environment.__file__).parents[1])
     return {"mutator": state} if state else None
@@ -75,14 +75,14 @@ def test_a_package_that_reads_the_traces_or_distributes_the_work_is_recorded(
     for cached in (run_environment._installed_packages, run_environment._packages_by_module):
         monkeypatch.setattr(run_environment, cached.__name__, cached.__wrapped__)
     manifest = toycar.manifest("toycar")
-    plain = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False).stretches[-1]
+    plain = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False).session_environments[-1]
     assert "door-examples" not in plain.packages
     packages = packages_of_distributor(choose_distributor("here:"))
     spread = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False, packages=packages)
     monkeypatch.setattr(type(toycar), "manifest", lambda *_: replace(manifest, trace_file="log.jsonl"))
     reading = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False)
     for begun in (spread, reading):
-        assert begun.stretches[-1].packages == {**plain.packages, "door-examples": "1.0"}
+        assert begun.session_environments[-1].packages == {**plain.packages, "door-examples": "1.0"}
     use(monkeypatch, **{"door-examples": "1.1"})
     with pytest.raises(MutatorError, match=r"door-examples 1\.0, here 1\.1"):
         accepted_version_differences(reading)
@@ -124,7 +124,7 @@ def test_different_versions_are_refused_unless_accepted(
     assert caught.value.exit_code == EXIT_WRONG_INPUT
     assert caught.value.got == f"this run used other versions: {told}"
     folder = begin_stretch(folder, toycar, records_glob="0002-*", accept_versions=True)
-    assert [list(stretch.accepted) for stretch in folder.stretches] == [[], [told]]
+    assert [list(stretch.accepted) for stretch in folder.session_environments] == [[], [told]]
     assert accepted_version_differences(folder) == ()  # from now on, these are the run's versions
 
 
@@ -153,4 +153,4 @@ def test_another_machine_is_recorded_but_not_refused(
     monkeypatch.setattr(name, lambda: other)
     assert accepted_version_differences(folder) == ()
     folder = begin_stretch(folder, toycar, records_glob="0002-*", accept_versions=False)
-    assert getattr(folder.stretches[1], changed) == other != getattr(folder.stretches[0], changed)
+    assert getattr(folder.session_environments[1], changed) == other != getattr(folder.session_environments[0], changed)

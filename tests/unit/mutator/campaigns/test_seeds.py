@@ -95,7 +95,7 @@ def test_planned_experiments_can_be_read_by_position(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
     folder = freeze_plan(SeedBySeedPlan(toycar, campaign()), tmp_path / "run", toycar)
-    planned = plan_file.ExperimentsInOrder(folder.path, folder.head.chunks)
+    planned = plan_file.ExperimentsReadOnAccess(folder.path, folder.head.chunks)
     every = plan_file.load_experiments(folder.path)
     assert (len(planned), tuple(planned)) == (len(every), every)
     assert [planned[i] for i in range(-3, len(every))] == [every[i] for i in range(-3, len(every))]

@@ -212,10 +212,10 @@ def test_the_only_input_of_a_reached_component_passed_the_fault_on() -> None:
 def test_a_component_changed_no_later_than_those_that_it_alone_feeds() -> None:
     """Only the speed control feeds the pedals."""
     found = path("finder", gas=1.2, place=1.3, wanted=1.25)
-    assert {s.name: s.t_by for s in found.components if s.t_by is not None} == {"speed": 1.2}
+    assert {s.name: s.t_changed_by for s in found.components if s.t_changed_by is not None} == {"speed": 1.2}
     assert [s.t_first for s in found.components if s.name == "speed"] == [1.25]
     late = path("eyes", "wheel", torque=1.0, place=1.1, gas=1.2, wanted=1.5)
-    assert {s.name: s.t_by for s in late.components if s.t_by is not None} == {"speed": 1.2}
+    assert {s.name: s.t_changed_by for s in late.components if s.t_changed_by is not None} == {"speed": 1.2}
 
 
 @pytest.mark.parametrize(

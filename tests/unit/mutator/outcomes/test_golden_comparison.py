@@ -52,8 +52,8 @@ def test_equal_traces_do_not_differ() -> None:
 def test_steps_after_the_end_of_the_drive_affect_only_max_dev() -> None:
     golden, faulty = trace(gas=[0, 0, 0, 0, 0]), trace(gas=[0, 2, 1, 9, 0])
     found = compare_traces(golden, faulty, [GAS], "t", t_end=0.2)
-    assert (found.max_dev, found.dev) == ((("gas", 9.0),), (("gas", 2.0),))
-    assert compare_traces(golden, faulty, [GAS], "t").dev == found.max_dev
+    assert (found.max_dev, found.max_dev_in_drive) == ((("gas", 9.0),), (("gas", 2.0),))
+    assert compare_traces(golden, faulty, [GAS], "t").max_dev_in_drive == found.max_dev
 
 
 def test_a_channel_is_compared_at_its_own_times() -> None:

@@ -13,7 +13,7 @@ from mutator.model import Record
 from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.golden_comparison import Trace, compare_traces
 from mutator.outcomes.series_sampling import SeriesSampler, write_sampled_series
-from mutator.store.series_folder import SeriesFolder, write_kept_series
+from mutator.store.series_folder import SeriesFolder, write_rerun_series
 from mutator.store.series_format import Series, decode_series, encode_series
 from mutator.targets.channels import Role
 from mutator.targets.manifest import TargetManifest
@@ -65,7 +65,7 @@ def test_internal_channels_have_ten_values_per_second(
     golden, faulty = stored(one, trace(speed=speed), record())
     assert golden.times_of(SPEED).tolist() == [*T[::10], 4.99]
     assert faulty.channel_values[SPEED].tolist() == rounded(np.sin(golden.times_of(SPEED)))
-    assert (faulty.points.t.tolist(), faulty.points.faulty_values.tolist()) == ([0.05], [3.0])
+    assert (faulty.extra_points.t.tolist(), faulty.extra_points.faulty_values.tolist()) == ([0.05], [3.0])
 
 
 def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: Callable[..., Record]) -> None:
@@ -74,11 +74,11 @@ def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: C
     gas = np.zeros(500)
     gas[[202, 303, 304, 404]] = 0.1, -7.0, 2.0, 9.0
     one = SeriesSampler(manifest, trace())
-    points = stored(one, trace(gas=gas), record(t_end=3.5))[1].points
+    points = stored(one, trace(gas=gas), record(t_end=3.5))[1].extra_points
     assert points.t.tolist() == [2.02, 3.03, 4.04]
     assert points.faulty_values.tolist() == rounded([0.1, -7.0, 9.0])
     assert set(points.channel_numbers.tolist()) == {GAS}
-    assert len(stored(one, trace(), record())[1].points.t) == 0
+    assert len(stored(one, trace(), record())[1].extra_points.t) == 0
 
 
 def test_infinite_huge_and_missing_values_survive_rounding(
@@ -96,7 +96,7 @@ def test_all_channels_are_stored_at_a_hazard(manifest: TargetManifest, record: C
     speed, gap = np.where(T < 2.0, T, 2 * T), 9.0 - T
     one = SeriesSampler(manifest, trace(speed=T, gap=gap))
     hazards = (("H1", 2.52), ("H3", 3.0), ("H2", 7.0))  # there is already a sample at 3.00 s
-    points = stored(one, trace(speed=speed, gap=gap), record(hazards=hazards))[1].points
+    points = stored(one, trace(speed=speed, gap=gap), record(hazards=hazards))[1].extra_points
     there = points.t == 2.52
     assert points.channel_numbers[there].tolist() == [0, 1, 2, 3, SPEED]
     assert points.faulty_values[there] == pytest.approx([0, 0, 0, 6.48, 5.04], rel=1e-6)
@@ -112,12 +112,12 @@ def test_a_run_that_ends_early_keeps_its_last_step(
     faulty = stored(one, trace(T[:303], speed=T[:303] ** 2), record())[1]
     assert faulty.t[-1] == 3.0
     assert faulty.facts["end"] == 4.99
-    assert (faulty.points.t[-1], faulty.points.faulty_values[-1]) == (3.02, rounded([3.02**2])[0])
+    assert (faulty.extra_points.t[-1], faulty.extra_points.faulty_values[-1]) == (3.02, rounded([3.02**2])[0])
 
 
 def test_a_run_without_a_step_has_no_values(manifest: TargetManifest, record: Callable[..., Record]) -> None:
     faulty = stored(SeriesSampler(manifest, trace()), trace(np.zeros(0)), record())[1]
-    assert (len(faulty.t), len(faulty.points.t)) == (0, 0)
+    assert (len(faulty.t), len(faulty.extra_points.t)) == (0, 0)
 
 
 def test_a_run_that_lasts_longer_has_more_times(
@@ -201,8 +201,8 @@ def test_curves_that_deviate_otherwise_than_the_record_says_are_refused(
     }
     forgery = curves.get(forged, faulty)
     reference = replace(golden, facts=about.get(forged, golden.facts))
-    path = SeriesFolder(tmp_path).kept_path(one.experiment_id)
-    write_kept_series(
+    path = SeriesFolder(tmp_path).rerun_series_path(one.experiment_id)
+    write_rerun_series(
         path,
         encode_series(reference),
         encode_series(forgery, golden if forged != "later" else replace(golden, t=golden.t[:0])),
@@ -216,7 +216,7 @@ def test_a_series_is_read_back_from_its_file(
 ) -> None:
     one = recorded(manifest, trace(), trace(speed=T), record(alerts=(("brake_hard", 2.5),)))
     write_sampled_series(tmp_path, manifest, trace(), trace(speed=T), one)
-    path = SeriesFolder(tmp_path).kept_path(one.experiment_id)
+    path = SeriesFolder(tmp_path).rerun_series_path(one.experiment_id)
     before = path.read_bytes()
     write_sampled_series(tmp_path, manifest, trace(), trace(speed=T), one)
     assert path.read_bytes() == before

@@ -47,7 +47,7 @@ def test_claims_about_all_faults_need_the_whole_plan(
     frame = results(*all_kinds, against)  # decides the paper's second observation
     of_all = (REFERENCES / "paper_observations.yaml").read_text().count("mixture: true")
     assert of_all
-    for done in (folder.planned_count - 1, folder.planned_count):
+    for done in (folder.planned_experiment_count - 1, folder.planned_experiment_count):
         done_results = pd.DataFrame({"status": ["ok"] * done})
         run = ReportedRun(
             folder=folder,

@@ -16,7 +16,7 @@ from mutator.preflight import equivalence_check
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter, read_segment
 from mutator.store.plan_choices import Choices
-from mutator.store.records import SCHEMA, load_records
+from mutator.store.records import RECORDS_SCHEMA, load_records
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -191,12 +191,12 @@ def test_runs_of_an_unneeded_check_are_deleted(threaded: Workspace, tmp_path: Pa
     folder = RunFolder.open(run)
     (path,) = (run / "records").iterdir()
     (run / "proof").mkdir()
-    lines = list(read_segment(path).numbered_objects(SCHEMA))
-    writer = LineWriter(run / "proof" / path.name, {"schema": SCHEMA, "plan": folder.head.plan})
+    lines = list(read_segment(path).numbered_objects(RECORDS_SCHEMA))
+    writer = LineWriter(run / "proof" / path.name, {"schema": RECORDS_SCHEMA, "plan": folder.head.plan})
     for _, line in lines[:1]:
         writer.append(line)
     writer.close()
-    file_digests.close_segments(run)
+    file_digests.add_segments_to_ledger(run)
     assert equivalence_check.remaining_sampled_experiments(folder) == ()
     summary = run_campaign(threaded, "small", run, engine="fork")
     assert (summary.proof, summary.seal) == (None, seal)

@@ -15,7 +15,7 @@ from mutator.preflight.canary import run_until_hazard
 from mutator.preflight.check_run_problems import CheckRun
 from mutator.preflight.preflight_checks import run_checks
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress
 from mutator.workspace import Workspace
@@ -148,7 +148,7 @@ def test_changed_golden_runs_are_refused(
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
     LineWriter(
-        folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head.plan}
+        folder.path / "records" / "0001-gw0.jsonl", {"schema": RECORDS_SCHEMA, "plan": folder.head.plan}
     ).close()
     monkeypatch.setattr(run_environment, "processor_name", lambda: "another")
     assert all(result.passed for result in run_checks(toycar, folder))

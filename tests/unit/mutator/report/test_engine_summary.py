@@ -15,7 +15,7 @@ from mutator.report.experiment_facts import timings_frame
 from mutator.results.table_building import build_tables
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.plan_choices import Choices
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.workspace import Workspace
@@ -72,7 +72,7 @@ def timing(name: str) -> dict[str, object]:
 
 
 def write_records(path: Path, records: list[Record]) -> None:
-    write(path, SCHEMA, [asdict(record) for record in records])
+    write(path, RECORDS_SCHEMA, [asdict(record) for record in records])
 
 
 def write(path: Path, schema: str, lines: list[dict[str, object]]) -> None:
@@ -173,7 +173,7 @@ def test_new_results_of_the_proof_make_a_report_out_of_date(finish: Finish) -> N
     build_tables(run)
     before = report_digests.inputs_digest(RunFolder.open(run), None)
     assert before == report_digests.inputs_digest(RunFolder.open(run), None)
-    write(run / "proof/0002-main.jsonl", SCHEMA, [])
+    write(run / "proof/0002-main.jsonl", RECORDS_SCHEMA, [])
     assert before != report_digests.inputs_digest(RunFolder.open(run), None)
 
 

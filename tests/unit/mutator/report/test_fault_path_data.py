@@ -72,7 +72,7 @@ def test_the_page_filters_by_the_links_that_a_fault_got_through() -> None:
     )
     untimed_paths = [
         UntimedPath(
-            state_by_component={}, late_ranks={}, links=one.links, reached="", stopped_at=(), entry_link=None
+            state_by_component={}, inferred_ranks={}, links=one.links, reached="", stopped_at=(), link_to_first_actuator=None
         )
         for one in (held, far)
     ]

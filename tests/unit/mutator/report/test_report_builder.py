@@ -17,7 +17,7 @@ from mutator.report import report_builder
 from mutator.report.panels import failed_runs_panel
 from mutator.report.report_digests import inputs_digest
 from mutator.store import approvals
-from mutator.store.run_folder import STOP_NOTE, RunFolder
+from mutator.store.run_folder import STOP_AT_HAZARD_NOTE, RunFolder
 from mutator.workspace import Workspace
 from tests.made_up_results import write_results
 
@@ -101,8 +101,8 @@ def test_the_report_states_its_origin(run: Path) -> None:
 
 def test_the_report_names_the_reviewers(run: Path) -> None:
     assert "reviewed" not in report_builder.write_report(run, None).markdown.read_text()
-    said = {"schema": approvals.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
-    write_json(run / approvals.FILE, said)
+    said = {"schema": approvals.APPROVALS_SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
+    write_json(run / approvals.APPROVALS_FILE, said)
     written = report_builder.ensure_report(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         assert "2 groups approved by Jane (1), Joe (1)" in text
@@ -143,13 +143,13 @@ def test_experiments_and_runs_are_counted_separately(run: Path) -> None:
 
 def test_the_report_says_what_stopped_runs_might_have_missed(run: Path) -> None:
     """If a run stops at a hazard, later alerts are unknown."""
-    assert STOP_NOTE not in report_builder.write_report(run, None).markdown.read_text()
+    assert STOP_AT_HAZARD_NOTE not in report_builder.write_report(run, None).markdown.read_text()
     stops = {"canary": {"after_hazard": "stop"}, "alerts": ["fcw"]}
     (run / "run.json").write_text(json.dumps(HEAD | stops))
     written = report_builder.write_report(run, None)
-    assert written.markdown.read_text().count(STOP_NOTE) == 3
-    assert f"share one run. {STOP_NOTE}" in written.markdown.read_text()
-    assert STOP_NOTE in written.page.read_text()
+    assert written.markdown.read_text().count(STOP_AT_HAZARD_NOTE) == 3
+    assert f"share one run. {STOP_AT_HAZARD_NOTE}" in written.markdown.read_text()
+    assert STOP_AT_HAZARD_NOTE in written.page.read_text()
 
 
 def drawn_again(run: Path, workspace: Workspace | None) -> bool:

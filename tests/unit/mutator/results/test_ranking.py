@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from mutator.model import Status
-from mutator.results.ranking import rank_by_experiment, ranks_of_rows
+from mutator.results.ranking import worst_first_rank_by_ok_experiment, worst_first_ranks
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_columns import SEVERITY_COLUMN, TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.results.table_reader import Results
@@ -76,7 +76,7 @@ def test_the_worst_results_come_first(tmp_path: Path) -> None:
     lines = [line | {"experiment_id": name} for name, line in WORST_FIRST.items()]
     random.Random(1).shuffle(lines)
     frame = frame_of(tmp_path, lines)
-    assert list(frame["experiment_id"].to_numpy()[ranks_of_rows(frame).argsort()]) == list(WORST_FIRST)
+    assert list(frame["experiment_id"].to_numpy()[worst_first_ranks(frame).argsort()]) == list(WORST_FIRST)
 
 
 _ENDINGS = [
@@ -122,9 +122,9 @@ def test_many_results_are_ranked_by_the_same_rules(tmp_path: Path) -> None:
             if draw.random() < 0.3:
                 line[name] = str(draw.randint(-3, 3))
     frame = frame_of(tmp_path, lines)
-    order = frame["experiment_id"].to_numpy()[ranks_of_rows(frame).argsort()]
+    order = frame["experiment_id"].to_numpy()[worst_first_ranks(frame).argsort()]
     ranked = ranked_one_by_one(rows_of(frame, {}))
     assert list(order) == [row.experiment_id for row in ranked]
-    assert rank_by_experiment(frame) == {
+    assert worst_first_rank_by_ok_experiment(frame) == {
         r.experiment_id: i for i, r in enumerate(ranked) if r.status is Status.OK
     }

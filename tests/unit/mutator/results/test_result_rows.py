@@ -7,11 +7,11 @@ import pytest
 
 from mutator.model import Outcome, Status
 from mutator.results.outcome_counting import (
-    count_endings,
-    count_outcomes,
+    count_by_outcome_or_status,
+    count_outcomes_by_group,
     count_table,
     fault_types_of,
-    hazard_names,
+    checked_hazard_names,
 )
 from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.results.table_reader import Results
@@ -50,13 +50,13 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
     masked = SEEN | {"outcome": "masked", "t_manifest": ""}
     rows = results(tmp_path, SEEN, hazard, warned, idle, masked).frame()
 
-    [chaff, total] = count_outcomes(rows, fault_types_of(rows))
+    [chaff, total] = count_outcomes_by_group(rows, fault_types_of(rows))
 
     assert (chaff.injected, chaff.activated, chaff.manifested) == (5, 4, 3)
     assert chaff.hazards == (2, 0, 1)
     assert (chaff.any_hazard, chaff.alerts, chaff.hazards_without_alert) == (2, 1, 1)
     assert total.injected == 5
-    assert count_endings(rows) == {"not_activated": 1, "masked": 1, "sdc": 1, "hazard": 2}
+    assert count_by_outcome_or_status(rows) == {"not_activated": 1, "masked": 1, "sdc": 1, "hazard": 2}
 
 
 @pytest.mark.parametrize("status", [Status.HARNESS_ERROR, Status.INVALID_MUTANT])
@@ -64,11 +64,11 @@ def test_unusable_experiments_are_counted_separately(tmp_path: Path, status: Sta
     bad = SEEN | {"status": status.value, "outcome": "", "t_h1": "3.0", "alerts": "fcw"}
     rows = results(tmp_path, SEEN, bad).frame()
 
-    [count, _] = count_outcomes(rows, fault_types_of(rows))
+    [count, _] = count_outcomes_by_group(rows, fault_types_of(rows))
 
     assert (count.injected, count.activated, count.any_hazard, count.alerts) == (1, 1, 0, 0)
     assert count.unusable == 1
-    assert count_endings(rows) == {"sdc": 1, status.value: 1}
+    assert count_by_outcome_or_status(rows) == {"sdc": 1, status.value: 1}
 
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
@@ -76,7 +76,7 @@ def test_a_crash_is_counted_as_injected_and_in_its_own_column(tmp_path: Path, st
     bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
     rows = results(tmp_path, SEEN, bad).frame()
 
-    heads, lines = count_table(count_outcomes(rows, fault_types_of(rows)), "fault type", hazard_names(rows))
+    heads, lines = count_table(count_outcomes_by_group(rows, fault_types_of(rows)), "fault type", checked_hazard_names(rows))
 
     assert heads[-1] == status.value
     assert lines[-1][heads.index("injected")] == "2"
@@ -85,13 +85,13 @@ def test_a_crash_is_counted_as_injected_and_in_its_own_column(tmp_path: Path, st
 
 def test_failure_columns_appear_only_if_a_run_failed(tmp_path: Path) -> None:
     rows = results(tmp_path, SEEN).frame()
-    heads, _ = count_table(count_outcomes(rows, fault_types_of(rows)), "fault type", hazard_names(rows))
+    heads, _ = count_table(count_outcomes_by_group(rows, fault_types_of(rows)), "fault type", checked_hazard_names(rows))
     assert heads[-1] == "hazard, no alert"
 
 
 def test_hazards_that_a_target_does_not_check_are_left_out(tmp_path: Path) -> None:
     seen = SEEN | {"h1": "", "h2": "0", "h3": ""}
-    assert hazard_names(results(tmp_path, seen, seen).frame()) == ("H2",)
+    assert checked_hazard_names(results(tmp_path, seen, seen).frame()) == ("H2",)
 
 
 def test_cells_are_converted_to_typed_values(tmp_path: Path) -> None:

@@ -24,13 +24,13 @@ from mutator.results import propagation_columns, table_building, table_files
 from mutator.results.table_columns import (
     TIMING_COLUMNS,
     FinishedExperiment,
-    cells_of,
+    cells_by_column,
     result_columns_of,
 )
 from mutator.results.table_files import TableColumn
 from mutator.store import plan_file
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.workspace import Workspace
@@ -45,7 +45,7 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
     folder = freeze_plan(plan, tmp_path / "run", toycar)
     for i in (0, 1):
         writer = LineWriter(
-            folder.path / "records" / f"0001-gw{i}.jsonl", {"schema": SCHEMA, "plan": folder.head.plan}
+            folder.path / "records" / f"0001-gw{i}.jsonl", {"schema": RECORDS_SCHEMA, "plan": folder.head.plan}
         )
         timings = LineWriter(folder.path / "timings" / f"0001-gw{i}.jsonl", {"schema": TIMINGS_SCHEMA})
         for experiment in plan.experiments[i:22:2]:
@@ -61,7 +61,7 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
 
 def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
     rows = list(csv.DictReader(table_building.build_tables(folder.path).open()))
-    assert (len(rows), folder.planned_count) == (22, 24)
+    assert (len(rows), folder.planned_experiment_count) == (22, 24)
     ids = [row["experiment_id"] for row in rows]
     assert ids == sorted(ids)
     table = pq.read_table(folder.path / "results.parquet")
@@ -103,7 +103,7 @@ def made_at_once(folder: RunFolder) -> dict[str, bytes]:
     columns = result_columns_of(folder.head)
     names = [column.name for column in columns]
     made = [
-        cells_of(columns, [FinishedExperiment(*one, folder.severity_scale, fault_paths_of(folder))])
+        cells_by_column(columns, [FinishedExperiment(*one, folder.severity_scale, fault_paths_of(folder))])
         for one in done
     ]
     rows = [{name: cell for name, (cell,) in zip(names, cells, strict=True)} for cells in made]
@@ -143,7 +143,7 @@ def test_tables_built_in_batches_have_the_same_bytes(
     left = (("gas", 2.0000001, 0.5), ("v_ego", 2.05, 1e-7), ("strange", 2.1, 3.0))
     last = plan_file.load_experiments(folder.path)[22]
     lines = LineWriter(
-        folder.path / "records" / "0002-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head.plan}
+        folder.path / "records" / "0002-gw0.jsonl", {"schema": RECORDS_SCHEMA, "plan": folder.head.plan}
     )
     lines.append(asdict(record(last.id, left=left, detail='a "b",\nc', t_manifest=2.05)))
     lines.close()
@@ -165,7 +165,7 @@ def test_row_groups_of_a_long_table_have_the_same_size(
     columns = (TableColumn("n", "count", "", ""),)
     for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
         for batch in (1, 3, 20):
-            with table_files.ParquetTable(tmp_path / "t.parquet", columns) as file:
+            with table_files.ParquetTableWriter(tmp_path / "t.parquet", columns) as file:
                 for first in range(0, size, batch):
                     some = range(first, min(size, first + batch))
                     file.append(table_files.parquet_batch(columns, [some]))
@@ -202,7 +202,7 @@ def test_tables_are_rebuilt_after_any_change(
 ) -> None:
     table_building.build_tables(folder.path)
     if changed == "more records":
-        head = {"schema": SCHEMA, "plan": folder.head.plan}
+        head = {"schema": RECORDS_SCHEMA, "plan": folder.head.plan}
         LineWriter(folder.path / "records" / "0002-gw0.jsonl", head).close()
     elif changed == "fewer timings":
         (folder.path / "timings" / "0001-gw1.jsonl").unlink()
@@ -248,7 +248,7 @@ def test_an_interrupted_build_is_not_reported_as_an_edited_table(
     table_building.build_tables(folder.path)
     planned = plan_file.load_experiments(folder.path)
     for killed_before, number in ((table_building.CSV_FILE, 2), (table_building.PARQUET_FILE, 3)):
-        head = {"schema": SCHEMA, "plan": folder.head.plan}
+        head = {"schema": RECORDS_SCHEMA, "plan": folder.head.plan}
         lines = LineWriter(folder.path / "records" / f"000{number}-gw0.jsonl", head)
         lines.append(asdict(record(planned[20 + number].id, max_dev=(("gas", 0.5),))))
         lines.close()

@@ -12,9 +12,9 @@ from mutator.results.table_columns import (
     SEVERITY_COLUMN,
     TIME_TO_HAZARD_COLUMNS,
     FinishedExperiment,
-    cells_of,
+    cells_by_column,
     result_columns,
-    severity_columns,
+    severity_and_time_columns,
 )
 from mutator.targets.contact_severity import SeverityScale
 
@@ -26,7 +26,7 @@ MakeRecord = Callable[..., Record]
 
 
 def row_of(experiment: Experiment, record: Record, scale: SeverityScale | None = None) -> dict[str, object]:
-    cells = cells_of(COLUMNS, [FinishedExperiment(experiment, record, scale)])
+    cells = cells_by_column(COLUMNS, [FinishedExperiment(experiment, record, scale)])
     return {column.name: cell for column, (cell,) in zip(COLUMNS, cells, strict=True)}
 
 
@@ -116,7 +116,7 @@ def test_a_row_has_the_severity_and_the_times_to_the_hazard(
 def test_a_scale_determines_the_columns_of_severity() -> None:
     times = ["fault_tolerant_time", "manifest_to_hazard"]
     for has_classes, names in ((True, ["severity", *times]), (False, times)):
-        severity = severity_columns(has_classes=has_classes)
+        severity = severity_and_time_columns(has_classes=has_classes)
         columns = [c.name for c in result_columns(("H1",), ("gas",), (), severity)]
         assert columns[columns.index("max_dev_gas") + 1 : columns.index("variant")] == names
     assert from_json_types(SeverityScale, as_json_types(SCALE)) == SCALE

@@ -23,13 +23,13 @@ from mutator.exports.run_export import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.report import report_builder
 from mutator.results import table_building
-from mutator.results.outcome_counting import hazard_names as checked_hazards
+from mutator.results.outcome_counting import checked_hazard_names as checked_hazards
 from mutator.results.table_columns import (
     SEVERITY_COLUMN,
     TIME_TO_HAZARD_COLUMNS,
     FinishedExperiment,
-    cells_of,
-    hazards_of_frame,
+    cells_by_column,
+    hazard_names_of_frame,
     result_columns,
     result_columns_of,
 )
@@ -190,7 +190,7 @@ def test_a_real_run_fills_each_column(crane: Workspace, tmp_path: Path, write_ru
     columns = result_columns(
         manifest.hazard_names, compared, metric_facts(manifest), (SEVERITY_COLUMN, *TIME_TO_HAZARD_COLUMNS)
     )
-    cells = cells_of(columns, [FinishedExperiment(experiment, record, crane.scale_of(manifest))])
+    cells = cells_by_column(columns, [FinishedExperiment(experiment, record, crane.scale_of(manifest))])
     row = {column.name: cell for column, (cell,) in zip(columns, cells, strict=True)}
     assert row["max_dev_wheel"]
 
@@ -281,7 +281,7 @@ def test_a_frame_computed_from_records_equals_the_stored_one(run: Path) -> None:
     names = [name for name in stored if name not in ("reached", "stopped_at")]
     computed = computed.sort_values("experiment_id", ignore_index=True)
     pd.testing.assert_frame_equal(computed[names], stored[names])
-    assert hazards_of_frame(computed) == hazards_of_frame(stored)
+    assert hazard_names_of_frame(computed) == hazard_names_of_frame(stored)
 
 
 def test_no_other_module_opens_the_tables() -> None:
@@ -341,7 +341,7 @@ def test_hazards_have_the_names_of_run_json(run: Path, reseal: Callable[[Path], 
     table = Results(run)
     assert checked_hazards(table.frame()) == ("CRUSHED", "Dropped")
     assert (
-        hazards_of_frame(table.frame()) == hazards_of_frame(table.indexed_frame()) == ("Dropped", "CRUSHED")
+        hazard_names_of_frame(table.frame()) == hazard_names_of_frame(table.indexed_frame()) == ("Dropped", "CRUSHED")
     )
     assert hazard_names(load_usable_results(table.path)) == ("CRUSHED", "Dropped")
     assert "way" in table.frame()
@@ -359,6 +359,6 @@ def test_a_table_without_a_hazard_of_run_json_is_refused(run: Path) -> None:
 def test_a_frame_without_its_hazards_is_refused(run: Path) -> None:
     """Pandas keeps them in frames made from a frame of a run, but another frame has none."""
     frame = Results.up_to_date(run).frame()
-    assert hazards_of_frame(frame[frame["status"] == "ok"].reset_index(drop=True)) == hazards_of_frame(frame)
+    assert hazard_names_of_frame(frame[frame["status"] == "ok"].reset_index(drop=True)) == hazard_names_of_frame(frame)
     with pytest.raises(MutatorError, match="without the names of its hazards"):
         prepare_results(pd.DataFrame(frame.to_dict("list")))

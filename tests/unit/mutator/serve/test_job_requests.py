@@ -115,7 +115,7 @@ def work(desk: RequestChecker, **order: Any) -> JobCommand:
 
 def test_requests_become_command_lines(desk: RequestChecker) -> None:
     run = desk.runs.folder("first")
-    experiment = next(plan_file.ids(run))
+    experiment = next(plan_file.experiment_ids(run))
     place = (f"--library={desk.workspace.library}", f"--templates={desk.workspace.templates}")
     about = {"run": "first", "experiment": experiment}
     of_run = (f"--run={run}", *place)

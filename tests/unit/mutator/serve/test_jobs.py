@@ -45,7 +45,7 @@ def busy(
 
 
 def experiment(client: Client) -> str:
-    return next(plan_file.ids(client.place / "runs/first"))
+    return next(plan_file.experiment_ids(client.place / "runs/first"))
 
 
 def test_the_run_of_a_job_is_complete_and_can_be_compared(busy: Client) -> None:

@@ -37,7 +37,7 @@ def test_lines_are_read_as_appended(tmp_path: Path) -> None:
     segment = read_segment(write(tmp_path / "records" / "a.jsonl", *given))
     assert values(segment) == given
     assert [number for number, _ in segment.numbered_objects(SCHEMA)] == [2, 3, 4, 5, 6, 7]
-    assert (segment.damaged_lines, segment.end_offset) == ((), segment.path.stat().st_size)
+    assert (segment.damaged_line_numbers, segment.complete_lines_end) == ((), segment.path.stat().st_size)
 
 
 def test_every_line_is_json_that_begins_with_its_checksum(path: Path) -> None:
@@ -54,9 +54,9 @@ def test_a_flipped_bit_is_reported_with_its_line(path: Path, bit: int) -> None:
         line = data[:place].count(b"\n") + 1
         segment = read_segment(path)
         if place == len(data) - 1:
-            assert (values(segment), segment.end_offset < len(data)) == ([0, 1, 2, 3, 4], True)
+            assert (values(segment), segment.complete_lines_end < len(data)) == ([0, 1, 2, 3, 4], True)
         else:
-            assert segment.damaged_lines[0] == line
+            assert segment.damaged_line_numbers[0] == line
 
 
 CHANGES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], tuple[int, ...]]] = {
@@ -75,7 +75,7 @@ def test_only_damaged_lines_are_lost(path: Path, change: str) -> None:
     make, damaged = CHANGES[change]
     path.write_bytes(b"".join(make(lines)))
     segment = read_segment(path)
-    assert segment.damaged_lines == damaged
+    assert segment.damaged_line_numbers == damaged
     with pytest.raises(MutatorError, match=rf"0001-gw0\.jsonl:{damaged[0]}: a damaged line; .* --repair"):
         values(segment)
 
@@ -85,7 +85,7 @@ def test_an_incomplete_last_line_is_not_damage(path: Path, keep: int) -> None:
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-1]) + lines[-1][:keep])
     segment = read_segment(path)
-    assert values(segment) == [0, 1, 2, 3, 4] and segment.end_offset == len(b"".join(lines[:-1]))
+    assert values(segment) == [0, 1, 2, 3, 4] and segment.complete_lines_end == len(b"".join(lines[:-1]))
 
 
 def test_a_renamed_file_is_reported(path: Path) -> None:

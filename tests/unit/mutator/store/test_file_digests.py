@@ -53,7 +53,7 @@ def test_a_ledger_is_read_as_written(run: Path) -> None:
 
 
 def test_every_changed_byte_is_found(run: Path) -> None:
-    path = run / file_digests.FILE
+    path = run / file_digests.DIGESTS_FILE
     data = path.read_bytes()
     for place in range(len(data)):
         path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
@@ -63,18 +63,18 @@ def test_every_changed_byte_is_found(run: Path) -> None:
 
 @pytest.mark.parametrize("content", ["{}", '{"schema": "digests/1"}', "[]", "", '{"schema": "digests/9"}'])
 def test_a_file_that_is_not_a_ledger_is_refused(run: Path, content: str) -> None:
-    (run / file_digests.FILE).write_text(content)
+    (run / file_digests.DIGESTS_FILE).write_text(content)
     with pytest.raises(MutatorError, match=r"digests\.json"):
         file_digests.load_ledger(run)
-    (run / file_digests.FILE).unlink()
+    (run / file_digests.DIGESTS_FILE).unlink()
     with pytest.raises(MutatorError, match=r"digests\.json: missing"):
         file_digests.load_ledger(run)
 
 
 def test_a_forged_ledger_is_refused(run: Path) -> None:
     """The checksum is valid, but the content is not that of a ledger."""
-    data = {"schema": file_digests.SCHEMA, "finished": True, "files": [], "rewriting": {}}
-    files.write_json(run / file_digests.FILE, data | {"sum": file_digests.digest(data)})
+    data = {"schema": file_digests.DIGESTS_SCHEMA, "finished": True, "files": [], "rewriting": {}}
+    files.write_json(run / file_digests.DIGESTS_FILE, data | {"sum": file_digests.digest(data)})
     with pytest.raises(MutatorError, match="not a list of digests"):
         file_digests.load_ledger(run)
 
@@ -98,7 +98,7 @@ def test_a_segment_with_a_second_name_is_not_cut_in_place(run: Path) -> None:
     path = segment(run, "records/0001-gw0.jsonl", 1)
     path.write_bytes(torn := path.read_bytes() + b'{"sum"')
     (run.parent / "mine").hardlink_to(path)
-    file_digests.close_segments(run)
+    file_digests.add_segments_to_ledger(run)
     assert (run.parent / "mine").read_bytes() == torn != path.read_bytes()
 
 
@@ -145,7 +145,7 @@ def test_after_a_kill_a_file_is_old_or_new(run: Path, monkeypatch: pytest.Monkey
 
 
 def test_a_file_announced_for_deletion_can_be_missing(run: Path) -> None:
-    with file_digests.rewriting_files(run, {FIRST: None}):
+    with file_digests.announcing_rewrites(run, {FIRST: None}):
         assert accepted(run)
         (run / FIRST).unlink()
         assert accepted(run)
@@ -156,7 +156,7 @@ def test_a_closed_segment_is_in_the_ledger(run: Path) -> None:
     path = segment(run, "records/0001-gw0.jsonl", 1, 2)
     whole = path.read_bytes()
     path.write_bytes(whole + b'{"sum":"0123')
-    file_digests.close_segments(run)
+    file_digests.add_segments_to_ledger(run)
     known = file_digests.load_ledger(run).files["records/0001-gw0.jsonl"]
     assert (path.read_bytes(), known) == (whole, FileDigest.of_bytes(whole, lines=3))
     assert not file_digests.load_ledger(run).finished
@@ -169,13 +169,13 @@ def test_a_damaged_segment_cannot_be_closed(run: Path) -> None:
     path = segment(run, "proof/0001-gw0.jsonl", 1, 2)
     path.write_bytes(path.read_bytes().replace(b'"value":1', b'"value":3'))
     with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: a damaged line"):
-        file_digests.close_segments(run)
+        file_digests.add_segments_to_ledger(run)
 
 
 def test_closing_twice_writes_once(run: Path) -> None:
     segment(run, "records/0001-gw0.jsonl", 1)
-    file_digests.close_segments(run, finished=True)
-    before = (run / file_digests.FILE).stat().st_mtime_ns
-    file_digests.close_segments(run)
-    assert (run / file_digests.FILE).stat().st_mtime_ns == before
-    assert json.loads((run / file_digests.FILE).read_text())["finished"] is True
+    file_digests.add_segments_to_ledger(run, finished=True)
+    before = (run / file_digests.DIGESTS_FILE).stat().st_mtime_ns
+    file_digests.add_segments_to_ledger(run)
+    assert (run / file_digests.DIGESTS_FILE).stat().st_mtime_ns == before
+    assert json.loads((run / file_digests.DIGESTS_FILE).read_text())["finished"] is True

@@ -19,7 +19,7 @@ from mutator.store.checksummed_blocks import block_bytes, read_blocks
 from mutator.store.checksummed_lines import read_segment, verified_lines
 from mutator.store.file_digests import FileDigest
 from mutator.store.patch_files import COMPLETE_BLOCK, PatchFolder
-from mutator.store.plan_file import read_lines
+from mutator.store.plan_file import read_plan_lines
 from mutator.store.series_folder import load_index
 from mutator.store.series_script import write_script
 from tests.costs import is_cheap, is_refused
@@ -41,7 +41,7 @@ def sparse(tmp_path: Path) -> Path:
     [
         lambda path: read_segment(path),
         lambda path: list(verified_lines(path, "records/1")),
-        lambda path: list(read_lines(path)),
+        lambda path: list(read_plan_lines(path)),
         lambda path: read_blocks(path),
         lambda path: read_json(path, "run/3"),
         FileDigest.of_file,

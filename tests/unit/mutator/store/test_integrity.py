@@ -13,9 +13,9 @@ from mutator.errors import MutatorError
 from mutator.model import Status
 from mutator.store import file_digests, integrity, plan_file
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.records import SCHEMA
+from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.work_stretches import Stretch
+from mutator.store.work_stretches import SessionEnvironment
 from mutator.workspace import Workspace
 
 Write = Callable[..., Path]
@@ -131,8 +131,8 @@ def test_swapped_files_are_reported(run: Path) -> None:
 
 def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> Path:
     """Turn a finished run into a killed one, with these lines in an unclosed segment."""
-    file_digests.close_segments(run, finished=False)
-    head = {"schema": SCHEMA, "plan": plan or RunFolder.open_unverified(run).head.plan}
+    file_digests.add_segments_to_ledger(run, finished=False)
+    head = {"schema": RECORDS_SCHEMA, "plan": plan or RunFolder.open_unverified(run).head.plan}
     writer = LineWriter(run / "records" / "0002-a.jsonl", head)
     for line in lines:
         writer.append(line)
@@ -141,7 +141,7 @@ def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> P
 
 
 def test_an_unclosed_segment_is_read(run: Path) -> None:
-    again = {"experiment_id": next(plan_file.ids(run)), "status": "harness_error"}
+    again = {"experiment_id": next(plan_file.experiment_ids(run)), "status": "harness_error"}
     path = unsealed(run, again, again)
     path.write_bytes(path.read_bytes() + b'{"sum"')
     assert RunFolder.open(run).problems() == []
@@ -216,7 +216,7 @@ def test_an_invalid_value_in_run_json_is_reported_by_key(run: Path, key: str) ->
         RunFolder.open_unverified(run)
 
 
-@pytest.mark.parametrize("key", [field.name for field in fields(Stretch)])
+@pytest.mark.parametrize("key", [field.name for field in fields(SessionEnvironment)])
 def test_a_damaged_stretch_of_work_is_reported(run: Path, key: str) -> None:
     """An audit prints stretches before it verifies anything."""
     data = json.loads((run / "run.json").read_text())

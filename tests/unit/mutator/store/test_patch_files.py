@@ -17,7 +17,7 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_a_patch_is_in_the_file_of_its_worker(run: Path) -> None:
-    assert PatchFolder(run).file_of("a" * 16, "0002-gw7") == run / "patches" / "0001-gw0.blocks"
+    assert PatchFolder(run).expected_file_of("a" * 16, "0002-gw7") == run / "patches" / "0001-gw0.blocks"
 
 
 def test_the_error_for_a_lost_patch_names_its_file(run: Path) -> None:
@@ -27,11 +27,11 @@ def test_the_error_for_a_lost_patch_names_its_file(run: Path) -> None:
     path.write_bytes(data)
     patches = PatchFolder(run)
     assert patches.read_patch("b" * 16) is None
-    assert patches.file_of("b" * 16) == path
+    assert patches.expected_file_of("b" * 16) == path
 
 
 def test_the_error_for_a_lost_file_takes_its_name_from_the_record(run: Path) -> None:
     path = run / "patches" / "0001-gw1.blocks"
     path.unlink()
-    assert PatchFolder(run).file_of("b" * 16, "0001-gw1") == path
-    assert PatchFolder(run).file_of("b" * 16) == run / "patches"
+    assert PatchFolder(run).expected_file_of("b" * 16, "0001-gw1") == path
+    assert PatchFolder(run).expected_file_of("b" * 16) == run / "patches"

@@ -19,7 +19,7 @@ def test_a_plan_is_read_as_written(experiment: Make, tmp_path: Path) -> None:
     faults = plan_file.load_faults(tmp_path)
     assert plan_file.load_experiments(tmp_path) == plan
     assert plan_file.load_chunk(tmp_path, chunks[1], faults) == plan[2:]
-    assert [*plan_file.ids(tmp_path)] == [e.id for e in plan]
+    assert [*plan_file.experiment_ids(tmp_path)] == [e.id for e in plan]
 
 
 def test_a_pipe_in_place_of_a_plan_is_refused(tmp_path: Path) -> None:
@@ -27,4 +27,4 @@ def test_a_pipe_in_place_of_a_plan_is_refused(tmp_path: Path) -> None:
     (tmp_path / "plan").mkdir()
     os.mkfifo(tmp_path / plan_file.EXPERIMENTS_FILE)
     with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read"):
-        list(plan_file.ids(tmp_path))
+        list(plan_file.experiment_ids(tmp_path))

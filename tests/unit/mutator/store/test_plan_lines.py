@@ -19,7 +19,7 @@ from mutator.store.plan_lines import (
     parse_canonical_experiment,
     parse_experiment,
     parse_fault,
-    values_behind_id,
+    values_hashed_into_id,
 )
 
 Make = Callable[..., Experiment]
@@ -160,6 +160,6 @@ def test_an_experiment_has_the_id_that_its_line_states(experiment: Make) -> None
     "line", [b"", b"{}", b"[]", b"3", b'"id"', b"\xff", b'{"id":3}', b'{"id":"../x"}', b"[" * 10_000]
 )
 def test_a_damaged_line_is_refused_by_every_reader(line: bytes) -> None:
-    for read in (id_on_line, values_behind_id, parse_fault, lambda line: parse_experiment(line, {})):
+    for read in (id_on_line, values_hashed_into_id, parse_fault, lambda line: parse_experiment(line, {})):
         with pytest.raises(MutatorError, match="a damaged line; the plan is damaged: restore"):
             read(line)

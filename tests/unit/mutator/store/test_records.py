@@ -11,10 +11,10 @@ from mutator._common.hashing import canonical_json
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.records import SCHEMA, load_records, record_as_json
+from mutator.store.records import RECORDS_SCHEMA, load_records, record_as_json
 from mutator.store.run_progress import RecordTail
 
-HEAD = {"schema": SCHEMA, "plan": "p"}
+HEAD = {"schema": RECORDS_SCHEMA, "plan": "p"}
 MakeRecord = Callable[..., Record]
 
 

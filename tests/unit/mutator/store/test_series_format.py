@@ -22,7 +22,7 @@ def series(values: np.ndarray, points: ExtraPoints | None = None) -> Series:
         channel_values=rows,
         sample_every=every,
         facts={"end": 1.0},
-        points=points or ExtraPoints(),
+        extra_points=points or ExtraPoints(),
     )
 
 
@@ -54,7 +54,7 @@ def test_points_round_trip() -> None:
         channel_numbers=np.array([2]), t=np.array([0.013]), golden_values=single, faulty_values=-single
     )
     values = np.zeros((3, 6), dtype="<f4")
-    found = decode_series(encode_series(series(values, points), series(values)), series(values)).points
+    found = decode_series(encode_series(series(values, points), series(values)), series(values)).extra_points
     assert (found.channel_numbers.tolist(), found.t.tolist()) == ([2], [0.013])
     assert (found.golden_values.tolist(), found.faulty_values.tolist()) == ([np.inf], [-np.inf])
 

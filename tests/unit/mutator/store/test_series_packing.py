@@ -9,9 +9,9 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Activation, Outcome, Record, Status
-from mutator.store.series_folder import SeriesFolder, run_facts, write_kept_series
+from mutator.store.series_folder import SeriesFolder, run_facts_for_series, write_rerun_series
 from mutator.store.series_format import Series, encode_series
-from mutator.store.series_packing import EncodedSeries, SeriesWriter, list_worker_files, pack_series
+from mutator.store.series_packing import EncodedSeries, SeriesWriter, list_unpacked_worker_files, pack_series
 
 RECORD = Record(
     experiment_id="e" * 16,
@@ -36,7 +36,7 @@ def series(number: int) -> Series:
         t=np.arange(600) / 20,
         channel_values=list(VALUES[number]),
         sample_every=[1] * 4,
-        facts={"n": number} | run_facts(RECORD),
+        facts={"n": number} | run_facts_for_series(RECORD),
     )
 
 
@@ -75,16 +75,16 @@ def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
     folder = SeriesFolder(packed)
     index = folder.index
     assert index is not None
-    assert [*index.experiment_entries] == IDS[::-1]
+    assert [*index.entry_number_by_experiment] == IDS[::-1]
     assert len(index.entry_sizes) == 151
-    assert len(index.chunks) > 3
+    assert len(index.chunk_entry_counts) > 3
     for number, name in enumerate(IDS):
         found = folder.load_series(name, RECORD)
         assert found is not None
-        assert found[1].facts == {"n": number} | run_facts(RECORD)
+        assert found[1].facts == {"n": number} | run_facts_for_series(RECORD)
         assert (np.array(found[1].channel_values) == VALUES[number]).all()
     assert folder.load_series("f" * 16, RECORD) is None
-    assert list_worker_files(packed) == []
+    assert list_unpacked_worker_files(packed) == []
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -109,8 +109,8 @@ def test_the_budget_keeps_the_best_series_however_often_they_are_packed(tmp_path
     assert sum(map(len, files(runs[0]).values())) < 1_010_000
     index = SeriesFolder(runs[0]).index
     assert index is not None
-    assert [*index.experiment_entries] == IDS[::-1][: len(index.experiment_entries)]
-    assert index.left_out_count == len(IDS) - len(index.experiment_entries) > 0
+    assert [*index.entry_number_by_experiment] == IDS[::-1][: len(index.entry_number_by_experiment)]
+    assert index.left_out_count == len(IDS) - len(index.entry_number_by_experiment) > 0
     assert files(runs[0]) == files(runs[1])
 
 
@@ -132,18 +132,18 @@ def test_equal_golden_runs_stay_separate(tmp_path: Path) -> None:
     pack_series(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index
     assert index is not None
-    assert [*index.experiment_entries] == IDS[3::-1]
+    assert [*index.entry_number_by_experiment] == IDS[3::-1]
     assert {*index.golden_by_experiment.values()} == {"A", "B+alone"}
 
 
 def test_a_truncated_segment_loses_only_its_last_series(tmp_path: Path) -> None:
     append(tmp_path, "0001-main", IDS[:3])
-    [segment] = list_worker_files(tmp_path)
+    [segment] = list_unpacked_worker_files(tmp_path)
     segment.write_bytes(segment.read_bytes()[:-100])
     pack_series(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index
     assert index is not None
-    assert [*index.experiment_entries] == IDS[1::-1]
+    assert [*index.entry_number_by_experiment] == IDS[1::-1]
 
 
 def test_experiments_of_a_damaged_chunk_can_be_rerun(tmp_path: Path) -> None:
@@ -151,7 +151,7 @@ def test_experiments_of_a_damaged_chunk_can_be_rerun(tmp_path: Path) -> None:
     pack_series(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index
     assert index is not None
-    chunk = tmp_path / "series" / f"{index.chunks[-1][0]}.js"
+    chunk = tmp_path / "series" / f"{index.chunk_entry_counts[-1][0]}.js"
     data = chunk.read_bytes()
     chunk.write_bytes(data[:300] + bytes([data[300] ^ 1]) + data[301:])
     with pytest.raises(MutatorError, match="damaged"):
@@ -159,12 +159,12 @@ def test_experiments_of_a_damaged_chunk_can_be_rerun(tmp_path: Path) -> None:
     (tmp_path / "series" / "index.js").write_bytes(data)
     with pytest.raises(MutatorError, match="damaged"):
         SeriesFolder(tmp_path).load_series(IDS[0], RECORD)
-    write_kept_series(
-        SeriesFolder(tmp_path).kept_path(IDS[0]), MADE[IDS[0]].golden_bytes, MADE[IDS[0]].faulty_bytes
+    write_rerun_series(
+        SeriesFolder(tmp_path).rerun_series_path(IDS[0]), MADE[IDS[0]].golden_bytes, MADE[IDS[0]].faulty_bytes
     )
     found = SeriesFolder(tmp_path).load_series(IDS[0], RECORD)
     assert found is not None
-    assert found[1].facts == {"n": 0, **run_facts(RECORD)}
+    assert found[1].facts == {"n": 0, **run_facts_for_series(RECORD)}
 
 
 def test_the_series_of_another_run_is_refused(packed: Path) -> None:

@@ -90,7 +90,7 @@ def test_a_change_after_verification_is_found(made: tuple[Workspace, Path], cach
 def test_a_damaged_entry_is_not_used(made: tuple[Workspace, Path], cache: Path) -> None:
     run = made[1]
     RunFolder.open(run)
-    key = integrity.verified_content_key(run)
+    key = integrity.verified_cache_key(run)
     assert verified_runs_cache.recall_facts(key) == {"verified": True}
     [entry] = (cache / "mutator" / "runs").iterdir()
     entry.write_text(json.dumps(json.loads(entry.read_text()) | {"ended": {}}))
@@ -104,7 +104,7 @@ def test_an_unfinished_run_has_no_entry(made: tuple[Workspace, Path], cache: Pat
     ledger = file_digests.load_ledger(run)
     try:
         file_digests.save_ledger(run, file_digests.DigestLedger(files=ledger.files))
-        assert integrity.verified_content_key(run) == ""
+        assert integrity.verified_cache_key(run) == ""
     finally:
         file_digests.save_ledger(run, ledger)
 

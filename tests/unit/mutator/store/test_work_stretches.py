@@ -11,30 +11,30 @@ from mutator._common.typed_json import from_json_types
 from mutator.errors import TypeMisfit
 from mutator.store.work_stretches import (
     Blas,
-    CloneState,
-    Machine,
-    Stretch,
-    describe_stretches,
-    package_versions,
+    GitCloneState,
+    WorkerMachine,
+    SessionEnvironment,
+    describe_environments,
+    version_texts_by_package,
     version_differences,
 )
 
-BEFORE = Stretch(
+BEFORE = SessionEnvironment(
     python="CPython 3.11.7",
     packages={"numpy": "1.26.4", "old": "1.0"},
     platform="Linux-6.1",
     cpu="Cray 1",
     blas=(Blas(library="openblas", version="0.3", kernel="Haswell", threads=1),),
-    git={"library": CloneState(commit="abc", changed=True)},
+    git={"library": GitCloneState(commit="abc", changed=True)},
 )
 
 
 def test_stretches_are_read_as_written() -> None:
-    machine = Machine(
+    machine = WorkerMachine(
         worker="w", mutator="0.2", host="h", python="3", platform="p", cpu=None, blas=BEFORE.blas, packages={}
     )
     for stretch in (BEFORE, replace(BEFORE, machines=(machine,))):
-        assert from_json_types(Stretch, json.loads(json.dumps(as_json_types(stretch)))) == stretch
+        assert from_json_types(SessionEnvironment, json.loads(json.dumps(as_json_types(stretch)))) == stretch
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_stretches_are_read_as_written() -> None:
 )
 def test_a_damaged_stretch_is_refused(stretch: Any, got: str) -> None:
     with pytest.raises(TypeMisfit, match=got):
-        from_json_types(Stretch, stretch)
+        from_json_types(SessionEnvironment, stretch)
 
 
 def test_every_difference_is_named() -> None:
@@ -63,13 +63,13 @@ def test_every_difference_is_named() -> None:
 
 
 def test_several_stretches_are_printed_together() -> None:
-    after = Stretch(
+    after = SessionEnvironment(
         python="CPython 3.12.1",
         packages={"numpy": "2.1.0"},
         platform="Linux-6.1",
         accepted=("numpy 1.26.4, here 2.1.0",),
     )
-    assert describe_stretches([BEFORE, after, after]) == {
+    assert describe_environments([BEFORE, after, after]) == {
         "python": "CPython 3.11.7, CPython 3.12.1",
         "platform": "Linux-6.1",
         "processor": "Cray 1",
@@ -77,4 +77,4 @@ def test_several_stretches_are_printed_together() -> None:
         "git commit of library": "abc with changes",
         "other versions accepted": "numpy 1.26.4, here 2.1.0",
     }
-    assert package_versions([BEFORE, after]) == {"numpy": "1.26.4, 2.1.0", "old": "1.0"}
+    assert version_texts_by_package([BEFORE, after]) == {"numpy": "1.26.4, 2.1.0", "old": "1.0"}

@@ -68,6 +68,6 @@ def test_versions_are_stored_with_a_stretch_of_work(toycar: Workspace, tmp_path:
     requiring(toycar, "HypoThesis>=6")
     folder = freeze_plan(build_plan(toycar, "small"), tmp_path / "run", toycar)
     begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False)
-    (stretch,) = RunFolder.open(folder.path).stretches
+    (stretch,) = RunFolder.open(folder.path).session_environments
     assert stretch.packages["hypothesis"] == metadata.version("hypothesis")
     assert accepted_version_differences(RunFolder.open(folder.path)) == ()

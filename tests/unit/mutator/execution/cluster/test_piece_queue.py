@@ -43,7 +43,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def ids(folder: RunFolder) -> list[str]:
-    return list(plan_file.ids(folder.path))
+    return list(plan_file.experiment_ids(folder.path))
 
 
 def board(folder: RunFolder, clock: Clock, proof: tuple[str, ...] = ()) -> PieceQueue:

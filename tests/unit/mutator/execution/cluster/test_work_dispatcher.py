@@ -30,7 +30,7 @@ from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record, Status
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.work_stretches import Stretch
+from mutator.store.work_stretches import SessionEnvironment
 from mutator.workspace import Workspace
 
 from .loops import run
@@ -131,7 +131,7 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
     """A session in which every experiment is pending, and the versions of workers are not checked."""
     monkeypatch.setattr(Bundle, "pack_for_run", lambda *given: Bundle(b"", ""))
     monkeypatch.setattr(WorkerRoster, "reason_to_refuse", lambda *given: "")
-    folder = append_stretch(folder, Stretch(python="", packages={}, platform=""))
+    folder = append_stretch(folder, SessionEnvironment(python="", packages={}, platform=""))
     return SimpleNamespace(
         workspace=toycar,
         folder=folder,
@@ -186,7 +186,7 @@ def test_no_experiment_is_blamed_for_a_failing_worker(session: Any, ending: Piec
 
 @pytest.mark.parametrize("ending", [PieceEnding.PROCESS_DIED, PieceEnding.HARNESS_FAILED])
 def test_an_experiment_that_fails_everywhere_is_a_harness_error(session: Any, ending: PieceEnding) -> None:
-    deadly = list(plan_file.ids(session.folder.path))[5]
+    deadly = list(plan_file.experiment_ids(session.folder.path))[5]
     records, remarks = dealt(session, Workers(alpha=sick(ending, deadly), beta=sick(ending, deadly)))
     assert (len(records), errors(records), session.problem, remarks) == (12, [deadly], "", [])
     assert records[deadly].detail.endswith("twice: the reason")
@@ -240,7 +240,7 @@ def test_no_experiment_is_given_up_while_results_are_written(
 
     for name in ("append_result", "append_harness_errors"):
         monkeypatch.setattr(ResultIntake, name, slow(getattr(ResultIntake, name)))
-    deadly = next(iter(plan_file.ids(session.folder.path)))
+    deadly = next(iter(plan_file.experiment_ids(session.folder.path)))
     work = sick(PieceEnding.PROCESS_DIED, deadly)
     records, _ = dealt(session, Workers(alpha=work, beta=work, gamma=work))
     assert errors(records) == [deadly]

@@ -4,7 +4,7 @@ import pytest
 
 from mutator._common.version import VERSION
 from mutator.execution.cluster.worker_roster import WorkerRoster, describe_worker
-from mutator.store.work_stretches import Stretch
+from mutator.store.work_stretches import SessionEnvironment
 
 FACTS = {
     "mutator": VERSION,
@@ -15,7 +15,7 @@ FACTS = {
     "blas": [{"library": "openblas", "version": "0.3.31", "kernel": "Zen", "threads": 1}],
     "packages": {"numpy": "2.4.6"},
 }
-STRETCH = Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform="Linux")
+STRETCH = SessionEnvironment(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform="Linux")
 
 
 @pytest.mark.parametrize(

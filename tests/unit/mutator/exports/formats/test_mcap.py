@@ -20,7 +20,7 @@ from mutator.exports.run_export import export
 from mutator.model import Activation, Experiment, Outcome
 from mutator.store.cleaning import list_deletable_files
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, run_facts, write_kept_series
+from mutator.store.series_folder import SeriesFolder, run_facts_for_series, write_rerun_series
 from mutator.store.series_format import ExtraPoints, Series, encode_series
 from mutator.workspace import Workspace
 
@@ -46,7 +46,7 @@ FAULTY = Series(  # the run ended after 0.5 s; gas was 1 for one step in between
     channel_values=list(np.array([[0.0, 0.75], [40.0, math.nan]], dtype="<f4")),
     sample_every=[1, 1],
     facts={"end": 1.0},
-    points=ExtraPoints(
+    extra_points=ExtraPoints(
         channel_numbers=np.array([0]),
         t=np.array([0.35]),
         golden_values=np.array([0.125], dtype="<f4"),
@@ -82,9 +82,9 @@ def run(
     golden = encode_series(GOLDEN)
     for record in RunFolder.open(run).records().values():
         if record.hazards:
-            faulty = replace(FAULTY, facts=FAULTY.facts | run_facts(record))
-            write_kept_series(
-                SeriesFolder(run).kept_path(record.experiment_id), golden, encode_series(faulty, GOLDEN)
+            faulty = replace(FAULTY, facts=FAULTY.facts | run_facts_for_series(record))
+            write_rerun_series(
+                SeriesFolder(run).rerun_series_path(record.experiment_id), golden, encode_series(faulty, GOLDEN)
             )
     return run
 
@@ -136,9 +136,9 @@ def test_negative_times_are_shifted(run: Path, tmp_path: Path) -> None:
     copy, name = tmp_path / "run", hazardous(run)[0]
     shutil.copytree(run, copy)
     early = replace(GOLDEN, t=GOLDEN.t - 0.5)
-    about = FAULTY.facts | run_facts(RunFolder.open(copy).records()[name])
+    about = FAULTY.facts | run_facts_for_series(RunFolder.open(copy).records()[name])
     faulty = replace(FAULTY, t=FAULTY.t - 0.5, facts=about)
-    write_kept_series(SeriesFolder(copy).kept_path(name), encode_series(early), encode_series(faulty, early))
+    write_rerun_series(SeriesFolder(copy).rerun_series_path(name), encode_series(early), encode_series(faulty, early))
     only = f'experiment_id == "{name}"'
     [file] = export(copy, Format.MCAP, tmp_path / "out", selection=ExportSelection(only=only)).iterdir()
     times = defaultdict(list)
