@@ -40,7 +40,7 @@ from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.patch_files import pack_patches
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import EXPERIMENT_BLOCK
-from mutator.store.work_stretches import SessionEnvironment
+from mutator.store.session_environments import SessionEnvironment
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

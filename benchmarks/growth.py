@@ -26,10 +26,10 @@ from mutator.mutants.mutant_building import build
 from mutator.results import table_building
 from mutator.statistics.results_frame import load_usable_results
 from mutator.store import file_digests, plan_file
-from mutator.store.check_results import CHECKS_FILE as CHECKS
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.file_digests import FileDigest
 from mutator.store.patch_files import PatchWriter
+from mutator.store.preflight_results import CHECKS_FILE as CHECKS
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -108,7 +108,9 @@ def working(size: int, out: Path) -> dict[str, float]:
     workspace = Workspace.find(root=ROOT)
     folder = RunFolder.open(out)
     manifest, models = workspace.manifest(folder.head.target), workspace.fault_models()
-    lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": folder.head.plan})
+    lines = LineWriter(
+        out / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": folder.head.plan}
+    )
     began = process_time()
     faults = plan_file.load_faults(out)
     number = 0

@@ -35,18 +35,18 @@ from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.preflight import equivalence_check
 from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store import file_digests, plan_file
-from mutator.store.check_results import CHECKS_FILE as CHECKS
-from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.file_digests import FileDigest
 from mutator.store.patch_files import _PatchPacker
+from mutator.store.preflight_results import CHECKS_FILE as CHECKS
+from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.records import PROOF_FOLDER, RECORDS_SCHEMA, record_as_json
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.series_folder import INDEX_NAME, SeriesIndex, save_index
 from mutator.store.series_format import encode_series
 from mutator.store.series_script import script_name_of, write_script
+from mutator.store.session_environments import SessionEnvironment
 from mutator.store.timings import TIMINGS_SCHEMA
-from mutator.store.work_stretches import SessionEnvironment
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

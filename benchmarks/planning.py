@@ -22,9 +22,8 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.preflight import check_run_problems, preflight_cache, preflight_checks
-from mutator.store.check_results import CHECKS_FILE
-from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_lines import LineWriter
+from mutator.store.preflight_results import CHECKS_FILE, CHECKS_SCHEMA
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -114,7 +113,9 @@ def main() -> None:
         new = out.with_name("new")
         table.add("new, first run", until_the_first_run(workspace, new))
         table.add("frozen, first run", until_the_first_run(workspace, new))
-        lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": plan.digest})
+        lines = LineWriter(
+            out / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": plan.digest}
+        )
         for experiment in plan.experiments:
             lines.append(asdict(masked(experiment)))
         lines.close()

@@ -38,8 +38,8 @@ from mutator.store.patch_files import PatchFolder, PatchWriter, rewrite_patch_fi
 from mutator.store.plan_choices import Choices
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.session_environments import SessionEnvironment
 from mutator.store.timings import TIMINGS_SCHEMA
-from mutator.store.work_stretches import SessionEnvironment
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
@@ -373,7 +373,10 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
         patch = b"diff --git a/a.py b/a.py\n"
         write_run(workspace, out, lambda experiment: {"patch": file_digests.digest(patch)}, **given)
         folder = RunFolder.open_unverified(out)
-        lines = [line for _, line in read_segment(out / "records" / "0001-a.jsonl").numbered_objects(RECORDS_SCHEMA)]
+        lines = [
+            line
+            for _, line in read_segment(out / "records" / "0001-a.jsonl").numbered_objects(RECORDS_SCHEMA)
+        ]
         patches = PatchWriter(out, "0001-a")
         for line in lines:
             patches.append(line["experiment_id"], patch)

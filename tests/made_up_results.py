@@ -7,7 +7,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from pyarrow import parquet
 
-from mutator.results.table_files import CsvTableWriter, ParquetTableWriter, TableColumn, csv_lines, parquet_batch
+from mutator.results.table_writers import (
+    CsvTableWriter,
+    ParquetTableWriter,
+    TableColumn,
+    csv_lines,
+    parquet_batch,
+)
 
 _TYPES = {"text": str, "flag": int, "count": int, "number": float}
 

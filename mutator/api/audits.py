@@ -20,7 +20,7 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import draw_experiment_ids, rerun_and_compare
 from mutator.report.report_audit import audit_report
 from mutator.store.run_folder import RunFolder
-from mutator.store.work_stretches import describe_environments, version_texts_by_package
+from mutator.store.session_environments import describe_environments, version_texts_by_package
 from mutator.workspace import Workspace
 
 MOST_LISTED_DIFFERENCES = 20  # in the text of an audit, to fit on a screen; `differences` has all
@@ -48,7 +48,10 @@ class Audit:
 
     def __str__(self) -> str:
         width = max(map(len, (*self.facts, *self.not_sealed)))
-        rows = [(check.checked_parts, str(check.checked_count), str(len(check.differences))) for check in self.checks]
+        rows = [
+            (check.checked_parts, str(check.checked_count), str(len(check.differences)))
+            for check in self.checks
+        ]
         table = TextTable(heads=("checked", "count", "differences"), rows=rows, right_aligned=(1, 2))
         difference_texts = [
             str(difference).replace(f"{self.run}/", "")
@@ -190,7 +193,9 @@ def _expected_digest_check(folder: RunFolder, seals: Seals, expected: str) -> Au
 def _digest_check(folder: RunFolder, digest_name: str, actual: str | None, expected: str) -> AuditCheck:
     wrong = MutatorError(f"{digest_name} {actual or 'none'}", where=folder.path, expected=expected)
     return AuditCheck(
-        checked_parts=f"{digest_name} as expected", checked_count=1, differences=() if actual == expected else (wrong,)
+        checked_parts=f"{digest_name} as expected",
+        checked_count=1,
+        differences=() if actual == expected else (wrong,),
     )
 
 
@@ -240,7 +245,8 @@ def _run_facts(folder: RunFolder) -> dict[str, str]:
     return {
         "run": folder.path.name,
         "campaign": f"{head.campaign} of {head.target}, {head.reading}, seed {head.seed}",
-        "experiments": f"{folder.planned_experiment_count}{f' of shard {folder.shard}' if folder.shard else ''}",
+        "experiments": f"{folder.planned_experiment_count}"
+        + (f" of shard {folder.shard}" if folder.shard else ""),
         "plan": head.plan,
         **{f"digest of {name}": value for name, value in head.sources.items()},
         "mutator": head.provenance.mutator,

@@ -4,8 +4,8 @@ from mutator._common.shared_cache import caches_folder as cache_folder
 from mutator._common.shared_cache import clear_cache as clear_caches
 from mutator._common.shared_cache import list_entries as cache_entries
 from mutator._common.shared_cache import prune_cache as prune_caches
-from mutator.store.cleaning import delete_run as delete_run_folder
-from mutator.store.cleaning import list_deletable_files as check_run_folder
+from mutator.store.run_deletion import delete_run as delete_run_folder
+from mutator.store.run_deletion import list_deletable_files as check_run_folder
 
 __all__ = [
     "cache_entries",

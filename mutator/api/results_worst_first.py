@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from mutator.campaigns.row_filters import compile_filter
-from mutator.results.ranking import worst_first_ranks
 from mutator.results.result_rows import ResultRow, cells_by_row, rows_of
 from mutator.results.table_reader import Results
+from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.store import plan_file
 
 _ROWS_PER_BATCH = 10_000  # to filter; as dictionaries, all rows of a large run would fill the memory

@@ -37,7 +37,7 @@ from mutator.results import table_building as results_table
 from mutator.statistics.mutation_score import mutation_score_sheet, totals_table
 from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet
-from mutator.store import cleaning
+from mutator.store import run_deletion
 from mutator.store.run_folder import GoldenRun, RunFolder
 
 if TYPE_CHECKING:
@@ -226,11 +226,11 @@ class Run(RunContents):
 
     def delete(self) -> None:
         """Delete the run folder; MutatorError if it is in use, or if it holds files that no run writes."""
-        cleaning.delete_run(self.path)
+        run_deletion.delete_run(self.path)
 
     def finish_deletion(self) -> bool:
         """Finish a deletion that another command has started; return whether the folder is gone."""
-        return cleaning.finish_deletion(self.path)
+        return run_deletion.finish_deletion(self.path)
 
 
 def alerts_note_if_any(run: Run) -> str:

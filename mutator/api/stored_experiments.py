@@ -19,7 +19,7 @@ from mutator.outcomes.series_sampling import traces_of_series
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, rerun_command
-from mutator.store.work_stretches import SessionEnvironment
+from mutator.store.session_environments import SessionEnvironment
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import ChannelFacts

@@ -70,7 +70,9 @@ def mutant_problems(
             continue
         key = (experiment.fault.id, experiment.trigger)
         if key not in built:
-            built[key] = _rebuilt_tree_and_patch_digests(manifest, models, experiment.fault, experiment.trigger)
+            built[key] = _rebuilt_tree_and_patch_digests(
+                manifest, models, experiment.fault, experiment.trigger
+            )
         tree, patch = built[key]
         if recorded.record.tree != tree:
             yield recorded.difference_error(

@@ -27,10 +27,10 @@ from mutator.campaigns.plan_tally import plan_digest
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.store import file_digests, plan_file
-from mutator.store.check_results import CHECKS_FILE as CHECKS
-from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.file_digests import FileDigest
+from mutator.store.preflight_results import CHECKS_FILE as CHECKS
+from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD
 from mutator.workspace import Workspace
@@ -40,7 +40,7 @@ Problems = Iterator[MutatorError]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AuditCheck:
-    """One step of an audit. `what` describes the `count` parts of the run that were checked."""
+    """One step of an audit. `checked_parts` describes the `checked_count` parts of the run that were checked."""
 
     checked_parts: str
     checked_count: int
@@ -63,7 +63,7 @@ class AuditCheck:
             AttributeError,
         ) as err:  # damaged data
             problems_so_far.append(MutatorError(f"the check '{what}' failed ({type(err).__name__}: {err})"))
-        return cls(what=what, count=count, differences=tuple(problems_so_far))
+        return cls(checked_parts=what, checked_count=count, differences=tuple(problems_so_far))
 
 
 def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[AuditCheck]:
@@ -165,7 +165,9 @@ def _plan_problems(folder: RunFolder) -> Problems:
         canary_hazard=campaign.canary.hazard,
     )
     for key, stored, value in head.differences(expected_head):
-        expected = f"{shortened_text(value)}, which follows from {plan_file.EXPERIMENTS_FILE} and {CAMPAIGN_FILE}"
+        expected = (
+            f"{shortened_text(value)}, which follows from {plan_file.EXPERIMENTS_FILE} and {CAMPAIGN_FILE}"
+        )
         yield MutatorError(f"{key} {shortened_text(stored)}", where=run / HEAD, expected=expected)
     if FileDigest.of_file(run / PLAN_CSV) != FileDigest.of_bytes(plan_csv_bytes(plan)):
         yield MutatorError(

@@ -73,7 +73,10 @@ def _renew_damaged_ledger(folder: RunFolder) -> Iterator[str]:
         raise  # somebody wrote this on purpose
     except MutatorError:
         plan_and_golden_paths = (path for name in ("plan", "golden") for path in (run / name).rglob("*"))
-        names = [*integrity.DIGESTED_TOP_FILES, *(path.relative_to(run).as_posix() for path in plan_and_golden_paths)]
+        names = [
+            *integrity.DIGESTED_TOP_FILES,
+            *(path.relative_to(run).as_posix() for path in plan_and_golden_paths),
+        ]
         digests = file_digests.digests_of_files(
             run, [name for name in names if file_digests.can_be_in_ledger(name)]
         )
@@ -82,7 +85,8 @@ def _renew_damaged_ledger(folder: RunFolder) -> Iterator[str]:
             run,
             DigestLedger(files={name: file_digest for name, file_digest in digests.items() if file_digest}),
         )
-        yield f"{file_digests.DIGESTS_FILE} rebuilt from the current files: only an earlier seal can confirm them"
+        name = file_digests.DIGESTS_FILE
+        yield f"{name} rebuilt from the current files: only an earlier seal can confirm them"
 
 
 def _file_changes(folder: RunFolder, ledger: DigestLedger) -> Iterator[_FileChange]:
@@ -195,7 +199,9 @@ def _trusted_lines(segment: Segment, file_digest: FileDigest | None, data: bytes
     """
     numbers = list(segment.lines)
     is_trusted = (
-        segment.damaged_line_numbers or file_digest is None or file_digest.has_same_bytes(FileDigest.of_bytes(data))
+        segment.damaged_line_numbers
+        or file_digest is None
+        or file_digest.has_same_bytes(FileDigest.of_bytes(data))
     )
     if (
         not is_trusted

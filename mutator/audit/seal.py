@@ -23,13 +23,13 @@ from mutator._common.hashing import canonical_json, digest
 from mutator.campaigns.plan_freezing import PLAN_CSV
 from mutator.store import file_digests, plan_file
 from mutator.store.approvals import review_digest
-from mutator.store.check_results import CHECKS_FILE as CHECKS
-from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.checksummed_lines import unread_segment, intact_lines
+from mutator.store.checksummed_lines import intact_lines, unread_segment
+from mutator.store.preflight_results import CHECKS_FILE as CHECKS
+from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.records import PROOF_FOLDER, parse_ending
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD
-from mutator.store.work_stretches import describe_environments
+from mutator.store.session_environments import describe_environments
 
 SEAL_SCHEMA, RESULTS_DIGEST_SCHEMA = "seal/2", "results-digest/2"
 _RUNS_SCHEMA = "results-digest/1"  # of the plan and its runs, as the seal includes them
@@ -115,7 +115,9 @@ def unsealed_facts(folder: RunFolder) -> dict[str, str]:
     choices = folder.head.choices
     chosen = {"chosen: shard": choices.shard, "chosen: series_mb": choices.series_mb}
     environment = {
-        name: text for name, text in describe_environments(folder.session_environments).items() if name != "python"
+        name: text
+        for name, text in describe_environments(folder.session_environments).items()
+        if name != "python"
     }
     approvals = {"approvals": _APPROVALS_NOTE} if review_digest(folder.path) else {}
     choice_texts = {name: str(value) for name, value in chosen.items() if value}
@@ -145,7 +147,9 @@ def _sha256_by_name(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
 
 def _version_texts(folder: RunFolder) -> list[str]:
     """Return the distinct sets of versions that computed anything, as canonical text."""
-    return sorted({canonical_json([stretch.python, stretch.packages]) for stretch in folder.session_environments})
+    return sorted(
+        {canonical_json([stretch.python, stretch.packages]) for stretch in folder.session_environments}
+    )
 
 
 def _record_digests(

@@ -11,7 +11,6 @@ from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.store import plan_file
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_check import check_deviations
 from mutator.store.series_folder import (
     INDEX_NAME,
     SeriesFolder,
@@ -23,6 +22,7 @@ from mutator.store.series_folder import (
 )
 from mutator.store.series_format import Series, decode_series
 from mutator.store.series_packing import list_unpacked_worker_files
+from mutator.store.series_record_check import check_deviations
 from mutator.targets.manifest import TargetManifest
 
 _RELATIVE_ROUNDING = 1e-5  # relative; values have six digits

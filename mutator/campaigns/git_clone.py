@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory, TemporaryFile
 
 from mutator._common.confined_files import open_below
 from mutator.errors import MutatorError
-from mutator.store.work_stretches import GitCloneState
+from mutator.store.session_environments import GitCloneState
 
 _MOST_GIT_TIME_S = 10.0  # for one answer; a clone on a stalled network folder must not stop a run
 _MOST_OUTPUT_BYTES = 32 << 20  # bytes of an answer; a tiny repository can list billions of files

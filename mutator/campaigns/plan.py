@@ -24,8 +24,8 @@ from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.store import plan_file
-from mutator.store.check_results import mean_golden_run_cpu_s
 from mutator.store.plan_choices import Choices
+from mutator.store.preflight_results import mean_golden_run_cpu_s
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
 from mutator.store.shards import Shard

@@ -16,7 +16,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from mutator.engines.process_endings import environment_variables_of_run
-from mutator.store.work_stretches import Blas
+from mutator.store.session_environments import Blas
 from mutator.targets.process_environment import THREAD_VARIABLES
 
 # a process of its own, because variables of the environment decide which BLAS numpy loads

@@ -14,10 +14,10 @@ from mutator.campaigns import run_environment
 from mutator.campaigns.git_clone import find_clone_state
 from mutator.errors import MutatorError
 from mutator.store import file_digests
-from mutator.store.check_results import packages_loaded_by_golden_runs
+from mutator.store.preflight_results import packages_loaded_by_golden_runs
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, RUN_SCHEMA
-from mutator.store.work_stretches import WorkerMachine, SessionEnvironment, version_differences
+from mutator.store.session_environments import SessionEnvironment, WorkerMachine, version_differences
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace

@@ -78,7 +78,11 @@ def verify(
         )
     if as_json:
         checks = [
-            {"what": c.checked_parts, "count": c.checked_count, "differences": [error_text(d) for d in c.differences]}
+            {
+                "what": c.checked_parts,
+                "count": c.checked_count,
+                "differences": [error_text(d) for d in c.differences],
+            }
             for c in audit.checks
         ]
         facts = {"run": str(run), "passed": audit.passed, **asdict(audit.seals), "facts": audit.facts}

@@ -8,8 +8,8 @@ from mutator._common.hashing import as_json_types
 from mutator.comparison.compared_runs import ComparedRun
 from mutator.comparison.pairs import ExperimentMatching, ExperimentPair
 from mutator.store.run_folder import RunFolder
-from mutator.store.work_stretches import describe_environments as ran_with
-from mutator.store.work_stretches import version_texts_by_package
+from mutator.store.session_environments import describe_environments as ran_with
+from mutator.store.session_environments import version_texts_by_package
 
 _SHOWN_DIGEST_DIGITS = 12  # shown digits of a digest
 _COMPARED_HEAD_FIELDS = ("campaign", "target", "seed", "reading")
@@ -60,7 +60,11 @@ def _facts_of_run(run: ComparedRun) -> dict[str, str]:
         values["scale of severity"] = f"{scale.name}: {bounds}"
     values["digest of plan"] = head.plan[:_SHOWN_DIGEST_DIGITS]
     values["mutator"] = head.provenance.mutator
-    return values | ran_with(stretches) | {f"package {k}": v for k, v in version_texts_by_package(stretches).items()}
+    return (
+        values
+        | ran_with(stretches)
+        | {f"package {k}": v for k, v in version_texts_by_package(stretches).items()}
+    )
 
 
 def differing_target_files(a: RunFolder, b: RunFolder) -> DifferingTargetFiles:

@@ -41,16 +41,16 @@ from mutator.preflight.preflight_checks import (
     run_checks,
 )
 from mutator.results import table_building
-from mutator.results.ranking import worst_first_rank_by_ok_experiment
 from mutator.results.table_reader import Results
+from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experiment
 from mutator.store import file_digests
-from mutator.store.check_results import golden_digests
 from mutator.store.plan_choices import Choices
+from mutator.store.preflight_results import golden_digests
 from mutator.store.records import LINE_SCHEMA_BY_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress, progress_label
 from mutator.store.series_packing import list_unpacked_worker_files, pack_series
-from mutator.store.work_stretches import WorkerMachine
+from mutator.store.session_environments import WorkerMachine
 from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
 

@@ -17,22 +17,22 @@ from mutator.campaigns.run_provenance import version_error
 from mutator.errors import CheckFailed, MutatorError
 from mutator.preflight import equivalence_check
 from mutator.results import table_building
-from mutator.results.ranking import worst_first_rank_by_ok_experiment
 from mutator.results.table_reader import frame_of_experiments
-from mutator.store import cleaning, file_digests, integrity, plan_file
+from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experiment
+from mutator.store import file_digests, integrity, plan_file, run_deletion
 from mutator.store.allowed_contents import check_plain_contents
 from mutator.store.approvals import APPROVALS_FILE as REVIEWED
-from mutator.store.check_results import CHECKS_FILE as CHECKS
-from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.patch_files import PatchWriter
+from mutator.store.preflight_results import CHECKS_FILE as CHECKS
+from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.store.run_writer import copy_line_files
 from mutator.store.series_folder import SERIES_FOLDER as SERIES
 from mutator.store.series_packing import pack_series
-from mutator.store.work_stretches import SessionEnvironment, version_differences
+from mutator.store.session_environments import SessionEnvironment, version_differences
 
 _UNFINISHED_MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
 _SHARDS_REMEDY = "give the folder of each shard of one plan exactly once"
@@ -72,7 +72,7 @@ def merge_shards(shards: Sequence[Path], out: Path, *, accept_versions: bool = F
                 _copy_shards(folders, out, stretches)
             return table_building.build_tables(out)
         except BaseException:
-            cleaning.delete_unfinished_run(out)
+            run_deletion.delete_unfinished_run(out)
             raise
 
 
@@ -82,7 +82,7 @@ def _make_empty_folder(out: Path) -> None:
         check_plain_contents(out.resolve())
     if any(out.glob(f"{_UNFINISHED_MARK}*")):
         with owning_run_folder(out, patience_s=0.0):
-            cleaning.delete_unfinished_run(out)
+            run_deletion.delete_unfinished_run(out)
     make_run_folder(out)
 
 

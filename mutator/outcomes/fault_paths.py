@@ -23,7 +23,7 @@ from mutator.outcomes.fault_routes import (
     studied_links,
 )
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import HEAD, DAMAGED_RUN_REMEDY
+from mutator.store.run_head import DAMAGED_RUN_REMEDY, HEAD
 from mutator.stpa.analysis_files import ComponentKind, ControlStructureModel
 from mutator.targets.channels import Role
 from mutator.targets.stored_target_facts import ChannelFacts
@@ -53,18 +53,18 @@ class LinkState(StrEnum):
 class PathComponent:
     """A component on a path, and its channels that left golden.
 
-    If a component that only this one feeds left golden before this one's own channels did, `t_by` is the time
+    If a component that only this one feeds left golden before this one's own channels did, `t_changed_by` is the time
     (s) when that happened: this component must have changed by then.
     """
 
     name: str
     state: ComponentState
-    channels: tuple[Departure, ...]
+    departures: tuple[Departure, ...]
     t_changed_by: float | None = None
 
     @property
     def t_first(self) -> float | None:
-        return min((first for _, first, _ in self.channels), default=None)
+        return min((first for _, first, _ in self.departures), default=None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,8 +98,8 @@ class UntimedPath:
     """A path without times. Paths have the same untimed path if they have the same injected components, and
     components left golden in the same order.
 
-    `late_ranks` has the components that must have changed before their own channels did, each with the rank
-    of `PathComponent.t_by` among all times. `entry_link` is the link by which the fault reached the first
+    `inferred_ranks` has the components that must have changed before their own channels did, each with the rank
+    of `PathComponent.t_changed_by` among all times. `link_to_first_actuator` is the link by which the fault reached the first
     actuator.
     """
 
@@ -182,8 +182,10 @@ class FaultPaths:
             PathComponent(
                 name=name,
                 state=state,
-                channels=tuple(departures_by_component.get(name, ())),
-                t_changed_by=times[untimed_path.inferred_ranks[name]] if name in untimed_path.inferred_ranks else None,
+                departures=tuple(departures_by_component.get(name, ())),
+                t_changed_by=times[untimed_path.inferred_ranks[name]]
+                if name in untimed_path.inferred_ranks
+                else None,
             )
             for name, state in untimed_path.state_by_component.items()
         ]
@@ -326,7 +328,9 @@ def fault_paths_of(folder: RunFolder) -> FaultPaths | None:
     try:
         structure = ControlStructureModel.model_validate(head.structure) if head.structure else None
     except ValueError:
-        raise MutatorError("damaged at 'structure'", where=folder.path / HEAD, remedy=DAMAGED_RUN_REMEDY) from None
+        raise MutatorError(
+            "damaged at 'structure'", where=folder.path / HEAD, remedy=DAMAGED_RUN_REMEDY
+        ) from None
     return FaultPaths(head.channels, structure)
 
 

@@ -262,4 +262,6 @@ def write_sampled_series(
 ) -> None:
     sampler = SeriesSampler(manifest, golden)
     data = encode_series(sampler.faulty_series(faulty, record), sampler.golden)
-    write_rerun_series(SeriesFolder(run).rerun_series_path(record.experiment_id), sampler.encoded_golden, data)
+    write_rerun_series(
+        SeriesFolder(run).rerun_series_path(record.experiment_id), sampler.encoded_golden, data
+    )

@@ -33,8 +33,8 @@ from mutator.preflight.preflight_runs import (
     OnProgress,
 )
 from mutator.store import file_digests, plan_file
-from mutator.store.check_results import CHECKS_FILE, SCHEMA, CheckResult
 from mutator.store.file_digests import FileDigest
+from mutator.store.preflight_results import CHECKS_FILE, CHECKS_SCHEMA, CheckResult
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
@@ -130,7 +130,7 @@ class _PreflightChecks:
         try:
             with raising_disk_full(copy):
                 cached_folders.copy_from_cache(preflight_cache.cached_checks_path(self.digest), copy)
-            stored = read_json(copy / CHECKS_FILE, SCHEMA)
+            stored = read_json(copy / CHECKS_FILE, CHECKS_SCHEMA)
             results = self._passed_results(stored, copy)
         except DiskFull:
             raise
@@ -169,7 +169,7 @@ class _PreflightChecks:
         self._check_goldens_same_as_before(goldens)
         cpu = [runs[GOLDEN, key].cpu_s for key in self.golden_runs]
         checks = {
-            "schema": SCHEMA,
+            "schema": CHECKS_SCHEMA,
             "digest": self.digest,
             "results": [asdict(result) for result in results],
             "goldens": goldens,
@@ -195,14 +195,16 @@ class _PreflightChecks:
             name: FileDigest.of_bytes(read_bounded(path)) for name, path in files.items() if path.is_file()
         }
         removed = {name: None for name in file_digests.load_ledger(run).names if name.startswith("golden/")}
-        with file_digests.announcing_rewrites(run, {**removed, **new, CHECKS_FILE: FileDigest.of_bytes(checks)}):
+        with file_digests.announcing_rewrites(
+            run, {**removed, **new, CHECKS_FILE: FileDigest.of_bytes(checks)}
+        ):
             shutil.rmtree(run / "golden", ignore_errors=True)
             golden.rename(run / "golden")
             write_atomic(run / CHECKS_FILE, checks)
 
     def _stored_checks(self) -> dict[str, Any] | None:
         path = self.folder.path / CHECKS_FILE
-        return read_json(path, SCHEMA) if path.is_file() else None
+        return read_json(path, CHECKS_SCHEMA) if path.is_file() else None
 
     def _check_goldens_same_as_before(self, goldens: dict[str, str]) -> None:
         """Raise CheckFailed if a run that has records would continue with different golden runs, for example

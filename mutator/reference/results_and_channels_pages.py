@@ -7,7 +7,7 @@ from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES
 from mutator.results.propagation_columns import PROPAGATION_COLUMNS as PROPAGATION
 from mutator.results.table_columns import TIMING_COLUMNS, result_columns, severity_and_time_columns
-from mutator.results.table_files import ARROW_TYPE_BY_COLUMN_TYPE, TableColumn
+from mutator.results.table_writers import ARROW_TYPE_BY_COLUMN_TYPE, TableColumn
 from mutator.targets.channels import Channel
 from mutator.targets.contact_severity import DELTA_V_NAME
 from mutator.targets.criteria import Hazard, Metric
@@ -59,7 +59,9 @@ def _result_columns_section(manifest: TargetManifest) -> Iterator[str]:
 
 def _columns_table(columns: Iterable[TableColumn]) -> Iterator[str]:
     heads = ("column", "type", "Parquet", "unit", "meaning")
-    rows = [(f"`{c.name}`", c.type, ARROW_TYPE_BY_COLUMN_TYPE[c.type], c.unit or "-", c.about) for c in columns]
+    rows = [
+        (f"`{c.name}`", c.type, ARROW_TYPE_BY_COLUMN_TYPE[c.type], c.unit or "-", c.about) for c in columns
+    ]
     yield TextTable(heads=heads, rows=rows).as_markdown(escape=False)
     yield ""
 

@@ -9,7 +9,7 @@ import numpy as np
 from mutator._common.helper_processes import map_in_processes, process_count_for
 from mutator.model import Fault, Record
 from mutator.outcomes.fault_paths import FaultPaths, PathInputs, UntimedPath
-from mutator.results.ranking import worst_first_ranks
+from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.statistics.event_times import FirstAlertsByHazardRun
 from mutator.store.run_folder import RunFolder
 

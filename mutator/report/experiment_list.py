@@ -28,11 +28,11 @@ from mutator.report.panel import REPORT_FOLDER
 from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines import SourceLines
 from mutator.results.outcome_counting import (
-    outcome_or_status_of_rows,
-    fault_types_of,
     checked_hazard_names,
+    fault_types_of,
     first_hazard_times,
     joined_occurred_hazards,
+    outcome_or_status_of_rows,
 )
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.review.patch_shapes import PatchShape, shapes_of_patches

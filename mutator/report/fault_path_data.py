@@ -122,7 +122,11 @@ class RunFaultPaths:
 
     @staticmethod
     def _latest_time_by_component(path: FaultPath | None) -> dict[str, float]:
-        return {s.name: round(s.t_changed_by, 4) for s in (path.components if path else ()) if s.t_changed_by is not None}
+        return {
+            s.name: round(s.t_changed_by, 4)
+            for s in (path.components if path else ())
+            if s.t_changed_by is not None
+        }
 
     def component_label(self, component: str) -> str:
         """Return the name of a component on pages."""

@@ -11,8 +11,8 @@ from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
 from mutator.report.film import ExperimentFilmer, Shot
-from mutator.results.ranking import worst_first_ranks
 from mutator.results.table_reader import Results
+from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_progress import Progress, StagePace

@@ -56,7 +56,8 @@ def first_hazard_times(frame: "pd.DataFrame") -> "pd.DataFrame":
     import pandas as pd
 
     columns = {
-        name: (frame[f"t_{name.lower()}"], frame[name.lower()].notna()) for name in hazard_names_of_frame(frame)
+        name: (frame[f"t_{name.lower()}"], frame[name.lower()].notna())
+        for name in hazard_names_of_frame(frame)
     }
     times = {name: time.where(is_checked) for name, (time, is_checked) in columns.items()}
     return pd.DataFrame(times, index=frame.index, dtype=float)

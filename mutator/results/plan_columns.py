@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from mutator.model import Experiment, Fault, Value, fault_label
-from mutator.results.table_files import TableColumn
+from mutator.results.table_writers import TableColumn
 
 
 @dataclass(frozen=True, slots=True)

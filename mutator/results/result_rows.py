@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from mutator.model import Fault, Outcome, Status, Value, fault_label
 from mutator.results.outcome_counting import (
     UNUSABLE_STATUSES,
-    outcome_or_status_of_rows,
     fault_types_of,
-    hazard_margins,
     first_hazard_times,
+    hazard_margins,
+    outcome_or_status_of_rows,
 )
 from mutator.results.plan_columns import numeric_value_of
 from mutator.results.table_columns import alert_names_in

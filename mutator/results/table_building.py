@@ -15,8 +15,13 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.results import propagation_columns
-from mutator.results.table_columns import TIMING_COLUMNS, FinishedExperiment, cells_by_column, result_columns_of
-from mutator.results.table_files import CsvTableWriter, ParquetTableWriter, csv_lines, parquet_batch
+from mutator.results.table_columns import (
+    TIMING_COLUMNS,
+    FinishedExperiment,
+    cells_by_column,
+    result_columns_of,
+)
+from mutator.results.table_writers import CsvTableWriter, ParquetTableWriter, csv_lines, parquet_batch
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import FileDigest
 from mutator.store.planned_experiments import PlannedExperiments
@@ -72,7 +77,8 @@ def write_tables(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     large run, two processes build the batches.
     """
     with computing_in_background(
-        lambda: _write_timings(folder, paths[TIMINGS_FILE]), process_count_for(folder.planned_experiment_count)
+        lambda: _write_timings(folder, paths[TIMINGS_FILE]),
+        process_count_for(folder.planned_experiment_count),
     ) as end:
         _write_result_tables(folder, paths)
         end()

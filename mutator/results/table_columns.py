@@ -18,7 +18,7 @@ from mutator.outcomes.verdict_rules import (
     severity_class_of,
 )
 from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
-from mutator.results.table_files import TableColumn
+from mutator.results.table_writers import TableColumn
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN, MetricFacts

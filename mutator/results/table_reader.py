@@ -16,7 +16,7 @@ from mutator.model import Experiment, Outcome, Status
 from mutator.results import table_building
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_columns import FinishedExperiment, cells_by_column, result_columns_of
-from mutator.results.table_files import TableColumn, parquet_batch, parquet_schema
+from mutator.results.table_writers import TableColumn, parquet_batch, parquet_schema
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import load_head

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from mutator.model import Fault, Outcome, Status
 from mutator.results.outcome_counting import UNUSABLE_STATUSES, outcome_or_status_of_rows
-from mutator.results.ranking import worst_first_ranks
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import Results
+from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.review.mutant_groups import Group
 from mutator.review.patch_shapes import group_label
 from mutator.store import plan_file

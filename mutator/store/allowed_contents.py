@@ -2,7 +2,7 @@
 
 Run folders travel: evidence comes from strangers. Two rules keep every command inside the folder:
 
-* `check_contents`, whenever a run folder is opened: nothing in it is a link, pipe, device or socket. A path
+* `check_plain_contents`, whenever a run folder is opened: nothing in it is a link, pipe, device or socket. A path
   of fixed names below a checked folder therefore stays in it. This is enough for a folder that somebody
   sends. It cannot stop a process that changes the folder at the same time, but such a process has the user's
   permissions, and needs no links.
@@ -21,7 +21,15 @@ SCRATCH_FOLDER, DAMAGED_FOLDER, TRACES_FOLDER = "work", "damaged", "traces"
 SIGNATURE_FILES = ("seal.json", "seal.json.sig")
 _EXPORTED_TABLES = ("results", "propagation", "timings")
 ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any text, including folders
-    *(HEAD, file_digests.DIGESTS_FILE, CAMPAIGN_FILE, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
+    *(
+        HEAD,
+        file_digests.DIGESTS_FILE,
+        CAMPAIGN_FILE,
+        "plan.csv",
+        "plan/*.jsonl",
+        "reviewed.json",
+        "checks.json",
+    ),
     *SIGNATURE_FILES,
     *("golden/*/*", "patches/*.blocks"),
     *("records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),

@@ -34,7 +34,9 @@ def approval_summary(run: Path) -> str:
     try:
         names = Counter(str(group["by"]) for group in groups)
     except (TypeError, KeyError):
-        raise MutatorError("damaged at 'groups'", where=run / APPROVALS_FILE, remedy=DAMAGED_RUN_REMEDY) from None
+        raise MutatorError(
+            "damaged at 'groups'", where=run / APPROVALS_FILE, remedy=DAMAGED_RUN_REMEDY
+        ) from None
     return f"{counted(len(groups), 'group')} approved by " + ", ".join(
         f"{name} ({n})" for name, n in sorted(names.items())
     )

@@ -221,7 +221,7 @@ def announcing_rewrites(
     """Announce that the `with` block changes files (None: deletes them); confirm the changes at its end.
 
     If the process is killed within the block, the folder can still be opened, and the files rewritten.
-    `finished` is as in `close_segments`, but applies from the start of the block.
+    `finished` is as in `add_segments_to_ledger`, but applies from the start of the block.
     """
     before = settled_ledger(run)
     before = replace(before, finished=before.finished if finished is None else finished)

@@ -79,7 +79,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
     def _read_and_parse_line(self, experiment_id: str) -> T:
         line = self.read_line(experiment_id)
         try:
-            return self._parse(line.content())
+            return self._parse(line.parse())
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
             raise self._damage_error(line.path, line.number) from None
 
@@ -103,7 +103,7 @@ class IndexedLine:
     def __init__(self, path: Path, number: int, data: bytes) -> None:
         self.path, self.number, self.data = path, number, data
 
-    def content(self) -> dict[str, Any]:
+    def parse(self) -> dict[str, Any]:
         """Return the object on the line; ValueError if the line is not a JSON object."""
         value = parse_json(self.data)
         if not isinstance(value, dict):

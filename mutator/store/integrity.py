@@ -14,7 +14,7 @@ from mutator._common.hashing import digest
 from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.store import file_digests, plan_file, verified_runs_cache
-from mutator.store.checksummed_lines import Segment, unread_segment, intact_lines, read_segment
+from mutator.store.checksummed_lines import Segment, intact_lines, read_segment, unread_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.patch_files import PatchFolder
 from mutator.store.records import RECORDS_SCHEMA, parse_ending, second_record_error
@@ -90,7 +90,7 @@ def current_digests_of(run: Path, ledger: DigestLedger) -> dict[str, FileDigest 
 
 
 def cache_key_of(run: Path, current_digests: Mapping[str, FileDigest | None]) -> str:
-    """Return the `verified_runs_cache.key_of` of these files and the ledger."""
+    """Return the `verified_runs_cache.cache_key` of these files and the ledger."""
     ledger = FileDigest.of_file(run / file_digests.DIGESTS_FILE)
     with_ledger = {**current_digests, file_digests.DIGESTS_FILE: ledger}
     return verified_runs_cache.cache_key(

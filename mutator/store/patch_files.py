@@ -137,7 +137,11 @@ class PatchFolder:
         if patch is not None:
             return patch.path
         damaged = (path for path in self.block_files() if not path.is_file() or read_blocks(path).is_damaged)
-        expected_path = path_below(self.run / PATCHES_FOLDER, f"{worker}{PATCH_FILE_SUFFIX}") if worker else self.run / PATCHES_FOLDER
+        expected_path = (
+            path_below(self.run / PATCHES_FOLDER, f"{worker}{PATCH_FILE_SUFFIX}")
+            if worker
+            else self.run / PATCHES_FOLDER
+        )
         return next(damaged, expected_path)
 
     def block_files(self) -> list[Path]:

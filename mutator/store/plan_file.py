@@ -118,7 +118,11 @@ def fault_line_by_id(run: Path) -> dict[str, bytes]:
 
 def selected_experiment_lines(run: Path, selected_ids: Container[str]) -> Iterator[bytes]:
     lines = read_plan_lines(run / EXPERIMENTS_FILE)
-    return (line.rstrip(b"\n") for name, line in zip(experiment_ids(run), lines, strict=True) if name in selected_ids)
+    return (
+        line.rstrip(b"\n")
+        for name, line in zip(experiment_ids(run), lines, strict=True)
+        if name in selected_ids
+    )
 
 
 def read_chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
@@ -184,7 +188,9 @@ def read_plan_lines(path: Path) -> Iterator[bytes]:
         with open_regular(path) as file:
             yield from read_bounded_lines(file, path)
     except OSError as err:
-        raise MutatorError(f"cannot be read ({err.strerror})", where=path, remedy=DAMAGED_PLAN_REMEDY) from None
+        raise MutatorError(
+            f"cannot be read ({err.strerror})", where=path, remedy=DAMAGED_PLAN_REMEDY
+        ) from None
 
 
 def parse_experiment_line(path: Path, number: int, line: bytes, faults: Mapping[str, Fault]) -> Experiment:
@@ -244,4 +250,6 @@ def canary_from_json(head_path: Path, data: Mapping[str, Any]) -> Experiment:
         fault = fault_from_json(data["fault"])
         return experiment_from_json({**data, "fault": fault.id}, {fault.id: fault})
     except (MutatorError, ValueError, LookupError, TypeError, AttributeError) as err:
-        raise MutatorError(f"damaged at 'canary' ({err})", where=head_path, remedy=DAMAGED_PLAN_REMEDY) from None
+        raise MutatorError(
+            f"damaged at 'canary' ({err})", where=head_path, remedy=DAMAGED_PLAN_REMEDY
+        ) from None

@@ -27,7 +27,9 @@ from mutator.model import (
     Trigger,
 )
 
-DAMAGED_PLAN_REMEDY = "the plan is damaged: restore the file from a copy of the run folder, or plan into a new one"
+DAMAGED_PLAN_REMEDY = (
+    "the plan is damaged: restore the file from a copy of the run folder, or plan into a new one"
+)
 _PARSE_ERRORS = (ValueError, LookupError, TypeError, AttributeError, RecursionError)
 
 # A plan can have a million lines. Patterns read a line in canonical JSON in a third of the time that a JSON
@@ -144,7 +146,8 @@ def experiment_from_json(data: Mapping[str, Any], faults: Mapping[str, Fault]) -
     """Read the experiment on a line; MutatorError if its id does not match, or for an unknown field."""
     if data["fault"] not in faults:
         raise MutatorError(
-            f"fault {data['fault']} is missing from plan/faults.jsonl, or was changed there", remedy=DAMAGED_PLAN_REMEDY
+            f"fault {data['fault']} is missing from plan/faults.jsonl, or was changed there",
+            remedy=DAMAGED_PLAN_REMEDY,
         )
     checked_name_not_path(str(data["scenario"]), "plan")
     trigger = data["trigger"]

@@ -15,7 +15,11 @@ from mutator.store.timings import TIMINGS_FOLDER, TIMINGS_SCHEMA
 
 RECORDS_SCHEMA = "records/2"
 RECORDS_FOLDER, PROOF_FOLDER = "records", "proof"  # folders of files of lines
-LINE_SCHEMA_BY_FOLDER = {RECORDS_FOLDER: RECORDS_SCHEMA, TIMINGS_FOLDER: TIMINGS_SCHEMA, PROOF_FOLDER: RECORDS_SCHEMA}
+LINE_SCHEMA_BY_FOLDER = {
+    RECORDS_FOLDER: RECORDS_SCHEMA,
+    TIMINGS_FOLDER: TIMINGS_SCHEMA,
+    PROOF_FOLDER: RECORDS_SCHEMA,
+}
 _RECORD_FIELDS = tuple(field.name for field in fields(Record))
 _DATACLASS_FIELDS = ("activation", "error")  # fields that contain dataclasses
 
@@ -117,7 +121,7 @@ def load_records(run: Path, folder: str = "records") -> IndexedLines[Record]:
 
 
 def _replaces(line: IndexedLine, earlier: IndexedLine) -> bool:
-    record, before = (record_from_json(record_line.content()) for record_line in (line, earlier))
+    record, before = (record_from_json(record_line.parse()) for record_line in (line, earlier))
     if record.status is Status.HARNESS_ERROR:
         return False
     if before.status is not Status.HARNESS_ERROR:

@@ -21,9 +21,9 @@ from mutator.store.allowed_contents import SCRATCH_FOLDER, TRACES_FOLDER, check_
 from mutator.store.patch_files import PatchFolder
 from mutator.store.records import load_records
 from mutator.store.run_head import HEAD, RunHead, StoredGolden, load_head
+from mutator.store.session_environments import SessionEnvironment
 from mutator.store.shards import Shard
 from mutator.store.timings import load_timings
-from mutator.store.work_stretches import SessionEnvironment
 from mutator.targets.contact_severity import SeverityScale
 
 STOP_AT_HAZARD_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
@@ -71,7 +71,7 @@ class RunFolder:
         """Open and verify an existing run folder.
 
         MutatorError if there is none, if it has another schema, if it contains links or the like
-        (`check_contents`), or if anything in it is damaged, missing or not in its plan.
+        (`check_plain_contents`), or if anything in it is damaged, missing or not in its plan.
         """
         folder = cls.open_unverified(path)
         for problem in folder.problems():

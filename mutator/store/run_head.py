@@ -14,13 +14,16 @@ from mutator.errors import MutatorError, TypeMisfit
 from mutator.model import Limits
 from mutator.store.plan_choices import Choices
 from mutator.store.plan_file import Chunk
-from mutator.store.work_stretches import SessionEnvironment
+from mutator.store.session_environments import SessionEnvironment
 from mutator.targets.stored_target_facts import TargetFacts
 
 RUN_SCHEMA = "run/3"
 HEAD, CAMPAIGN_FILE = RUN_HEAD_FILE, "campaign.yaml"
 DAMAGED_RUN_REMEDY = "the run folder is damaged: restore the file from a copy of it"
 NameTuple = tuple[str, ...]
+Sha256 = str
+FirstAndLastSeed = tuple[int, int]
+OperatorSelectionText = str  # number of mutants of a selection of operators, and what was left out
 # scenario, changes; seed, if the plan has several
 StoredGolden = tuple[str, NameTuple] | tuple[str, NameTuple, int]
 
@@ -37,15 +40,15 @@ class PlanFacts:
     """What run.json says about the plan."""
 
     schema: str
-    plan: str
+    plan: Sha256
     campaign: str
-    campaign_digest: str
+    campaign_digest: Sha256
     study: str | None
     target: str
     seed: int
-    seeds: tuple[int, int] | None = added_field(None)  # the first and the last, if the plan has several
+    seeds: FirstAndLastSeed | None = added_field(None)  # if the plan has several
     reading: str
-    operators: NameTuple = added_field(())
+    operators: tuple[OperatorSelectionText, ...] = added_field(())
     choices: Choices
     experiments: int
     runs: int
@@ -61,16 +64,21 @@ class RunHead(TargetFacts, PlanFacts):
     goldens: tuple[StoredGolden, ...]
     canary: Mapping[str, Any]
     canary_hazard: str
-    sources: Mapping[str, str]
+    sources: Mapping[str, Sha256]
     provenance: Provenance
     stretches: tuple[SessionEnvironment, ...]
     chunks: tuple[Chunk, ...]
-    later: Mapping[str, Any] = field(default_factory=dict)  # keys that a later version adds: kept, and sealed
+    keys_of_later_versions: Mapping[str, Any] = field(
+        default_factory=dict
+    )  # keys that a later version adds: kept, and sealed
 
     def as_json(self) -> dict[str, Any]:
         """Return the keys and their values in JSON types, in the order of the file."""
         values: dict[str, Any] = as_json_types(self)
-        return {**{name: values[name] for name in _HEAD_KEYS if name in values}, **values["later"]}
+        return {
+            **{name: values[name] for name in _HEAD_KEYS if name in values},
+            **values["keys_of_later_versions"],
+        }
 
     def differences(self, other: "RunHead") -> Iterator[tuple[str, Any, Any]]:
         """Yield the keys whose values differ, with both values."""
@@ -83,7 +91,9 @@ class RunHead(TargetFacts, PlanFacts):
         return json_bytes(self.as_json())
 
 
-_HEAD_KEYS = tuple(head_field.name for head_field in fields(RunHead) if head_field.name != "later")
+_HEAD_KEYS = tuple(
+    head_field.name for head_field in fields(RunHead) if head_field.name != "keys_of_later_versions"
+)
 
 
 def load_head(run: Path) -> RunHead:
@@ -101,9 +111,11 @@ def load_head(run: Path) -> RunHead:
 
 
 def _with_unknown_keys_apart(content: dict[str, Any]) -> dict[str, Any]:
-    """Put the keys that this version does not know under `later`."""
+    """Put the keys that this version does not know under `keys_of_later_versions`."""
     known_keys = {name: value for name, value in content.items() if name in _HEAD_KEYS}
-    return known_keys | {"later": {name: value for name, value in content.items() if name not in known_keys}}
+    return known_keys | {
+        "keys_of_later_versions": {name: value for name, value in content.items() if name not in known_keys}
+    }
 
 
 def _damage_error(path: Path, misfit: TypeMisfit) -> MutatorError:

@@ -83,7 +83,7 @@ class RecordTail:
             name = progress_label(data["status"], data["outcome"])
             if name != Status.HARNESS_ERROR or data["experiment_id"] not in self._label_by_experiment:
                 self._label_by_experiment[data["experiment_id"]] = name
-        except (ValueError, KeyError):  # a head, or damage that `read_records` reports
+        except (ValueError, KeyError):  # a head, or damage that `load_records` reports
             return
 
 

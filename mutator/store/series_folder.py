@@ -17,8 +17,8 @@ from mutator._common.confined_files import checked_relative_path, path_below
 from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
 from mutator.model import Record
-from mutator.store.series_check import check_deviations
 from mutator.store.series_format import Series, decode_series
+from mutator.store.series_record_check import check_deviations
 from mutator.store.series_script import read_script, script_name_of, write_script
 
 SERIES_SCHEMA, SERIES_FOLDER, RERUN_SERIES_FOLDER = "series/1", "series", "kept"
@@ -33,8 +33,8 @@ _LENGTH_STRUCT = struct.Struct("<I")
 class SeriesIndex:
     """The content of `series/index.js`.
 
-    * `chunks`: (name, number of entries); `entry_sizes`: the bytes of each entry, in order
-    * `golden_entries`, `experiment_entries`: the number of the entry of each golden run and each experiment
+    * `chunk_entry_counts`: (name, number of entries); `entry_sizes`: the bytes of each entry, in order
+    * `entry_number_by_golden`, `entry_number_by_experiment`: the number of the entry of each golden run and each experiment
     * `left_out_count`: how many experiments ended normally but have no series, mostly because of `budget_mb`
     """
 
@@ -60,7 +60,9 @@ class SeriesIndex:
             "goldens": self.entry_number_by_golden,
             "ids": "".join(self.entry_number_by_experiment),
             "entries": [b - a for a, b in zip([0, *numbers], numbers, strict=False)],
-            "golden_of": [names.index(self.golden_by_experiment[name]) for name in self.entry_number_by_experiment],
+            "golden_of": [
+                names.index(self.golden_by_experiment[name]) for name in self.entry_number_by_experiment
+            ],
         }
 
     @classmethod
@@ -72,10 +74,10 @@ class SeriesIndex:
         golden_of = (names[code] for code in data["golden_of"])
         return cls(
             plan=data["plan"],
-            chunks=tuple((str(name), int(count)) for name, count in data["chunks"]),
+            chunk_entry_counts=tuple((str(name), int(count)) for name, count in data["chunks"]),
             entry_sizes=tuple(data["sizes"]),
-            golden_entries=dict(data["goldens"]),
-            experiment_entries=dict(zip(ids, accumulate(data["entries"]), strict=True)),
+            entry_number_by_golden=dict(data["goldens"]),
+            entry_number_by_experiment=dict(zip(ids, accumulate(data["entries"]), strict=True)),
             golden_by_experiment=dict(zip(ids, golden_of, strict=True)),
             left_out_count=data["left_out"],
             budget_mb=data["budget_mb"],
@@ -218,7 +220,9 @@ def load_index(path: Path) -> SeriesIndex:
             decompress_bounded(packed, _MOST_INDEX_RATIO * len(packed) + _MOST_INDEX_BYTES, gzip=True)
         )
         if data["schema"] != SERIES_SCHEMA:
-            raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SERIES_SCHEMA, remedy=remedy)
+            raise MutatorError(
+                f"schema {data['schema']!r}", where=path, expected=SERIES_SCHEMA, remedy=remedy
+            )
         index = SeriesIndex.from_json(data)
         for name in (*(name for name, _ in index.chunk_entry_counts), *index.entry_number_by_golden):
             checked_relative_path(name, path)

@@ -12,7 +12,7 @@ from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
 from mutator.store.checksummed_blocks import BlockWriter, read_blocks
-from mutator.store.series_folder import SERIES_FOLDER, INDEX_NAME, SeriesFolder, SeriesIndex, save_index
+from mutator.store.series_folder import INDEX_NAME, SERIES_FOLDER, SeriesFolder, SeriesIndex, save_index
 from mutator.store.series_script import script_name_of, size_in_script, write_script
 
 WORKER_FILE_SUFFIX = ".blocks"  # suffix of the workers' files in series/
@@ -220,7 +220,9 @@ def _write_packed_files(
         chunk_entry_counts=tuple((name, len(sizes)) for name, sizes in chunks),
         entry_sizes=tuple(size for _, sizes in chunks for size in sizes),
         entry_number_by_golden={name: golden_numbers[entry.digest] for name, entry in goldens.items()},
-        entry_number_by_experiment={name: experiment_numbers[to_pack.experiments[name][1].digest] for name in chosen},
+        entry_number_by_experiment={
+            name: experiment_numbers[to_pack.experiments[name][1].digest] for name in chosen
+        },
         golden_by_experiment=golden_of,
         left_out_count=ended_count - len(chosen),
         budget_mb=budget_mb,

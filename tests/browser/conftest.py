@@ -87,7 +87,9 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     plan = build_plan(workspace, "toy")
     out = freeze_plan(plan, folder / "run", workspace)
     manifest, models = workspace.manifest("toycar"), workspace.fault_models()
-    lines = LineWriter(out.path / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": plan.digest})
+    lines = LineWriter(
+        out.path / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": plan.digest}
+    )
     patches = PatchWriter(out.path, "0001-main")
     for number, experiment in enumerate(plan.experiments):
         data = build(manifest, models, experiment.fault, experiment.trigger).patch_bytes

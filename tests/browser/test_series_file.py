@@ -108,7 +108,9 @@ def test_the_page_reads_the_points_between_the_values(browser: Any, run: Path) -
     }
     faulty = Series(t=t, channel_values=longer, sample_every=[1, 2], facts=happened, extra_points=points)
     name = SeriesFolder(run).rerun_ids()[0]
-    write_rerun_series(SeriesFolder(run).rerun_series_path(name), encode_series(golden), encode_series(faulty, golden))
+    write_rerun_series(
+        SeriesFolder(run).rerun_series_path(name), encode_series(golden), encode_series(faulty, golden)
+    )
     (run / "series" / "index.js").unlink()
     page = run / "report" / "index.html"
     page.write_text(page.read_text().replace('"packed": true', '"packed": false'))

@@ -11,8 +11,8 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.execution.session import Session
-from mutator.results.ranking import worst_first_rank_by_ok_experiment
 from mutator.results.table_reader import Results
+from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experiment
 from mutator.store import checksummed_blocks, checksummed_lines
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.checksummed_lines import read_segment
@@ -139,7 +139,9 @@ def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
     ran = cli(*WORDS)
     assert ran.code == 0, ran.err
     assert [
-        one for one in worst_first_rank_by_ok_experiment(Results(cut).frame()) if not SeriesFolder(cut).has_series(one)
+        one
+        for one in worst_first_rank_by_ok_experiment(Results(cut).frame())
+        if not SeriesFolder(cut).has_series(one)
     ] == names[-1:]
     assert cli("verify", "run").code == 0
     assert cli("rerun", names[-1], "--trace", "--run", "run").code == 0

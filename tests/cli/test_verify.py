@@ -213,7 +213,8 @@ def pack_with(name: str, forged: bytes) -> None:
     for one in index.entry_number_by_experiment:
         key = index.golden_by_experiment[one]
         golden, faulty = [
-            there.read_entry(number) for number in (index.entry_number_by_golden[key], index.entry_number_by_experiment[one])
+            there.read_entry(number)
+            for number in (index.entry_number_by_golden[key], index.entry_number_by_experiment[one])
         ]
         writer.append(
             one,

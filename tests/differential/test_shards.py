@@ -97,12 +97,18 @@ def test_merged_shards_have_the_seal_of_the_single_run(runs: Runs, tmp_path: Pat
 def test_the_whole_plan_decides_the_engine_of_a_shard(
     runs: Runs, toy: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine_choice, "MIN_EXPERIMENTS_TO_FORK", RunFolder.open(runs["whole"]).planned_experiment_count)
+    monkeypatch.setattr(
+        engine_choice, "MIN_EXPERIMENTS_TO_FORK", RunFolder.open(runs["whole"]).planned_experiment_count
+    )
     assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
 
 def test_an_approval_is_merged_if_every_shard_has_it(copies: Runs, tmp_path: Path) -> None:
-    said = {"schema": approvals.APPROVALS_SCHEMA, "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane Doe"}]}
+    said = {
+        "schema": approvals.APPROVALS_SCHEMA,
+        "target": "toycar",
+        "groups": [{"group": "0" * 12, "by": "Jane Doe"}],
+    }
     shards = [copies["1/2"], copies["2/2"]]
     approvals.write_approvals(shards[0], said)
     merge_shards(shards, tmp_path / "half")

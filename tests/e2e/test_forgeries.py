@@ -104,7 +104,9 @@ def a_patch(run: Path, deep: bool) -> None:
 
 def put_patch(run: Path, name: str, data: bytes) -> None:
     found = PatchFolder(run)
-    path = found.expected_file_of(name) if name in set(found) else found.block_files()[0]  # each worker has one
+    path = (
+        found.expected_file_of(name) if name in set(found) else found.block_files()[0]
+    )  # each worker has one
     kept = {other: found.read_patch(other) or b"" for other in found if found.expected_file_of(other) == path}
     patches = kept | {name: data}
     rewrite_patches(path, patches.items())

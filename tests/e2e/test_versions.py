@@ -175,7 +175,11 @@ def test_another_machine_repeats_the_golden_runs(
     monkeypatch.setattr(run_environment, "processor_name", lambda: "another")
     assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 6
     assert len(executed) == 8
-    assert [stretch.cpu == "another" for stretch in RunFolder.open(out).session_environments] == [False, False, True]
+    assert [stretch.cpu == "another" for stretch in RunFolder.open(out).session_environments] == [
+        False,
+        False,
+        True,
+    ]
 
     monkeypatch.setattr(run_environment, "processor_name", lambda: "a third")
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))

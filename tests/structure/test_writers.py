@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 MUTATOR = Path(__file__).parents[2] / "mutator"
-WRITERS = {"LineWriter", "PatchWriter", "SeriesWriter", "write_with_new_head"}
+WRITERS = {"LineWriter", "PatchWriter", "SeriesWriter", "write_lines_with_new_head"}
 EXCEPTIONS = {"execution/shard_merging.py": {"PatchWriter"}}
 
 

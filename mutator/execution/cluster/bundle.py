@@ -33,8 +33,8 @@ from mutator.execution.cluster.unpacked_bundle import BUNDLE_SCHEMA, META_FILE, 
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import TEMPLATE_FOLDER_GLOBS
 from mutator.results.table_columns import check_column_names
-from mutator.store.check_results import CHECKS_FILE as CHECKS
-from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
+from mutator.store.preflight_results import CHECKS_FILE as CHECKS
+from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest

@@ -25,7 +25,7 @@ from mutator.execution.cluster.worker_calls import await_answer, call_on_worker,
 from mutator.execution.cluster.worker_roster import WorkerRoster, describe_worker
 from mutator.execution.session import Session
 from mutator.preflight import equivalence_check
-from mutator.store.work_stretches import WorkerMachine
+from mutator.store.session_environments import WorkerMachine
 
 _WORKER_CHECK_INTERVAL_S = 0.5  # between two checks of the present workers
 _WORKERLESS_TIMEOUT_S = 60.0  # time without any worker after which the command gives up

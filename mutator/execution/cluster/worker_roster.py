@@ -8,7 +8,7 @@ from typing import Any
 
 from mutator._common.message_text import counted
 from mutator._common.version import VERSION
-from mutator.store.work_stretches import SessionEnvironment, version_differences
+from mutator.store.session_environments import SessionEnvironment, version_differences
 
 _MOST_RECENT_PIECES = 20  # finished pieces used to measure a worker's rate
 
@@ -26,7 +26,9 @@ class _AdmittedWorker:
 class WorkerRoster:
     """The workers of a run, present and refused. `now` returns the time in seconds."""
 
-    def __init__(self, stretch: SessionEnvironment, *, accept: bool, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, stretch: SessionEnvironment, *, accept: bool, now: Callable[[], float] = time.monotonic
+    ) -> None:
         self._stretch, self._accept_versions, self._now = stretch, accept, now
         self._admitted_workers: dict[str, _AdmittedWorker] = {}
         self.refusal_reasons: dict[str, str] = {}

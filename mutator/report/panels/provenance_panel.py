@@ -7,7 +7,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.store.approvals import approval_summary
 from mutator.store.run_head import HEAD
-from mutator.store.work_stretches import describe_environments, version_texts_by_package
+from mutator.store.session_environments import describe_environments, version_texts_by_package
 
 LISTED_PACKAGES = (
     "jinja2",
@@ -74,7 +74,11 @@ def _provenance_facts(run: ReportedRun) -> list[tuple[str, str]]:
         **{f"chosen: {name}": value for name, value in chosen.items() if value is not None},
         **{f"digest of {name}": value for name, value in head.sources.items()},
         "mutator": head.provenance.mutator,
-        **{name: text for name, text in describe_environments(folder.session_environments).items() if name == "python"},
+        **{
+            name: text
+            for name, text in describe_environments(folder.session_environments).items()
+            if name == "python"
+        },
         **{name: packages[name] for name in LISTED_PACKAGES if name in packages},
     }
     return [(name, str(value)) for name, value in facts.items()]

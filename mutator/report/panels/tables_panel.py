@@ -8,7 +8,12 @@ from mutator._common.table_rendering import TextTable
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note, fault_free_table
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
-from mutator.results.outcome_counting import count_outcomes_by_group, count_table, fault_types_of, checked_hazard_names
+from mutator.results.outcome_counting import (
+    checked_hazard_names,
+    count_outcomes_by_group,
+    count_table,
+    fault_types_of,
+)
 from mutator.statistics.metric_tables import fault_tolerant_times_sheet, metrics_sheet, severity_sheet
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.sheet_selection import run_sheets

@@ -115,7 +115,9 @@ def driven_once(
     patches = PatchWriter(folder.path, "0002-a")
     patches.append(experiment.id, (root / "single" / "mutant.patch").read_bytes())
     patches.close()
-    lines = LineWriter(folder.path / "records" / "0002-a.jsonl", {"schema": RECORDS_SCHEMA, "plan": folder.head.plan})
+    lines = LineWriter(
+        folder.path / "records" / "0002-a.jsonl", {"schema": RECORDS_SCHEMA, "plan": folder.head.plan}
+    )
     lines.append(dataclasses.asdict(single.record))
     lines.close()
     return folder.path

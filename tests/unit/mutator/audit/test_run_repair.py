@@ -183,7 +183,7 @@ def test_an_intact_run_is_not_changed(run: Path) -> None:
 def test_a_run_resumes_after_a_killed_repair(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     edit(run / RECORDS, lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]])
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
-        patched.setattr(file_digests, "close_segments", kill)
+        patched.setattr(file_digests, "add_segments_to_ledger", kill)
         repair_run(RunFolder.open_unverified(run))
     folder = RunFolder.open(run)
     assert (len(folder.records()), folder.is_finished) == (23, False)
@@ -247,7 +247,9 @@ def test_a_file_outside_that_a_record_names_stays(run: Path) -> None:
     lines = [segment.parse_line(number) for number in segment.lines if number > 1]
     lines[0] |= {"experiment_id": name, "patch": "ab" * 32}
     plan = RunFolder.open_unverified(run).head.plan
-    (run / RECORDS).write_bytes(line_file_bytes(run / RECORDS, {"schema": RECORDS_SCHEMA, "plan": plan}, lines))
+    (run / RECORDS).write_bytes(
+        line_file_bytes(run / RECORDS, {"schema": RECORDS_SCHEMA, "plan": plan}, lines)
+    )
     repaired(run)
     assert mine.read_text() == "mine"
 

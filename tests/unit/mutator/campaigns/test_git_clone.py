@@ -12,7 +12,7 @@ import pytest
 
 from mutator.campaigns import git_clone
 from mutator.campaigns.git_clone import GitClone, find_clone_state, find_user_name
-from mutator.store.work_stretches import GitCloneState
+from mutator.store.session_environments import GitCloneState
 
 IDENTITY = ("-c", "user.name=x", "-c", "user.email=x@example.org", "-c", "commit.gpgsign=false")
 

@@ -260,6 +260,8 @@ def test_the_run_schema_does_not_affect_the_plan_digest(
     toycar: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = build_plan(toycar, "small").digest
-    monkeypatch.setattr("mutator.store.run_head.SCHEMA", "run/9")
-    monkeypatch.setattr("mutator.campaigns.plan.SCHEMA", "run/9", raising=False)  # the module that imports it
+    monkeypatch.setattr("mutator.store.run_head.RUN_SCHEMA", "run/9")
+    monkeypatch.setattr(
+        "mutator.campaigns.plan.RUN_SCHEMA", "run/9", raising=False
+    )  # the module that imports it
     assert build_plan(toycar, "small").digest == before

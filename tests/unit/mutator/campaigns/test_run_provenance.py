@@ -14,9 +14,9 @@ from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.campaigns.run_provenance import accepted_version_differences, begin_stretch
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
 from mutator.execution.distributor_choice import choose_distributor, packages_of_distributor
-from mutator.store.check_results import SCHEMA
+from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.work_stretches import GitCloneState
+from mutator.store.session_environments import GitCloneState
 from mutator.workspace import Workspace
 
 
@@ -24,7 +24,7 @@ from mutator.workspace import Workspace
 def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
     """A planned run whose checks list `iniconfig` and `hypothesis` as packages that golden runs loaded."""
     planned = freeze_plan(build_plan(toycar, "small"), tmp_path / "run", toycar)
-    said = {"schema": SCHEMA, "packages": ["hypothesis", "iniconfig"]}
+    said = {"schema": CHECKS_SCHEMA, "packages": ["hypothesis", "iniconfig"]}
     (planned.path / "checks.json").write_text(json.dumps(said))
     return planned
 
@@ -153,4 +153,8 @@ def test_another_machine_is_recorded_but_not_refused(
     monkeypatch.setattr(name, lambda: other)
     assert accepted_version_differences(folder) == ()
     folder = begin_stretch(folder, toycar, records_glob="0002-*", accept_versions=False)
-    assert getattr(folder.session_environments[1], changed) == other != getattr(folder.session_environments[0], changed)
+    assert (
+        getattr(folder.session_environments[1], changed)
+        == other
+        != getattr(folder.session_environments[0], changed)
+    )

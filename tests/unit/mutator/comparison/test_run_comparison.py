@@ -16,7 +16,7 @@ from mutator.comparison.input_differences import differing_pairs_remarks, input_
 from mutator.comparison.run_comparison import Comparison, Gate, compare_runs, findings_of_gates
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import AfterHazard, Experiment, Outcome, Status
-from mutator.store.work_stretches import SessionEnvironment
+from mutator.store.session_environments import SessionEnvironment
 from mutator.workspace import Workspace
 
 Write = Callable[..., Path]
@@ -108,7 +108,9 @@ def test_a_run_compared_with_itself_has_no_changes(runs: tuple[Path, Path]) -> N
 
 def test_differing_versions_are_reported(runs: tuple[Path, Path]) -> None:
     sides = [load_compared_run(runs[0]) for _ in "ab"]
-    old = SessionEnvironment(python="CPython 3.11.7", packages={"numpy": "2.0"}, platform="Linux", cpu="Cray 1")
+    old = SessionEnvironment(
+        python="CPython 3.11.7", packages={"numpy": "2.0"}, platform="Linux", cpu="Cray 1"
+    )
     new = replace(old, python="CPython 3.12.1", packages={"numpy": "2.1", "cv": "5"})
     for side, stretches in zip(sides, ((old,), (old, new)), strict=True):
         vars(side.folder)["head"] = replace(side.folder.head, stretches=stretches)

@@ -9,7 +9,7 @@ from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import DigestLedger
 from mutator.store.plan_choices import Choices
-from mutator.store.work_stretches import SessionEnvironment
+from mutator.store.session_environments import SessionEnvironment
 from tests.made_head import made_head
 from tests.made_up_results import write_results
 
@@ -19,7 +19,9 @@ HEAD = made_head(
     campaign="night_<b>drive</b>",
     compared=COMPARED,
     choices=as_json_types(Choices(limit=3)),
-    stretches=[as_json_types(SessionEnvironment(python="3.11.7", platform="Linux", packages={"numpy": "2.4.6"}))],
+    stretches=[
+        as_json_types(SessionEnvironment(python="3.11.7", platform="Linux", packages={"numpy": "2.4.6"}))
+    ],
 )
 OK = {
     "module": "radar",

@@ -171,7 +171,12 @@ def untimed_path(by: str = "", stopped_at: tuple[str, ...] = ()) -> UntimedPath:
     these components."""
     entered = PathLink(name=by, tail=by, tip="pedals", state=LinkState.THROUGH) if by else None
     return UntimedPath(
-        state_by_component={}, inferred_ranks={}, links=(), reached="", stopped_at=stopped_at, link_to_first_actuator=entered
+        state_by_component={},
+        inferred_ranks={},
+        links=(),
+        reached="",
+        stopped_at=stopped_at,
+        link_to_first_actuator=entered,
     )
 
 

@@ -30,7 +30,7 @@ CHANNELS = [
 def path(*states: ComponentState, stopped_at: tuple[str, ...] = ()) -> FaultPath:
     names = ("eyes", "pedals", "car")
     components = tuple(
-        PathComponent(name=n, state=s, channels=()) for n, s in zip(names, states, strict=True)
+        PathComponent(name=n, state=s, departures=()) for n, s in zip(names, states, strict=True)
     )
     through = {
         ComponentState.REACHED: LinkState.THROUGH,
@@ -72,7 +72,12 @@ def test_the_page_filters_by_the_links_that_a_fault_got_through() -> None:
     )
     untimed_paths = [
         UntimedPath(
-            state_by_component={}, inferred_ranks={}, links=one.links, reached="", stopped_at=(), link_to_first_actuator=None
+            state_by_component={},
+            inferred_ranks={},
+            links=one.links,
+            reached="",
+            stopped_at=(),
+            link_to_first_actuator=None,
         )
         for one in (held, far)
     ]

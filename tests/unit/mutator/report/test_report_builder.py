@@ -101,7 +101,11 @@ def test_the_report_states_its_origin(run: Path) -> None:
 
 def test_the_report_names_the_reviewers(run: Path) -> None:
     assert "reviewed" not in report_builder.write_report(run, None).markdown.read_text()
-    said = {"schema": approvals.APPROVALS_SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
+    said = {
+        "schema": approvals.APPROVALS_SCHEMA,
+        "target": "toycar",
+        "groups": [{"by": "Jane"}, {"by": "Joe"}],
+    }
     write_json(run / approvals.APPROVALS_FILE, said)
     written = report_builder.ensure_report(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):

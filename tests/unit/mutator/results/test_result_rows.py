@@ -7,11 +7,11 @@ import pytest
 
 from mutator.model import Outcome, Status
 from mutator.results.outcome_counting import (
+    checked_hazard_names,
     count_by_outcome_or_status,
     count_outcomes_by_group,
     count_table,
     fault_types_of,
-    checked_hazard_names,
 )
 from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.results.table_reader import Results
@@ -76,7 +76,9 @@ def test_a_crash_is_counted_as_injected_and_in_its_own_column(tmp_path: Path, st
     bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
     rows = results(tmp_path, SEEN, bad).frame()
 
-    heads, lines = count_table(count_outcomes_by_group(rows, fault_types_of(rows)), "fault type", checked_hazard_names(rows))
+    heads, lines = count_table(
+        count_outcomes_by_group(rows, fault_types_of(rows)), "fault type", checked_hazard_names(rows)
+    )
 
     assert heads[-1] == status.value
     assert lines[-1][heads.index("injected")] == "2"
@@ -85,7 +87,9 @@ def test_a_crash_is_counted_as_injected_and_in_its_own_column(tmp_path: Path, st
 
 def test_failure_columns_appear_only_if_a_run_failed(tmp_path: Path) -> None:
     rows = results(tmp_path, SEEN).frame()
-    heads, _ = count_table(count_outcomes_by_group(rows, fault_types_of(rows)), "fault type", checked_hazard_names(rows))
+    heads, _ = count_table(
+        count_outcomes_by_group(rows, fault_types_of(rows)), "fault type", checked_hazard_names(rows)
+    )
     assert heads[-1] == "hazard, no alert"
 
 

@@ -20,14 +20,14 @@ from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Record
 from mutator.outcomes.fault_paths import fault_paths_of
-from mutator.results import propagation_columns, table_building, table_files
+from mutator.results import propagation_columns, table_building, table_writers
 from mutator.results.table_columns import (
     TIMING_COLUMNS,
     FinishedExperiment,
     cells_by_column,
     result_columns_of,
 )
-from mutator.results.table_files import TableColumn
+from mutator.results.table_writers import TableColumn
 from mutator.store import plan_file
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import RECORDS_SCHEMA
@@ -45,7 +45,8 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
     folder = freeze_plan(plan, tmp_path / "run", toycar)
     for i in (0, 1):
         writer = LineWriter(
-            folder.path / "records" / f"0001-gw{i}.jsonl", {"schema": RECORDS_SCHEMA, "plan": folder.head.plan}
+            folder.path / "records" / f"0001-gw{i}.jsonl",
+            {"schema": RECORDS_SCHEMA, "plan": folder.head.plan},
         )
         timings = LineWriter(folder.path / "timings" / f"0001-gw{i}.jsonl", {"schema": TIMINGS_SCHEMA})
         for experiment in plan.experiments[i:22:2]:
@@ -161,14 +162,14 @@ def test_tables_built_in_batches_have_the_same_bytes(
 def test_row_groups_of_a_long_table_have_the_same_size(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(table_files, "_MOST_GROUP_ROWS", 4)
+    monkeypatch.setattr(table_writers, "_MOST_GROUP_ROWS", 4)
     columns = (TableColumn("n", "count", "", ""),)
     for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
         for batch in (1, 3, 20):
-            with table_files.ParquetTableWriter(tmp_path / "t.parquet", columns) as file:
+            with table_writers.ParquetTableWriter(tmp_path / "t.parquet", columns) as file:
                 for first in range(0, size, batch):
                     some = range(first, min(size, first + batch))
-                    file.append(table_files.parquet_batch(columns, [some]))
+                    file.append(table_writers.parquet_batch(columns, [some]))
             found = pq.ParquetFile(tmp_path / "t.parquet")
             assert [found.metadata.row_group(i).num_rows for i in range(found.num_row_groups)] == groups
             assert found.read()["n"].to_pylist() == list(range(size))

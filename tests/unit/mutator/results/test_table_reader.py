@@ -76,7 +76,7 @@ def run(crane: Workspace, tmp_path: Path, write_run: WriteRun) -> Path:
 ALONE = """
 import sys
 from pathlib import Path
-from mutator.results.outcome_counting import hazard_names as checked_hazards
+from mutator.results.outcome_counting import checked_hazard_names as checked_hazards
 from mutator.results.table_reader import Results, is_same_parquet
 table = Results(Path(sys.argv[1]))
 assert is_same_parquet(table.path, table.path)
@@ -341,7 +341,9 @@ def test_hazards_have_the_names_of_run_json(run: Path, reseal: Callable[[Path], 
     table = Results(run)
     assert checked_hazards(table.frame()) == ("CRUSHED", "Dropped")
     assert (
-        hazard_names_of_frame(table.frame()) == hazard_names_of_frame(table.indexed_frame()) == ("Dropped", "CRUSHED")
+        hazard_names_of_frame(table.frame())
+        == hazard_names_of_frame(table.indexed_frame())
+        == ("Dropped", "CRUSHED")
     )
     assert hazard_names(load_usable_results(table.path)) == ("CRUSHED", "Dropped")
     assert "way" in table.frame()
@@ -359,6 +361,8 @@ def test_a_table_without_a_hazard_of_run_json_is_refused(run: Path) -> None:
 def test_a_frame_without_its_hazards_is_refused(run: Path) -> None:
     """Pandas keeps them in frames made from a frame of a run, but another frame has none."""
     frame = Results.up_to_date(run).frame()
-    assert hazard_names_of_frame(frame[frame["status"] == "ok"].reset_index(drop=True)) == hazard_names_of_frame(frame)
+    assert hazard_names_of_frame(
+        frame[frame["status"] == "ok"].reset_index(drop=True)
+    ) == hazard_names_of_frame(frame)
     with pytest.raises(MutatorError, match="without the names of its hazards"):
         prepare_results(pd.DataFrame(frame.to_dict("list")))

@@ -15,7 +15,7 @@ from mutator.store import file_digests, integrity, plan_file
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.work_stretches import SessionEnvironment
+from mutator.store.session_environments import SessionEnvironment
 from mutator.workspace import Workspace
 
 Write = Callable[..., Path]

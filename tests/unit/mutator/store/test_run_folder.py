@@ -12,7 +12,7 @@ from mutator._common import folder_locks
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
-from mutator.store.cleaning import delete_run
+from mutator.store.run_deletion import delete_run
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

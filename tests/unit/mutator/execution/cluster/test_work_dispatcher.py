@@ -30,7 +30,7 @@ from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record, Status
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.work_stretches import SessionEnvironment
+from mutator.store.session_environments import SessionEnvironment
 from mutator.workspace import Workspace
 
 from .loops import run

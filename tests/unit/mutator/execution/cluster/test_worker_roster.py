@@ -4,7 +4,7 @@ import pytest
 
 from mutator._common.version import VERSION
 from mutator.execution.cluster.worker_roster import WorkerRoster, describe_worker
-from mutator.store.work_stretches import SessionEnvironment
+from mutator.store.session_environments import SessionEnvironment
 
 FACTS = {
     "mutator": VERSION,

@@ -12,7 +12,7 @@ from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
 from mutator.exports import ExportTable, find_export
 from mutator.store.allowed_contents import ALLOWED_FILE_GLOBS
-from mutator.store.cleaning import delete_run, finish_deletion
+from mutator.store.run_deletion import delete_run, finish_deletion
 from mutator.workspace import Workspace
 
 PAGE = Path(__file__).parents[4] / "docs" / "reference" / "run-folder.md"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from mutator._common.files import read_json
 from mutator.store.run_folder import RunFolder
 
-SCHEMA = "checks/1"
+CHECKS_SCHEMA = "checks/1"
 CHECKS_FILE = "checks.json"
 
 
@@ -20,15 +20,15 @@ class CheckResult:
 
 def packages_loaded_by_golden_runs(folder: RunFolder) -> tuple[str, ...]:
     path = folder.path / CHECKS_FILE
-    return tuple(read_json(path, SCHEMA).get("packages", ())) if path.is_file() else ()
+    return tuple(read_json(path, CHECKS_SCHEMA).get("packages", ())) if path.is_file() else ()
 
 
 def golden_digests(folder: RunFolder) -> dict[str, str]:
     """Return the digest of each golden run, by its key."""
-    return dict(read_json(folder.path / CHECKS_FILE, SCHEMA)["goldens"])
+    return dict(read_json(folder.path / CHECKS_FILE, CHECKS_SCHEMA)["goldens"])
 
 
 def mean_golden_run_cpu_s(folder: RunFolder) -> float | None:
     path = folder.path / CHECKS_FILE
-    run_cpu_s = read_json(path, SCHEMA).get("run_cpu_s") if path.is_file() else None
+    run_cpu_s = read_json(path, CHECKS_SCHEMA).get("run_cpu_s") if path.is_file() else None
     return run_cpu_s if isinstance(run_cpu_s, int | float) else None

@@ -9,14 +9,14 @@ import pytest
 from mutator._common.hashing import as_json_types
 from mutator._common.typed_json import from_json_types
 from mutator.errors import TypeMisfit
-from mutator.store.work_stretches import (
+from mutator.store.session_environments import (
     Blas,
     GitCloneState,
-    WorkerMachine,
     SessionEnvironment,
+    WorkerMachine,
     describe_environments,
-    version_texts_by_package,
     version_differences,
+    version_texts_by_package,
 )
 
 BEFORE = SessionEnvironment(

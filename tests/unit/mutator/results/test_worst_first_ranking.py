@@ -9,10 +9,10 @@ from pathlib import Path
 import pandas as pd
 
 from mutator.model import Status
-from mutator.results.ranking import worst_first_rank_by_ok_experiment, worst_first_ranks
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_columns import SEVERITY_COLUMN, TIME_TO_HAZARD_COLUMNS, result_columns
 from mutator.results.table_reader import Results
+from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experiment, worst_first_ranks
 from mutator.targets.contact_severity import SEVERITY_CLASSES
 from mutator.targets.stored_target_facts import MetricFacts
 from tests.made_head import made_head

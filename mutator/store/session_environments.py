@@ -1,9 +1,12 @@
-"""Stretches of work: the software and machine of each session of a run folder."""
+"""The environment of each session of a run folder: its software and machine."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from mutator._common.hashing import added_field
+
+FileStemGlob = str
+VersionDifference = str  # numpy 1.26.4, here 2.1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,16 +61,20 @@ class SessionEnvironment:
     blas: tuple[Blas, ...] = ()
     threads: Mapping[str, str] = field(default_factory=dict)  # thread settings in the target's environment
     git: Mapping[str, GitCloneState] | None = None  # the clones of mutator, library, templates and target
-    records: str = "*"  # glob of the session's files in records/, timings/ and proof/, without suffix
-    accepted: tuple[str, ...] = ()  # differences of Python and packages from the previous stretch
+    records: FileStemGlob = (
+        "*"  # glob of the session's files in records/, timings/ and proof/, without suffix
+    )
+    accepted: tuple[VersionDifference, ...] = ()  # from the previous session
     machines: tuple[WorkerMachine, ...] = added_field(())
 
     def __str__(self) -> str:
         return ", ".join(filter(None, (self.python, self.platform, self.cpu)))
 
 
-def version_differences(before: SessionEnvironment, python: str, packages: Mapping[str, str | None]) -> tuple[str, ...]:
-    """List the differences between a stretch and the current versions: `numpy 1.26.4, here 2.1.0`."""
+def version_differences(
+    before: SessionEnvironment, python: str, packages: Mapping[str, str | None]
+) -> tuple[VersionDifference, ...]:
+    """List the differences between a session's versions and the current ones: `numpy 1.26.4, here 2.1.0`."""
     texts = [] if before.python == python else [f"{before.python}, here {python}"]
     for name in sorted(before.packages.keys() | packages):
         old, new = before.packages.get(name), packages.get(name)
@@ -77,7 +84,7 @@ def version_differences(before: SessionEnvironment, python: str, packages: Mappi
 
 
 def describe_environments(environments: Iterable[SessionEnvironment]) -> dict[str, str]:
-    """Describe the software and machines of stretches; several values are listed, oldest first."""
+    """Describe the software and machines of sessions; several values are listed, oldest first."""
     texts_by_name: dict[str, dict[str, None]] = {}
     for environment in environments:
         for name, text in _describe_environment(environment).items():

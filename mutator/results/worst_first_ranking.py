@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
-from mutator.results.outcome_counting import outcome_or_status_of_rows, hazard_margins
+from mutator.results.outcome_counting import hazard_margins, outcome_or_status_of_rows
 from mutator.targets.contact_severity import DELTA_V_NAME, SEVERITY_CLASSES
 
 if TYPE_CHECKING:
