@@ -40,7 +40,7 @@ Problems = Iterator[MutatorError]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AuditCheck:
-    """One step of an audit. `checked_parts` describes the `checked_count` parts of the run that were checked."""
+    """One step of an audit. `checked_parts` describes what was checked, and `checked_count` counts it."""
 
     checked_parts: str
     checked_count: int

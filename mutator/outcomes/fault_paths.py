@@ -53,8 +53,8 @@ class LinkState(StrEnum):
 class PathComponent:
     """A component on a path, and its channels that left golden.
 
-    If a component that only this one feeds left golden before this one's own channels did, `t_changed_by` is the time
-    (s) when that happened: this component must have changed by then.
+    If a component that only this one feeds left golden before this one's own channels did, `t_changed_by` is
+    the time (s) when that happened: this component must have changed by then.
     """
 
     name: str
@@ -98,9 +98,9 @@ class UntimedPath:
     """A path without times. Paths have the same untimed path if they have the same injected components, and
     components left golden in the same order.
 
-    `inferred_ranks` has the components that must have changed before their own channels did, each with the rank
-    of `PathComponent.t_changed_by` among all times. `link_to_first_actuator` is the link by which the fault reached the first
-    actuator.
+    `inferred_ranks` has the components that must have changed before their own channels did, each with the
+    rank of `PathComponent.t_changed_by` among all times. `link_to_first_actuator` is the link by which the
+    fault reached the first actuator.
     """
 
     state_by_component: Mapping[str, ComponentState]  # in causal order

@@ -2,8 +2,8 @@
 
 Run folders travel: evidence comes from strangers. Two rules keep every command inside the folder:
 
-* `check_plain_contents`, whenever a run folder is opened: nothing in it is a link, pipe, device or socket. A path
-  of fixed names below a checked folder therefore stays in it. This is enough for a folder that somebody
+* `check_plain_contents`, whenever a run folder is opened: nothing in it is a link, pipe, device or socket. A
+  path of fixed names below a checked folder therefore stays in it. This is enough for a folder that somebody
   sends. It cannot stop a process that changes the folder at the same time, but such a process has the user's
   permissions, and needs no links.
 * `mutator._common.confined_files`, wherever a name comes from a file: the name is checked when it is joined.

@@ -34,7 +34,8 @@ class SeriesIndex:
     """The content of `series/index.js`.
 
     * `chunk_entry_counts`: (name, number of entries); `entry_sizes`: the bytes of each entry, in order
-    * `entry_number_by_golden`, `entry_number_by_experiment`: the number of the entry of each golden run and each experiment
+    * `entry_number_by_golden`, `entry_number_by_experiment`: the number of the entry of each golden run and
+      each experiment
     * `left_out_count`: how many experiments ended normally but have no series, mostly because of `budget_mb`
     """
 
