@@ -43,7 +43,8 @@ class Series:
 
     `channel_values` has the values of each channel in single precision (NaN: no value). `sample_every` gives
     n for each channel: it has a value at every n-th time. `facts` is plain data. `extra_points` are a faulty
-    run's values between these times."""
+    run's values between these times.
+    """
 
     t: np.ndarray
     channel_values: Sequence[np.ndarray]
