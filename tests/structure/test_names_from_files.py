@@ -46,8 +46,8 @@ ALLOWED = {  # joins of names that no file contains
     "operators/executed_lines.py: scratch / 'work' / f'lines-{i}'": "a number",
     "review/called_code.py: folder / constant.value": "only compared with the tree's paths",
     "review/effect_pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
-    "store/cleaning.py: Path(folder, name)": "names from os.walk",
-    "store/cleaning.py: Path(name).with_name(final_name_of_half_written(Path(name).name))": (
+    "store/run_deletion.py: Path(folder, name)": "names from os.walk",
+    "store/run_deletion.py: Path(name).with_name(final_name_of_half_written(Path(name).name))": (
         "only compared with patterns"
     ),
     "targets/source_tree.py: root / name": "the folder of a checked glob",

@@ -147,7 +147,7 @@ const SeriesFile = (() => {
     return eventMarks.sort((a, b) => a[1] - b[1]);
   }
 
-  const ROUNDING = 2 ** -19, SMALLEST = 1e-37, LARGEST = 3e38; // as in store/series_check.py
+  const ROUNDING = 2 ** -19, SMALLEST = 1e-37, LARGEST = 3e38; // as in store/series_record_check.py
 
   /** Whether a channel deviates by `largest` at most and, unless it has times of its own, at least. */
   function deviates(golden, run, channel, largest) {
