@@ -79,7 +79,10 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
     said = {"schema": CHECKS_SCHEMA, "digest": looked_at.digest, "results": [], "goldens": goldens}
     looked_at._store_in_run_folder(json_bytes(said | {"run_cpu_s": 1.0}))
     preflight_cache.store_passed_checks(
-        preflight_cache.cached_checks_path(looked_at.digest), folder.path, CHECKS_FILE, looked_at.pending_folder
+        preflight_cache.cached_checks_path(looked_at.digest),
+        folder.path,
+        CHECKS_FILE,
+        looked_at.pending_folder,
     )
 
 

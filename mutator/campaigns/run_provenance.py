@@ -81,7 +81,12 @@ def _versions_to_record(folder: RunFolder, more_packages: Iterable[str] = ()) ->
     """Return the versions of the harness's requirements, packages that golden runs loaded, and `more`."""
     before = (name for stretch in folder.session_environments[-1:] for name in stretch.packages)
     return run_environment.package_versions(
-        {*run_environment.required_packages(), *packages_loaded_by_golden_runs(folder), *before, *more_packages}
+        {
+            *run_environment.required_packages(),
+            *packages_loaded_by_golden_runs(folder),
+            *before,
+            *more_packages,
+        }
     )
 
 

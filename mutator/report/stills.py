@@ -94,7 +94,8 @@ def _missing_stills_by_id(
     ids = (str(frame["experiment_id"].iloc[row]) for row in order)
     with_pictures = (name for name in ids if change_names & set(experiments[name].changes))
     worst_ids = islice(
-        with_pictures, min(MOST_FILMED_EXPERIMENTS, folder.planned_experiment_count // PLANNED_PER_FILMED_EXPERIMENT)
+        with_pictures,
+        min(MOST_FILMED_EXPERIMENTS, folder.planned_experiment_count // PLANNED_PER_FILMED_EXPERIMENT),
     )
     stills_by_id = {name: _missing_stills(folder, name, records[name]) for name in worst_ids}
     return {name: shots for name, shots in stills_by_id.items() if shots}

@@ -343,7 +343,11 @@ def check_column_names(manifest: TargetManifest) -> None:
     compared = [channel.name for channel in manifest.compared_channels]
     used_names = {column.name for column in result_columns((), compared, paths=True)}
     used_names |= {SEVERITY_COLUMN.name, *(column.name for column in TIME_TO_HAZARD_COLUMNS)}
-    used_names |= {*DERIVED_COLUMN_NAMES, DRIVE_END_COLUMN, *drive_deviation_column_by_channel(compared).values()}
+    used_names |= {
+        *DERIVED_COLUMN_NAMES,
+        DRIVE_END_COLUMN,
+        *drive_deviation_column_by_channel(compared).values(),
+    }
     is_mapping = isinstance(manifest.source.data.get("hazards"), dict)
     for i, hazard in enumerate(manifest.hazard_names):
         names = {column.name for column in hazard_columns(hazard)}

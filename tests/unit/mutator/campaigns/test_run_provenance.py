@@ -75,7 +75,9 @@ def test_a_package_that_reads_the_traces_or_distributes_the_work_is_recorded(
     for cached in (run_environment._installed_packages, run_environment._packages_by_module):
         monkeypatch.setattr(run_environment, cached.__name__, cached.__wrapped__)
     manifest = toycar.manifest("toycar")
-    plain = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False).session_environments[-1]
+    plain = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False).session_environments[
+        -1
+    ]
     assert "door-examples" not in plain.packages
     packages = packages_of_distributor(choose_distributor("here:"))
     spread = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False, packages=packages)
