@@ -7,7 +7,7 @@ from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.targets.criteria import Hazard
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import TIME, ieee_divide, names_in, parse_expression, to_python_source
+from mutator.triggers.conditions import TIME, divide, names_in, parse_expression, to_python_source
 
 _STOP_REMEDY = "leave `after_hazard` out of the campaign, so that runs continue"
 
@@ -48,7 +48,7 @@ def stop_function_source(manifest: TargetManifest) -> str:
     ]
     holds = " or ".join(f"({to_python_source(text)})" for text in conditions)
     return "\n".join(
-        [getsource(ieee_divide), "_div = divide", "def over(recorded):", *lines, f"    return {holds}", ""]
+        [getsource(divide), "_div = divide", "def over(recorded):", *lines, f"    return {holds}", ""]
     )
 
 

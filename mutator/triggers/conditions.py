@@ -103,7 +103,7 @@ def evaluate_condition(condition: str, values: Mapping[str, float]) -> bool:
     )
 
 
-def ieee_divide(a: float, b: float) -> float:
+def divide(a: float, b: float) -> float:
     """Divide as IEEE 754 does: infinite or NaN for b = 0. The probe contains the same function."""
     if b:
         return a / b
@@ -114,7 +114,7 @@ def ieee_divide(a: float, b: float) -> float:
 @lru_cache(maxsize=256)
 def _compile_function(text: str, names: tuple[str, ...], number: bool) -> Callable[..., object]:
     source = f"lambda {', '.join(names)}: {to_python_source(text, is_formula=number)}"
-    functions = {"__builtins__": {}, "abs": abs, "min": min, "max": max, "math": math, "_div": ieee_divide}
+    functions = {"__builtins__": {}, "abs": abs, "min": min, "max": max, "math": math, "_div": divide}
     return eval(compile(source, "<condition>", "eval"), functions)  # type: ignore[no-any-return]
 
 
