@@ -51,7 +51,7 @@ EXCEPTIONS: dict[str, str] = {
             "target/selfdrive/sim/effects/compiled_scattered.py::_droplets.kept",
             "target/selfdrive/sim/effects/compiled_scattered.py::agrees.seen",
             "target/selfdrive/sim/effects/effect.py::Effect._seen",
-            "target/selfdrive/sim/moved_picture.py::CodedShiftMover.seen",
+            "target/selfdrive/sim/moved_picture.py::AuthorsCodeShiftMover.seen",
             "target/selfdrive/sim/moved_picture.py::HomographyMover.seen",
             "target/selfdrive/sim/moved_picture.py::ShiftMover.seen",
             "target/selfdrive/sim/plant.py::Plant.shown",
