@@ -30,7 +30,7 @@ WINDOWS_PART = (
     slice(FIRST_ROW, FIRST_ROW + WINDOWS_PART_SIZE[0]),
     slice(FIRST_COLUMN, FIRST_COLUMN + WINDOWS_PART_SIZE[1]),
 )
-MIN_LOG_ODDS = 4.0  # lowest log odds of a window with a mark; see visiond_lab.calibrate_as_coded
+MIN_LOG_ODDS = 4.0  # lowest log odds of a window with a mark; see visiond_lab.calibrate_authors_code
 MIN_EDGE_STEEPNESS = 4.0  # an edge's squared gradient, as a multiple of the window's mean
 MIN_WINDOW_EDGES = 25  # px, in a window that is used
 POINTS_IN_RADIUS = 5  # points within the clusters' radius if all were evenly spread
