@@ -35,7 +35,7 @@ got through it, or a box to list those whose faults were masked there.</p>
 <option>{{ kind }}</option>
 {% endfor %}
 </select>
-<span class="quiet" id="path-counts-active" role="status">{{ counts[all].active }} active</span></div>
+<span class="quiet" id="path-counts-active" role="status">{{ counts[all].active_fault_count }} active</span></div>
 <div class="scroll" id="path-counts" tabindex="0" role="group"
 aria-label="Control structure">{{ figure }}</div>
 {{ data }}
@@ -48,7 +48,7 @@ aria-label="Control structure">{{ figure }}</div>
 {% for name, (tail, tip, carries) in links.items() %}
 <tr data-link="{{ name }}"><td>{{ label(tail) }}</td><td>{{ label(tip) }}</td>
 <td>{{ carries }}</td>
-<td class="number">{{ share(counts[all].passed[name], counts[all].reached[name]) }}</td></tr>
+<td class="number">{{ share(counts[all].passed_by_link[name], counts[all].reached_by_link[name]) }}</td></tr>
 {% endfor %}
 </tbody></table></div></details>
 <h3>Where masked faults were stopped</h3>

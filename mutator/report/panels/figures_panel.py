@@ -12,7 +12,7 @@ _HTML_TEMPLATE = """\
 {% for drawing in drawings %}
 <h3>{{ drawing.title }}</h3>
 <p>{{ drawing.note }}
-{% for what, code in drawing.codes %}
+{% for what, code in drawing.described_code_lines %}
 <br>{{ what }}: <code>{{ code }}</code>
 {% endfor %}</p>
 {% if drawing.figure %}
