@@ -70,7 +70,7 @@ SUBCOMMAND_GROUPS = (
 EXAMPLES = f"""\b
 Examples:
   mutator list                                    show what the library contains
-  mutator try radar/chaff --scenario S1           try one fault: diff, verdict, plot
+  mutator try radar/chaff --scenario S1           try one fault: diff and verdict
   mutator run quickstart --out runs/first         run or resume a campaign
   mutator show 3f9a                               show one experiment by the start of its id
 

@@ -195,10 +195,9 @@ def _list_events(record: "Record", manifest: "TargetManifest | None") -> list[tu
     ]
 
 
-def print_trial(terminal: Terminal, trial: "Trial") -> None:
-    """Print an experiment that `try` has just run; write its plot next to its traces."""
-    with terminal.show_spinner("drawing"):
-        plot_path = trial.save_plot(trial.folder / "plot.svg")
+def print_trial(terminal: Terminal, trial: "Trial", *, with_plot: bool) -> None:
+    """Print an experiment that `try` has just run. `with_plot`: write a plot next to its traces."""
+    plot_path = _replace_plot(terminal, trial, with_plot=with_plot)
     if terminal.as_json:
         facts = {**experiment_facts(trial.experiment), **trial.verdict, "patch": trial.patch}
         facts |= {"golden_hazards_s": dict(trial.golden_hazards)}
@@ -218,5 +217,17 @@ def print_trial(terminal: Terminal, trial: "Trial") -> None:
         terminal.print_text(trial.log.strip(), without_folding=True)
     if plot_path:
         terminal.print_link("plot", plot_path, f"plot: {plot_path}")
+    elif trial.has_trace:
+        terminal.print_text(f"traces: {trial.folder} (--plot plots them)", without_folding=True)
     else:
-        terminal.print_text("no plot: the run left no trace")
+        terminal.print_text("the run left no trace")
+
+
+def _replace_plot(terminal: Terminal, trial: "Trial", *, with_plot: bool) -> Path | None:
+    """Delete the plot of an earlier trial of the same experiment; write a new one if wanted."""
+    path = trial.folder / "plot.svg"
+    path.unlink(missing_ok=True)
+    if not with_plot:
+        return None
+    with terminal.show_spinner("drawing"):
+        return trial.save_plot(path)

@@ -55,7 +55,7 @@ TRY_EXAMPLES = """\b
 Examples:
   mutator try radar/chaff --scenario S1 --trigger C2
   mutator try radar/chaff -s S1 --value 40 --trigger 10   exactly 40 m, from 10 s
-  mutator try my_fault.yaml --scenario S5                 your own spec
+  mutator try my_fault.yaml --scenario S5 --plot          your own spec; plot both runs, too
 """
 
 
@@ -84,6 +84,9 @@ def try_spec(
             help="Arm contexts and `always` after this time. Default: the manifest's.",
         ),
     ] = None,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Plot the golden and the faulty run, next to their traces.")
+    ] = False,
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder for patch, traces and plot.")
     ] = _DEFAULT_OUT,
@@ -92,7 +95,7 @@ def try_spec(
     *,
     workspace_options: WorkspaceOptions,
 ) -> None:
-    """Inject one fault and run it once: diff, verdict, plot."""
+    """Inject one fault and run it once: diff and verdict."""
     from mutator.api.target_and_fault_selection import FaultChoice, SelectedTarget, middle_of_each_variant
     from mutator.cli.experiment_view import print_trial
 
@@ -121,7 +124,7 @@ def try_spec(
             workspace=selected_target.workspace,
             out=out,
         )
-    print_trial(terminal, trial)
+    print_trial(terminal, trial, with_plot=plot)
     if trial.status is mutator.Status.HARNESS_ERROR:
         raise typer.Exit(EXIT_HARNESS_ERRORS)
 

@@ -194,7 +194,7 @@ class RequestChecker:
             "--manifest": request.target,
             "--out": self._new_folder(TRIALS_FOLDER),
         }
-        arguments = ("try", request.spec, *_joined_options(options), *self._workspace_options())
+        arguments = ("try", request.spec, "--plot", *_joined_options(options), *self._workspace_options())
         return JobCommand(
             job_request=request,
             title=f"{request.spec} in {request.scenario}, {request.trigger}",

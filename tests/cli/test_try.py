@@ -1,6 +1,8 @@
 """`try` and `generate`, which need no run folder, on the toy target."""
 
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -23,8 +25,34 @@ def test_try_needs_no_campaign(cli: Cli, root: Path) -> None:
     for wanted in ("sensor/silence/no_data", "t >= 2.0", "if not _fi.active", "verdict: "):
         assert wanted in answer.out
     assert "method" not in answer.out
-    [plot] = [line.removeprefix("plot: ") for line in answer.out.splitlines() if line.startswith("plot: ")]
-    assert Path(plot).is_file()
+
+
+def test_try_draws_a_plot_only_if_asked(cli: Cli, root: Path) -> None:
+    """A plot costs more time than the two runs; one of an earlier trial must not stay next to new traces."""
+    words = ("try", "sensor/lane", "-s", "A", "--trigger", "1")
+    [line] = [line for line in cli(*words, "--plot").out.splitlines() if line.startswith("plot: ")]
+    plot = Path(line.removeprefix("plot: "))
+    assert plot.is_file()
+    assert f"traces: {plot.parent} (--plot plots them)" in cli(*words).out
+    assert not plot.exists()
+    assert cli(*words, "--json").json["plot"] is None
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("try", "sensor/lane", "-s", "A", "--trigger", "1"),
+        ("diff", "sensor/lane"),
+    ],
+)
+def test_try_and_diff_load_neither_pandas_nor_matplotlib(root: Path, words: tuple[str, ...]) -> None:
+    code = (
+        "import sys; from mutator.cli.app import main; code = main(sys.argv[1:]); print(code, *sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True)
+    exit_code, *modules = done.stdout.splitlines()[-1].split()
+    assert exit_code == "0"
+    assert {"pandas", "matplotlib"}.isdisjoint(modules)
 
 
 def test_try_says_whether_an_alert_came_before_the_hazard(cli: Cli, root: Path) -> None:

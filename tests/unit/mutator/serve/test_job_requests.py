@@ -132,6 +132,7 @@ def test_requests_become_command_lines(desk: RequestChecker) -> None:
     assert work(desk, **TRY, **given).argv == (
         "try",
         "sensor/lane",
+        "--plot",
         *options,
         f"--out={run.parent}/try",
         *place,
