@@ -35,7 +35,8 @@ got through it, or a box to list those whose faults were masked there.</p>
 <option>{{ kind }}</option>
 {% endfor %}
 </select>
-<span class="quiet" id="path-counts-active" role="status">{{ counts[all].active_fault_count }} active</span></div>
+<span class="quiet" id="path-counts-active"
+role="status">{{ counts[all].active_fault_count }} active</span></div>
 <div class="scroll" id="path-counts" tabindex="0" role="group"
 aria-label="Control structure">{{ figure }}</div>
 {{ data }}
