@@ -122,7 +122,7 @@ def test_one_experiment_of_a_shared_run_can_run_on_a_cluster(runs: tuple[Path, P
     )
     bundle.unpack_bundle(Bundle.pack_for_run(toy, folder, "reference").data, tmp_path)
     chunk = next(one for one in pending_chunks_of(folder, {}) if {"A", "C"} == set(_scenarios(folder, one)))
-    left = replace(chunk, places=(_scenarios(folder, chunk).index("C"),))
+    left = replace(chunk, pending_positions=(_scenarios(folder, chunk).index("C"),))
     piece = PieceQueue(folder, [left], ()).take_piece("w")
     assert piece is not None and piece.golden_key == "A+alone"
     site = UnpackedBundle(tmp_path)

@@ -218,7 +218,7 @@ def test_a_defect_in_a_worker_is_reported(
 
     monkeypatch.setattr(Worker, "run", broken)
     summary = run_campaign(toy, "small", tmp_path / "run")
-    assert (summary.exit_code, summary.done) == (3, 12 - len(seen[1].places))
+    assert (summary.exit_code, summary.done) == (3, 12 - len(seen[1].pending_positions))
     assert "chunk-00001 failed because of a defect in mutator" in summary.problem
     assert "ZeroDivisionError: seven" in summary.problem
 
