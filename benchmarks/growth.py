@@ -21,7 +21,7 @@ from mutator._common.hashing import digest
 from mutator.audit.seal import seals_of
 from mutator.campaigns.plan import Plan, build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.model import Activation, Experiment, Outcome, Record, Status
+from mutator.model import Experiment, ObservedActivation, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.results import table_building
 from mutator.statistics.results_frame import load_usable_results
@@ -67,7 +67,9 @@ def record(experiment: Experiment, number: int) -> Record:
         outcome=Outcome.HAZARD if hazard else Outcome.SDC if active else Outcome.NOT_ACTIVATED,
         detail="",
         tree="f" * 64,
-        activation=Activation(first=2.0 + number % 997 / 100, last=30.0, count=number) if active else None,
+        activation=ObservedActivation(first=2.0 + number % 997 / 100, last=30.0, count=number)
+        if active
+        else None,
         t_manifest=2.05 + number % 997 / 100 if active else None,
         max_dev=(("gas", number / 7), ("brake", number / 11), ("steer_torque", number / 13)),
         hazards=(("H1", 20.0 + number % 997 / 100),) if hazard else (),

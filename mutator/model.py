@@ -264,7 +264,7 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Activation:
+class ObservedActivation:
     """When and how often injected statements ran while the fault was active. Times in s."""
 
     first: float
@@ -293,7 +293,7 @@ class Record:
     outcome: Outcome | None  #: what the fault did; None unless the status is `ok`
     detail: str  #: why the status is not `ok`; empty if it is
     tree: str  #: digest of the source tree that ran
-    activation: Activation | None  #: when and how often injected statements ran; None: never
+    activation: ObservedActivation | None  #: when and how often injected statements ran; None: never
     t_manifest: float | None  #: when a compared channel first left its tolerance, in s
     max_dev: tuple[tuple[str, float], ...]  #: largest deviation of each compared channel
     #: (name, first time in s) of each hazard after the activation, sorted by time

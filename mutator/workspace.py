@@ -24,7 +24,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec, load_spec
-from mutator.faults.library_readings import Readings, load_readings
+from mutator.faults.library_readings import SpecReadings, load_readings
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
 from mutator.results.table_columns import check_column_names
@@ -143,7 +143,7 @@ class Workspace:
         """Return the fault models of the templates folder."""
         return load_fault_models(self.templates)
 
-    def readings(self) -> Readings:
+    def readings(self) -> SpecReadings:
         """Return the readings that the library declares."""
         return load_readings(self.library)
 

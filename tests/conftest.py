@@ -16,7 +16,6 @@ from mutator.campaigns.plan import Plan, build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.campaigns.run_provenance import append_stretch
 from mutator.model import (
-    Activation,
     Anchor,
     AnchorKind,
     Experiment,
@@ -25,6 +24,7 @@ from mutator.model import (
     Hold,
     Injection,
     Method,
+    ObservedActivation,
     Outcome,
     Record,
     Status,
@@ -265,7 +265,7 @@ def record() -> Callable[..., Record]:
             "outcome": Outcome.MASKED,
             "detail": "",
             "tree": "t" * 64,
-            "activation": Activation(first=2.0, last=3.0, count=5),
+            "activation": ObservedActivation(first=2.0, last=3.0, count=5),
             "t_manifest": None,
             "max_dev": (("gas", 0.0), ("brake", 0.0), ("steer_torque", 0.0)),
             "hazards": (),

@@ -20,7 +20,7 @@ _WORKER_PATIENCE_S = 15.0  # workers of a dead command exit well within this tim
 
 
 @contextmanager
-def owning_run_folder(run: Path, patience_s: float = _WORKER_PATIENCE_S) -> Iterator[None]:
+def lock_run_folder(run: Path, patience_s: float = _WORKER_PATIENCE_S) -> Iterator[None]:
     """Lock the existing folder `run`; MutatorError while another command or its workers use it."""
     with raising_disk_full(run):
         fd = _open_lock_file(run, OWNER_LOCK_FILE, os.O_CREAT)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mutator._common.argument_checks import check_type, check_whole_number
-from mutator._common.folder_locks import owning_run_folder
+from mutator._common.folder_locks import lock_run_folder
 from mutator._common.hashing import digest
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
@@ -170,7 +170,7 @@ def seal(run: str | Path, *, sign: str | Path | None = None) -> Seals:
     if sign is None:
         return seals_of(folder)
     # what a running command writes would outdate the signature
-    with owning_run_folder(folder.path, patience_s=0.0):
+    with lock_run_folder(folder.path, patience_s=0.0):
         seals = seals_of(folder)
         write_signature(folder, seals, Path(sign))
     return seals

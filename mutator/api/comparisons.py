@@ -69,12 +69,12 @@ class RunComparison:
         """One row for each experiment that both runs have, with the columns of pairs.csv. Columns of a single
         run end in `_a` or `_b`. Times are in s since the start of the simulation.
         """
-        return _pairs_frame(self.comparison.pairs)
+        return _pair_cells_frame(self.comparison.pairs)
 
     @cached_property
     def changed(self) -> "pd.DataFrame":
         """The rows of `pairs` whose result changed, new hazards first."""
-        return _pairs_frame(self.comparison.changed_pairs)
+        return _pair_cells_frame(self.comparison.changed_pairs)
 
     @cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
@@ -116,7 +116,7 @@ def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None
     return RunComparison(comparing.compare_runs(runs[0].path, runs[1].path, only, (first, second)))
 
 
-def _pairs_frame(pairs: Sequence[ExperimentPair]) -> "pd.DataFrame":
+def _pair_cells_frame(pairs: Sequence[ExperimentPair]) -> "pd.DataFrame":
     import pandas as pd
 
     frame = pd.DataFrame([comparison_files.pair_cells(pair) for pair in pairs])

@@ -13,7 +13,7 @@ from mutator.api.mutants import build_selected
 from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Record
-from mutator.outcomes.fault_paths import FaultPath, FaultPaths, fault_paths_of
+from mutator.outcomes.fault_paths import FaultPath, FaultPathFinder, fault_paths_of
 from mutator.outcomes.golden_comparison import Trace
 from mutator.outcomes.series_sampling import traces_of_series
 from mutator.store import plan_file
@@ -80,7 +80,7 @@ class StoredRun:
         return self.folder.records()
 
     @cached_property
-    def fault_paths(self) -> FaultPaths | None:
+    def fault_paths(self) -> FaultPathFinder | None:
         """The paths of faults through the target; None if unknown."""
         return fault_paths_of(self.folder)
 

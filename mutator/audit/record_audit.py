@@ -11,7 +11,7 @@ from mutator._common.message_text import counted
 from mutator.engines.engine_jobs import MODES_TO_PROVE
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.model import Activation, Fault, Record, Status, Trigger
+from mutator.model import Fault, ObservedActivation, Record, Status, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.verdict_rules import EventTimes, outcome_of
 from mutator.preflight import equivalence_check
@@ -211,7 +211,7 @@ def _departure_contradictions(record: Record, head: RunHead) -> _Contradictions:
         yield f"actuators left golden at {times or 'no time'}", f"{when}, as recorded"
 
 
-def _is_in_order(events: EventTimes, activation: Activation | None) -> bool:
+def _is_in_order(events: EventTimes, activation: ObservedActivation | None) -> bool:
     if activation is None:
         return not events
     times = [time for _, time in events]

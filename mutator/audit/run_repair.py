@@ -21,7 +21,7 @@ from mutator._common.confined_files import (
     writing_below,
 )
 from mutator._common.files import raising_disk_full
-from mutator._common.folder_locks import owning_run_folder
+from mutator._common.folder_locks import lock_run_folder
 from mutator._common.message_text import counted
 from mutator.audit.record_audit import load_stored_records
 from mutator.audit.series_repair import repair_series
@@ -48,7 +48,7 @@ def repair_run(folder: RunFolder, workspace: Workspace | None = None) -> list[st
     With a `workspace`, golden series are rebuilt. Raises MutatorError if a command is using the folder
     or the plan is damaged.
     """
-    with owning_run_folder(folder.path, patience_s=0.0), raising_disk_full(folder.path):
+    with lock_run_folder(folder.path, patience_s=0.0), raising_disk_full(folder.path):
         renewed = list(_renew_damaged_ledger(folder))
         ledger = file_digests.settled_ledger(folder.path)
         lost_patches = _lost_patches(folder)

@@ -18,7 +18,7 @@ from mutator.campaigns.operator_selection import MutantActivity, OperatorSelecti
 from mutator.config.yaml_files import load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.errors import MutatorError
-from mutator.faults.library_readings import READINGS_FILE, Readings
+from mutator.faults.library_readings import READINGS_FILE, SpecReadings
 from mutator.model import AfterHazard, Limits, Method
 
 SCHEMA = "campaign/1"
@@ -193,7 +193,7 @@ def load_campaign_study(campaign: Campaign) -> CheckableStudy | None:
         ) from error
 
 
-def check_readings(campaign: Campaign, readings: Readings) -> None:
+def check_readings(campaign: Campaign, readings: SpecReadings) -> None:
     """Raise MutatorError for an undeclared reading, or if `armed_after_s` or `setting` omits a reading."""
     readings_text = ", ".join(readings.names)
     remedy = f"correct the name, or declare the reading in the library's {READINGS_FILE}"

@@ -14,7 +14,7 @@ from mutator._common.files import (
     write_atomic,
     writing_atomic,
 )
-from mutator._common.folder_locks import owning_run_folder
+from mutator._common.folder_locks import lock_run_folder
 from mutator._common.hashing import as_json_types, digest
 from mutator._common.version import VERSION
 from mutator.campaigns.plan import Plan, SeedBySeedPlan
@@ -60,7 +60,7 @@ def freeze_plan_with_tally(
     is_new = not out.exists()
     make_run_folder(out)
     try:
-        with owning_run_folder(out):
+        with lock_run_folder(out):
             return freeze_plan_in_owned_folder(plan, out, workspace)
     except BaseException:  # also an interruption: a new folder without a whole plan does not stay
         if is_new and not RunFolder.exists(out):

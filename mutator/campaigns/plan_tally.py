@@ -11,7 +11,7 @@ from mutator.model import Experiment, Fault
 from mutator.store.run_folder import GoldenRun
 
 # The start of every plan digest. Publications cite digests, so this text must never change.
-_DIGEST_PREFIX = "run/1"
+_PLAN_DIGEST_PREFIX = "run/1"
 
 FaultTypeAndMethod = tuple[str, str, str]  # module, fault type, method
 
@@ -62,7 +62,7 @@ class PlanDigestBuilder:
 
     def __init__(self) -> None:
         # a JSON list, hashed as it grows, so that no plan has to be in memory as a whole
-        self._hash = sha256(f"[{canonical_json(_DIGEST_PREFIX)},[".encode())
+        self._hash = sha256(f"[{canonical_json(_PLAN_DIGEST_PREFIX)},[".encode())
         self._separator = ""
 
     def add(self, ids: Sequence[str]) -> None:

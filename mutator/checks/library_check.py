@@ -13,7 +13,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModelExample, FaultModels
 from mutator.faults.fault_specs import FaultSpec, Variant
 from mutator.faults.injection_parameters import resolve_injection
-from mutator.faults.library_readings import Readings
+from mutator.faults.library_readings import SpecReadings
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
 from mutator.mutants.anchors import parse_file
@@ -78,7 +78,7 @@ def library_problems(workspace: Workspace, target: str) -> list[MutatorError]:
 
 
 def campaign_problems(
-    workspace: Workspace, readings: Readings, manifest: TargetManifest | None = None
+    workspace: Workspace, readings: SpecReadings, manifest: TargetManifest | None = None
 ) -> list[MutatorError]:
     """Problems of the library's campaigns, and those that their studies find in the library's data.
 

@@ -43,7 +43,7 @@ def write_comparison(comparison: Comparison, out: Path) -> ComparisonFiles:
     write_atomic(pairs, pairs_csv(comparison))
     write_atomic(out / "unmatched.csv", unmatched_csv(comparison))
     write_atomic(text, render_markdown(comparison).encode())
-    write_atomic(hypertext, render_page(comparison).encode())
+    write_atomic(hypertext, render_html_page(comparison).encode())
     return ComparisonFiles(markdown=text, page=hypertext, pairs=pairs)
 
 
@@ -140,7 +140,7 @@ def _unmatched_reasons_table(comparison: Comparison) -> TextTable:
     return TextTable(heads=("why", "experiments"), rows=rows, right_aligned=(1,))
 
 
-def render_page(comparison: Comparison) -> str:
+def render_html_page(comparison: Comparison) -> str:
     """Return the comparison as one HTML page. All text from runs is escaped."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup

@@ -25,7 +25,7 @@ TIME_COLUMN_BY_EVENT = {
 TIME_SPAN_NAMES = ("activation to manifest", "activation to alert", "activation to hazard", "alert to hazard")
 
 
-def pairs_frame(pairs: Sequence[ExperimentPair]) -> pd.DataFrame:
+def usable_pair_events(pairs: Sequence[ExperimentPair]) -> pd.DataFrame:
     """Return a frame with a row for each pair that has valid results in both runs.
 
     Columns: `kind` (`sensor/bias`), `fault` (the resampling unit: variant and value), flags `activated_a`,

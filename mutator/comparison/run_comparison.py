@@ -21,9 +21,9 @@ from mutator.comparison.pair_sheets import (
     RunDisplayNames,
     change_counts_sheet,
     endings_cross_table,
-    pairs_frame,
     rates_sheets,
     times_sheets,
+    usable_pair_events,
 )
 from mutator.comparison.pairs import (
     ExperimentMatching,
@@ -129,7 +129,7 @@ class Comparison:
     @cached_property
     def sheets(self) -> tuple[Sheet, ...]:
         """The tables, most important first."""
-        frame = pairs_frame(self.pairs)
+        frame = usable_pair_events(self.pairs)
         rates, rates_by_type = rates_sheets(frame, self.names)
         spans, spans_by_type = times_sheets(frame, self.names)
         counts = (endings_cross_table(self.pairs, self.names), change_counts_sheet(self.pairs))

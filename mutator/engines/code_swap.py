@@ -15,7 +15,7 @@ from types import CodeType
 from mutator.errors import MutantNotSwappable
 from mutator.mutants.constant_imports import module_name
 from mutator.mutants.injected_lines import has_constant_or_default_settings, tag_of
-from mutator.mutants.probe import Probe, probe_path
+from mutator.mutants.probe import ProbeSource, probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches_any_glob
@@ -51,7 +51,7 @@ class CodeSwap:
 
 
 def plan_swap(
-    manifest: TargetManifest, mutated_files: Mapping[str, bytes], probe: Probe, tree_folder: str
+    manifest: TargetManifest, mutated_files: Mapping[str, bytes], probe: ProbeSource, tree_folder: str
 ) -> CodeSwap:
     """Return what turns the pristine program, loaded from the folder `tree`, into the mutant with `files`.
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Limits, Status
-from mutator.mutants.probe import Probe, is_probe_path, report_problem
+from mutator.mutants.probe import ProbeSource, is_probe_path, report_problem
 from mutator.targets.manifest import TargetManifest
 
 
@@ -37,7 +37,7 @@ class Job:
     scenario_changes: tuple[str, ...] = ()
     changed_files: Mapping[str, bytes] = field(default_factory=dict)
     mutant_id: str | None = None  # the id that the probe must report; None for a tree without a probe
-    probe: Probe | None = None  # the probe in `changed_files`; engines that fork need it
+    probe_source: ProbeSource | None = None  # the probe in `changed_files`; engines that fork need it
     injection_ids: tuple[str, ...] = ()  # all ids that the probe must report on
     hash_seed: int = 0
     golden_folder: Path | None = None  # output folder of the fault-free run, if known

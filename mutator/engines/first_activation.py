@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mutator.mutants.probe import Probe
+from mutator.mutants.probe import ProbeSource
 from mutator.triggers.trace_formulas import ARITHMETIC_FUNCTIONS, COMPARISON_FUNCTIONS
 
 
@@ -51,7 +51,7 @@ class ForkPoint:
     last_time_s: float | None
 
 
-def find_fork_point(probe: Probe, observations: GoldenObservations) -> ForkPoint | None:
+def find_fork_point(probe: ProbeSource, observations: GoldenObservations) -> ForkPoint | None:
     """Return the point where a mutant leaves the golden run; None if its trigger never holds."""
     return _cached_fork_point(*probe.armed_condition, observations)
 
@@ -82,7 +82,7 @@ def _cached_fork_point(
 
 
 def activity_at_observations(armed_condition: tuple[float, str], columns: np.ndarray) -> np.ndarray:
-    """Return for each observation whether a probe with this `Probe.armed_condition` is active.
+    """Return for each observation whether a probe with this `ProbeSource.armed_condition` is active.
 
     `columns` are the times (s) of all observations, then the observed values.
     """

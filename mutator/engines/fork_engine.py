@@ -47,7 +47,7 @@ from mutator.engines.thread_messages import describe_too_many_threads, remedy_fo
 from mutator.errors import ForkServerLost, MutantNotSwappable, NotForkable
 from mutator.model import Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
-from mutator.mutants.probe import Probe, probe_attributes_after, probe_module, untriggered_report
+from mutator.mutants.probe import ProbeSource, probe_attributes_after, probe_module, untriggered_report
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_function import stop_function_source
 from mutator.triggers.trigger_kinds import always_trigger
@@ -134,7 +134,7 @@ class ForkEngine:
             if self._obstacle:
                 raise NotForkable(*self._obstacle.args)
             steps = len(self._golden_observations(job, job.golden_folder).counts_before_steps)
-            swap = self._plan_swap(job, self._null_mutant.files, self._null_mutant.probe)
+            swap = self._plan_swap(job, self._null_mutant.files, self._null_mutant.probe_source)
             waiting = self._process_before_step(job, steps - 1, swap)
             reply, _ = waiting.send_request({"do": "load", "modules": []}, self._patience_s)
             if reply["threads"]:
@@ -157,9 +157,9 @@ class ForkEngine:
         if self._obstacle:
             raise NotForkable(*self._obstacle.args)
         # the server has started with one hash seed, which its forks cannot change
-        if job.probe is None or job.golden_folder is None or job.hash_seed:
+        if job.probe_source is None or job.golden_folder is None or job.hash_seed:
             raise NotForkable("not an experiment")
-        swap = self._plan_swap(job, job.changed_files, job.probe)
+        swap = self._plan_swap(job, job.changed_files, job.probe_source)
         if self._forks_before_first_step:
             return self._fork_before_first_step(job, folder, swap)
         observations = self._golden_observations(job, job.golden_folder)
@@ -167,14 +167,14 @@ class ForkEngine:
             job.stop_at_hazard and job.golden_has_terminal_hazard
         ):  # the run can stop before the fault is active, and so before a fork
             return self._fork_before_first_step(job, folder, swap)
-        fork_point = find_fork_point(job.probe, observations)
+        fork_point = find_fork_point(job.probe_source, observations)
         if fork_point is None:
             return _golden_result_of_inactive_fault(job, job.golden_folder)
         return self._run_in_fork(
             self._process_before_step(job, fork_point.step, swap), job, folder, swap, fork_point
         )
 
-    def _plan_swap(self, job: Job, files: Mapping[str, bytes], probe: Probe) -> CodeSwap:
+    def _plan_swap(self, job: Job, files: Mapping[str, bytes], probe: ProbeSource) -> CodeSwap:
         return plan_swap(self._manifest, files, probe, str(self._ensure_server(job).tree_folder))
 
     def _fork_before_first_step(self, job: Job, folder: Path, swap: CodeSwap) -> JobResult:
@@ -340,7 +340,7 @@ class ForkEngine:
             return GoldenObservations(values=values, counts_before_steps=before, imported_modules=libraries)
         folder = self._runs_folder / f"watch-{content_id(_golden_key(job))}"
         try:
-            swap = self._plan_swap(job, self._null_mutant.files, self._null_mutant.probe)
+            swap = self._plan_swap(job, self._null_mutant.files, self._null_mutant.probe_source)
             null = replace(job, mutant_id=None, stop_at_hazard=False)
             self._process_before_step(job, 0, swap)  # NotForkable, with the reason, if the run cannot begin
             # Fork before the first step, because a later fork misses earlier observations.

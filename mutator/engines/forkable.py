@@ -52,7 +52,7 @@ def reasons_by_unforkable_variant(
     for name, fault in variants.items():
         try:
             mutant = build(manifest, models, fault, always_trigger())
-            plan_swap(manifest, mutant.files, mutant.probe, "")
+            plan_swap(manifest, mutant.files, mutant.probe_source, "")
         except MutantNotSwappable as reason:
             reasons[name] = str(reason)
         except MutatorError:

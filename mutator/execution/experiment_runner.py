@@ -15,7 +15,7 @@ from mutator.campaigns.shared_runs import group_by_run
 from mutator.engines.engine_jobs import Engine, Job, JobResult, RunMode
 from mutator.errors import BadAddition, BadOutput, InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.model import Activation, AfterHazard, Experiment, Record, Status
+from mutator.model import AfterHazard, Experiment, ObservedActivation, Record, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden_comparison
@@ -179,7 +179,7 @@ class ExperimentRunner:
             scenario_changes=experiment.changes,
             changed_files=mutant.files,
             mutant_id=mutant.id,
-            probe=mutant.probe,
+            probe_source=mutant.probe_source,
             injection_ids=mutant.injection_ids,
             golden_folder=self.goldens.folder_of(experiment),
             stop_at_hazard=stop,
@@ -324,7 +324,7 @@ def _describe_problem(err: MutatorError) -> str:
     return f"{Path(err.where or '').name}: {err.got}"
 
 
-def _reason_not_by_fault(t_first: float | None, activation: Activation | None) -> str:
+def _reason_not_by_fault(t_first: float | None, activation: ObservedActivation | None) -> str:
     """Return why the fault cannot have caused a difference from the golden run; empty if it can."""
     if t_first is None or (activation is not None and t_first >= activation.first):
         return ""
@@ -339,7 +339,7 @@ def _record_of_mutant_without_outcome(
     status: Status,
     detail: str,
     mutant: Mutant | None,
-    activation: Activation | None = None,
+    activation: ObservedActivation | None = None,
 ) -> Record:
     bare = record_without_outcome(experiment.id, status, detail)
     if mutant is not None:

@@ -47,7 +47,7 @@ class RunTraces:
         Reruns the experiment if no trace is stored. Raises MutatorError if that is impossible, or if the
         result differs from the campaign's.
         """
-        stored = self.folder.kept_traces_folder(experiment_id)
+        stored = self.folder.rerun_traces_folder(experiment_id)
         experiment = self._experiments[experiment_id]
         golden = self.folder.golden_folder_of(experiment)
         if not golden.is_dir():
@@ -81,7 +81,7 @@ class RunTraces:
 
     def is_faulty_trace_stored(self, experiment_id: str) -> bool:
         """Return whether a stored faulty trace matches the record."""
-        faulty = self.folder.kept_traces_folder(experiment_id) / "faulty"
+        faulty = self.folder.rerun_traces_folder(experiment_id) / "faulty"
         if not path_below(faulty, self.manifest.trace_file).is_file():
             return False
         return trace_digest(self.manifest, faulty) == self.record(experiment_id).trace_digest

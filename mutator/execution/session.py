@@ -19,7 +19,7 @@ from secrets import token_bytes
 from typing import Any
 
 from mutator._common.files import is_half_written, remove_anything_at
-from mutator._common.folder_locks import owning_run_folder, wait_for_workers
+from mutator._common.folder_locks import lock_run_folder, wait_for_workers
 from mutator._common.interrupts import raising_keyboard_interrupts
 from mutator.audit.seal import Seals, seals_of
 from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
@@ -329,7 +329,7 @@ def open_session(
     """
     is_new = not out.exists()
     make_run_folder(out)
-    with raising_keyboard_interrupts(), owning_run_folder(out):
+    with raising_keyboard_interrupts(), lock_run_folder(out):
         if notify and not RunFolder.exists(out):
             notify(Progress(stage="plan"))
         try:

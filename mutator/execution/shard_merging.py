@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mutator._common.confined_files import open_below, path_below
 from mutator._common.files import raising_disk_full, read_json, write_atomic, writing_atomic
-from mutator._common.folder_locks import owning_run_folder
+from mutator._common.folder_locks import lock_run_folder
 from mutator._common.message_text import counted
 from mutator.audit.seal import UNSEALED_KEYS_BY_FILE, without_keys
 from mutator.campaigns.plan_freezing import make_run_folder
@@ -60,12 +60,12 @@ def merge_shards(shards: Sequence[Path], out: Path, *, accept_versions: bool = F
     _check_shard_numbers(folders)
     with ExitStack() as stack:
         for folder in folders:
-            stack.enter_context(owning_run_folder(folder.path, patience_s=0.0))
+            stack.enter_context(lock_run_folder(folder.path, patience_s=0.0))
             _check_shard_finished(folder)
         stretches = list(_merged_stretches(folders, accept_versions=accept_versions))
         _check_same_goldens(folders)
         _make_empty_folder(out)
-        stack.enter_context(owning_run_folder(out))
+        stack.enter_context(lock_run_folder(out))
         try:
             with raising_disk_full(out):
                 path_below(out, f"{_UNFINISHED_MARK}{os.getpid()}").touch()
@@ -81,7 +81,7 @@ def _make_empty_folder(out: Path) -> None:
     if out.is_dir():
         check_plain_contents(out.resolve())
     if any(out.glob(f"{_UNFINISHED_MARK}*")):
-        with owning_run_folder(out, patience_s=0.0):
+        with lock_run_folder(out, patience_s=0.0):
             run_deletion.delete_unfinished_run(out)
     make_run_folder(out)
 

@@ -92,7 +92,7 @@ def rerun_experiment(
         workspace,
         manifest,
         experiment,
-        out or folder.kept_traces_folder(full_id),
+        out or folder.rerun_traces_folder(full_id),
         limits=folder.limits,
         golden=golden if golden.is_dir() else None,
     )

@@ -14,7 +14,7 @@ from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.faults.injection_model import InjectionModel
 from mutator.faults.injection_specs import InjectionSpec
-from mutator.faults.library_readings import Readings
+from mutator.faults.library_readings import SpecReadings
 from mutator.model import Hold
 
 SCHEMA = "fault_spec/1"
@@ -92,7 +92,7 @@ class FaultSpec:
     fault_type: str
     about: str
     variants: tuple[Variant, ...]
-    readings: Readings  # the library's
+    readings: SpecReadings  # the library's
     source: YamlSource
 
     @property
@@ -210,7 +210,7 @@ class SpecModel(StrictModel, title="The file"):
 
 
 @cache
-def build_spec_model(readings: Readings) -> type[SpecModel]:
+def build_spec_model(readings: SpecReadings) -> type[SpecModel]:
     """Make the schema of a library's spec files. A variant has one key for each reading."""
     keys: dict[str, Any] = {}
     for name, about in zip(readings.names, readings.descriptions, strict=True):
@@ -229,7 +229,7 @@ def build_spec_model(readings: Readings) -> type[SpecModel]:
     )
 
 
-def load_spec(path: Path, readings: Readings) -> FaultSpec:
+def load_spec(path: Path, readings: SpecReadings) -> FaultSpec:
     """Read one spec of a library; errors have file and line. `expand_spec` does the remaining checks."""
     model, source = load_yaml_model(path, build_spec_model(readings), SCHEMA)
     models: dict[str, _VariantModelBase] = model.variants  # type: ignore[attr-defined]
@@ -255,7 +255,7 @@ def _check_name(name: str, source: YamlSource, keys: KeyPath) -> None:
 
 
 def _build_variant(
-    spec: str, name: str, model: _VariantModelBase, readings: Readings, source: YamlSource
+    spec: str, name: str, model: _VariantModelBase, readings: SpecReadings, source: YamlSource
 ) -> Variant:
     keys: KeyPath = ("variants", name)
     _check_name(name, source, keys)

@@ -16,7 +16,7 @@ _NAME_PATTERN = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Readings:
+class SpecReadings:
     """The readings of a library, in order. The first is the default, which every variant must define."""
 
     names: tuple[str, ...]
@@ -36,7 +36,7 @@ class Readings:
             )
 
 
-DEFAULT_READINGS = Readings(
+DEFAULT_READINGS = SpecReadings(
     names=("as_described", "as_coded"),
     descriptions=(
         "The injections according to the text that describes the fault.",
@@ -60,7 +60,7 @@ class ReadingsModel(StrictModel, title="readings.yaml"):
     )
 
 
-def load_readings(library: Path) -> Readings:
+def load_readings(library: Path) -> SpecReadings:
     path = checked_path_inside(library, library / READINGS_FILE)
     if not path.is_file():
         return DEFAULT_READINGS
@@ -74,4 +74,4 @@ def load_readings(library: Path) -> Readings:
                 remedy="rename it",
             )
     about = tuple(reading.about.strip() for reading in model.readings.values())
-    return Readings(names=tuple(model.readings), descriptions=about)
+    return SpecReadings(names=tuple(model.readings), descriptions=about)

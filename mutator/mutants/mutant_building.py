@@ -25,7 +25,7 @@ from mutator.mutants.injected_lines import OBSERVATION_TAG, observe_call
 from mutator.mutants.injection_edits import InjectionEdit, edits_of
 from mutator.mutants.normalized_source import compiles, normalize_numbers_and_ids
 from mutator.mutants.patch_rendering import render_changed_file, render_new_file
-from mutator.mutants.probe import Probe, build_probe_settings, probe_path, render_probe
+from mutator.mutants.probe import ProbeSource, build_probe_settings, probe_path, render_probe
 from mutator.mutants.splicing import (
     ExpressionEdit,
     LineEdit,
@@ -51,7 +51,7 @@ class Mutant:
     files: dict[str, bytes]  # full new content by path, including the probe
     patch: str  # git style, a/ and b/ prefixes; applies with `patch -p1` at the root
     tree_digest: str  # of the whole mutated tree
-    probe: Probe
+    probe_source: ProbeSource
     injection_ids: tuple[str, ...]  # ids used in tags and in the probe's report, in the fault's order
 
     @cached_property
@@ -103,7 +103,7 @@ def _build_with(
         files=dict(sorted(files.items())),
         patch="".join(text for _, text in sorted(patches.items())),
         tree_digest=manifest.tree.digest_with(files),
-        probe=probe,
+        probe_source=probe,
         injection_ids=ids,
     )
 
@@ -137,7 +137,7 @@ def _build_probe(
     hold: Hold,
     ids: tuple[str, ...],
     sets_constants_or_defaults: bool,
-) -> Probe:
+) -> ProbeSource:
     # also a package or an extension module of this name would be imported instead of the probe
     probe_stem = probe_path(manifest.probe_package).removesuffix("py")
     if clashes := [

@@ -15,7 +15,7 @@ from mutator._common.hashing import content_id
 from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.errors import MutatorError
 from mutator.faults.probe_template_parts import ProbeTemplates, TemplatePart
-from mutator.model import Activation, Hold, Injection, Trigger
+from mutator.model import Hold, Injection, ObservedActivation, Trigger
 from mutator.mutants.template_rendering import render_template
 from mutator.targets.observed_values import Observation
 from mutator.triggers.conditions import TIME, canonical_condition, to_python_source
@@ -53,7 +53,7 @@ class ProbeSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Probe:
+class ProbeSource:
     """A probe's source: parts with its own settings, and parts of code that all probes of a target share.
 
     In its file, they alternate.
@@ -140,12 +140,14 @@ def build_probe_settings(
     )
 
 
-def render_probe(templates: ProbeTemplates, settings: ProbeSettings) -> Probe:
+def render_probe(templates: ProbeTemplates, settings: ProbeSettings) -> ProbeSource:
     """Render the templates with these settings."""
     settings_parts = _render_parts(templates.settings, vars(settings))
     code = {name: getattr(settings, name) for name in _SETTINGS_USED_BY_CODE_TEMPLATE}
     code_parts = _render_code(templates.code, tuple(code.items()))
-    return Probe(settings_parts=settings_parts, code_parts=code_parts, armed_after_s=settings.armed_after_s)
+    return ProbeSource(
+        settings_parts=settings_parts, code_parts=code_parts, armed_after_s=settings.armed_after_s
+    )
 
 
 @lru_cache(maxsize=16)  # all mutants of a target share one or two
@@ -221,13 +223,13 @@ def was_triggered(report: Mapping[str, Any] | None) -> bool:
     return bool(report and report["triggered"])
 
 
-def activation_of(report: Mapping[str, Any]) -> Activation | None:
+def activation_of(report: Mapping[str, Any]) -> ObservedActivation | None:
     """Return the first and last execution of any injection, and the number of executions; None if none."""
     injections = report.get("injections")
     ran = [i for i in injections.values() if i and i["count"]] if isinstance(injections, dict) else []
     if not ran:
         return None
-    return Activation(
+    return ObservedActivation(
         first=min(i["first"] for i in ran),
         last=max(i["last"] for i in ran),
         count=sum(i["count"] for i in ran),

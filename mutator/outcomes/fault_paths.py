@@ -125,7 +125,7 @@ class PathInputs(NamedTuple):
     is_masked: bool
 
 
-class FaultPaths:
+class FaultPathFinder:
     """The paths of faults through a target.
 
     Without a `structure`, the components form a chain: those of internal channels, then those of actuators,
@@ -320,7 +320,7 @@ class FaultPaths:
         return min((ranks[name] for name in {*names, *behind_unrecorded} if name in ranks), default=inf)
 
 
-def fault_paths_of(folder: RunFolder) -> FaultPaths | None:
+def fault_paths_of(folder: RunFolder) -> FaultPathFinder | None:
     """Return the fault paths of a run's target, from run.json. None if no channel names a component."""
     head = folder.head
     if not any(channel.component for channel in head.channels):
@@ -331,7 +331,7 @@ def fault_paths_of(folder: RunFolder) -> FaultPaths | None:
         raise MutatorError(
             "damaged at 'structure'", where=folder.path / HEAD, remedy=DAMAGED_RUN_REMEDY
         ) from None
-    return FaultPaths(head.channels, structure)
+    return FaultPathFinder(head.channels, structure)
 
 
 _CHANGED_STATES = (ComponentState.REACHED, ComponentState.PASSED, ComponentState.FEEDBACK)

@@ -174,9 +174,9 @@ def _metric_values(metric: Metric, values: ValuesByName) -> np.ndarray:
     missing.
     """
     if metric.aggregate == "duration":
-        numbers = trace_formulas.condition_at_each_step(metric.formula, values).astype(float)
+        numbers = trace_formulas.condition_at_each_step(metric.step_formula, values).astype(float)
     else:
-        numbers = trace_formulas.formula_at_each_step(metric.formula, values)
+        numbers = trace_formulas.formula_at_each_step(metric.step_formula, values)
     return (
         np.where(np.isnan(values[GOLDEN_PREFIX + TIME]), np.nan, numbers) if metric.uses_golden else numbers
     )

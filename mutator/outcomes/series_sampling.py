@@ -61,7 +61,7 @@ class SeriesSampler:
     def faulty_series(self, faulty: Trace, record: Record) -> Series:
         faulty_time = np.asarray(faulty[self._clock], dtype=float)
         last = faulty_time[-1] if len(faulty_time) else -np.inf
-        is_prefix = _has_same_times(faulty_time, self._time)
+        is_prefix = _has_same_times_until_shorter_ends(faulty_time, self._time)
         time, golden, values = self._values_at_common_times(faulty, faulty_time)
         golden_samples = self.golden.t[self.golden.t <= last + _TIME_SLACK_S]
         late_steps = np.flatnonzero(time > self._time[-1] + _TIME_SLACK_S)
@@ -112,7 +112,7 @@ class SeriesSampler:
         """Return the union of both runs' step times, and each run's values. After its end, a run has no value
         (NaN) or, if the runs have different times, its last one.
         """
-        if _has_same_times(faulty_time, self._time):
+        if _has_same_times_until_shorter_ends(faulty_time, self._time):
             time = max(faulty_time, self._time, key=len)
             return (
                 time,
@@ -141,7 +141,7 @@ class SeriesSampler:
         return np.where(place >= 0, values[:, np.maximum(place, 0)], np.nan)
 
 
-def _has_same_times(times: np.ndarray, other_times: np.ndarray) -> bool:
+def _has_same_times_until_shorter_ends(times: np.ndarray, other_times: np.ndarray) -> bool:
     """Whether two runs have the same times up to the end of the shorter one."""
     rows = min(len(times), len(other_times))
     return bool(np.array_equal(times[:rows], other_times[:rows]))

@@ -2,13 +2,15 @@
 
 from collections.abc import Iterable, Sequence
 
-from mutator.model import Activation, Outcome, Record
+from mutator.model import ObservedActivation, Outcome, Record
 from mutator.targets.contact_severity import DELTA_V_NAME, SeverityScale
 
 EventTimes = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
 
 
-def first_events_after(events: Iterable[tuple[str, float]], activation: Activation | None) -> EventTimes:
+def first_events_after(
+    events: Iterable[tuple[str, float]], activation: ObservedActivation | None
+) -> EventTimes:
     """Return the first event of each name at or after activation, by time and then name.
 
     The fault cannot have caused earlier events.
@@ -22,7 +24,9 @@ def first_events_after(events: Iterable[tuple[str, float]], activation: Activati
     return tuple(sorted(first.items(), key=lambda event: (event[1], event[0])))
 
 
-def outcome_of(*, activation: Activation | None, t_manifest: float | None, hazards: EventTimes) -> Outcome:
+def outcome_of(
+    *, activation: ObservedActivation | None, t_manifest: float | None, hazards: EventTimes
+) -> Outcome:
     """Return the first of not_activated, hazard, sdc and masked that applies.
 
     `hazards` are those at or after activation. A hazard applies even without an actuator difference, because

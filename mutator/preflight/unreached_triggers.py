@@ -46,7 +46,7 @@ def load_observations(folder: Path) -> dict[str, Observations]:
 
 
 def armed_condition_of(workspace: Workspace, manifest: TargetManifest, trigger: Trigger) -> ArmedCondition:
-    return build(manifest, workspace.fault_models(), None, trigger).probe.armed_condition
+    return build(manifest, workspace.fault_models(), None, trigger).probe_source.armed_condition
 
 
 def is_ever_active(condition: ArmedCondition, observations: Observations) -> bool:

@@ -19,7 +19,7 @@ from mutator.faults.fault_models import (
     ParamSchema,
 )
 from mutator.faults.injection_specs import DIMENSIONLESS
-from mutator.faults.library_readings import Readings
+from mutator.faults.library_readings import SpecReadings
 from mutator.stpa import analysis_files, context_tables, hazard_list
 from mutator.targets import manifest_files, severity_model
 
@@ -64,7 +64,7 @@ _FIXED_FORMATS: tuple[tuple[type[StrictModel], str, str], ...] = (
 )
 
 
-def yaml_formats(declared_readings: Readings) -> tuple[YamlFormat, ...]:
+def yaml_formats(declared_readings: SpecReadings) -> tuple[YamlFormat, ...]:
     specs = (spec.build_spec_model(declared_readings), spec.SCHEMA, "faults/*/*.yaml")
     return (
         *(

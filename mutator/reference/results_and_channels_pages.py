@@ -134,8 +134,8 @@ def _hazard_row(hazard: Hazard) -> tuple[str, ...]:
 def _metric_row(metric: Metric) -> tuple[str, ...]:
     if metric.name == DELTA_V_NAME:
         definition = "as in `severity`"
-    elif metric.formula:
-        definition = f"{metric.aggregate} of `{metric.formula}`"
+    elif metric.step_formula:
+        definition = f"{metric.aggregate} of `{metric.step_formula}`"
     else:
         definition = "min of the hazard's robustness"
     if metric.where:

@@ -60,7 +60,7 @@ class AnswerTable:
 class ReportAnswer:
     """The answer to a question. `has_wide_tables`: they have many columns."""
 
-    name: str
+    html_name: str
     title: str
     paragraph: str
     tables: tuple[AnswerTable, ...] = ()  # tables without rows are not shown

@@ -112,7 +112,7 @@ def silent_hazards_answer(frame: pd.DataFrame, alerts_caveat: str = "") -> Repor
         "Only after the hazard": [ALERT_AFTER_HAZARD],
     }
     return ReportAnswer(
-        name="unwarned",
+        html_name="unwarned",
         title="Which hazards were silent",
         paragraph="No hazard occurred."
         if hazards.empty
@@ -158,7 +158,7 @@ def tolerated_faults_answer(frame: pd.DataFrame) -> ReportAnswer:
     ]
     never = [(fault_type_link(kind, **ends), f"{of:,}") for kind, of in whole]
     return ReportAnswer(
-        name="survived",
+        html_name="survived",
         title="What the controller tolerated",
         paragraph="No fault was activated." if active.empty else paragraph,
         tables=(
@@ -196,7 +196,7 @@ def time_spent_answer(frame: pd.DataFrame, timings: pd.DataFrame) -> ReportAnswe
         if s > 0
     ]
     return ReportAnswer(
-        name="time",
+        html_name="time",
         title="Where the time went",
         paragraph=paragraph + _describe_truncation(int((costs > 0).sum()), "fault types"),
         tables=(AnswerTable(heads=("fault type, most time first", "CPU time"), rows=rows),),

@@ -8,7 +8,7 @@ import numpy as np
 
 from mutator._common.helper_processes import map_in_processes, process_count_for
 from mutator.model import Fault, Record
-from mutator.outcomes.fault_paths import FaultPaths, PathInputs, UntimedPath
+from mutator.outcomes.fault_paths import FaultPathFinder, PathInputs, UntimedPath
 from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.statistics.event_times import FirstAlertsByHazardRun
 from mutator.store.run_folder import RunFolder
@@ -44,7 +44,7 @@ class ExperimentFacts:
         results: "DataFrame",
         records: Mapping[str, Record],
         faults: Mapping[str, Fault],
-        fault_paths: FaultPaths | None,
+        fault_paths: FaultPathFinder | None,
     ) -> "ExperimentFacts":
         codes: dict[int, int] = {}  # compared by identity, because equal untimed paths are one object
         untimed_paths: list[UntimedPath] = []
@@ -73,7 +73,7 @@ def _path_inputs_and_hazard_alerts_by_batch(
     results: "DataFrame",
     records: Mapping[str, Record],
     faults: Mapping[str, Fault],
-    fault_paths: FaultPaths | None,
+    fault_paths: FaultPathFinder | None,
 ) -> Iterator[tuple[list[PathInputs | None], dict[str, _TimedAlerts]]]:
     """Yield, for each batch of experiments, their `PathInputs`, and the alerts of those with a hazard."""
     pairs = results[["experiment_id", "fault_id"]]

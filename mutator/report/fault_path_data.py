@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Experiment, Record
-from mutator.outcomes.fault_paths import FaultPath, FaultPaths, LinkState, UntimedPath
+from mutator.outcomes.fault_paths import FaultPath, FaultPathFinder, LinkState, UntimedPath
 from mutator.store.run_folder import RunFolder
 from mutator.targets.stored_target_facts import ChannelFacts
 
@@ -24,7 +24,7 @@ class _LazyFaultPaths(Mapping[str, FaultPath]):
     """The paths of experiments, computed on access."""
 
     def __init__(
-        self, fault_paths: FaultPaths, planned: Mapping[str, Experiment], records: Mapping[str, Record]
+        self, fault_paths: FaultPathFinder, planned: Mapping[str, Experiment], records: Mapping[str, Record]
     ) -> None:
         self._fault_paths, self._planned, self._records = fault_paths, planned, records
         self._last: tuple[str, FaultPath | None] | None = None
@@ -49,7 +49,7 @@ class _LazyFaultPaths(Mapping[str, FaultPath]):
 class RunFaultPaths:
     """The known paths of a run, and the distinct untimed paths of its experiments."""
 
-    fault_paths: FaultPaths
+    fault_paths: FaultPathFinder
     channels: Sequence[ChannelFacts]
     path_by_experiment: Mapping[str, FaultPath]
     records: Mapping[str, Record]
@@ -59,7 +59,7 @@ class RunFaultPaths:
     def of(
         cls,
         folder: RunFolder,
-        fault_paths: FaultPaths,
+        fault_paths: FaultPathFinder,
         planned: Mapping[str, Experiment],
         records: Mapping[str, Record],
         untimed_paths: Sequence[UntimedPath],

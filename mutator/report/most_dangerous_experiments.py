@@ -55,7 +55,7 @@ def most_dangerous_answer(
     )
     heads = (f"fault types with hazards, {first}", "hazards / activated")
     return ReportAnswer(
-        name="dangerous",
+        html_name="dangerous",
         title="What is dangerous",
         has_wide_tables=True,
         paragraph="No fault was activated." if active.empty else paragraph,

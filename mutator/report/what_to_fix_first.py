@@ -58,7 +58,7 @@ def fix_first_answer(frame: pd.DataFrame, paths: RunFaultPaths | None, *, has_al
         for kind in order[:MOST_FAULT_TYPES]
     ]
     return ReportAnswer(
-        name="first",
+        html_name="first",
         title="What to fix first",
         has_wide_tables=True,
         paragraph=_rule_paragraph(order, counted_hazards, classes, plural_noun),

@@ -26,7 +26,7 @@ from mutator.targets.stored_target_facts import DRIVE_END_COLUMN, MetricFacts
 if TYPE_CHECKING:
     import pandas as pd
 
-    from mutator.outcomes.fault_paths import FaultPaths
+    from mutator.outcomes.fault_paths import FaultPathFinder
     from mutator.store.run_head import RunHead
 
 UNIT_OF_CHANNEL = "as its channel"  # a unit
@@ -41,7 +41,7 @@ class FinishedExperiment:
         experiment: Experiment,
         record: Record,
         scale: SeverityScale | None = None,
-        fault_paths: "FaultPaths | None" = None,
+        fault_paths: "FaultPathFinder | None" = None,
     ) -> None:
         self.experiment, self.record, self.severity_scale = experiment, record, scale
         self.is_ok = record.status is Status.OK

@@ -20,7 +20,7 @@ _SHOWN_HOLE = "⟨⟩"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DecisionBasis:
+class BasisTexts:
     """The texts that a decision is bound to. `diff` has one text for each shape, or a pair of texts for each
     change that an operator makes.
     """

@@ -20,7 +20,7 @@ from mutator.errors import MutatorError, ReviewConflict
 from mutator.review import review_file, reviewed_texts
 from mutator.review.commit_authors import check_four_eyes, library_commit
 from mutator.review.mutant_groups import Group
-from mutator.review.review_entries import Decision, DecisionVerdict, Flag, Remark, ReviewEntry
+from mutator.review.review_entries import DecisionVerdict, Flag, GroupDecision, Remark, ReviewEntry
 from mutator.workspace import Workspace
 
 _REVIEWS_FOLDER = "reviews"  # in the library
@@ -79,7 +79,7 @@ class Review:
         """The file, which might not exist."""
         return path_below(self.library, _review_file_name(self.target))
 
-    def decision(self, group_id: str) -> Decision | None:
+    def decision(self, group_id: str) -> GroupDecision | None:
         entry = self.entry_by_group.get(group_id)
         return entry.decision if entry else None
 
@@ -259,7 +259,7 @@ def _entry_after_action(entry: ReviewEntry, action: ReviewAction, at: str, commi
     if action.text:
         entry = replace(entry, remarks=(*entry.remarks, Remark(by=action.by, at=at, text=action.text)))
     if kind in _VERDICT_BY_ACTION:
-        decision = Decision(
+        decision = GroupDecision(
             group=group.id,
             what=group.label,
             verdict=_VERDICT_BY_ACTION[kind],

@@ -105,7 +105,7 @@ def pictures_of_groups(
         pictures_by_group = {name: _load_cached(request.key) for name, request in requests.items()}
         missing = {name: request for name, request in requests.items() if pictures_by_group[name] is None}
         if missing:
-            pictures_by_group |= _draw_pictures(manifest, models, scenario, missing)
+            pictures_by_group |= _run_and_cache_pictures(manifest, models, scenario, missing)
     return {name: pictures for name, pictures in pictures_by_group.items() if pictures}
 
 
@@ -193,7 +193,7 @@ def _choose_faults(faults: Sequence[Fault]) -> tuple[Fault, ...]:
     return tuple(sorted_faults[place] for place in sorted(places))
 
 
-def _draw_pictures(
+def _run_and_cache_pictures(
     manifest: TargetManifest, models: FaultModels, scenario: Path, requests: Mapping[str, _DrawRequest]
 ) -> dict[str, EffectPictures]:
     """Draw and cache the images of groups. All groups of a place share one run of the target."""

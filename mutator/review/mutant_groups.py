@@ -2,7 +2,7 @@
 
 A group does not depend on triggers, or on which of its mutants are selected. Its id follows from its label.
 Decisions are bound to its diff, which has holes instead of values, to the target's code and to the templates
-(`DecisionBasis`).
+(`BasisTexts`).
 """
 
 from collections import Counter
@@ -26,7 +26,7 @@ from mutator.operators.operator_lookup import OPERATOR_MODELS, operator_name_of
 from mutator.operators.statement_facts import statement_facts_of
 from mutator.review import patch_shapes
 from mutator.review.called_code import CalledCode
-from mutator.review.decision_basis import DecisionBasis, distinct_diffs, fault_hunks, function_sources
+from mutator.review.decision_basis import BasisTexts, distinct_diffs, fault_hunks, function_sources
 from mutator.review.patch_shapes import PatchShape
 from mutator.review.review_entries import BasisDigests, ValueRanges
 from mutator.review.reviewed_texts import render_reviewed_text
@@ -218,7 +218,7 @@ class _GroupBuilder:
             *(path for model in fault_models for path in (model.template_path, model.source.path)),
         )
 
-    def _basis_of_mutants(self, faults: Sequence[Fault], patches: Sequence[str]) -> DecisionBasis:
+    def _basis_of_mutants(self, faults: Sequence[Fault], patches: Sequence[str]) -> BasisTexts:
         """Return the texts that a decision about mutants is bound to; `faults` has one for each shape."""
         calls: dict[str, str] = {}
         for fault in faults:
@@ -226,20 +226,20 @@ class _GroupBuilder:
             for path in dict.fromkeys(i.location.path for i in fault.injections):
                 calls |= self._called_code.called_by_injected_lines(path, mutant.files[path])
         injections = faults[0].injections
-        return DecisionBasis(
+        return BasisTexts(
             diff=distinct_diffs(patches),
             functions=function_sources(self.manifest.tree, [i.location for i in injections]),
             templates={i.model: self.models.get(i.model).template for i in injections},
             called_code=calls,
         )
 
-    def _basis_of_operator(self, fault: Fault, operator: str) -> DecisionBasis:
+    def _basis_of_operator(self, fault: Fault, operator: str) -> BasisTexts:
         """Return the texts that determine all mutants of an operator in a function, selected or not."""
         location, tree = fault.injections[0].location, self.manifest.tree
         file, facts = parsed_file(tree, location.path), statement_facts_of(tree, location.path)
         mutations = list(mutations_of(file, facts, location.function, self.models, [operator]))
         models = {*OPERATOR_MODELS, *(mutation.model for mutation in mutations)}
-        return DecisionBasis(
+        return BasisTexts(
             diff=[[mutation.source_before, mutation.source_after] for mutation in mutations],
             functions=function_sources(tree, [location]),
             templates={model.name: model.template for model in self.models if model.name in models},
@@ -255,7 +255,7 @@ class _GroupBuilder:
         location = self.manifest.observation.location
         label = f"the probe, observing at {patch_shapes.location_label(location)}"
         patch = build(self.manifest, self.models, None, always_trigger()).patch
-        material = DecisionBasis(
+        material = BasisTexts(
             diff=distinct_diffs([patch]),
             functions=function_sources(self.manifest.tree, [location]),
             templates={probe_template_parts.CODE_TEMPLATE_FILE: self.models.probe_templates.whole_text},

@@ -43,7 +43,7 @@ class BasisDigests:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Decision:
+class GroupDecision:
     """A decision about a group, made by the reviewer `by`, and the group's state at that time.
 
     `at` is the time (UTC, ISO 8601), `commit` the commit of the library, `tool` the version of mutator. In
@@ -98,7 +98,7 @@ class ReviewEntry:
 
     group: str
     what: str
-    decision: Decision | None = None
+    decision: GroupDecision | None = None
     remarks: tuple[Remark, ...] = ()
     flag: Flag | None = None
 

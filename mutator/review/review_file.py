@@ -13,9 +13,9 @@ from mutator.config.yaml_sources import YamlSource
 from mutator.review.review_entries import (
     TIME_PATTERN,
     BasisDigests,
-    Decision,
     DecisionVerdict,
     Flag,
+    GroupDecision,
     Remark,
     ReviewEntry,
 )
@@ -114,9 +114,9 @@ def _parse_entry(block: _BlockModel, source: YamlSource, i: int) -> ReviewEntry:
     )
 
 
-def _parse_decision(block: _BlockModel) -> Decision:
+def _parse_decision(block: _BlockModel) -> GroupDecision:
     values = block.values
-    return Decision(
+    return GroupDecision(
         group=block.group,
         what=block.what,
         verdict=DecisionVerdict(str(block.decision)),

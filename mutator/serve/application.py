@@ -135,7 +135,7 @@ def _page_routes(site: ServedSite) -> list[Route]:
         runs_of_target = [run for run in site.summarize_runs() if run["target"] == selection.target]
         runs = [{"key": run["key"], "name": run["key"]} for run in runs_of_target]
         token = site.tokens.token_of(review_page_name(selection.target))
-        return HTMLResponse(site.reviews.render_page(selection, request.url.query, runs, token))
+        return HTMLResponse(site.reviews.render_html_page(selection, request.url.query, runs, token))
 
     return [
         Route("/", _in_thread(home)),

@@ -15,13 +15,13 @@ _MOST_PAIRS = 20  # pairs of runs offered for comparison
 
 def home_page(workspace: Workspace, runs: Sequence[Mapping[str, Any]], token: str) -> str:
     targets = tuple(workspace.targets)
-    return _render_page(
+    return _render_html_page(
         "home.html", runs=runs, pairs=_consecutive_comparable_pairs(runs), targets=targets, token=token
     )
 
 
 def error_page(facts: Mapping[str, Any]) -> str:
-    return _render_page("error.html", **facts)
+    return _render_html_page("error.html", **facts)
 
 
 def form_choices(workspace: Workspace) -> dict[str, Any]:
@@ -57,7 +57,7 @@ def _consecutive_comparable_pairs(runs: Sequence[Mapping[str, Any]]) -> list[tup
     return pairs[-_MOST_PAIRS:]
 
 
-def _render_page(name: str, **content: Any) -> str:
+def _render_html_page(name: str, **content: Any) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

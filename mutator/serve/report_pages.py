@@ -101,7 +101,7 @@ class RunPages:
         notes = (self._golden_alerts_note(a), self._golden_alerts_note(b))
         comparison = comparing.compare_runs(a, b, None, notes)
         return {
-            "index.html": comparison_files.render_page(comparison).encode(),
+            "index.html": comparison_files.render_html_page(comparison).encode(),
             "pairs.csv": comparison_files.pairs_csv(comparison),
             "unmatched.csv": comparison_files.unmatched_csv(comparison),
         }

@@ -103,7 +103,7 @@ class ServedReviews:
             raise NotServed(f"no group '{name}'", expected="the id of a group on the page")
         return matching
 
-    def render_page(
+    def render_html_page(
         self, selection: GroupSelection, query: str, runs: Sequence[Mapping[str, Any]], token: str
     ) -> str:
         review, groups = load_review(self.workspace, selection.target), self.groups(selection)

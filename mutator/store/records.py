@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from mutator._common.confined_files import path_below
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import Activation, Outcome, Record, RunError, Status
+from mutator.model import ObservedActivation, Outcome, Record, RunError, Status
 from mutator.store.indexed_lines import IndexedLine, IndexedLines
 from mutator.store.timings import TIMINGS_FOLDER, TIMINGS_SCHEMA
 
@@ -38,7 +38,7 @@ def record_from_json(data: Mapping[str, Any]) -> Record:
         outcome=Outcome(data["outcome"]) if data["outcome"] else None,
         detail=data["detail"],
         tree=data["tree"],
-        activation=Activation(**activation) if activation else None,
+        activation=ObservedActivation(**activation) if activation else None,
         t_manifest=data["t_manifest"],
         max_dev=_name_value_pairs(data["max_dev"]),
         hazards=_name_value_pairs(data["hazards"]),

@@ -10,7 +10,7 @@ from pathlib import Path
 from mutator._common.confined_files import unlink_below
 from mutator._common.doors import EXPORTS
 from mutator._common.files import final_name_of_half_written, is_half_written, read_json, remove_folder
-from mutator._common.folder_locks import owning_run_folder
+from mutator._common.folder_locks import lock_run_folder
 from mutator.errors import MutatorError
 from mutator.store.allowed_contents import (
     ALLOWED_FILE_GLOBS,
@@ -30,7 +30,7 @@ def delete_run(path: Path) -> None:
     it.
     """
     list_deletable_files(path)
-    with owning_run_folder(path, patience_s=0.0):
+    with lock_run_folder(path, patience_s=0.0):
         files = list_deletable_files(path)  # check again, because now nobody else can write to the folder
         _delete_files(path, sorted(files, key=lambda file: file == path / HEAD))  # run.json is deleted last
 
@@ -51,7 +51,7 @@ def finish_deletion(path: Path) -> bool:
     """
     for _ in range(_DELETION_TRIES):
         try:
-            with owning_run_folder(path, patience_s=0.0):
+            with lock_run_folder(path, patience_s=0.0):
                 if RunFolder.exists(path):
                     return False
                 delete_unfinished_run(path)

@@ -212,7 +212,7 @@ class RunFolder:
     def golden_folder_of(self, experiment: Experiment) -> Path:
         return self.golden_folder(*self.golden_run_of(experiment))
 
-    def kept_traces_folder(self, experiment_id: str) -> Path:
+    def rerun_traces_folder(self, experiment_id: str) -> Path:
         """Return the folder of the traces that `rerun --trace` keeps."""
         return path_below(self.path / TRACES_FOLDER, experiment_id)
 

@@ -17,7 +17,7 @@ class Metric:
 
     name: str
     aggregate: Aggregate
-    formula: str
+    step_formula: str
     where: str = ""
     unit: str
     worse: WorseDirection
@@ -26,7 +26,7 @@ class Metric:
 
     @property
     def uses_golden(self) -> bool:
-        return GOLDEN_PREFIX in self.formula or GOLDEN_PREFIX in self.where
+        return GOLDEN_PREFIX in self.step_formula or GOLDEN_PREFIX in self.where
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +62,7 @@ class Hazard:
         return Metric(
             name=f"margin_{self.name.lower()}",
             aggregate="min",
-            formula=self.margin,
+            step_formula=self.margin,
             unit=self.unit,
             worse="lower",
             about=f"smallest distance from the limit of {self.name}; negative beyond the limit",

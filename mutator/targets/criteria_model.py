@@ -178,7 +178,7 @@ def _build_metric(name: str, model: MetricModel, names: Collection[str], source:
     return Metric(
         name=name,
         aggregate=aggregate,
-        formula=canonical(getattr(model, aggregate), names, source, (*keys, aggregate)),
+        step_formula=canonical(getattr(model, aggregate), names, source, (*keys, aggregate)),
         where=manifest_condition(model.where, names, source, (*keys, "where")),
         unit=model.unit,
         worse=model.worse,

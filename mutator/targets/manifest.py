@@ -26,7 +26,7 @@ from mutator.triggers.conditions import GOLDEN_PREFIX, names_in
 _DELTA_V_METRIC = Metric(
     name=DELTA_V_NAME,
     aggregate="at_end",
-    formula="",
+    step_formula="",
     unit="m/s",
     worse="higher",
     about="change of the car's speed in the contact, from contact speed and masses",
@@ -238,7 +238,7 @@ def _names_in_criteria(
     rules: Iterable[Hazard], metrics: Iterable[Metric], names: Collection[str]
 ) -> set[str]:
     texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal_condition)]
-    texts += [text for metric in metrics for text in (metric.formula, metric.where)]
+    texts += [text for metric in metrics for text in (metric.step_formula, metric.where)]
     in_stl = (name for rule in rules for name in temporal_logic.names_in_stl(rule.required_stl, names))
     return {name.removeprefix(GOLDEN_PREFIX) for text in texts if text for name in names_in(text)}.union(
         in_stl

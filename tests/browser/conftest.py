@@ -17,7 +17,7 @@ import pytest
 from mutator._common.hashing import digest
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.model import Activation, Experiment, Outcome, Record, Status
+from mutator.model import Experiment, ObservedActivation, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.series_sampling import SeriesSampler, write_sampled_series
 from mutator.report import report_builder
@@ -66,7 +66,7 @@ def record(experiment: Experiment, number: int, patch: bytes) -> Record:
         outcome=outcome if status is Status.OK else None,
         detail="" if status is Status.OK else "<b>the disk</b> is gone",
         tree="f" * 64,
-        activation=Activation(first=1.0 + number / 10, last=5.0, count=number) if active else None,
+        activation=ObservedActivation(first=1.0 + number / 10, last=5.0, count=number) if active else None,
         t_manifest=1.5 + number / 10 if active else None,
         max_dev=(("gas", 0.3 if number in (1, 2, 7) else number / 7), ("brake", 0.0), ("wheel_turn", 0.0)),
         hazards=(("H3", 4.0 + number / 10),) if hazard else (),

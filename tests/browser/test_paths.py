@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from mutator.model import Activation, Experiment, Outcome
+from mutator.model import Experiment, ObservedActivation, Outcome
 from mutator.report import report_builder
 from mutator.report.panels import figures_panel
 from mutator.results import table_building
@@ -31,7 +31,7 @@ links:
   echo: {from: world, to: sensing, label: echo}
 """
 COMPONENTS = {"gas": "pedals", "brake": "pedals", "gap": "world", "speed": "world"}
-ACTIVE = {"activation": Activation(first=1.5, last=5.0, count=9)}
+ACTIVE = {"activation": ObservedActivation(first=1.5, last=5.0, count=9)}
 CHANGED = {
     **ACTIVE,
     "outcome": Outcome.SDC,

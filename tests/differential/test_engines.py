@@ -140,7 +140,7 @@ class Engines:
             seed=7,
             changed_files=built.files,
             mutant_id=built.id,
-            probe=built.probe,
+            probe_source=built.probe_source,
             injection_ids=built.injection_ids,
             golden_folder=self.golden(scenario),
         )

@@ -55,13 +55,13 @@ def active(fi: str) -> bool:
         while frame is not None and not frame.f_code.co_filename.endswith(PICTURE_REQUEST["file"]):
             frame = frame.f_back
         if frame is not None:
-            _draw_pictures({**frame.f_globals, **frame.f_locals})
+            _draw_before_and_after_effects({**frame.f_globals, **frame.f_locals})
             _has_drawn = True
             raise SystemExit
     return False
 
 
-def _draw_pictures(names: dict[str, Any]) -> None:
+def _draw_before_and_after_effects(names: dict[str, Any]) -> None:
     before = _evaluate_picture(names)
     after = []
     for lines in PICTURE_REQUEST["effects"]:

@@ -117,7 +117,7 @@ class ExperimentFileBuilder:
         """Return the kept traces, if both runs have one. MutatorError if a trace does not match its record:
         using the coarser series instead would hide the mismatch.
         """
-        trace_folder = self._folder.kept_traces_folder(experiment_id)
+        trace_folder = self._folder.rerun_traces_folder(experiment_id)
         if self._traces is None or not trace_folder.is_dir() or experiment_id not in self._records:
             return None
         golden = self._folder.golden_folder_of(self._experiments[experiment_id])

@@ -17,8 +17,8 @@ _HTML_TEMPLATE = """\
 {% for column in columns %}
 <div class="column">
 {% for answer in column %}
-<section class="answer {{ answer.name }}" aria-labelledby="answer-{{ answer.name }}">
-<h2 id="answer-{{ answer.name }}">{{ answer.title }}</h2>
+<section class="answer {{ answer.html_name }}" aria-labelledby="answer-{{ answer.html_name }}">
+<h2 id="answer-{{ answer.html_name }}">{{ answer.title }}</h2>
 <p>{{ answer.paragraph }}
 {% for link in answer.links %}
 <a href="#{{ link.fragment }}">{{ link.text }}</a>{{ "" if loop.last else ", " }}

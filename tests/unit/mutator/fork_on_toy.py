@@ -58,7 +58,7 @@ class Fork:
             seed=7,
             changed_files=built.files,
             mutant_id=built.id,
-            probe=built.probe,
+            probe_source=built.probe_source,
             injection_ids=built.injection_ids,
             golden_folder=self.golden,
         )

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from mutator.audit.record_audit import StoredRecord, verdict_problems
-from mutator.model import Activation, Outcome, Record, Status
+from mutator.model import ObservedActivation, Outcome, Record, Status
 from mutator.targets.channels import Channel, Role
 from mutator.targets.stored_target_facts import ChannelFacts
 from tests.made_head import HEAD as MADE_UP
@@ -58,7 +58,7 @@ def test_deviations_must_fit_the_target_and_the_drive(
         {"outcome": Outcome.SDC, "t_manifest": 2.0, "left": (("gas", 2.0, 1.0),)},
         {"outcome": Outcome.HAZARD, "hazards": (("H3", 2.5),), "alerts": (("fcw", 2.0), ("lane", 2.0))},
         BAD_END | {"status": Status.TIMEOUT, "detail": "stopped"},
-        BAD_END | {"status": Status.CRASHED, "activation": Activation(first=2.0, last=3.0, count=5)},
+        BAD_END | {"status": Status.CRASHED, "activation": ObservedActivation(first=2.0, last=3.0, count=5)},
     ],
 )
 def test_a_valid_record_is_not_reported(record: MakeRecord, fields: dict[str, Any]) -> None:
@@ -77,8 +77,11 @@ def test_a_valid_record_is_not_reported(record: MakeRecord, fields: dict[str, An
         ({"outcome": Outcome.HAZARD, "hazards": (("H9", 4.0),)}, "hazard H9; expected one of H1, H3"),
         ({"alerts": (("fcw", 2.5), ("fcw", 3.0))}, "alerts"),
         ({"outcome": Outcome.NOT_ACTIVATED, "activation": None, "alerts": (("fcw", 2.5),)}, "alerts"),
-        ({"activation": Activation(first=3.0, last=2.0, count=5)}, "active 5 times, from 3.0 s to 2.0 s"),
-        ({"activation": Activation(first=2.0, last=3.0, count=0)}, "active 0 times, from 2.0 s"),
+        (
+            {"activation": ObservedActivation(first=3.0, last=2.0, count=5)},
+            "active 5 times, from 3.0 s to 2.0 s",
+        ),
+        ({"activation": ObservedActivation(first=2.0, last=3.0, count=0)}, "active 0 times, from 2.0 s"),
         ({"trace_digest": ""}, "trace digest ''"),
         ({"max_dev": (("gas", 0.0),)}, "differences of gas; expected those of gas, brake"),
         ({"max_dev": (("gas", 0.1), ("brake", 0.0))}, "gas differs, but no manifestation is recorded"),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.folder_locks import owning_run_folder
+from mutator._common.folder_locks import lock_run_folder
 from mutator.audit.run_repair import _set_aside, repair_run
 from mutator.errors import MutatorError, UnsafePath
 from mutator.store import file_digests, plan_file
@@ -194,7 +194,7 @@ def kill(*_: object, **__: object) -> None:
 
 
 def test_a_folder_in_use_is_refused(run: Path) -> None:
-    with owning_run_folder(run), pytest.raises(MutatorError, match="in use"):
+    with lock_run_folder(run), pytest.raises(MutatorError, match="in use"):
         repair_run(RunFolder.open_unverified(run))
 
 

@@ -8,10 +8,10 @@ import pytest
 
 from mutator.engines.code_swap import CodeSwap, plan_swap
 from mutator.errors import MutantNotSwappable
-from mutator.mutants.probe import Probe
+from mutator.mutants.probe import ProbeSource
 from mutator.targets.source_tree import SourceTree
 
-PROBE = Probe(settings_parts=("",), code_parts=("def observe(): pass\n",), armed_after_s=0.0)
+PROBE = ProbeSource(settings_parts=("",), code_parts=("def observe(): pass\n",), armed_after_s=0.0)
 PRISTINE = """
 import math
 from functools import wraps

@@ -9,7 +9,7 @@ import pytest
 from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
 from mutator.model import Hold, Trigger
 from mutator.mutants.mutant_building import build
-from mutator.mutants.probe import Probe, probe_attributes_after
+from mutator.mutants.probe import ProbeSource, probe_attributes_after
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
 
@@ -18,8 +18,8 @@ from mutator.workspace import Workspace
 def probe(toycar: Workspace):
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
-    def make(trigger: Trigger) -> Probe:
-        return build(manifest, models, None, trigger).probe
+    def make(trigger: Trigger) -> ProbeSource:
+        return build(manifest, models, None, trigger).probe_source
 
     return make
 

@@ -13,7 +13,7 @@ from mutator.campaigns.plan import build_plan
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.errors import MutatorError
 from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens
-from mutator.model import Activation, Experiment, Outcome, Record, Status
+from mutator.model import Experiment, ObservedActivation, Outcome, Record, Status
 from mutator.outcomes import trace_files
 from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store.plan_choices import Choices
@@ -105,7 +105,7 @@ NEVER = {"a": {"first": None, "last": None, "count": 0}}
 def test_an_active_fault_without_an_effect_is_masked(judged: Callable[..., Record]) -> None:
     record = judged(ran=RAN)
     assert (record.status, record.outcome) == (Status.OK, Outcome.MASKED)
-    assert record.activation == Activation(first=0.2, last=0.5, count=5)
+    assert record.activation == ObservedActivation(first=0.2, last=0.5, count=5)
     assert record.max_dev == (("gas", 0.0), ("brake", 0.0), ("wheel_turn", 0.0))
 
 

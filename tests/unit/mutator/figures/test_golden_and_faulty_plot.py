@@ -18,7 +18,7 @@ from mutator.figures.golden_and_faulty_plot import (
     event_marks,
     save_figure,
 )
-from mutator.model import Activation, Outcome, Record, Status
+from mutator.model import ObservedActivation, Outcome, Record, Status
 from mutator.targets.channels import Channel
 
 TIME = np.arange(300) * 0.01
@@ -98,7 +98,7 @@ def test_marks_of_a_record_are_sorted_by_time() -> None:
         outcome=Outcome.HAZARD,
         detail="",
         tree="",
-        activation=Activation(first=6.94, last=20.0, count=12),
+        activation=ObservedActivation(first=6.94, last=20.0, count=12),
         t_manifest=7.0,
         max_dev=(),
         hazards=(("H1", 18.0),),

@@ -15,7 +15,7 @@ from mutator.engines.first_activation import activity_at_observations
 from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.probe_template_parts import CODE_TEMPLATE_FILE, SETTINGS_TEMPLATE_FILE
-from mutator.model import Activation, Hold, Trigger
+from mutator.model import Hold, ObservedActivation, Trigger
 from mutator.mutants import probe as contract
 from mutator.mutants.injected_lines import probe_setting_spans
 from mutator.mutants.mutant_building import build
@@ -28,7 +28,7 @@ TRIGGER = Trigger(name="near", condition="hwt < 2.0 and rs > 0.0", armed_after_s
 MUTANT, IDS = "0123456789abcdef", ("0a1b2c3d", "4e5f6071")
 
 
-def probe(clone: Workspace, trigger: Trigger = TRIGGER) -> contract.Probe:
+def probe(clone: Workspace, trigger: Trigger = TRIGGER) -> contract.ProbeSource:
     models, observation = clone.fault_models(), clone.manifest("openpilot").observation
     settings = contract.build_probe_settings(MUTANT, trigger, trigger.hold, IDS, observation, 0.1)
     return contract.render_probe(models.probe_templates, settings)
@@ -153,7 +153,7 @@ def test_a_report_without_an_active_injection_has_no_activation(report: dict[str
 def test_activations_of_all_injections_are_added(clone: Workspace) -> None:
     early = {"first": 0.25, "last": 0.75, "count": 1}
     report = {"injections": {"a": RAN, "b": early, "c": NEVER}}
-    assert contract.activation_of(report) == Activation(first=0.25, last=2.0, count=4)
+    assert contract.activation_of(report) == ObservedActivation(first=0.25, last=2.0, count=4)
     fi = module(clone)
     for read in (contract.was_triggered, contract.activation_of):
         assert read(fi.report()) == read(contract.untriggered_report(MUTANT))  # type: ignore[operator]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mutator._common.typed_json import from_json_types
-from mutator.model import Activation, Outcome, Record, Status
+from mutator.model import ObservedActivation, Outcome, Record, Status
 from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.golden_comparison import compare_traces
 from mutator.results.propagation_columns import PROPAGATION_COLUMNS, propagation_cells
@@ -93,7 +93,7 @@ def test_the_table_keeps_the_order_of_records_and_departures() -> None:
         outcome=Outcome.SDC,
         detail="",
         tree="",
-        activation=Activation(first=0.1, last=0.2, count=1),
+        activation=ObservedActivation(first=0.1, last=0.2, count=1),
         t_manifest=0.3,
         max_dev=(),
         hazards=(),

@@ -10,7 +10,6 @@ import pytest
 from mutator._common.typed_json import from_json_types
 from mutator.errors import MutatorError
 from mutator.model import (
-    Activation,
     Anchor,
     AnchorKind,
     Experiment,
@@ -18,12 +17,13 @@ from mutator.model import (
     FaultLocation,
     Injection,
     Method,
+    ObservedActivation,
     Outcome,
     Record,
     Status,
     Trigger,
 )
-from mutator.outcomes.fault_paths import ComponentState, FaultPath, FaultPaths, LinkState, fault_paths_of
+from mutator.outcomes.fault_paths import ComponentState, FaultPath, FaultPathFinder, LinkState, fault_paths_of
 from mutator.store.run_folder import RunFolder
 from mutator.stpa.analysis_files import ControlStructureModel
 from mutator.targets.stored_target_facts import ChannelFacts
@@ -74,7 +74,7 @@ CHANNELS = [
     from_json_types(ChannelFacts, ["torque", "-", "actuator", "rack", ""]),
     from_json_types(ChannelFacts, ["place", "m", "truth", "car", ""]),
 ]
-WAYS = FaultPaths(CHANNELS, STRUCTURE)
+WAYS = FaultPathFinder(CHANNELS, STRUCTURE)
 
 
 def experiment(*modules: str) -> Experiment:
@@ -104,7 +104,7 @@ def record(outcome: Outcome | None, **left: float) -> Record:
         outcome=outcome,
         detail="",
         tree="",
-        activation=Activation(first=1.0, last=1.0, count=1),
+        activation=ObservedActivation(first=1.0, last=1.0, count=1),
         t_manifest=None,
         max_dev=(),
         hazards=(),
@@ -115,7 +115,7 @@ def record(outcome: Outcome | None, **left: float) -> Record:
 
 
 def path(
-    *modules: str, outcome: Outcome = Outcome.SDC, fault_paths: FaultPaths = WAYS, **left: float
+    *modules: str, outcome: Outcome = Outcome.SDC, fault_paths: FaultPathFinder = WAYS, **left: float
 ) -> FaultPath:
     found = fault_paths.fault_path(experiment(*modules), record(outcome, **left))
     assert found is not None
@@ -182,7 +182,7 @@ def test_links_that_the_study_ignores_are_not_part_of_the_path() -> None:
     links = {name: {"from": tail, "to": tip, "label": ""} for name, (tail, tip) in LINKS.items()}
     for studied, names in ((True, {"wheel", "rack"}), (False, set())):
         structure = replace_links({**links, "engaged": {**ends, "studied": studied}})
-        found = states(path("speed", fault_paths=FaultPaths(CHANNELS, structure), wanted=1.1, gas=1.1))
+        found = states(path("speed", fault_paths=FaultPathFinder(CHANNELS, structure), wanted=1.1, gas=1.1))
         assert found.keys() - {"speed", "pedals", "car"} == names
 
 
@@ -232,7 +232,7 @@ def test_the_first_changed_input_decides_between_fault_and_feedback(
 ) -> None:
     """The car moved differently before the speed control changed."""
     pace = from_json_types(ChannelFacts, ["pace", "m/s", "internal", "gauge", ""])
-    fault_paths = FaultPaths([*CHANNELS, pace], STRUCTURE)
+    fault_paths = FaultPathFinder([*CHANNELS, pace], STRUCTURE)
     found = path("finder", "wheel", fault_paths=fault_paths, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
 
@@ -244,7 +244,7 @@ def test_a_component_with_a_single_input_is_reached_even_after_the_car() -> None
 
 
 def test_components_without_channels_are_unobserved() -> None:
-    fault_paths = FaultPaths([channel for channel in CHANNELS if channel.name != "seen"], STRUCTURE)
+    fault_paths = FaultPathFinder([channel for channel in CHANNELS if channel.name != "seen"], STRUCTURE)
     found = path("eyes", fault_paths=fault_paths, wanted=1.2, gas=1.2, place=1.3)
     assert states(found)["finder"] is ComponentState.UNRECORDED
     assert link_states(found)["picture"] is LinkState.UNKNOWN
@@ -269,7 +269,7 @@ def test_a_fault_outside_all_components_has_no_path() -> None:
 
 
 def test_without_a_structure_components_are_ordered_by_role() -> None:
-    fault_paths = FaultPaths(CHANNELS[::-1], None)
+    fault_paths = FaultPathFinder(CHANNELS[::-1], None)
     found = path("eyes", fault_paths=fault_paths, outcome=Outcome.MASKED, angle=1.0)
     assert [*states(found)] == ["wheel", "speed", "finder", "rack", "pedals", "car"]
     assert (found.reached, found.stopped_at) == ("wheel", ("speed",))
@@ -279,7 +279,7 @@ def test_without_a_structure_components_are_ordered_by_role() -> None:
 
 def test_a_chain_has_feedback_too() -> None:
     """The fault is injected after the interface, whose channels change only after the car."""
-    fault_paths = FaultPaths(
+    fault_paths = FaultPathFinder(
         [
             from_json_types(ChannelFacts, ["seen", "", "internal", "interface", ""]),
             from_json_types(ChannelFacts, ["ask", "", "actuator", "control", ""]),
@@ -299,7 +299,9 @@ def test_a_path_through_a_loop_has_each_component_once() -> None:
     links: dict[str, Any] = {name: one.model_dump(by_alias=True) for name, one in STRUCTURE.links.items()}
     links["back"] = {"from": "speed", "to": "finder", "label": ""}
     circle = replace_links(links)
-    found = path("eyes", fault_paths=FaultPaths(CHANNELS, circle), seen=1.0, wanted=1.0, gas=1.0, place=1.1)
+    found = path(
+        "eyes", fault_paths=FaultPathFinder(CHANNELS, circle), seen=1.0, wanted=1.0, gas=1.0, place=1.1
+    )
     assert [one.name for one in found.components] == ["eyes", "finder", "speed", "pedals", "car"]
     assert found.reached == "car"
 
@@ -313,7 +315,7 @@ def replace_links(links: dict[str, Any]) -> ControlStructureModel:
 def test_the_structure_is_read_from_run_json(tmp_path: Folder) -> None:
     """Without components, there are no paths."""
 
-    def read(**changes: object) -> FaultPaths | None:
+    def read(**changes: object) -> FaultPathFinder | None:
         (tmp_path / "run.json").write_text(json.dumps(made_head(**changes)))
         return fault_paths_of(RunFolder.open_unverified(tmp_path))
 

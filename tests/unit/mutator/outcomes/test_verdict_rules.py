@@ -4,10 +4,10 @@ from itertools import product
 
 import pytest
 
-from mutator.model import Activation, Outcome
+from mutator.model import ObservedActivation, Outcome
 from mutator.outcomes.verdict_rules import first_events_after, outcome_of, reaction_time
 
-ACTIVE = Activation(first=2.0, last=4.0, count=3)
+ACTIVE = ObservedActivation(first=2.0, last=4.0, count=3)
 
 # activated, manifested, a hazard at or after the activation -> outcome
 TRUTH = {

@@ -78,7 +78,7 @@ def run(tmp_path: Path) -> ReportedRun:
 
 @pytest.fixture
 def answer_by_name(run: ReportedRun) -> dict[str, ReportAnswer]:
-    return {answer.name: answer for answer in build_answers(run)}
+    return {answer.html_name: answer for answer in build_answers(run)}
 
 
 def test_the_worst_experiment_is_first(answer_by_name: dict[str, ReportAnswer]) -> None:
@@ -258,7 +258,7 @@ def test_a_report_without_hazards_has_no_empty_table(run: ReportedRun) -> None:
 
 def test_a_report_without_activated_faults_calls_none_tolerated(run: ReportedRun) -> None:
     idle = part_of(run, names_of(run, "t_activation"))
-    found = {answer.name: answer for answer in build_answers(idle)}
+    found = {answer.html_name: answer for answer in build_answers(idle)}
     assert found["dangerous"].paragraph == found["survived"].paragraph == "No fault was activated."
     assert not any(answer.links for answer in found.values())
     assert found["time"].paragraph.startswith(
@@ -268,7 +268,7 @@ def test_a_report_without_activated_faults_calls_none_tolerated(run: ReportedRun
 
 def test_a_crash_is_not_tolerated(run: ReportedRun) -> None:
     frame = run.frame.assign(outcome=run.frame["outcome"].where(run.frame["kind"] != "car/steer", ""))
-    found = {answer.name: answer for answer in build_answers(replace(run, frame=frame))}
+    found = {answer.html_name: answer for answer in build_answers(replace(run, frame=frame))}
     assert found["survived"].paragraph == (
         "2 of 7 activated faults (29 %) led to no hazard: 1 changed no actuator (masked), 1 did (sdc). "
         "1 crashed or timed out. 0 of 3 fault types (0 %) never led to a hazard, a crash or a timeout."
@@ -276,9 +276,9 @@ def test_a_crash_is_not_tolerated(run: ReportedRun) -> None:
 
 
 def test_counts_of_one_use_the_singular(run: ReportedRun) -> None:
-    found = {answer.name: answer for answer in build_answers(part_of(run, {"0" * 16, "1" * 16}))}
+    found = {answer.html_name: answer for answer in build_answers(part_of(run, {"0" * 16, "1" * 16}))}
     assert found["unwarned"].paragraph.startswith("1 of 2 hazards (50 %) was silent")
-    found = {answer.name: answer for answer in build_answers(part_of(run, {"0" * 16}))}
+    found = {answer.html_name: answer for answer in build_answers(part_of(run, {"0" * 16}))}
     assert "1 of 1 experiment (100 %) was simulated" in found["time"].paragraph
 
 

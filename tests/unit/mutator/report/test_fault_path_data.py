@@ -8,7 +8,7 @@ from mutator.model import Record
 from mutator.outcomes.fault_paths import (
     ComponentState,
     FaultPath,
-    FaultPaths,
+    FaultPathFinder,
     LinkState,
     PathComponent,
     PathLink,
@@ -56,7 +56,10 @@ def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Recor
     }
     by_id = {"a": far, "c": held, "d": far}
     found = RunFaultPaths(
-        fault_paths=FaultPaths(CHANNELS, None), channels=CHANNELS, path_by_experiment=by_id, records=records
+        fault_paths=FaultPathFinder(CHANNELS, None),
+        channels=CHANNELS,
+        path_by_experiment=by_id,
+        records=records,
     )
     data = found.page_data(["a", "b", "c", "d"])
     assert data["shape"] == [0, -1, 1, 0]
@@ -82,7 +85,7 @@ def test_the_page_filters_by_the_links_that_a_fault_got_through() -> None:
         for one in (held, far)
     ]
     found = RunFaultPaths(
-        fault_paths=FaultPaths(CHANNELS, None),
+        fault_paths=FaultPathFinder(CHANNELS, None),
         channels=CHANNELS,
         path_by_experiment={},
         records={},

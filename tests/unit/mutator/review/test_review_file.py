@@ -7,7 +7,14 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.review import review_file
-from mutator.review.review_entries import BasisDigests, Decision, DecisionVerdict, Flag, Remark, ReviewEntry
+from mutator.review.review_entries import (
+    BasisDigests,
+    DecisionVerdict,
+    Flag,
+    GroupDecision,
+    Remark,
+    ReviewEntry,
+)
 from mutator.review.review_file import ReviewFileContent
 
 BOUND = BasisDigests(diff="d" * 16, function="f" * 16, template="0" * 16, calls="c" * 16)
@@ -15,7 +22,7 @@ AT = "2026-11-24T16:00:00Z"
 
 
 def entry(name: str) -> ReviewEntry:
-    decision = Decision(
+    decision = GroupDecision(
         group=name * 12,
         what=f"group {name}",
         verdict=DecisionVerdict.APPROVED,

@@ -9,7 +9,7 @@ import pytest
 
 from mutator._common.hashing import canonical_json
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import Activation, Outcome, Record, RunError, Status
+from mutator.model import ObservedActivation, Outcome, Record, RunError, Status
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import RECORDS_SCHEMA, load_records, record_as_json
 from mutator.store.run_progress import RecordTail
@@ -38,7 +38,7 @@ def test_records_are_read_as_written(tmp_path: Path, record: MakeRecord) -> None
 
 
 def test_a_line_equals_asdict(record: MakeRecord) -> None:
-    activation = Activation(first=1.0, last=2.0, count=3)
+    activation = ObservedActivation(first=1.0, last=2.0, count=3)
     error = RunError(kind="ValueError", message="no", place="a.py:3")
     for one in (record(), replace(record(), activation=activation), replace(record(), error=error)):
         assert canonical_json(record_as_json(one)) == canonical_json(asdict(one))

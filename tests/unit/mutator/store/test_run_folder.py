@@ -22,7 +22,7 @@ from pathlib import Path
 from mutator._common import folder_locks
 run = Path(sys.argv[1])
 if sys.argv[2] == "owner":
-    with folder_locks.owning_run_folder(run):
+    with folder_locks.lock_run_folder(run):
         print("held", flush=True)
         time.sleep(60)
 else:
@@ -77,7 +77,7 @@ def test_a_run_folder_has_one_owner(folder: RunFolder) -> None:
     process = holder(folder, "owner")
     try:
         for attempt in (
-            lambda: folder_locks.owning_run_folder(folder.path).__enter__(),
+            lambda: folder_locks.lock_run_folder(folder.path).__enter__(),
             lambda: delete_run(folder.path),
         ):
             with pytest.raises(MutatorError, match=f"in use by process {process.pid}"):
@@ -85,7 +85,7 @@ def test_a_run_folder_has_one_owner(folder: RunFolder) -> None:
     finally:
         process.kill()
         process.communicate()
-    with folder_locks.owning_run_folder(folder.path):
+    with folder_locks.lock_run_folder(folder.path):
         assert (folder.path / "owner.lock").read_text().strip().isdigit()
 
 
@@ -93,8 +93,8 @@ def test_a_new_owner_waits_for_workers_of_a_dead_command(folder: RunFolder) -> N
     process = holder(folder, "worker", "1")
     assert folder_locks.living_worker_pids(folder.path) == [process.pid]
     with pytest.raises(MutatorError, match=rf"workers of an earlier run .* {process.pid}\)"):
-        folder_locks.owning_run_folder(folder.path, patience_s=0.2).__enter__()
-    with folder_locks.owning_run_folder(folder.path):
+        folder_locks.lock_run_folder(folder.path, patience_s=0.2).__enter__()
+    with folder_locks.lock_run_folder(folder.path):
         assert folder_locks.living_worker_pids(folder.path) == []
     process.communicate()
 
@@ -106,16 +106,16 @@ def test_a_lock_that_is_not_a_file_is_refused(folder: RunFolder, name: str) -> N
     place.parent.mkdir(exist_ok=True)
     os.mkfifo(place)
     with pytest.raises(MutatorError, match=rf"{name}: not a regular file"):
-        folder_locks.owning_run_folder(folder.path).__enter__()
+        folder_locks.lock_run_folder(folder.path).__enter__()
     place.unlink()
     place.mkdir(parents=True)
     with pytest.raises(MutatorError, match=rf"{name}: not a regular file"):
-        folder_locks.owning_run_folder(folder.path).__enter__()
+        folder_locks.lock_run_folder(folder.path).__enter__()
     place.rmdir()
     head = (folder.path / "run.json").read_bytes()
     place.symlink_to(folder.path / "run.json")
     with pytest.raises(MutatorError, match=rf"{name}: not a regular file"):
-        folder_locks.owning_run_folder(folder.path).__enter__()
+        folder_locks.lock_run_folder(folder.path).__enter__()
     assert (folder.path / "run.json").read_bytes() == head
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.model import Activation, Outcome, Record, Status
+from mutator.model import ObservedActivation, Outcome, Record, Status
 from mutator.store.series_folder import SeriesFolder, run_facts_for_series, write_rerun_series
 from mutator.store.series_format import Series, encode_series
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, list_unpacked_worker_files, pack_series
@@ -19,7 +19,7 @@ RECORD = Record(
     outcome=Outcome.MASKED,
     detail="",
     tree="t" * 64,
-    activation=Activation(first=2.0, last=3.0, count=5),
+    activation=ObservedActivation(first=2.0, last=3.0, count=5),
     t_manifest=None,
     max_dev=(),
     hazards=(),

@@ -17,7 +17,7 @@ from mcap.reader import make_reader
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.exports import ExportSelection, ExportTable, Format
 from mutator.exports.run_export import export
-from mutator.model import Activation, Experiment, Outcome
+from mutator.model import Experiment, ObservedActivation, Outcome
 from mutator.store.run_deletion import list_deletable_files
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, run_facts_for_series, write_rerun_series
@@ -60,7 +60,7 @@ def became(e: Experiment) -> dict[str, Any]:
         return {}
     return {
         "outcome": Outcome.HAZARD,
-        "activation": Activation(first=0.25, last=0.5, count=6),
+        "activation": ObservedActivation(first=0.25, last=0.5, count=6),
         "t_manifest": 0.35,
         "alerts": (("brake_hard", 0.4),),
         "hazards": (("H3", 0.45), ("H1", 0.5)),
