@@ -10,7 +10,10 @@ from selfdrive.sim.road_look import OtherCar, RoadLook
 
 CAR_LENGTH = 4.4  # m of a car
 CAMERA_TO_BUMPER = 1.5  # m from the camera to the front bumper, from which the lead's distance is measured
-NEAREST_DRAWN, FARTHEST_DRAWN = 4.0, 400.0  # m ahead; a car can be drawn between them
+CAR_HEIGHT = 1.55  # m; at least that of the lead
+LEAST_DEPTH = 0.3  # m along the optical axis; closer points have no sensible place in a picture
+FARTHEST_DRAWN = 400.0  # m ahead
+ROOF_DRAWN_BELOW = 4.0  # m ahead; pictures of cars farther away show no roof
 FRACTION_BITS = 4  # fractional bits of OpenCV's coordinates
 
 LEAD_PAINT = (70.0, 45.0, 130.0)  # BGR, a dark red
@@ -32,14 +35,24 @@ def draw_car(picture: np.ndarray, model: CameraModel, car: OtherCar) -> None:
 def draw_lead(picture: np.ndarray, model: CameraModel, lead: float, offset: float, heading: float) -> None:
     """Draw a car into a BGR picture, in the lane centre, with its rear `lead` m ahead of the front bumper."""
     ahead = lead + CAMERA_TO_BUMPER
-    if not NEAREST_DRAWN <= ahead <= FARTHEST_DRAWN:
-        return
     car = OtherCar(
         x=ahead * cos(heading) - offset * sin(heading), y=-offset * cos(heading) - ahead * sin(heading)
     )
+    if ahead > FARTHEST_DRAWN or not is_before_camera(model, car.x):
+        return
     side = tuple(0.7 * part for part in LEAD_PAINT)
     _draw_vehicle(
         picture, model, car, (LEAD_PAINT, side, (70.0, 62.0, 55.0), (40.0, 40.0, 230.0), (24.0, 24.0, 24.0))
+    )
+    if ahead < ROOF_DRAWN_BELOW and model.height > car.height:
+        _draw_roof(picture, model, car, tuple(0.85 * part for part in LEAD_PAINT))
+
+
+def is_before_camera(model: CameraModel, ahead: float) -> bool:
+    """Whether all of a car can be projected whose rear is `ahead` m from the camera."""
+    return all(
+        ahead * cos(model.pitch) + (model.height - z) * sin(model.pitch) >= LEAST_DEPTH
+        for z in (0.0, CAR_HEIGHT)
     )
 
 
@@ -101,6 +114,13 @@ def _draw_vehicle(picture: np.ndarray, model: CameraModel, car: OtherCar, tones:
     fill([*inset, (near, right + 0.15, waist), (near, left - 0.15, waist)], glass)
     for inner, outer in ((left - 0.26, left), (right + 0.26, right)):
         back(outer, inner, 0.75 * waist, 0.95 * waist, lamps)
+
+
+def _draw_roof(picture: np.ndarray, model: CameraModel, car: OtherCar, tone: Tone) -> None:
+    """Draw the roof of a car near the camera, which must be above it."""
+    near, far, half = car.x + 0.5, car.x + CAR_LENGTH - 1.5, 0.5 * car.width - 0.2
+    corners = [(near, half), (near, -half), (far, -half), (far, half)]
+    _fill_polygon(picture, [model.project(x, car.y + y, car.height) for x, y in corners], tone)
 
 
 def _fill_polygon(picture: np.ndarray, points: list[tuple[float, float]], tone: Tone) -> None:

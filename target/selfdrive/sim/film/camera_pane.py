@@ -11,12 +11,19 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.film import drawing
 from selfdrive.sim.film.film_recorder import SAMPLE_DISTANCES
 from selfdrive.sim.film.recorded_film import DetectedLine, FilmFrame
-from selfdrive.sim.lead_picture import CAMERA_TO_BUMPER, FARTHEST_DRAWN, NEAREST_DRAWN, draw_lead
+from selfdrive.sim.lead_picture import (
+    CAMERA_TO_BUMPER,
+    CAR_HEIGHT,
+    FARTHEST_DRAWN,
+    draw_lead,
+    is_before_camera,
+)
 from selfdrive.sim.road_renderer import RoadRenderer
 
 LINE_HALF_WIDTH, PATH_HALF_WIDTH = 0.06, 0.8  # m; half the drawn width
 LINE_OPACITY, PATH_OPACITY = 0.8, 0.3  # opacity over the picture
-LEAD_FRAME_HALF_WIDTH, LEAD_FRAME_HEIGHT = 1.0, 1.55  # m; of the frame around the lead
+LEAD_FRAME_HALF_WIDTH = 1.0  # m; of the frame around the lead
+MIN_TURN_DISTANCE = 4.0  # m; a nearer lead is not turned further
 LEAD_FRAME_MARGIN = 4  # pixels
 MIN_SHOWN_DISTANCE_ERROR = 2.0  # m; a larger error of the camera's message is drawn
 
@@ -52,7 +59,7 @@ class CameraPane:
         else:
             picture = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
         if frame.d_rel is not None:
-            turn = -self._road_shift(frame, frame.d_rel) / max(frame.d_rel, NEAREST_DRAWN)
+            turn = -self._road_shift(frame, frame.d_rel) / max(frame.d_rel, MIN_TURN_DISTANCE)
             draw_lead(picture, self._model, frame.d_rel, -frame.middle, turn)
         return picture
 
@@ -114,10 +121,10 @@ class CameraPane:
         self, pane: np.ndarray, frame: FilmFrame, distance: float, colour: drawing.Colour, label: str
     ) -> None:
         x = distance + CAMERA_TO_BUMPER
-        if not NEAREST_DRAWN <= x <= FARTHEST_DRAWN:
+        if x > FARTHEST_DRAWN or not is_before_camera(self._model, x):
             return
         y = frame.middle + self._road_shift(frame, distance)
-        corners = [(x, y + LEAD_FRAME_HALF_WIDTH, LEAD_FRAME_HEIGHT), (x, y - LEAD_FRAME_HALF_WIDTH, 0.0)]
+        corners = [(x, y + LEAD_FRAME_HALF_WIDTH, CAR_HEIGHT), (x, y - LEAD_FRAME_HALF_WIDTH, 0.0)]
         left, top, right, bottom = (
             round(part) for corner in corners for part in self._picture_to_pane(*self._model.project(*corner))
         )

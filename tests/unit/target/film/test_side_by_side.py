@@ -48,6 +48,16 @@ def test_detected_lines_lie_on_the_painted_ones_in_a_bend(frame):
     assert (covered[..., 2].astype(int) - covered[..., 0] > 90).sum() < 0.4 * yellow
 
 
+def test_the_lead_is_drawn_and_outlined_at_contact(frame):
+    """The still of a contact must show the vehicle that is hit, with its distance."""
+    pane = CameraPane(CameraModel(), *PANE_SIZE)
+    hit = pane.draw(frame(lines=None, d_rel=-0.1, camera_lead=None))
+    free = pane.draw(frame(lines=None, d_rel=None, camera_lead=None))
+    changed = (hit != free).any(axis=2)
+    assert changed.mean() > 0.15
+    assert is_drawn(hit[changed], drawing.INK)
+
+
 def wrong_lines(y, prob):
     return {"lines": dict.fromkeys(("left", "right"), DetectedLine(y=(y,) * 8, prob=prob))}
 

@@ -207,6 +207,23 @@ def test_a_lead_that_cannot_be_seen_is_not_drawn(standard):
     assert np.array_equal(plain, standard.render_colour(3.0, lead=500.0))
 
 
+@pytest.mark.parametrize("lead", [2.0, 0.0, -0.5])
+def test_a_lead_at_contact_fills_the_lane_ahead(standard, lead):
+    """The picture of a contact must show what is hit, up to a lead that overlaps the front bumper."""
+    changed = standard.render_colour(3.0, lead=lead) != standard.render_colour(3.0)
+    rows, columns = np.nonzero(changed.any(axis=2))
+    assert np.ptp(columns) == pytest.approx(1.8 * CALTECH.fx / (lead + CAMERA_TO_BUMPER), rel=0.35)
+    assert abs(columns.mean() - CALTECH.cx) < 3.0
+    assert rows.max() == pytest.approx(min(CALTECH.rows - 1, CALTECH.row(lead + CAMERA_TO_BUMPER)), abs=2.0)
+
+
+def test_a_camera_below_the_roof_does_not_see_it():
+    renderer = RoadRenderer(UDACITY, BARE, 0, periods=1)
+    near, roof_free = (renderer.render_colour(3.0, lead=lead) for lead in (2.4, 2.6))
+    tops = [np.nonzero((p != renderer.render_colour(3.0)).any(axis=2))[0].min() for p in (near, roof_free)]
+    assert abs(int(tops[0]) - int(tops[1])) <= 3
+
+
 def test_a_turn_pans_the_sky(standard):
     ahead, turned = standard.render_grey(0.0), standard.render_grey(0.0, 0.5, 0.05)
     shift = round(CALTECH.fx * np.tan(0.05) / np.cos(CALTECH.pitch))
