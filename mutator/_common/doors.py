@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from mutator._common.files import is_disk_full_error
 from mutator._common.message_text import spelling_suggestion
 from mutator._common.resource_shortages import find_shortage
+from mutator._common.version import DISTRIBUTION
 from mutator.errors import BadAddition, InternalException, MutatorError
 
 if TYPE_CHECKING:
@@ -149,7 +150,7 @@ class Door:
 
     def _entry_points_of_others(self, name: str) -> "list[EntryPoint]":
         points = _entry_points(self.group).select(name=name)
-        return [point for point in points if not (point.dist and point.dist.name == "mutator")]
+        return [point for point in points if not (point.dist and point.dist.name == DISTRIBUTION)]
 
     def _name_error(self, name: str, got: str, remedy: str) -> MutatorError:
         others = ", ".join(other for other in self.names() if other != name)

@@ -15,6 +15,7 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from mutator._common.version import DISTRIBUTION
 from mutator.engines.process_endings import environment_variables_of_run
 from mutator.store.session_environments import Blas
 from mutator.targets.process_environment import THREAD_VARIABLES
@@ -104,7 +105,7 @@ def required_packages() -> frozenset[str]:
     """
     installed = _installed_packages()
     visited: set[tuple[str, str]] = set()
-    pending = [("mutator", "")]
+    pending = [(DISTRIBUTION, "")]
     while pending:
         name, extra = pending.pop()
         if (name, extra) not in visited and name in installed:
@@ -113,7 +114,7 @@ def required_packages() -> frozenset[str]:
                 if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
                     required_name = canonicalize_name(requirement.name)
                     pending += [(required_name, extra_name) for extra_name in ("", *requirement.extras)]
-    return frozenset(name for name, _ in visited) - {"mutator"} or frozenset(installed)
+    return frozenset(name for name, _ in visited) - {DISTRIBUTION} or frozenset(installed)
 
 
 def packages_of_modules(modules: Iterable[str]) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from packaging.requirements import Requirement
 
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.message_text import counted
+from mutator._common.version import DISTRIBUTION
 from mutator.checks.fast_engine_check import import_and_fork_finding
 from mutator.checks.findings import CheckState, Finding
 from mutator.engines.sandbox import reason_sandbox_unavailable as shortcoming_of_sandbox
@@ -61,7 +62,13 @@ def _python_finding() -> Finding:
 
 
 def _package_findings() -> Iterator[Finding]:
-    for line in importlib.metadata.requires("mutator") or ():
+    try:
+        lines = importlib.metadata.requires(DISTRIBUTION) or ()
+    except importlib.metadata.PackageNotFoundError:
+        remedy = "install it: `pip install -c constraints.txt -e .` in the clone"
+        yield Finding(name=DISTRIBUTION, level=CheckState.WARN, found=NOT_INSTALLED, remedy=remedy)
+        return
+    for line in lines:
         requirement = Requirement(line)
         if requirement.marker and not requirement.marker.evaluate({"extra": ""}):
             continue

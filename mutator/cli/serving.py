@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from mutator._common.version import extra_install_command
 from mutator.cli import completion
 from mutator.cli.console import Terminal
 from mutator.cli.options import WorkspaceOptions, with_workspace_options
@@ -46,7 +47,7 @@ def serve(
     """Show reports, review mutants and start jobs in a browser."""
     if not all(map(find_spec, ("starlette", "uvicorn"))):
         raise MutatorError(
-            "the server is not installed", expected="the extra `serve`", remedy="pip install 'mutator[serve]'"
+            "the server is not installed", expected="the extra `serve`", remedy=extra_install_command("serve")
         )
     from mutator.api.serving import serve_runs
 

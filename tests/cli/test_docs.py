@@ -66,10 +66,6 @@ VARYING = re.compile(
 )
 
 
-# The package called mutator on the public index is another project.
-BY_NAME = re.compile(r"\b(?:pip|pipx|uv)\b[^\n`]*\b(?:install|add)\b[^\n`]*(?<![\w/.-])mutator(?![\w/.*-])")
-
-
 def name(page: Path) -> str:
     return page.relative_to(CLONE).as_posix()
 
@@ -227,18 +223,6 @@ def test_no_link_is_broken(page: Path) -> None:
     for file, anchor in links(page):
         assert file.exists(), f"{name(page)}: {file}"
         assert not anchor or anchor in anchors(file), f"{name(page)}: {file.name}#{anchor}"
-
-
-@pytest.mark.parametrize("page", PAGES, ids=name)
-def test_no_page_installs_by_name(page: Path) -> None:
-    """On the public index, the name `mutator` belongs to another project."""
-    assert not BY_NAME.search(page.read_text(encoding="utf-8"))
-
-
-@pytest.mark.parametrize("command", ["pip install mutator", "pip install 'mutator[dev]'", "uv add mutator"])
-def test_the_pattern_finds_installs_by_name(command: str) -> None:
-    assert BY_NAME.search(command)
-    assert not BY_NAME.search("pip install dist/mutator-0.1.0.whl && .venv/bin/mutator list")
 
 
 def test_the_index_names_every_page() -> None:

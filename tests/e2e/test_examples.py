@@ -29,7 +29,7 @@ def example(request: pytest.FixtureRequest) -> str:
     name: str = request.param
     for package in (INSTALLED[name], ALSO.get(name, "numpy")):
         if find_spec(package) is None:
-            pytest.skip(f"no {package} here: pip install 'mutator[examples]'")
+            pytest.skip(f"no {package} here: pip install 'mutator-fi[examples]'")
     return name
 
 

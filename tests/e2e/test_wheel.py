@@ -2,16 +2,20 @@
 
 import json
 import os
+import re
 import shutil
+import signal
 import subprocess
 import sys
 import tarfile
+import time
 import zipfile
 from io import BytesIO
 from pathlib import Path
 
 import pytest
 
+from mutator._common.version import DISTRIBUTION
 from mutator.campaigns.plan import build_plan
 from mutator.workspace import Workspace
 
@@ -22,19 +26,34 @@ SHIPPED = ("target", "fault_library", "templates")
 CHAFF = ("radar/chaff", "--scenario", "S1", "--trigger", "C2", "--value", "40")
 
 
-def call(*words: object, here: Path) -> str:
+def environment(here: Path) -> dict[str, str]:
     settings = ("MUTATOR_", "PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
     kept = {name: value for name, value in os.environ.items() if not name.startswith(settings)}
+    return kept | {"XDG_CACHE_HOME": str(here / "cache"), "XDG_DATA_HOME": str(here / "data")}
+
+
+def call(*words: object, here: Path) -> str:
     done = subprocess.run(
         [str(word) for word in words],
         cwd=here,
-        env=kept | {"XDG_CACHE_HOME": str(here / "cache"), "XDG_DATA_HOME": str(here / "data")},
+        env=environment(here),
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, f"{words}: {done.stdout[-2000:]}\n{done.stderr[-4000:]}"
     return done.stdout
+
+
+def interrupt_after_first_record(*words: object, here: Path, out: Path) -> None:
+    command = [str(word) for word in words]
+    process = subprocess.Popen(
+        command, cwd=here, env=environment(here), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    while process.poll() is None and not any(p.stat().st_size for p in out.glob("records/*.jsonl")):
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(60) != 0, "it ended before it could be interrupted"
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +139,14 @@ def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhe
     assert not [*unpacked.rglob("*.pyc"), *unpacked.rglob("__pycache__")]
 
 
+def test_pip_knows_the_wheel_by_the_name_of_the_distribution(wheel: Path, python: Path) -> None:
+    assert wheel.name.startswith("mutator_fi-")
+    listed = json.loads(call(python, "-m", "pip", "list", "--format", "json", here=wheel.parent))
+    assert [package["name"] for package in listed if "mutator" in package["name"]] == [DISTRIBUTION]
+    examined = json.loads(call(python.with_name("mutator"), "doctor", "--json", here=wheel.parent))
+    assert "libcst" in str(examined), "the harness's requirements are checked"
+
+
 def test_the_first_commands_work_in_an_empty_folder(python: Path, elsewhere: Path) -> None:
     mutator, workspace = python.with_name("mutator"), Workspace.find(CLONE)
     listed = json.loads(call(mutator, "list", "--json", here=elsewhere))
@@ -128,8 +155,11 @@ def test_the_first_commands_work_in_an_empty_folder(python: Path, elsewhere: Pat
     assert "d_rel = d_rel + 40  # fi:" in tried
     assert "experiment     0ef69fca1dbb8f42" in tried
     assert "verdict: hazard" in tried
-    ran = call(mutator, "run", "quickstart", "--out", "runs/q", "-n", 2, here=elsewhere)
-    assert "60 of 60 experiments done" in ran
+    run = (mutator, "run", "quickstart", "--out", "runs/q", "-n", 2)
+    interrupt_after_first_record(*run, here=elsewhere, out=elsewhere / "runs/q")
+    resumed = call(*run, here=elsewhere)
+    [now] = re.findall(r"60 of 60 experiments done, (\d+) now", resumed)
+    assert 0 < int(now) < 60
     head = json.loads((elsewhere / "runs/q/run.json").read_text())
     plan = build_plan(workspace, "quickstart")
     assert head["plan"] == plan.digest

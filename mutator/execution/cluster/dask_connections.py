@@ -10,6 +10,7 @@ from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mutator._common.version import extra_install_command
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def requiring_extra(extra: str) -> Iterator[None]:
         raise MutatorError(
             f"the package {error.name} is not installed",
             argument="cluster",
-            remedy=f"pip install '.[{extra}]' in a clone, or pip install 'FILE.whl[{extra}]'",
+            remedy=extra_install_command(extra),
         ) from None
 
 

@@ -5,18 +5,19 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common.version import DISTRIBUTION
 from mutator.campaigns import run_environment
 
 
 def test_required_packages_include_indirect_requirements() -> None:
     found = run_environment.required_packages()
     assert {"numpy", "jinja2", "markupsafe", "pydantic-core", "execnet", "pytest-xdist"} <= found
-    assert not {"hypothesis", "mypy", "tox", "import-linter", "mutator"} & found
+    assert not {"hypothesis", "mypy", "tox", "import-linter", DISTRIBUTION} & found
 
 
 def test_requirements_that_do_not_apply_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     told = {
-        "mutator": ("1", ["a[fast]>=1", "w; sys_platform == 'win32'", "t; extra == 'test'"]),
+        DISTRIBUTION: ("1", ["a[fast]>=1", "w; sys_platform == 'win32'", "t; extra == 'test'"]),
         "a": ("1", ["b", "c; extra == 'fast'", "d; extra == 'slow'", "gone"]),
         **{name: ("1", []) for name in "bcdtw"},
     }

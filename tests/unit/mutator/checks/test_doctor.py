@@ -25,6 +25,14 @@ def test_a_missing_package_fails_with_its_pip_line(monkeypatch: pytest.MonkeyPat
     assert finding.remedy == "pip install 'no-such-package<3,>=2'"
 
 
+def test_a_harness_that_pip_did_not_install_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It runs from the clone, but its requirements and the additions of other packages are unknown."""
+    monkeypatch.setattr(doctor, "DISTRIBUTION", "no-such-mutator")
+    [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "no-such-mutator"]
+    assert (finding.level, finding.found) == (CheckState.WARN, "not installed")
+    assert "pip install" in finding.remedy
+
+
 def test_another_version_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     """The package might still work."""
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ["numpy>=999"])

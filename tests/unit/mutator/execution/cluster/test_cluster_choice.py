@@ -128,7 +128,9 @@ def test_a_loopback_address_of_a_scheduler_that_listens_elsewhere_is_refused(
 def test_without_dask_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     for text in ("local:1", "tcp://127.0.0.1:1"):
-        with pytest.raises(MutatorError, match=r"distributed is not installed; pip install '.\[cluster\]'"):
+        with pytest.raises(
+            MutatorError, match=r"distributed is not installed; pip install 'mutator-fi\[cluster\]'"
+        ):
             run(opened(parse_cluster_choice(text)))
 
 
