@@ -13,7 +13,7 @@ from mutator.mutants.constants_and_defaults import (
     choose_constant_or_default,
     list_constants_and_defaults,
 )
-from mutator.mutants.expression_resolution import (
+from mutator.mutants.anchor_resolution import (
     choose_expression,
     describe_valid_nth,
     normalized_anchor_name,

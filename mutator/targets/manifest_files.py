@@ -18,7 +18,7 @@ from mutator.targets.observation_model import ObservationModel, build_observatio
 from mutator.targets.process_environment import check_environment
 from mutator.targets.relative_paths import clean_relative_path
 from mutator.targets.required_packages import parse_requirements
-from mutator.targets.scene_model import SceneModel, build_scene
+from mutator.targets.overhead_view_model import SceneModel, build_scene
 from mutator.targets.severity_model import check_contact
 from mutator.targets.target_roots import (
     INSTALLED_PREFIX,

@@ -30,7 +30,7 @@ from mutator.engines.engine_jobs import MODES_TO_PROVE, EngineArguments, Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import DiskFull, MutatorError, ResourceShortage, WorkerGoldenRunsDiffer
 from mutator.execution.cluster.golden_cache import GoldenRunCache
-from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceKind, PieceResult
+from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceKind, PieceResult
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
 from mutator.execution.worker import timing_of

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 
 from mutator.campaigns.chunks import PendingChunk
-from mutator.execution.cluster.pieces import Piece, PieceKind
+from mutator.execution.cluster.piece_messages import Piece, PieceKind
 from mutator.execution.cluster.work_by_golden import (
     GoldenRunGroup,
     PlanLinesOfRun,

@@ -4,7 +4,7 @@ import json
 from functools import partial
 
 from mutator.errors import MutatorError
-from mutator.execution.cluster.pieces import Piece, PieceKind, PieceResult
+from mutator.execution.cluster.piece_messages import Piece, PieceKind, PieceResult
 from mutator.execution.experiment_runner import record_without_outcome
 from mutator.execution.written_files import FileDigests
 from mutator.model import Status

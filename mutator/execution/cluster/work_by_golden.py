@@ -7,7 +7,7 @@ from itertools import groupby
 from typing import Any
 
 from mutator.campaigns.chunks import PendingChunk
-from mutator.execution.cluster.pieces import Piece
+from mutator.execution.cluster.piece_messages import Piece
 from mutator.store import plan_file
 from mutator.store.plan_lines import id_on_line, parse_experiment, parse_fault, values_hashed_into_id
 from mutator.store.run_folder import RunFolder

@@ -23,7 +23,7 @@ from mutator._common.files import raising_disk_full, remove_folder
 from mutator._common.resource_shortages import find_shortage
 from mutator.errors import MutatorError, PieceNoLongerNeeded
 from mutator.execution.cluster import bundle
-from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceResult
+from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceResult
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.worker import python_command_dying_with
 

@@ -9,7 +9,7 @@ import pytest
 from mutator._common import shared_cache
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
-from mutator.execution.finished_run_cache import find_finished_run
+from mutator.execution.finished_outcome_cache import find_finished_run
 from mutator.store import file_digests, integrity, verified_runs_cache
 from mutator.store.patch_files import PatchFolder
 from mutator.store.patch_files import rewrite_patch_file as rewrite_patches

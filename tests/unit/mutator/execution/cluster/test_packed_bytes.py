@@ -7,7 +7,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
-from mutator.execution.cluster.pieces import PieceEnding, PieceResult
+from mutator.execution.cluster.piece_messages import PieceEnding, PieceResult
 
 
 def test_parts_are_read_back_in_order() -> None:

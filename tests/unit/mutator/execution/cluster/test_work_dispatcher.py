@@ -22,7 +22,7 @@ from mutator.errors import MutatorWarning
 from mutator.execution.cluster import cluster_distributor
 from mutator.execution.cluster.bundle import Bundle
 from mutator.execution.cluster.cluster_distributor import ClusterDistributor
-from mutator.execution.cluster.pieces import Piece, PieceEnding, PieceResult
+from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceResult
 from mutator.execution.cluster.result_intake import ResultIntake
 from mutator.execution.cluster.work_dispatcher import WorkDispatcher
 from mutator.execution.cluster.worker_roster import WorkerRoster

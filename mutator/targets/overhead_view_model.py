@@ -8,7 +8,7 @@ from pydantic import Field
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.targets.manifest_formulas import manifest_condition, manifest_formula
-from mutator.targets.scene import ActorShape, GroundLine, Scene, SceneActor
+from mutator.targets.overhead_view import ActorShape, GroundLine, Scene, SceneActor
 
 
 class _ActorModel(StrictModel, title="An actor"):
