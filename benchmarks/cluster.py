@@ -34,8 +34,8 @@ from mutator.execution.cluster import cluster_distributor, worker_roster, worker
 from mutator.execution.cluster import result_intake as intakes
 from mutator.execution.cluster.bundle import Bundle
 from mutator.execution.cluster.cluster_choice import parse_cluster_choice
-from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceResult
+from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.patch_files import pack_patches
 from mutator.store.run_folder import RunFolder

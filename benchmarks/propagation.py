@@ -13,8 +13,9 @@ from time import process_time
 
 import mutator
 from mutator.outcomes.channel_departures import departures_from_golden
-from mutator.outcomes.golden_comparison import compare_traces, load_trace
+from mutator.outcomes.golden_comparison import compare_traces
 from mutator.outcomes.hazards_and_metrics import load_manifest_channels
+from mutator.outcomes.trace_loading import load_trace
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -9,8 +9,8 @@ from mutator.api.notebook_html import diff_html, facts_html, text_html
 from mutator.figures.golden_and_faulty_plot import draw_golden_and_faulty, event_marks
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.file_patches import patch_without_new_files
-from mutator.outcomes.golden_comparison import Trace, values_on_steps
 from mutator.outcomes.trace_files import own_times
+from mutator.outcomes.trace_loading import Trace, values_on_steps
 from mutator.outcomes.verdict_rules import (
     fault_tolerant_time,
     manifestation_to_hazard_time,

@@ -11,8 +11,8 @@ from mutator.api.stored_experiments import StoredExperiment
 from mutator.api.trials import Trial, build_trial
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun_experiment
-from mutator.outcomes.golden_comparison import Trace, load_trace
 from mutator.outcomes.series_sampling import write_sampled_series
+from mutator.outcomes.trace_loading import Trace, load_trace
 from mutator.report.film import ExperimentFilmer, Shot
 
 

@@ -28,7 +28,7 @@ from mutator.outcomes.fault_free_runs import (
     fault_free_alerts_note,
     load_fault_free_runs,
 )
-from mutator.outcomes.golden_comparison import load_trace
+from mutator.outcomes.trace_loading import load_trace
 from mutator.preflight import equivalence_check
 from mutator.report import report_builder
 from mutator.report.stills import take_stills

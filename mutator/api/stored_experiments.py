@@ -14,8 +14,8 @@ from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Record
 from mutator.outcomes.fault_paths import FaultPath, FaultPathFinder, fault_paths_of
-from mutator.outcomes.golden_comparison import Trace
 from mutator.outcomes.series_sampling import traces_of_series
+from mutator.outcomes.trace_loading import Trace
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, rerun_command

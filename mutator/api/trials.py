@@ -14,8 +14,8 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import SingleRun, run_single
 from mutator.figures.golden_and_faulty_plot import save_figure
 from mutator.model import Experiment, Method, Record
-from mutator.outcomes.golden_comparison import Trace, load_trace
 from mutator.outcomes.hazards_and_metrics import load_judged_run
+from mutator.outcomes.trace_loading import Trace, load_trace
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import ChannelFacts, channel_facts

@@ -25,8 +25,8 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.store import file_digests, plan_file
-from mutator.store.allowed_contents import check_plain_contents
 from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
+from mutator.store.plain_contents_check import check_plain_contents
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RUN_SCHEMA, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest

@@ -18,12 +18,12 @@ from mutator.faults.fault_models import FaultModels
 from mutator.model import AfterHazard, Experiment, ObservedActivation, Record, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import activation_of
-from mutator.outcomes import golden_comparison
+from mutator.outcomes import golden_comparison, trace_loading
 from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.failure_cause import judge_failure, run_error
-from mutator.outcomes.golden_comparison import Trace
 from mutator.outcomes.hazards_and_metrics import RunJudgement, load_judged_run, load_manifest_channels
 from mutator.outcomes.series_sampling import SeriesSampler
+from mutator.outcomes.trace_loading import Trace
 from mutator.outcomes.verdict_rules import first_events_after, outcome_of
 from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store.run_folder import GoldenRun
@@ -273,8 +273,8 @@ class ExperimentRunner:
             if judged.t_end is None:
                 why = "was stopped, but no terminal hazard is in its trace"
                 return _record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, why, mutant)
-            reference = golden_comparison.trace_until(reference, faulty[time][-1], time)
-        faulty = golden_comparison.with_golden_times(reference, faulty, time)
+            reference = trace_loading.trace_until(reference, faulty[time][-1], time)
+        faulty = trace_loading.with_golden_times(reference, faulty, time)
         difference = golden_comparison.compare_traces(
             reference, faulty, self.manifest.compared_channels, time, judged.t_end
         )
@@ -292,7 +292,7 @@ class ExperimentRunner:
             max_dev=difference.max_dev,
             hazards=tuple(hazards),
             alerts=tuple(first_events_after(judged.alerts, activation)),
-            trace_digest=golden_comparison.trace_digest(self.manifest, execution.out),
+            trace_digest=trace_loading.trace_digest(self.manifest, execution.out),
             patch=digest(mutant.patch_bytes),
             t_end=judged.t_end,
             dev=() if judged.t_end is None else difference.max_dev_in_drive,

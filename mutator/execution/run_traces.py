@@ -8,8 +8,8 @@ from mutator._common.confined_files import path_below
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun_experiment
 from mutator.model import Experiment, Record
-from mutator.outcomes.golden_comparison import Trace, load_trace, trace_digest
 from mutator.outcomes.series_sampling import traces_of_series, write_sampled_series
+from mutator.outcomes.trace_loading import Trace, load_trace, trace_digest
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, rerun_command

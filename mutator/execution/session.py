@@ -30,7 +30,11 @@ from mutator.engines.engine_choice import choose_engine, reason_not_to_fork
 from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import ensure_work_folder
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, DiskFull, MutatorError, MutatorWarning
-from mutator.execution.finished_outcome_cache import FinishedRunOutcome, find_finished_run, remember_finished_run
+from mutator.execution.finished_outcome_cache import (
+    FinishedRunOutcome,
+    find_finished_run,
+    remember_finished_run,
+)
 from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record

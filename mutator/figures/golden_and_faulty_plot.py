@@ -17,7 +17,7 @@ from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
 from mutator.figures.style import shipped_style
 from mutator.model import Record
-from mutator.outcomes.golden_comparison import Trace, times_of
+from mutator.outcomes.trace_loading import Trace, times_of
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 

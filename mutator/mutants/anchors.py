@@ -8,15 +8,15 @@ from mutator._common.interrupts import delaying_interrupts
 from mutator._common.message_text import counted, spelling_suggestion
 from mutator.errors import MutatorError
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
-from mutator.mutants.constants_and_defaults import (
-    ConstantOrDefault,
-    choose_constant_or_default,
-    list_constants_and_defaults,
-)
 from mutator.mutants.anchor_resolution import (
     choose_expression,
     describe_valid_nth,
     normalized_anchor_name,
+)
+from mutator.mutants.constants_and_defaults import (
+    ConstantOrDefault,
+    choose_constant_or_default,
+    list_constants_and_defaults,
 )
 from mutator.mutants.expressions import Expression, list_expressions
 from mutator.mutants.name_scopes import normalize_identifier, used_names_by_function

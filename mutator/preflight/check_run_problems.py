@@ -11,7 +11,7 @@ from mutator.engines.engine_jobs import JobResult
 from mutator.errors import BadOutput
 from mutator.model import Status
 from mutator.mutants.probe import was_triggered
-from mutator.outcomes import golden_comparison
+from mutator.outcomes import trace_loading
 from mutator.outcomes.hazards_and_metrics import load_judged_run
 from mutator.targets.manifest import TargetManifest
 
@@ -46,7 +46,7 @@ def read_check_run(manifest: TargetManifest, execution: JobResult) -> CheckRun:
     return CheckRun(
         problem="",
         output_digest=output_digest_of(manifest, execution.out),
-        trace_digest=golden_comparison.trace_digest(manifest, execution.out),
+        trace_digest=trace_loading.trace_digest(manifest, execution.out),
         alerts=judged.alerts,
         hazards=judged.hazards,
         has_triggered=was_triggered(execution.probe_report),

@@ -12,12 +12,8 @@ from mutator._common.doors import EXPORTS
 from mutator._common.files import final_name_of_half_written, is_half_written, read_json, remove_folder
 from mutator._common.folder_locks import lock_run_folder
 from mutator.errors import MutatorError
-from mutator.store.allowed_contents import (
-    ALLOWED_FILE_GLOBS,
-    ALLOWED_TOP_FOLDERS,
-    check_plain_contents,
-    is_unchecked_folder,
-)
+from mutator.store.allowed_contents import ALLOWED_FILE_GLOBS, ALLOWED_TOP_FOLDERS
+from mutator.store.plain_contents_check import check_plain_contents, is_unchecked_folder
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, RUN_SCHEMA
 

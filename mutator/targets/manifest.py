@@ -17,8 +17,8 @@ from mutator.targets.channels import Channel, Role
 from mutator.targets.contact_severity import DELTA_V_NAME, ContactSettings
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.observed_values import Observation
-from mutator.targets.placeholders import fill_placeholders
 from mutator.targets.overhead_view import Scene
+from mutator.targets.placeholders import fill_placeholders
 from mutator.targets.source_tree import SourceTree, matches_any_glob, read_tree
 from mutator.triggers import temporal_logic
 from mutator.triggers.conditions import GOLDEN_PREFIX, names_in

@@ -15,10 +15,10 @@ from mutator.targets.criteria_model import HazardModel, MetricModel, build_hazar
 from mutator.targets.entry_model import EntryModel, ScenarioChangeModel, check_commands
 from mutator.targets.manifest import FilmCommands, TargetManifest
 from mutator.targets.observation_model import ObservationModel, build_observation
+from mutator.targets.overhead_view_model import SceneModel, build_scene
 from mutator.targets.process_environment import check_environment
 from mutator.targets.relative_paths import clean_relative_path
 from mutator.targets.required_packages import parse_requirements
-from mutator.targets.overhead_view_model import SceneModel, build_scene
 from mutator.targets.severity_model import check_contact
 from mutator.targets.target_roots import (
     INSTALLED_PREFIX,

@@ -18,8 +18,8 @@ from mutator._common.typed_json import from_json_types
 from mutator.errors import DiskFull, MutatorError, SchedulerGone, WorkerCutOff, WorkerRefused
 from mutator.execution.cluster import worker_tasks
 from mutator.execution.cluster.bundle import Bundle
-from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceResult
+from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.execution.cluster.result_intake import ResultIntake
 from mutator.execution.cluster.worker_calls import await_answer, call_on_worker, submit_to_worker
 from mutator.execution.cluster.worker_roster import WorkerRoster, describe_worker

@@ -10,8 +10,8 @@ import pytest
 from mutator.campaigns.chunks import pending_chunks_of
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.execution.cluster.piece_messages import Piece, PieceKind
+from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.preflight.equivalence_check import SampledExperiment
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder

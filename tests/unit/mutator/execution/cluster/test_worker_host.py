@@ -15,8 +15,8 @@ from mutator.errors import MutatorError, PieceNoLongerNeeded
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.bundle import Bundle, load_run_inputs
 from mutator.execution.cluster.golden_cache import GoldenRunCache
-from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceResult
+from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.cluster.worker_host import WorkerHost
 from mutator.execution.session import open_session
