@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 MOST_LISTED_FINDINGS = 20  # experiments listed in the terminal; the written comparison lists all of them
 GATES_HELP = (
-    "new-hazard, other-hazard, higher-severity, earlier-hazard, lost-alert, worse, new-crash, harness-error, "
-    "unmatched, severity:CLASS (S0 to S3: RUN_B has a contact of that class or worse, RUN_A a milder one or "
-    "none)"
+    "new-hazard, new-silent-hazard (no alert comes before it; new, or its alert is lost), other-hazard, "
+    "higher-severity, earlier-hazard, lost-alert, worse, new-crash, harness-error, unmatched, severity:CLASS "
+    "(S0 to S3: RUN_B has a contact of that class or worse, RUN_A a milder one or none)"
 )
 
 
@@ -31,7 +31,8 @@ EXAMPLES = """\b
 Examples:
   mutator compare runs/before runs/after
   mutator compare runs/before runs/after --only 'module == "vision_input"'
-  mutator compare runs/main runs/change --fail-on new-hazard,new-crash,harness-error
+  mutator compare runs/main runs/change \\
+    --fail-on new-hazard,new-silent-hazard,new-crash,harness-error,unmatched
   mutator compare runs/main runs/change --fail-on severity:S2
 
 With --fail-on, the exit code is 1 if such a change is found; each is printed. Otherwise it is 3 if
@@ -100,8 +101,9 @@ def _parse_gates(texts: list[str]) -> "list[mutator.Gate]":
 
 def _print_comparison(terminal: Terminal, run_comparison: "mutator.RunComparison") -> None:
     comparison = run_comparison.comparison
-    if comparison.campaign_parts_remark:
-        terminal.print_text(comparison.campaign_parts_remark, style="bold")
+    for remark in comparison.campaign_remarks:
+        terminal.print_text(remark, style="bold")
+    if comparison.campaign_remarks:
         terminal.print_text()
     differing = [(f.name, f.a, f.b) for f in comparison.facts if f.is_different]
     if differing:
@@ -119,7 +121,7 @@ def _print_comparison(terminal: Terminal, run_comparison: "mutator.RunComparison
         terminal.print_text()
     terminal.print_text(run_comparison.summary)
     for remark in comparison.remarks:
-        if remark != comparison.campaign_parts_remark:
+        if remark not in comparison.campaign_remarks:
             terminal.print_text(remark)
 
 
@@ -150,9 +152,17 @@ def _fail_on_findings(
     gates: "list[mutator.Gate]",
     failing: "tuple[GateFinding, ...]",
 ) -> None:
-    for finding in failing[:MOST_LISTED_FINDINGS]:
-        terminal.print_error(f"{finding.gate.value}: {finding.description} [{finding.experiment_id}]")
-    if unlisted := failing[MOST_LISTED_FINDINGS:]:
+    gates_by_experiment: dict[tuple[str, str], list[str]] = {}  # an experiment can fail several gates
+    for finding in failing:
+        experiment = (finding.description, finding.experiment_id)
+        gates_by_experiment.setdefault(experiment, []).append(finding.gate.value)
+    lines = [
+        f"{', '.join(kinds)}: {description} [{experiment_id}]"
+        for (description, experiment_id), kinds in gates_by_experiment.items()
+    ]
+    for line in lines[:MOST_LISTED_FINDINGS]:
+        terminal.print_error(line)
+    if unlisted := lines[MOST_LISTED_FINDINGS:]:
         terminal.print_error(f"and {len(unlisted)} more")
     if failing:  # outweighs missing results
         raise typer.Exit(EXIT_CHECK_FAILED)

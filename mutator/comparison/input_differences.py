@@ -94,6 +94,18 @@ def differing_pairs_remarks(a: ComparedRun, b: ComparedRun, matching: Experiment
     return tuple(f"Pairs {what}: {n} of {len(matching.pairs)}." for n, what in counts if n)
 
 
+def different_campaigns_remark(a: ComparedRun, b: ComparedRun) -> str:
+    """Return a remark that the runs are of different campaigns, or of two versions of one; else ''."""
+    head_a, head_b = a.folder.head, b.folder.head
+    if head_a.campaign != head_b.campaign:
+        campaigns = f"The runs are of different campaigns: {head_a.campaign} and {head_b.campaign}."
+    elif head_a.campaign_digest != head_b.campaign_digest:
+        campaigns = f"The file of the campaign {head_a.campaign} differs between the runs."
+    else:
+        return ""
+    return f"{campaigns} Only experiments that both plan are compared."
+
+
 def campaign_parts_remark(a: ComparedRun, b: ComparedRun) -> str:
     """Return a remark that the runs are different parts of a campaign; empty if they are the same part."""
     of_a, of_b = (

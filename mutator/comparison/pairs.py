@@ -1,5 +1,6 @@
 """Matches the experiments of two runs and classifies the changes in each pair."""
 
+import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ class ResultChangeKind(StrEnum):
     for the worse.
     """
 
+    NEW_SILENT_HAZARD = "new-silent-hazard"
     NEW_HAZARD = "new-hazard"
     OTHER_HAZARD = "other-hazard"
     HIGHER_SEVERITY = "higher-severity"
@@ -116,8 +118,24 @@ def _change_kinds_between(a: ResultRow, b: ResultRow) -> Iterable[ResultChangeKi
     yield from _hazard_change_kinds(a, b)
     if a.severity != b.severity:
         yield ResultChangeKind.HIGHER_SEVERITY if a.severity < b.severity else ResultChangeKind.LOWER_SEVERITY
-    if bool(a.alerts) != bool(b.alerts):
-        yield ResultChangeKind.LOST_ALERT if a.alerts else ResultChangeKind.NEW_ALERT
+    yield from _alert_change_kinds(a, b)
+
+
+def _alert_change_kinds(a: ResultRow, b: ResultRow) -> Iterable[ResultChangeKind]:
+    if silent_hazards(b) - silent_hazards(a):
+        yield ResultChangeKind.NEW_SILENT_HAZARD
+    if b.alerts and not a.alerts:
+        yield ResultChangeKind.NEW_ALERT
+    # a hazard that is gone needs no alert
+    if a.alerts and not b.alerts and (b.hazards or not a.hazards):
+        yield ResultChangeKind.LOST_ALERT
+
+
+def silent_hazards(row: ResultRow) -> frozenset[str]:
+    """Return the names of the hazards in the drive that no alert came before."""
+    silent_until = math.inf if row.t_alert is None else row.t_alert
+    drive_end = math.inf if row.t_end is None else row.t_end
+    return frozenset(name for name, time in row.hazards if time <= min(silent_until, drive_end))
 
 
 def _change_kind_by_harm(harm_increase: int) -> ResultChangeKind:

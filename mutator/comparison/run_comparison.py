@@ -11,6 +11,7 @@ from mutator.comparison.input_differences import (
     DifferingTargetFiles,
     InputFact,
     campaign_parts_remark,
+    different_campaigns_remark,
     differing_pairs_remarks,
     differing_target_files,
     input_facts,
@@ -42,13 +43,16 @@ class Gate(StrEnum):
     """What a gate fails on: a change for the worse, or an unmatched experiment."""
 
     NEW_HAZARD = ResultChangeKind.NEW_HAZARD.value  #: a hazard, although the first run has none
+    #: a hazard without an alert before it, although the first run has no such hazard, or an alert before it
+    NEW_SILENT_HAZARD = ResultChangeKind.NEW_SILENT_HAZARD.value
     #: another hazard, although the first run already has one
     OTHER_HAZARD = ResultChangeKind.OTHER_HAZARD.value
     HIGHER_SEVERITY = (
         ResultChangeKind.HIGHER_SEVERITY.value
     )  #: a contact of a higher class, or a contact although the first run has none
     EARLIER_HAZARD = ResultChangeKind.EARLIER_HAZARD.value  #: less time from activation to the first hazard
-    LOST_ALERT = ResultChangeKind.LOST_ALERT.value  #: no alert, although the first run has one
+    #: no alert, although the first run has one; a hazard of the first run, if any, is not gone
+    LOST_ALERT = ResultChangeKind.LOST_ALERT.value
     WORSE = (
         ResultChangeKind.WORSE.value
     )  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard
@@ -114,17 +118,18 @@ class Comparison:
         """Caveats to read before the tables."""
         noted = zip((self.names.a, self.names.b), self.golden_alerts_notes, strict=True)
         alert_remarks = tuple(f"{name}: {note}" for name, note in noted if note)
-        first = (self.campaign_parts_remark,) if self.campaign_parts_remark else ()
         return (
-            first
+            self.campaign_remarks
             + differing_pairs_remarks(self.a, self.b, self.matching)
             + severity_remarks(self.a, self.b)
             + alert_remarks
         )
 
     @cached_property
-    def campaign_parts_remark(self) -> str:
-        return campaign_parts_remark(self.a, self.b)
+    def campaign_remarks(self) -> tuple[str, ...]:
+        """Remarks that the runs cover different campaigns, or different parts of one; the first to read."""
+        remarks = (different_campaigns_remark(self.a, self.b), campaign_parts_remark(self.a, self.b))
+        return tuple(filter(None, remarks))
 
     @cached_property
     def sheets(self) -> tuple[Sheet, ...]:
@@ -179,9 +184,10 @@ def compare_runs(
     a, b = a.classified_by(scale), b.classified_by(scale)
     matching = match_experiments(a, b)
     if not matching.pairs:
+        campaigns = dict.fromkeys((a.folder.head.campaign, b.folder.head.campaign))
         raise MutatorError(
-            f"no experiment of {a.name} has a partner in {b.name} (experiments with a result: "
-            f"{len(a.row_by_id)} and {len(b.row_by_id)})",
+            f"no experiment of {a.name} has a partner in {b.name} (campaign {' and '.join(campaigns)}; "
+            f"experiments with a result: {len(a.row_by_id)} and {len(b.row_by_id)})",
             where=run_b,
             argument="only",
             expected="runs of the same faults, scenarios and triggers",

@@ -16,6 +16,7 @@ from mutator.results.outcome_counting import (
 from mutator.results.plan_columns import numeric_value_of
 from mutator.results.table_columns import alert_names_in
 from mutator.targets.contact_severity import DELTA_V_NAME
+from mutator.targets.stored_target_facts import DRIVE_END_COLUMN
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,6 +45,7 @@ class ResultRow:
     detail: str
     severity: str = ""  # class of the contact that ended the drive
     delta_v: float | None = None  # delta-v of that contact in m/s
+    t_end: float | None = None  # when a terminal hazard ended the drive
     margins: tuple[tuple[str, float], ...] = ()  # by hazard: those that occurred or, if none did, all
 
     @property
@@ -117,5 +119,6 @@ def _build_row(
         detail=cells["detail"],
         severity=cells.get("severity", ""),
         delta_v=cells.get(DELTA_V_NAME),
+        t_end=cells.get(DRIVE_END_COLUMN),
         margins=margins,
     )

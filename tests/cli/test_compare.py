@@ -49,6 +49,24 @@ def test_a_different_selection_is_reported_before_any_table(cli: Cli, root: Path
     assert "different parts" not in cli("compare", runs[1], runs[1], "--out", "d").out
 
 
+def test_different_campaigns_are_reported_before_any_table(cli: Cli, root: Path, write_run: Write) -> None:
+    """So is a campaign file that changed between the runs; only experiments of both are compared."""
+    workspace = Workspace.find(root)
+    runs = [write_run(workspace, Path(name), campaign=name) for name in ("toy", "small")]
+    answer = cli("compare", *runs, "--out", "c")
+    assert answer.code == 0, answer.err
+    assert answer.out.startswith("The runs are of different campaigns: toy and small.")
+    assert (Path("c") / "COMPARISON.md").read_text().count("different campaigns: toy and small") == 1
+    assert cli("compare", *runs, "--out", "c", "--fail-on", "unmatched").code == 1
+    file = root / "fault_library" / "campaigns" / "toy.yaml"
+    file.write_text(file.read_text() + "# changed\n")
+    changed = write_run(workspace, Path("changed"))
+    answer = cli("compare", runs[0], changed, "--out", "c")
+    assert answer.out.startswith("The file of the campaign toy differs between the runs.")
+    refused = cli("compare", *runs, "--only", 'method == "random" and value == 1.0')
+    assert (refused.code, "(campaign toy and small; experiments" in refused.err) == (2, True)
+
+
 def test_alerts_of_fault_free_runs_are_named(
     cli: Cli, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -70,6 +88,9 @@ def test_a_gate_fails_for_a_new_hazard(cli: Cli, runs: tuple[Path, Path]) -> Non
     assert failed.code == 1
     assert "new-hazard: sensor/silence/no_data, A, guided" in failed.err
     assert (Path("c") / "index.html").is_file()
+    both = cli("compare", *runs, "--out", "c", "--fail-on", "new-hazard,new-silent-hazard")
+    assert both.err.count("sensor/silence/no_data, A, guided far") == 1
+    assert "new-hazard, new-silent-hazard: sensor/silence/no_data, A, guided" in both.err
     assert cli("compare", *reversed(runs), "--fail-on", "lost-alert", "--fail-on", "new-hazard").code == 0
 
 

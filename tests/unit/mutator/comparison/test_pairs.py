@@ -94,6 +94,9 @@ HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H1", 5.0),)}
 LATER = {"outcome": Outcome.HAZARD, "hazards": (("H1", 6.0),)}
 OTHER = {"outcome": Outcome.HAZARD, "hazards": (("H1", 5.0), ("H2", 7.0))}
 ALERT = {"alerts": ("fcw",), "t_alert": 3.0}
+WARNED = HAZARD | ALERT
+WARNED_LATE = HAZARD | {"alerts": ("fcw",), "t_alert": 5.0}
+TWO_WARNED = OTHER | {"alerts": ("fcw",), "t_alert": 6.0}  # H1 silently, then H2 after an alert
 IDLE = {"outcome": Outcome.NOT_ACTIVATED, "t_activation": None}
 CRASH = {"status": Status.CRASHED, "outcome": None}
 TIMEOUT = {"status": Status.TIMEOUT, "outcome": None}
@@ -109,12 +112,21 @@ SDC = {"outcome": Outcome.SDC, "t_manifest": 2.5}
         ({}, SDC, "worse"),
         (SDC, {}, "better"),
         ({}, IDLE, "otherwise"),
-        (IDLE, HAZARD, "new-hazard worse"),
+        (IDLE, HAZARD, "new-silent-hazard new-hazard worse"),
+        (IDLE, WARNED, "new-hazard new-alert worse"),
+        (WARNED, HAZARD, "new-silent-hazard lost-alert"),
+        (WARNED, WARNED_LATE, "new-silent-hazard"),
+        (WARNED | LATER, HAZARD, "new-silent-hazard lost-alert earlier-hazard"),
+        (HAZARD, WARNED_LATE, "new-alert"),
+        (HAZARD, TWO_WARNED, "other-hazard new-alert"),
+        (TWO_WARNED, OTHER, "new-silent-hazard lost-alert"),
+        (WARNED, SDC, "hazard-gone better"),
         (HAZARD, SDC, "hazard-gone better"),
         (HAZARD, LATER, "later-hazard"),
         (LATER, HAZARD, "earlier-hazard"),
         (HAZARD, LATER | {"t_activation": 3.0}, ""),
-        (HAZARD, OTHER, "other-hazard"),
+        (HAZARD, OTHER, "new-silent-hazard other-hazard"),
+        (HAZARD | {"t_end": 5.0}, OTHER | {"t_end": 5.0}, "other-hazard"),
         (OTHER, HAZARD, ""),
         (ALERT, {}, "lost-alert"),
         ({}, ALERT, "new-alert"),
@@ -131,7 +143,7 @@ SDC = {"outcome": Outcome.SDC, "t_manifest": 2.5}
 def test_each_kind_of_change_is_reported(
     experiment: Make, a: dict[str, Any], b: dict[str, Any], changes: str
 ) -> None:
-    """Times are compared relative to the activation."""
+    """Times are compared relative to the activation. A hazard after the end of the drive is not silent."""
     e = experiment()
     pair = ExperimentPair(e, e, row(**a), row(**b))
     assert pair.change_kinds == {ResultChangeKind(name) for name in changes.split()}

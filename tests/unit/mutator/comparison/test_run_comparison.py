@@ -177,7 +177,7 @@ def test_the_page_the_markdown_and_the_csv_file_list_every_change(found: Compari
     written = comparison_files.write_comparison(found, tmp_path / "out")
     pairs = list(csv.DictReader(written.pairs.open()))
     assert len(pairs) == 24
-    assert sum(p["changes"] == "new-hazard;worse" for p in pairs) == len(
+    assert sum(p["changes"] == "new-silent-hazard;new-hazard;worse" for p in pairs) == len(
         findings_of_gates(found, [Gate.NEW_HAZARD])
     )
     text = written.page.read_text()
