@@ -249,7 +249,8 @@ def _describe_ending(row: ResultRow) -> str:
     if row.severity:
         details.append(f"{row.severity}, delta-v {row.delta_v:.1f} m/s")
     if row.alerts:
-        details.append(f"alert {', '.join(row.alerts)}")
+        is_late = bool(row.hazards) and row.reaction_time is None
+        details.append(f"alert {', '.join(row.alerts)}" + (" only after the hazard" if is_late else ""))
     if not row.usable or (row.detail and not details):
         details.append(row.detail.splitlines()[0] if row.detail else "no result")
     return f"{row.ending} ({'; '.join(details)})" if details else row.ending
