@@ -12,10 +12,10 @@ from mutator.mutants.file_patches import patch_without_new_files
 from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.trace_loading import Trace, values_on_steps
 from mutator.outcomes.verdict_rules import (
-    fault_tolerant_time,
     manifestation_to_hazard_time,
     reaction_time,
     severity_class_of,
+    time_to_hazard,
 )
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
@@ -211,7 +211,7 @@ def verdict_facts(record: Record, scale: SeverityScale | None) -> dict[str, Any]
         "alerts_s": dict(record.alerts),
         "reaction_time_s": reaction_time(record.hazards, record.alerts),
         "severity": severity_class_of(record, scale),
-        "fault_tolerant_time_s": fault_tolerant_time(record),
+        "time_to_hazard_s": time_to_hazard(record),
         "manifest_to_hazard_s": manifestation_to_hazard_time(record),
         "largest_difference": dict(record.max_dev),
         # the other order would undo the limit: `dev` replaces values of the whole run

@@ -22,6 +22,7 @@ _ORDER_OPERATORS: dict[type[ast.cmpop], Callable[[object, object], bool]] = {
     ast.Gt: operator.gt,  # type: ignore[dict-item]
     ast.GtE: operator.ge,  # type: ignore[dict-item]
 }
+RENAMED_COLUMNS = {"fault_tolerant_time": "time_to_hazard"}  # columns of earlier versions
 _MOST_CHARACTERS = 2000  # more than anybody writes; limits how deep an expression can nest
 _ALLOWED_SYNTAX = (
     'columns, numbers, "strings", ==, !=, <, <=, >, >=, in, not in, and, or, not, match(column, "glob*")'
@@ -129,8 +130,12 @@ class _FilterCompiler:
         if isinstance(node, ast.Name):
             name = node.id
             if name not in self.columns:
+                new_name = RENAMED_COLUMNS.get(name)
+                remedy = (
+                    f"write `{new_name}`, the name of this column now" if new_name in self.columns else ""
+                )
                 raise _filter_error(
-                    self.text, f"unknown column `{name}`", "one of " + ", ".join(self.columns)
+                    self.text, f"unknown column `{name}`", "one of " + ", ".join(self.columns), remedy
                 )
             return lambda row: row[name]
         constant = self.constant_value(node)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from mutator.workspace import Workspace
 
 _TIME_LABELS = {
-    "fault_tolerant_time_s": "fault-tolerant time (first hazard - activation)",
+    "time_to_hazard_s": "time to hazard (first hazard - activation)",
     "reaction_time_s": "reaction time (first hazard - first alert)",
 }
 

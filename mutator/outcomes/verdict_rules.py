@@ -49,11 +49,26 @@ def reaction_time(hazards: EventTimes, alerts: EventTimes) -> float | None:
     return hazards[0][1] - alerts[0][1]
 
 
-def fault_tolerant_time(record: Record) -> float | None:
-    """Return the fault-tolerant time: from activation to the first hazard, in s. None without a hazard."""
+def time_to_hazard(record: Record) -> float | None:
+    """Return the time from activation to the first hazard, in s, also if the fault had ended by then. None
+    without a hazard.
+    """
     if not record.hazards or record.activation is None:
         return None
     return record.hazards[0][1] - record.activation.first
+
+
+def was_active_at_hazard(record: Record) -> bool:
+    """Return whether the fault still acted when the first hazard came.
+
+    It did if it was active then or later. A run can end with the hazard, so that the next activation is
+    missing: the fault acted, too, if that was due, at the mean interval of its activations.
+    """
+    activation = record.activation
+    if not record.hazards or activation is None:
+        return False
+    mean_interval_s = (activation.last - activation.first) / max(activation.count - 1, 1)
+    return activation.last + mean_interval_s >= record.hazards[0][1]
 
 
 def manifestation_to_hazard_time(record: Record) -> float | None:

@@ -9,6 +9,7 @@ import numpy as np
 from mutator._common.helper_processes import map_in_processes, process_count_for
 from mutator.model import Fault, Record
 from mutator.outcomes.fault_paths import FaultPathFinder, PathInputs, UntimedPath
+from mutator.outcomes.verdict_rules import was_active_at_hazard
 from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.statistics.event_times import FirstAlertsByHazardRun
 from mutator.store.run_folder import RunFolder
@@ -22,12 +23,14 @@ _EXPERIMENTS_IN_BATCH = (
 # extra columns of a frame of results; no metric has such a name
 RANK_COLUMN, UNTIMED_PATH_COLUMN = "#place", "#untimed_path"
 _TimedAlerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
+_BatchFacts = tuple[list[PathInputs | None], dict[str, _TimedAlerts], set[str]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExperimentFacts:
     """`worst_first_ranks` (from 0) and `untimed_path_indices` (into `distinct_untimed_paths`, -1: none) have
-    a number for each row of the results. `alerts_by_hazardous_id` has only experiments with a hazard.
+    a number for each row of the results. `alerts_by_hazardous_id` has only experiments with a hazard, and
+    `ids_active_at_hazard` those whose fault still acted when the hazard came.
     `timings` has a row for each timed experiment; its engine is '' if not recorded.
     """
 
@@ -35,6 +38,7 @@ class ExperimentFacts:
     untimed_path_indices: np.ndarray
     distinct_untimed_paths: tuple[UntimedPath, ...]
     alerts_by_hazardous_id: FirstAlertsByHazardRun
+    ids_active_at_hazard: frozenset[str]
     timings: "DataFrame"
 
     @classmethod
@@ -50,10 +54,12 @@ class ExperimentFacts:
         untimed_paths: list[UntimedPath] = []
         path_numbers = np.full(len(results), -1, dtype=np.int32)
         alerts: dict[str, _TimedAlerts] = {}
-        for number, (all_inputs, batch_alerts) in enumerate(
-            _path_inputs_and_hazard_alerts_by_batch(results, records, faults, fault_paths)
+        ids_active_at_hazard: set[str] = set()
+        for number, (all_inputs, batch_alerts, batch_active_ids) in enumerate(
+            _path_inputs_and_hazards_by_batch(results, records, faults, fault_paths)
         ):
             alerts |= batch_alerts
+            ids_active_at_hazard |= batch_active_ids
             for row, inputs in enumerate(all_inputs, start=number * _EXPERIMENTS_IN_BATCH):
                 untimed_path = fault_paths.untimed_path_from(inputs) if fault_paths and inputs else None
                 if untimed_path is not None:
@@ -65,36 +71,41 @@ class ExperimentFacts:
             untimed_path_indices=path_numbers,
             distinct_untimed_paths=tuple(untimed_paths),
             alerts_by_hazardous_id=alerts,
+            ids_active_at_hazard=frozenset(ids_active_at_hazard),
             timings=timings_frame(folder),
         )
 
 
-def _path_inputs_and_hazard_alerts_by_batch(
+def _path_inputs_and_hazards_by_batch(
     results: "DataFrame",
     records: Mapping[str, Record],
     faults: Mapping[str, Fault],
     fault_paths: FaultPathFinder | None,
-) -> Iterator[tuple[list[PathInputs | None], dict[str, _TimedAlerts]]]:
-    """Yield, for each batch of experiments, their `PathInputs`, and the alerts of those with a hazard."""
+) -> Iterator[_BatchFacts]:
+    """Yield, for each batch of experiments, their `PathInputs`, the alerts of those with a hazard, and the
+    ids of those whose fault still acted then.
+    """
     pairs = results[["experiment_id", "fault_id"]]
 
-    def inputs_and_alerts(piece: "DataFrame") -> tuple[list[PathInputs | None], dict[str, _TimedAlerts]]:
+    def inputs_and_hazards(piece: "DataFrame") -> _BatchFacts:
         all_inputs: list[PathInputs | None] = []
-        alerts = {}
+        alerts, active_ids = {}, set()
         for name, fault in zip(piece["experiment_id"], piece["fault_id"], strict=True):
             record, inputs = records.get(name), None
             if record is not None:
                 if record.hazards:
                     alerts[name] = record.alerts
+                if was_active_at_hazard(record):
+                    active_ids.add(name)
                 if fault_paths and fault in faults:
                     inputs = fault_paths.path_inputs(faults[fault], record)
             all_inputs.append(inputs)
-        return all_inputs, alerts
+        return all_inputs, alerts, active_ids
 
     batches = [
         pairs[begin : begin + _EXPERIMENTS_IN_BATCH] for begin in range(0, len(pairs), _EXPERIMENTS_IN_BATCH)
     ]
-    return map_in_processes(inputs_and_alerts, batches, process_count_for(len(pairs)))
+    return map_in_processes(inputs_and_hazards, batches, process_count_for(len(pairs)))
 
 
 def timings_frame(folder: RunFolder) -> "DataFrame":

@@ -15,7 +15,9 @@ _COUNTING_TERMS = {
     "injected": "experiments with a valid result: no harness error, no invalid mutant",
     "activated": "a changed statement ran while its trigger held",
     "manifested": "after activation, an actuator output differed from the golden run",
-    "fault-tolerant time": "the time from activation to the first hazard",
+    "time to hazard": "the time from activation to the first hazard, also if the fault had ended by then",
+    "FTTI": "the fault tolerant time interval of ISO 26262, the shortest time from a fault to a hazard; runs "
+    "are a sample, so their shortest time with the fault still active is an upper bound",
     "margin": "the distance that a run kept from a hazard, negative once the hazard has occurred",
     "end of the drive": "the first terminal hazard, such as a contact: the simulation continues, but metrics "
     "and fault paths leave out later steps",

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
 from mutator.outcomes.verdict_rules import (
-    fault_tolerant_time,
     manifestation_to_hazard_time,
     reaction_time,
     severity_class_of,
+    time_to_hazard,
 )
 from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
 from mutator.results.table_writers import TableColumn
@@ -141,11 +141,11 @@ SEVERITY_COLUMN = ResultColumn(
 )
 TIME_TO_HAZARD_COLUMNS = (
     ResultColumn(
-        "fault_tolerant_time",
+        "time_to_hazard",
         "number",
         "s",
-        "time from the activation to the first hazard",
-        lambda f: _rounded_time(fault_tolerant_time(f.record)),
+        "time from the activation to the first hazard, also if the fault had ended by then",
+        lambda f: _rounded_time(time_to_hazard(f.record)),
     ),
     ResultColumn(
         "manifest_to_hazard",

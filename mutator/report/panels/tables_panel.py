@@ -14,7 +14,7 @@ from mutator.results.outcome_counting import (
     count_table,
     fault_types_of,
 )
-from mutator.statistics.metric_tables import fault_tolerant_times_sheet, metrics_sheet, severity_sheet
+from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, times_to_hazard_sheet
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.sheet_selection import run_sheets
 from mutator.statistics.statistics_sheet import Sheet
@@ -144,7 +144,11 @@ def _statistic_sheets(run: ReportedRun, published: PublishedCounts | None) -> tu
 def _distribution_sheets(run: ReportedRun) -> tuple[Sheet, ...]:
     sheets = (
         severity_sheet(run.frame),
-        fault_tolerant_times_sheet(run.frame, has_alerts=run.folder.has_alerts),
+        times_to_hazard_sheet(
+            run.frame,
+            run.frame["experiment_id"].isin(run.experiment_facts.ids_active_at_hazard),
+            has_alerts=run.folder.has_alerts,
+        ),
         metrics_sheet(run.frame, run.folder.head.metrics),
     )
     return tuple(sheet for sheet in sheets if sheet.lines)

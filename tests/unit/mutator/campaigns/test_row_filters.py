@@ -69,6 +69,17 @@ def test_the_error_for_an_unknown_column_lists_the_known_columns() -> None:
         compile_filter("speed > 1", ROW)
 
 
+def test_an_old_column_name_is_answered_with_the_new_one() -> None:
+    """Only where that column can be used."""
+    old = "fault_tolerant_time < 2"
+    with pytest.raises(MutatorError) as caught:
+        compile_filter(old, ["value", "time_to_hazard"])
+    assert caught.value.remedy == "write `time_to_hazard`, the name of this column now"
+    with pytest.raises(MutatorError) as caught:
+        compile_filter(old, ["value"])
+    assert not caught.value.remedy
+
+
 @pytest.mark.parametrize("text", ['value > "S1"', "scenario in 5"])
 def test_comparing_incompatible_values_is_a_mutator_error(text: str) -> None:
     accepts = compile_filter(text, ROW)

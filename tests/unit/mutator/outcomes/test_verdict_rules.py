@@ -1,11 +1,18 @@
 """The verdict's truth table, and the events that the verdict uses."""
 
+from collections.abc import Callable
 from itertools import product
 
 import pytest
 
-from mutator.model import ObservedActivation, Outcome
-from mutator.outcomes.verdict_rules import first_events_after, outcome_of, reaction_time
+from mutator.model import ObservedActivation, Outcome, Record
+from mutator.outcomes.verdict_rules import (
+    first_events_after,
+    outcome_of,
+    reaction_time,
+    time_to_hazard,
+    was_active_at_hazard,
+)
 
 ACTIVE = ObservedActivation(first=2.0, last=4.0, count=3)
 
@@ -68,3 +75,34 @@ def test_the_reaction_time_is_first_hazard_minus_first_alert(
     hazards: tuple, alerts: tuple, expected: float | None
 ) -> None:
     assert reaction_time(hazards, alerts) == expected
+
+
+@pytest.mark.parametrize(
+    ("activation", "hazard", "is_active"),
+    [
+        (ObservedActivation(first=2.0, last=30.0, count=2801), 4.0, True),
+        (ObservedActivation(first=2.0, last=4.0, count=201), 4.0, True),
+        (
+            ObservedActivation(first=2.0, last=3.98, count=100),
+            4.0,
+            True,
+        ),  # the run ended; the next one was due at 4.0
+        (ObservedActivation(first=2.0, last=3.97, count=198), 4.0, False),
+        (ObservedActivation(first=2.0, last=2.0, count=1), 4.0, False),
+        (ObservedActivation(first=2.0, last=2.0, count=1), 2.0, True),
+        (None, 4.0, False),
+        (ObservedActivation(first=2.0, last=30.0, count=2801), None, False),
+    ],
+)
+def test_a_fault_can_end_before_its_hazard(
+    record: Callable[..., Record],
+    activation: ObservedActivation | None,
+    hazard: float | None,
+    is_active: bool,
+) -> None:
+    """The time to the hazard counts from the activation all the same."""
+    hazards = () if hazard is None else (("H1", hazard), ("H2", 9.0))
+    finished = record(activation=activation, hazards=hazards)
+    assert was_active_at_hazard(finished) == is_active
+    expected = hazard - activation.first if activation and hazard is not None else None
+    assert time_to_hazard(finished) == expected

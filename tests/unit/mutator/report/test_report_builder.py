@@ -176,7 +176,7 @@ def test_an_up_to_date_report_is_not_written_again(run: Path) -> None:
     assert drawn_again(run, HERE)
 
 
-@pytest.mark.parametrize("name", ["REPORT.md", "index.html", "tables/fault_tolerant_times.csv"])
+@pytest.mark.parametrize("name", ["REPORT.md", "index.html", "tables/times_to_hazard.csv"])
 def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None:
     out = run / "report"
     report_builder.write_report(run, None)
@@ -254,7 +254,7 @@ def test_published_fault_types_alone_add_no_published_numbers(run: Path, workspa
     assert not (run / "report" / "observations.md").exists()
     tables = {path.name for path in (run / "report").glob("tables/*")}
     # computed from the hazards of this run
-    assert tables == {"fault_tolerant_times.csv", "fault_tolerant_times.md"}
+    assert tables == {"times_to_hazard.csv", "times_to_hazard.md"}
 
 
 @pytest.mark.parametrize("workspace", [HERE, None], ids=["library", "no library"])

@@ -108,13 +108,13 @@ def test_a_row_has_the_severity_and_the_times_to_the_hazard(
     hit = {"outcome": Outcome.HAZARD, "t_manifest": 2.25, "t_end": 5.5, "metrics": (("delta_v", 5.5),)}
     kept = record(**hit | {"hazards": (("H1", 5.5), ("H2", 7.0))} | given)
     cells = row_of(experiment(), kept, SCALE)
-    told = (cells["severity"], cells["fault_tolerant_time"], cells["manifest_to_hazard"])
+    told = (cells["severity"], cells["time_to_hazard"], cells["manifest_to_hazard"])
     assert told == (severity, tolerant, after_manifest)
     assert row_of(experiment(), kept)["severity"] is None  # without a scale
 
 
 def test_a_scale_determines_the_columns_of_severity() -> None:
-    times = ["fault_tolerant_time", "manifest_to_hazard"]
+    times = ["time_to_hazard", "manifest_to_hazard"]
     for has_classes, names in ((True, ["severity", *times]), (False, times)):
         severity = severity_and_time_columns(has_classes=has_classes)
         columns = [c.name for c in result_columns(("H1",), ("gas",), (), severity)]

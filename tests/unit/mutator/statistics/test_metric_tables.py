@@ -8,7 +8,7 @@ import pytest
 
 from mutator.statistics import median_intervals
 from mutator.statistics.median_intervals import median_difference, median_interval
-from mutator.statistics.metric_tables import fault_tolerant_times_sheet, metrics_sheet, severity_sheet
+from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, times_to_hazard_sheet
 from mutator.targets.stored_target_facts import MetricFacts
 
 METRICS = [
@@ -51,7 +51,7 @@ def test_each_metric_has_its_spread_by_fault_type() -> None:
 def test_without_values_there_is_no_table() -> None:
     frame = FRAME[FRAME["kind"] == "a/y"]
     assert metrics_sheet(frame, []).lines == ()
-    assert fault_tolerant_times_sheet(frame).lines == ()
+    assert times_to_hazard_sheet(frame, frame["is_hazard"]).lines == ()
     assert severity_sheet(frame.drop(columns="severity")).lines == ()
 
 
@@ -67,13 +67,16 @@ def test_severity_classes_are_counted_by_fault_type() -> None:
 
 
 def test_times_to_a_hazard_need_an_earlier_event() -> None:
-    told = [line[:6] for line in fault_tolerant_times_sheet(FRAME).lines]
+    """The bound of the FTTI has only runs whose fault still acted."""
+    still_active = pd.Series([False, True, False, True, True, False, False])
+    told = [line[:6] for line in times_to_hazard_sheet(FRAME, still_active).lines]
     assert told == [
         ("a/x", "activation to hazard", 5, 1.0, 2.0, 3.0),
+        ("a/x", "activation to hazard, fault still active", 3, 2.0, 3.0, 4.0),
         ("a/x", "manifestation to hazard", 3, 0.5, 1.75, 3.0),
         ("a/x", "alert to hazard", 2, 1.0, 1.75, 2.5),
     ]
-    assert len(fault_tolerant_times_sheet(FRAME, has_alerts=False).lines) == 2
+    assert len(times_to_hazard_sheet(FRAME, still_active, has_alerts=False).lines) == 3
 
 
 @pytest.mark.parametrize("pairs", [False, True])
