@@ -113,6 +113,14 @@ def test_guided_faults_are_ahead_only_per_activated_fault(table_3: dict[str, Jud
     assert effects == dict.fromkeys(("rain", "snow", "occlusion", "contrast"), HOLDS)
 
 
+def test_a_claim_that_allows_no_exception_names_none() -> None:
+    """The rule `never` fails with the first run that has the property, whatever share the sentence allows."""
+    claims = [claim.claim for one in judge_observations(FILE, of_rows({}), []) for claim in one.claims]
+    strict = [claim.claim_text for claim in claims if claim.claim_rule and claim.claim_rule.never]
+    assert strict
+    assert not [text for text in strict if "less than" in text or "twenty" in text or "%" in text]
+
+
 def test_claims_about_a_driver_use_the_cited_reaction_time() -> None:
     driver_s = load_published_numbers(REFERENCES).driver_reaction_s
     claims = [claim for one in judge_observations(FILE, of_rows({}), []) for claim in one.claims]
