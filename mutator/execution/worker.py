@@ -5,6 +5,7 @@ import socket
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from mutator.store import plan_file
 from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter
+from mutator.store.timings import ending_text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,6 +196,7 @@ def timing_of(finished: RecordedExperiment, worker: str) -> dict[str, Any]:
         "worker": worker,
         "engine": finished.mode,
         "why": finished.fallback_reason,
+        "ended": ending_text(datetime.now(UTC)),
     }
 
 

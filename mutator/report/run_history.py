@@ -19,6 +19,7 @@ from mutator.report.panel import REPORT_FOLDER, rendered
 from mutator.results.result_rows import ResultRow
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
+from mutator.store.timings import ending_of
 from mutator.web import asset_text
 
 HISTORY_FILES = ("HISTORY.md", "history.html")
@@ -36,10 +37,10 @@ _COLUMN_HEADS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PastRun:
-    """One run. `date` is the time of its last record."""
+    """One run. `date` is the time of its last record; None if an older version wrote it without times."""
 
     folder: RunFolder
-    date: datetime
+    date: datetime | None
     target_commit: str
     rows_by_id: Mapping[str, ResultRow]
     cpu_s: float
@@ -88,7 +89,7 @@ def write_history(folder: Path) -> History:
             expected="a run folder, or a folder of run folders",
             remedy="check the path",
         )
-    runs.sort(key=lambda run: (run.date, run.name))
+    runs.sort(key=_order)
     text, page = (folder / name for name in HISTORY_FILES)
     write_atomic(text, _history_markdown(runs, omission_reasons).encode())
     write_atomic(page, _history_html(folder, runs, omission_reasons).encode())
@@ -98,15 +99,19 @@ def write_history(folder: Path) -> History:
 def _past_run(path: Path) -> PastRun:
     folder = RunFolder.open_unverified(path)
     rows = {row.experiment_id: row for row in Results(path).rows()}
-    files = [*(path / "records").glob("*.jsonl"), Results(path).path]
-    # the records of equal runs are equal, so they have no date; the files do
-    last = max(file.stat().st_mtime for file in files if file.exists())
-    git = folder.session_environments[-1].git or {}
-    state = git.get("target")
+    sessions = folder.session_environments  # none: nothing has run yet
+    state = (sessions[-1].git or {}).get("target") if sessions else None
     commit = f"{state.commit[:8]}{' with changes' if state.changed else ''}" if state else "-"
-    cpu_s = sum(float(line["cpu_s"]) for line in folder.timings().values())
-    date = datetime.fromtimestamp(last, UTC)
+    cpu_s, date = 0.0, None
+    for line in folder.timings().values():
+        cpu_s += float(line["cpu_s"])
+        if (ended := ending_of(line)) and (date is None or ended > date):
+            date = ended
     return PastRun(folder=folder, date=date, target_commit=commit, rows_by_id=rows, cpu_s=cpu_s)
+
+
+def _order(run: PastRun) -> tuple[datetime, str]:
+    return run.date or datetime.min.replace(tzinfo=UTC), run.name
 
 
 def _group_by_plan(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
@@ -116,7 +121,7 @@ def _group_by_plan(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
         runs_by_plan.setdefault(f"{run.folder.head.campaign}, plan {run.folder.head.plan[:8]}", []).append(
             run
         )
-    return dict(sorted(runs_by_plan.items(), key=lambda item: item[1][-1].date, reverse=True))
+    return dict(sorted(runs_by_plan.items(), key=lambda item: _order(item[1][-1]), reverse=True))
 
 
 def _table_cells(run: PastRun) -> list[str]:
@@ -126,7 +131,7 @@ def _table_cells(run: PastRun) -> list[str]:
     severity_text = ", ".join(f"{name} {classes[name]}" for name in (*order, "no contact") if classes[name])
     silent = sum(row.reaction_time is None for row in hazards)
     return [
-        f"{run.date:%Y-%m-%d %H:%M}",
+        f"{run.date:%Y-%m-%d %H:%M}" if run.date else "-",
         run.target_commit,
         f"{len(run.rows_by_id)} of {run.folder.planned_experiment_count}",
         f"{len(hazards)} of {run.activated_count} activated",

@@ -1,5 +1,7 @@
-"""Timings on disk: what each experiment cost, and where it ran."""
+"""Timings on disk: what each experiment cost, where it ran, and when it ended."""
 
+from collections.abc import Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +9,21 @@ from mutator.store.indexed_lines import IndexedLines
 
 TIMINGS_FOLDER, TIMINGS_SCHEMA = "timings", "timings/2"  # the folder of the files of lines
 _LONGEST_RUN_S = 1e9  # 30 years: no run takes longer, and sums of such times are finite
+_TIME_FORMAT = "%Y-%m-%dT%H:%M:%SZ"
+
+
+def ending_text(moment: datetime) -> str:
+    """Return the text of `ended` for a moment in UTC."""
+    return moment.strftime(_TIME_FORMAT)
+
+
+def ending_of(line: Mapping[str, Any]) -> datetime | None:
+    """Return when the experiment of a timing line ended (UTC); None in lines of older versions.
+
+    ValueError for another text.
+    """
+    text = line.get("ended")
+    return None if text is None else datetime.strptime(text, _TIME_FORMAT).replace(tzinfo=UTC)
 
 
 def load_timings(run: Path) -> IndexedLines[dict[str, Any]]:
@@ -26,4 +43,5 @@ def _checked_timing(data: dict[str, Any]) -> dict[str, Any]:
             raise ValueError(name)
         if name != "why" and value and not value.isprintable():
             raise ValueError(name)
+    ending_of(data)
     return data

@@ -1,5 +1,6 @@
 """The history of the runs in a folder."""
 
+import json
 import os
 import shutil
 from pathlib import Path
@@ -8,9 +9,13 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.report.run_history import write_history
+from mutator.store.checksummed_lines import LineWriter
+from mutator.store.timings import TIMINGS_SCHEMA
 from tests.made_up_results import write_results
 
-from .made_run import COLUMNS, NONE, OK, Page, make_run
+from .made_run import COLUMNS, HEAD, NONE, OK, Page, make_run
+
+COST = {"cpu_s": 1.0, "wall_s": 1.0, "host": "h", "worker": "a", "engine": "reference", "why": ""}
 
 
 @pytest.fixture
@@ -21,7 +26,13 @@ def folder(tmp_path: Path) -> Path:
         run = make_run(tmp_path / name)
         named = [{"experiment_id": f"{i}" * 16, "fault_id": "f"} | line for i, line in enumerate(lines)]
         write_results(run, COLUMNS, named)
-        os.utime(run / "results.parquet", (3600 * hour, 3600 * hour))
+        timings = LineWriter(
+            run / "timings" / "0001-a.jsonl", {"schema": TIMINGS_SCHEMA, "plan": HEAD["plan"]}
+        )
+        for line in named[::-1]:  # the last line is not the last experiment that ended
+            ended = f"2026-11-24T{hour:02}:0{line['experiment_id'][0]}:00Z"
+            timings.append(COST | {"experiment_id": line["experiment_id"], "ended": ended})
+        timings.close()
     (tmp_path / "broken").mkdir()
     shutil.copy(tmp_path / "before" / "run.json", tmp_path / "broken")
     return tmp_path
@@ -34,7 +45,27 @@ def test_changes_between_runs_are_counted(folder: Path) -> None:
     assert "before to after: 1 new hazard, 1 gone, 0 changed otherwise, of 3 shared." in text
     assert f"`mutator compare {folder / 'before'} {folder / 'after'}`" in text
     assert text.index("| after |") < text.index("| before |"), "the newest run is not first"
-    assert "| 1970-01-01 02:00 | - | 3 of 3 | 1 of 3 activated | - | 1 of 1 |" in text
+    assert "| 2026-11-24 02:02 | - | 3 of 3 | 1 of 3 activated | - | 1 of 1 |" in text
+
+
+def test_a_run_keeps_its_date_when_it_is_copied(folder: Path) -> None:
+    before = write_history(folder).markdown.read_bytes()
+    for path in folder.rglob("*"):
+        os.utime(path, (0, 0))
+    assert write_history(folder).markdown.read_bytes() == before
+
+
+def test_a_run_of_an_older_version_has_no_date_and_is_the_oldest(folder: Path) -> None:
+    shutil.rmtree(folder / "after" / "timings")
+    text = write_history(folder).markdown.read_text()
+    assert "| after | - | - | 3 of 3 |" in text
+    assert text.index("| before |") < text.index("| after |")
+
+
+def test_a_plan_that_has_not_run_yet_is_no_error(folder: Path) -> None:
+    head = json.loads((folder / "after" / "run.json").read_text())
+    (folder / "after" / "run.json").write_text(json.dumps(head | {"stretches": []}))
+    assert write_history(folder).runs == 2
 
 
 def test_a_command_quotes_the_names_of_runs(folder: Path) -> None:

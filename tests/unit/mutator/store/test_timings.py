@@ -1,13 +1,14 @@
 """Timings are not sealed, so their values are checked when they are read."""
 
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from mutator.errors import MutatorError
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.timings import TIMINGS_SCHEMA, load_timings
+from mutator.store.timings import TIMINGS_SCHEMA, ending_of, ending_text, load_timings
 
 LINE = {
     "experiment_id": "a" * 16,
@@ -32,6 +33,12 @@ def test_a_timing_is_read(tmp_path: Path) -> None:
     assert dict(load_timings(tmp_path)) == {"a" * 16: LINE}
 
 
+def test_the_end_of_an_experiment_is_read_in_utc() -> None:
+    moment = datetime(2026, 11, 24, 16, 31, 7, tzinfo=UTC)
+    assert ending_of(LINE | {"ended": ending_text(moment)}) == moment
+    assert ending_of(LINE) is None  # a line of an older version
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [
@@ -39,6 +46,7 @@ def test_a_timing_is_read(tmp_path: Path) -> None:
         *[(name, value) for name in ("host", "worker", "engine", "why") for value in (["a"], {"a": 1}, 1)],
         ("experiment_id", True),
         *[(name, "\x1b[2J") for name in ("host", "worker", "engine")],
+        *[("ended", value) for value in (5, "yesterday", "2026-02-30T01:02:03Z", "")],
     ],
 )
 def test_another_type_of_a_value_is_a_damaged_line(tmp_path: Path, name: str, value: object) -> None:
