@@ -97,7 +97,8 @@ def main() -> int:
         found = times(detector, drive(marks, weather, amount), options.repeat)
         slow |= median(found) > goal
         name = f"{weather} {amount:g}" if weather else "clean"
-        figures = "".join(f"{value:7.2f} ms" for value in (found[0], median(found), max(found[1:]), goal))
+        shown = (found[0], median(found), max(found[1:], default=found[0]), goal)
+        figures = "".join(f"{value:7.2f} ms" for value in shown)
         language = "C" if detector.calculated_by else "Python"
         print(f"{kind:<10}{marks:<8}{name:<18}{figures}{median(found) / goal:8.2f}  {language}")
     return int(slow)
