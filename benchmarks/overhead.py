@@ -76,20 +76,20 @@ class Bench:
         limits = build_plan(workspace, "paper", Choices(limit=1)).campaign.limits
         self.common = (self.manifest, self.work, limits)
 
-    def golden(self) -> float:
-        """Return the CPU time (s) of the golden run minus that of a two-step run."""
+    def golden(self) -> tuple[Path, float]:
+        """Return the output folder of a golden run, and its CPU time (s) minus that of a two-step run."""
         job = Job(name="golden", scenario=self.workspace.scenario(SCENARIO), seed=1)
         engine = ReferenceEngine(*self.common)
         whole = engine.execute(job, self.folder / "golden")
         few = replace(self.manifest, entry_args=(*self.manifest.entry_args, "--max-steps", "2"))
         short = ReferenceEngine(few, *self.common[1:]).execute(job, self.folder / "few")
-        return whole.cpu_s - short.cpu_s
+        return whole.out, whole.cpu_s - short.cpu_s
 
-    def cost(self, experiments: Sequence[Experiment]) -> Cost:
+    def cost(self, experiments: Sequence[Experiment], golden: Path) -> Cost:
         """Return the cost of the experiments without the first `FEW`. All must be forked."""
         null = build(self.manifest, self.models, None, always_trigger())
         engine = ForkEngine(*self.common, null_mutant=null)
-        goldens = LoadedGoldens(self.manifest, lambda experiment: self.folder / "golden" / "out")
+        goldens = LoadedGoldens(self.manifest, lambda experiment: golden)
         runner = ExperimentRunner(self.manifest, self.models, engine, goldens, self.workspace.scenario)
         records = LineWriter(self.folder / "records.jsonl", {"schema": RECORDS_SCHEMA})
 
@@ -168,8 +168,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     known = late(workspace, options.experiments + FEW)
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(workspace, Path(folder))
-        driving = bench.golden()
-        cost = bench.cost(known)
+        golden, driving = bench.golden()
+        cost = bench.cost(known, golden)
     count = options.experiments
     facts = {name: 1e3 * seconds / count for name, seconds in asdict(cost).items()}
     total = sum(facts.values())
