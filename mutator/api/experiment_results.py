@@ -61,6 +61,8 @@ class ExperimentResult(ABC):
 
     def _notebook_facts(self) -> list[tuple[str, object]]:
         facts = experiment_facts(self.experiment) | (self.verdict if self.record else {"status": "not run"})
+        if facts.get("severity"):
+            facts["severity"] = self.severity_label
         texts = {
             name: ", ".join(f"{k} {v if isinstance(v, str) else f'{v:.4g}'}" for k, v in value.items())
             or None  # which `facts_html` leaves out
@@ -108,6 +110,12 @@ class ExperimentResult(ABC):
     def verdict(self) -> dict[str, Any]:
         """The verdict as plain data. Times are simulation times in s; None: no such event."""
         return verdict_facts(self.record, self.scale) if self.record else {"status": None}
+
+    @property
+    def severity_label(self) -> str:
+        """The severity class of the contact, in words: `S2 severe`; empty without contact."""
+        name = severity_class_of(self.record, self.scale) if self.record else None
+        return self.scale.labels[name] if self.scale and name else ""
 
     @property
     @abstractmethod

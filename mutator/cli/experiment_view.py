@@ -45,11 +45,15 @@ def print_worst_experiments(
     terminal: Terminal, workspace: "Workspace", run: Path | None, only: str | None, limit: int
 ) -> None:
     folder = run or find_newest_run(workspace.library.parent)
-    worst_rows, count = worst_results(open_stored_run(folder).path, only, limit)
+    stored_run = open_stored_run(folder)
+    worst_rows, count = worst_results(stored_run.path, only, limit)
     rows = [_row_facts(row) for row in worst_rows]
     if terminal.as_json:
         terminal.print_json({"run": str(folder), "count": count, "worst": rows})
         return
+    scale = stored_run.folder.severity_scale
+    if scale:
+        rows = [row | {"severity": scale.labels.get(str(row["severity"]), "")} for row in rows]
     heads = tuple(rows[0]) if rows else ()
     terminal.print_table(heads, [tuple(row.values()) for row in rows], right_aligned=(3, 5))
     terminal.print_text(
@@ -113,7 +117,7 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
         terminal.print_text(note)
     if verdict["severity"]:
         terminal.print_text(
-            f"severity: {verdict['severity']}, delta-v {verdict['metrics']['delta_v']:.2f} m/s"
+            f"severity: {result.severity_label}, delta-v {verdict['metrics']['delta_v']:.2f} m/s"
         )
     for name, what in _TIME_LABELS.items():
         if verdict[name] is not None:

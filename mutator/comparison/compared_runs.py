@@ -47,10 +47,11 @@ class ComparedRun:
         """Return this side with contacts classified by `scale`, or unclassified if it is None."""
         rows = {}
         for name, row in self.row_by_id.items():
-            severity = ""
+            severity, label = "", ""
             if scale and row.severity and row.delta_v is not None:
                 severity = scale.class_of(row.delta_v)
-            rows[name] = replace(row, severity=severity)
+                label = scale.labels[severity]
+            rows[name] = replace(row, severity=severity, severity_label=label)
         return replace(self, row_by_id=rows)
 
 

@@ -197,7 +197,7 @@ def _ending_html(row: ResultRow) -> str:
 
     details = [name for name, _ in row.hazards] + [f"alert {name}" for name in row.alerts]
     if row.severity:
-        details.insert(0, row.severity)
+        details.insert(0, row.severity_label)
     if row.detail:
         details.append(row.detail)
     return Markup('<span class="ending {0}">{0}</span> {1}').format(row.ending, ", ".join(details))

@@ -9,9 +9,10 @@ from mutator.comparison.compared_runs import ComparedRun
 from mutator.comparison.pair_sheets import RunDisplayNames, lines_with_holm_p, total_and_type_sheets
 from mutator.comparison.pairs import ExperimentPair
 from mutator.statistics.median_intervals import median_difference
+from mutator.statistics.metric_tables import describe_classes
 from mutator.statistics.paired_statistics import wilcoxon_p
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
-from mutator.targets.contact_severity import SEVERITY_CLASSES
+from mutator.targets.contact_severity import SEVERITY_CLASSES, SeverityScale
 
 NO_CONTACT = "no contact"
 
@@ -62,14 +63,17 @@ def _median_cells(frame: pd.DataFrame) -> tuple[SheetCell, ...]:
     return (len(frame), *medians, *interval, PValue(wilcoxon_p(first, second)))
 
 
-def severity_cross_table(pairs: Sequence[ExperimentPair], names: RunDisplayNames) -> Sheet:
+def severity_cross_table(
+    pairs: Sequence[ExperimentPair], names: RunDisplayNames, scale: SeverityScale | None
+) -> Sheet:
     order = [*SEVERITY_CLASSES[::-1], ""]
     counts = Counter((p.row_a.severity, p.row_b.severity) for p in pairs if p.is_usable)
     classes = [name for name in order if any(name in pair for pair in counts)]
     return Sheet(
         name="severity",
         title="Severity",
-        note=f"Rows: severity class in {names.a}. Columns: severity class in {names.b}.",
+        note=f"Rows: severity class in {names.a}. Columns: severity class in {names.b}."
+        + describe_classes(scale, classes),
         heads=(f"{names.a} / {names.b}", *(name or NO_CONTACT for name in classes)),
         lines=tuple(
             (severity_class or NO_CONTACT, *(counts[severity_class, other] for other in classes))

@@ -139,7 +139,7 @@ class Comparison:
         spans, spans_by_type = times_sheets(frame, self.names)
         counts = (endings_cross_table(self.pairs, self.names), change_counts_sheet(self.pairs))
         metrics, metrics_by_type = metrics_sheets(self.pairs, self.a, self.b, self.names)
-        severity = severity_cross_table(self.pairs, self.names)
+        severity = severity_cross_table(self.pairs, self.names, self.b.folder.severity_scale)
         return (
             *(*counts, rates, spans),
             *(sheet for sheet in (severity, metrics) if sheet.lines),
@@ -247,7 +247,7 @@ def _describe_ending(row: ResultRow) -> str:
         names = ", ".join(name for name, _ in row.hazards)
         details.append(names if time is None else f"{names} {time:.2f} s after activation")
     if row.severity:
-        details.append(f"{row.severity}, delta-v {row.delta_v:.1f} m/s")
+        details.append(f"{row.severity_label}, delta-v {row.delta_v:.1f} m/s")
     if row.alerts:
         is_late = bool(row.hazards) and row.reaction_time is None
         details.append(f"alert {', '.join(row.alerts)}" + (" only after the hazard" if is_late else ""))

@@ -35,14 +35,17 @@ class ShareBar:
 
 @dataclass(frozen=True, slots=True)
 class ExplainedCodes:
-    """Codes of hazards or of a severity class, whose meanings the page explains. `prefix` precedes them."""
+    """Codes of hazards or of a severity class, whose meanings the page explains. `prefix` precedes them, and
+    `label` replaces them.
+    """
 
     codes: tuple[str, ...]
     prefix: str = ""
+    label: str = ""
 
     @property
     def text(self) -> str:
-        return f"{self.prefix} {', '.join(self.codes)}".lstrip()
+        return f"{self.prefix} {self.label or ', '.join(self.codes)}".lstrip()
 
 
 AnswerCell = str | PageLink | ShareBar | ExplainedCodes

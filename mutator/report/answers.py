@@ -37,9 +37,11 @@ def build_answers(run: ReportedRun) -> tuple[ReportAnswer, ...]:
     """All answers for which the run has the data."""
     frame = _frame_for_answers(run)
     has_alerts = run.folder.has_alerts
-    answers = [most_dangerous_answer(frame, run.folder.head.metrics, has_alerts=has_alerts)]
+    scale = run.folder.severity_scale
+    labels = scale.labels if scale else {}
+    answers = [most_dangerous_answer(frame, run.folder.head.metrics, labels, has_alerts=has_alerts)]
     if (frame["outcome"] == "hazard").any():
-        answers.append(fix_first_answer(frame, run.run_fault_paths, has_alerts=has_alerts))
+        answers.append(fix_first_answer(frame, run.run_fault_paths, labels, has_alerts=has_alerts))
     if has_alerts:
         answers.append(silent_hazards_answer(frame, run.folder.stop_at_hazard_note))
     answers.append(tolerated_faults_answer(frame))

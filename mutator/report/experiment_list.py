@@ -130,6 +130,8 @@ def _list_table_data(run: ReportedRun, listed: "DataFrame") -> dict[str, Any]:
     data = results_table_data(
         listed, run.faults, run.run_fault_paths, has_alerts=run.folder.has_alerts, source=run.source_lines
     )
+    if scale := run.folder.severity_scale:
+        data["severities"] = scale.labels
     if len(listed) < len(run.results):
         data |= {"of": len(run.results), "map": build_heat_map(run)}
     return data

@@ -84,7 +84,8 @@ def _severity_meanings(scale: SeverityScale | None, before: str = "") -> dict[st
     if not scale:
         return {}
     meanings = {
-        f"{before}{name}": f"delta-v of {low:.2f} m/s or more: {about}" for name, low, about in scale.classes
+        (f"{before}{scale.labels[name]}" if before else name): f"delta-v of {low:.2f} m/s or more: {about}"
+        for name, low, about in scale.classes
     }
     return meanings | {
         "no contact": "no severity class; these runs rank by margin, alternating between hazards"

@@ -30,14 +30,18 @@ NO_CONTACT_VALUE = "no contact"  # the page filter's name for an empty severity
 
 
 def most_dangerous_answer(
-    frame: pd.DataFrame, metrics: Sequence[MetricFacts], *, has_alerts: bool
+    frame: pd.DataFrame,
+    metrics: Sequence[MetricFacts],
+    severity_labels: Mapping[str, str],
+    *,
+    has_alerts: bool,
 ) -> ReportAnswer:
     active = frame[frame["is_activated"]]
     ranked = frame[frame["outcome"] == "hazard"].sort_values("place")
     contact_column = find_contact_column(frame)
     paragraph = f"{describe_share(len(ranked), len(active), 'activated faults')} led to a hazard."
     if SEVERITY_COLUMN in frame and len(ranked):
-        paragraph = f"{paragraph.removesuffix('.')}: {_describe_severities(ranked)}."
+        paragraph = f"{paragraph.removesuffix('.')}: {_describe_severities(ranked, severity_labels)}."
     elif contact_column:
         hits = int((ranked[contact_column] > 0).sum())
         paragraph += f" {describe_share(hits, len(ranked), 'hazards')} involved contact."
@@ -59,7 +63,10 @@ def most_dangerous_answer(
         title="What is dangerous",
         has_wide_tables=True,
         paragraph="No fault was activated." if active.empty else paragraph,
-        tables=(*_worst_tables(ranked, units, has_alerts=has_alerts), AnswerTable(heads=heads, rows=rows)),
+        tables=(
+            *_worst_tables(ranked, units, severity_labels, has_alerts=has_alerts),
+            AnswerTable(heads=heads, rows=rows),
+        ),
         links=_list_links(ranked),
     )
 
@@ -98,17 +105,18 @@ def find_contact_column(frame: pd.DataFrame) -> str:
     return next((name for name in ("delta_v", "contact_speed") if name in frame), "")
 
 
-def _describe_severities(hazards: pd.DataFrame) -> str:
-    """`2 of severity S3, 4 of severity S1, 14 without contact`."""
+def _describe_severities(hazards: pd.DataFrame, labels: Mapping[str, str]) -> str:
+    """`2 of severity S3 possibly fatal, 4 of severity S1 light, 14 without contact`."""
     counts = hazards[SEVERITY_COLUMN].value_counts()
     parts = [
-        f"{counts[name]} of severity {name}" for name in sorted(filter(None, counts.index), reverse=True)
+        f"{counts[name]} of severity {labels.get(name, name)}"
+        for name in sorted(filter(None, counts.index), reverse=True)
     ]
     return ", ".join((*parts, f"{counts.get('', 0)} without contact"))
 
 
 def _worst_tables(
-    ranked: pd.DataFrame, units: Mapping[str, str], *, has_alerts: bool
+    ranked: pd.DataFrame, units: Mapping[str, str], severity_labels: Mapping[str, str], *, has_alerts: bool
 ) -> tuple[AnswerTable, ...]:
     """Return the worst hazards in one list, or in two if only some have a severity class: the others, which
     rank by margin, would rarely appear in a common list.
@@ -116,7 +124,16 @@ def _worst_tables(
     with_contact = ranked[ranked[SEVERITY_COLUMN] != ""] if SEVERITY_COLUMN in ranked else ranked
     without_contact = ranked.drop(with_contact.index)
     if with_contact.empty or without_contact.empty:
-        return (_worst_table(ranked.head(MOST_LISTED), "worst", HAZARD_FILTER, units, has_alerts=has_alerts),)
+        return (
+            _worst_table(
+                ranked.head(MOST_LISTED),
+                "worst",
+                HAZARD_FILTER,
+                units,
+                severity_labels,
+                has_alerts=has_alerts,
+            ),
+        )
     contacts = with_contact.head(max(MOST_LISTED_CONTACTS, MOST_LISTED - len(without_contact)))
     others = without_contact.head(MOST_LISTED - len(contacts))
     classes = sorted(with_contact[SEVERITY_COLUMN].unique())
@@ -125,8 +142,12 @@ def _worst_tables(
         {**HAZARD_FILTER, SEVERITY_COLUMN: [NO_CONTACT_VALUE]},
     )
     return (
-        _worst_table(contacts, "worst with contact", contact_filter, units, has_alerts=has_alerts),
-        _worst_table(others, "worst without contact", no_contact_filter, units, has_alerts=has_alerts),
+        _worst_table(
+            contacts, "worst with contact", contact_filter, units, severity_labels, has_alerts=has_alerts
+        ),
+        _worst_table(
+            others, "worst without contact", no_contact_filter, units, severity_labels, has_alerts=has_alerts
+        ),
     )
 
 
@@ -135,6 +156,7 @@ def _worst_table(
     first_head: str,
     list_filter: Mapping[str, Sequence[str]],
     units: Mapping[str, str],
+    severity_labels: Mapping[str, str],
     *,
     has_alerts: bool,
 ) -> AnswerTable:
@@ -147,7 +169,8 @@ def _worst_table(
     if SEVERITY_COLUMN in ranked and (ranked[SEVERITY_COLUMN] != "").any():
         heads.append("severity")
         columns.append(
-            ExplainedCodes((name,), "severity") if name else "-" for name in ranked[SEVERITY_COLUMN]
+            ExplainedCodes((name,), "severity", severity_labels.get(name, "")) if name else "-"
+            for name in ranked[SEVERITY_COLUMN]
         )
     if contact_column or any(name.startswith(MARGIN_PREFIX) for name in units):
         heads.append("measure")

@@ -128,14 +128,18 @@ def _table_cells(run: PastRun) -> list[str]:
     hazards = run.hazards
     classes = Counter(row.severity or "no contact" for row in hazards)
     order = sorted((name for name in classes if name != "no contact"), reverse=True)
-    severity_text = ", ".join(f"{name} {classes[name]}" for name in (*order, "no contact") if classes[name])
+    scale = run.folder.severity_scale
+    labels = scale.labels if scale else {}
+    severity_text = ", ".join(
+        f"{labels.get(name, name)}: {classes[name]}" for name in (*order, "no contact") if classes[name]
+    )
     silent = sum(row.reaction_time is None for row in hazards)
     return [
         f"{run.date:%Y-%m-%d %H:%M}" if run.date else "-",
         run.target_commit,
         f"{len(run.rows_by_id)} of {run.folder.planned_experiment_count}",
         f"{len(hazards)} of {run.activated_count} activated",
-        severity_text if run.folder.severity_scale and hazards else "-",
+        severity_text if scale and hazards else "-",
         f"{silent} of {len(hazards)}" if run.folder.has_alerts else "-",
         describe_duration(run.cpu_s),
     ]

@@ -24,7 +24,13 @@ from mutator.report.most_dangerous_experiments import NO_CONTACT_VALUE, SEVERITY
 MOST_FAULT_TYPES = 5  # maximum number of fault types listed
 
 
-def fix_first_answer(frame: pd.DataFrame, paths: RunFaultPaths | None, *, has_alerts: bool) -> ReportAnswer:
+def fix_first_answer(
+    frame: pd.DataFrame,
+    paths: RunFaultPaths | None,
+    severity_labels: Mapping[str, str],
+    *,
+    has_alerts: bool,
+) -> ReportAnswer:
     """Say which fault types to fix first: those with the most silent hazards in the highest severity
     class; ties are broken by the next lower classes, then by hazards without contact, then by the shortest
     time from activation to hazard. If the target has no alerts, all hazards are counted. `frame` must have at
@@ -52,6 +58,7 @@ def fix_first_answer(frame: pd.DataFrame, paths: RunFaultPaths | None, *, has_al
             frame[frame["kind"] == kind],
             counted_hazards[counted_hazards["kind"] == kind],
             classes,
+            severity_labels,
             list_filter,
             paths,
         )
@@ -61,7 +68,7 @@ def fix_first_answer(frame: pd.DataFrame, paths: RunFaultPaths | None, *, has_al
         html_name="first",
         title="What to fix first",
         has_wide_tables=True,
-        paragraph=_rule_paragraph(order, counted_hazards, classes, plural_noun),
+        paragraph=_rule_paragraph(order, counted_hazards, classes, severity_labels, plural_noun),
         tables=(AnswerTable(heads=tuple(heads), rows=rows),),
     )
 
@@ -94,7 +101,11 @@ def _fault_types_in_order(hazards: pd.DataFrame, classes: Sequence[str]) -> list
 
 
 def _rule_paragraph(
-    order: Sequence[str], counted_hazards: pd.DataFrame, classes: Sequence[str], plural_noun: str
+    order: Sequence[str],
+    counted_hazards: pd.DataFrame,
+    classes: Sequence[str],
+    severity_labels: Mapping[str, str],
+    plural_noun: str,
 ) -> str:
     is_first_type = counted_hazards["kind"] == order[0]
     first_share = describe_share(int(is_first_type.sum()), len(counted_hazards), plural_noun)
@@ -102,7 +113,8 @@ def _rule_paragraph(
     if classes[0]:
         of_class = counted_hazards[SEVERITY_COLUMN] == classes[0]
         part, all_ = int((is_first_type & of_class).sum()), int(of_class.sum())
-        paragraph += f", and {'the only one' if all_ == 1 else f'{part} of {all_}'} of severity {classes[0]}"
+        paragraph += f", and {'the only one' if all_ == 1 else f'{part} of {all_}'} of severity "
+        paragraph += severity_labels.get(classes[0], classes[0])
         paragraph += f", the highest among the {plural_noun}"
     paragraph += f". The rule: fault types with the most {plural_noun}"
     if len(classes) > 1:
@@ -120,13 +132,16 @@ def _fault_type_row(
     results_of_type: pd.DataFrame,
     counted_hazards: pd.DataFrame,
     classes: Sequence[str],
+    severity_labels: Mapping[str, str],
     list_filter: Mapping[str, Sequence[str]],
     paths: RunFaultPaths | None,
 ) -> tuple[AnswerCell, ...]:
     counts_by_class = [(name, len(_hazards_of_class(counted_hazards, name))) for name in classes]
     if SEVERITY_COLUMN in counted_hazards:
         named = [
-            f"{n} severity {name}" if name else f"{n} without contact" for name, n in counts_by_class if n
+            f"{n} severity {severity_labels.get(name, name)}" if name else f"{n} without contact"
+            for name, n in counts_by_class
+            if n
         ]
         numbers = ", ".join(named)
     else:

@@ -9,7 +9,7 @@ from mutator.statistics.median_intervals import median_interval
 from mutator.statistics.results_frame import select_common_columns
 from mutator.statistics.shares import share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
-from mutator.targets.contact_severity import SEVERITY_CLASSES
+from mutator.targets.contact_severity import SEVERITY_CLASSES, SeverityScale
 from mutator.targets.stored_target_facts import MetricFacts
 
 HIGHER_IS_WORSE = "higher"
@@ -47,7 +47,13 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[MetricFacts]) -> Sheet:
     )
 
 
-def severity_sheet(frame: pd.DataFrame) -> Sheet:
+def describe_classes(scale: SeverityScale | None, names: Sequence[str]) -> str:
+    """Return a sentence with the classes in words, to append to a note; empty without a scale."""
+    labels = [scale.labels[name] for name in names if name] if scale else []
+    return f" Severity classes: {', '.join(labels)}." if labels else ""
+
+
+def severity_sheet(frame: pd.DataFrame, scale: SeverityScale | None = None) -> Sheet:
     """Return the table of activated faults by severity class. Without classes, it has no lines."""
     lines: list[tuple[SheetCell, ...]] = []
     columns = [name for name in ("kind", "severity") if name in frame]
@@ -60,7 +66,8 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
         name="severity",
         title="Severity by fault type",
         note="Activated faults whose drive ended in a contact, in total and by class. 95 % "
-        "Wilson intervals; in brackets, the count and the total. Hazards without a contact have no class.",
+        "Wilson intervals; in brackets, the count and the total. Hazards without a contact have no class."
+        + describe_classes(scale, SEVERITY_CLASSES),
         heads=("fault type", "contact", *SEVERITY_CLASSES),
         lines=tuple(lines),
     )

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from mutator._common.hashing import added_field
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 
 SEVERITY_CLASSES = ("S0", "S1", "S2", "S3")  # from ISO 26262-3, the mildest first
@@ -51,17 +52,24 @@ class ContactSettings:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeverityScale:
     """The classes of delta-v: (name, least delta-v in m/s, meaning), the mildest first, beginning at 0.
-    `source` cites the bounds.
+    `source` cites the bounds. `words` names classes in a word or two: (name, words).
     """
 
     name: str
     about: str
     source: str
     classes: tuple[tuple[str, float, str], ...]
+    words: tuple[tuple[str, str], ...] = added_field(())
 
     def __post_init__(self) -> None:
         if not any(least <= 0.0 for _, least, _ in self.classes):
             raise ValueError("no class of severity begins at 0")
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """The classes as people read them, by name: `S2 severe`. S1 alone could also be a scenario."""
+        words = dict(self.words)
+        return {name: f"{name} {words.get(name) or about}".rstrip() for name, _, about in self.classes}
 
     def class_of(self, delta_v_mps: float) -> str:
         """Return the class of a delta-v in m/s, 0 or more; a value on a bound is in the upper class."""

@@ -19,6 +19,9 @@ class _SeverityClassModel(StrictModel, title="A class"):
     from_kph: float = Field(
         ge=0.0, allow_inf_nan=False, description="The smallest delta-v in the class; 0 for S0."
     )
+    words: str = Field(
+        "", description="The harm in a word or two, shown after the name of the class. Default: `about`."
+    )
     about: str = Field(description="The harm in this class.")
 
 
@@ -80,5 +83,10 @@ def load_severity_scale(path: Path) -> SeverityScale:
         classes=tuple(
             (name, severity_class.from_kph * _MPS_PER_KPH, severity_class.about)
             for name, severity_class in model.classes.items()
+        ),
+        words=tuple(
+            (name, severity_class.words)
+            for name, severity_class in model.classes.items()
+            if severity_class.words
         ),
     )

@@ -143,7 +143,7 @@ def _statistic_sheets(run: ReportedRun, published: PublishedCounts | None) -> tu
 
 def _distribution_sheets(run: ReportedRun) -> tuple[Sheet, ...]:
     sheets = (
-        severity_sheet(run.frame),
+        severity_sheet(run.frame, run.folder.severity_scale),
         times_to_hazard_sheet(
             run.frame,
             run.frame["experiment_id"].isin(run.experiment_facts.ids_active_at_hazard),

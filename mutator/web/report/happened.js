@@ -75,7 +75,7 @@ class Happened {
     const name = this.text("severity"), scale = this.facts.severity;
     if (!name || !scale) return "";
     const about = scale.classes.find(([of]) => of === name)?.[2];
-    return el("div", {}, el("b", {}, `Severity ${name}`), `: delta-v ${this.table.number(this.row, "delta_v").toFixed(2)} m/s`,
+    return el("div", {}, el("b", {}, `Severity ${this.table.called("severity", name)}`), `: delta-v ${this.table.number(this.row, "delta_v").toFixed(2)} m/s`,
       about ? `, ${about}` : "", el("details.quiet", {}, el("summary", {}, "Source of the classes"), `${scale.name}: ${scale.source}`));
   }
 

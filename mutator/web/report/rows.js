@@ -12,7 +12,7 @@ const Rows = (() => {
     { name: "trigger", title: "Trigger" },
     { name: "outcome", title: "Outcome", none: "no outcome" },
     { name: "status", title: "Status" },
-    { name: "severity", title: "Severity", none: "no contact", show: (value) => (value === "no contact" ? `${value}, any outcome` : `severity ${value}`) },
+    { name: "severity", title: "Severity", none: "no contact", show: (value) => (value === "no contact" ? `${value}, any outcome` : value) },
     { name: "hazards", title: "Hazard", between: ";", none: "no hazard" },
     { name: "alerts", title: "Alert", between: ";", none: "no alert" },
     { name: "warning", title: "Alert in time", none: "no hazard" },
@@ -53,6 +53,7 @@ const Rows = (() => {
       this.count = data.count;
       this.checked = data.checked; // the hazards that were checked
       this.labels = data.labels; // labels of components
+      this.severities = data.severities || {}; // severity classes in words, by name
       this.of = data.of || data.count; // number of experiments of the run; for a large run the page lists only the worst
       this.map = data.map || null; // of all experiments, if not all are listed (report/whole_map.py)
       this.columns = new Map(data.columns.map((c) => [c.name, column(c)]));
@@ -70,8 +71,9 @@ const Rows = (() => {
       return column ? column.text(row) : "";
     }
 
-    /** The text that shows a value of a column. Components have labels. */
+    /** The text that shows a value of a column. Components have labels, and severity classes have words. */
     called(name, text) {
+      if (name === "severity") return this.severities[text] || text;
       return OF_COMPONENTS.includes(name) ? text.replace(/[^;→]+/g, (part) => this.labels[part] || part).replaceAll("→", " → ").replaceAll(";", ", ") : text;
     }
 

@@ -155,15 +155,16 @@ def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
 def test_severity_and_then_time_decide_what_to_fix_first() -> None:
     many = [("a/many", "S1", 1.0)] * 5
     some = [("b/slow", "S3", 9.0), ("c/fast", "S3", 8.0), ("d/both", "S3", 9.5), ("d/both", "", 9.0)]
-    answer = fix_first_answer(hazards(*some, *many), None, has_alerts=True)
+    labels = {"S1": "S1 light", "S3": "S3 fatal"}
+    answer = fix_first_answer(hazards(*some, *many), None, labels, has_alerts=True)
     lines = answer.tables[0].rows
     kinds = [line[0].text for line in lines if isinstance(line[0], PageLink)]
     assert kinds == ["d/both", "c/fast", "b/slow", "a/many"]
     assert lines[0][1] == PageLink(
-        "1 severity S3, 1 without contact",
+        "1 severity S3 fatal, 1 without contact",
         "kind=d%2Fboth&warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard&severity=S3&sort=rank",
     )
-    assert "and 1 of 3 of severity S3, the highest among the silent hazards." in answer.paragraph
+    assert "and 1 of 3 of severity S3 fatal, the highest among the silent hazards." in answer.paragraph
 
 
 def untimed_path(by: str = "", stopped_at: tuple[str, ...] = ()) -> UntimedPath:
@@ -187,7 +188,7 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
     frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(untimed_path=[0, 0, 1, -1])
     masked = frame[:1].assign(experiment_id="masked", outcome="masked", untimed_path=2)
     answer = fix_first_answer(
-        pd.concat([frame, masked]), cast(RunFaultPaths, SimpleNamespace(**structure)), has_alerts=True
+        pd.concat([frame, masked]), cast(RunFaultPaths, SimpleNamespace(**structure)), {}, has_alerts=True
     )
     [line] = answer.tables[0].rows
     silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
@@ -200,18 +201,20 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
 def test_six_contacts_and_four_other_hazards_are_listed() -> None:
     frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
     metrics = [MetricFacts("margin_h1", "m", "", "lower"), MetricFacts("margin_h2", "s", "", "lower")]
-    hit, missed, _ = most_dangerous_answer(frame, metrics, has_alerts=True).tables
+    answer = most_dangerous_answer(frame, metrics, {"S1": "S1 light"}, has_alerts=True)
+    assert "12 of severity S1 light, 12 without contact" in answer.paragraph
+    hit, missed, _ = answer.tables
     assert (len(hit.rows), len(missed.rows)) == (6, 4)
     assert "severity" in hit.heads and "severity" not in missed.heads
     assert hit.rows[0][0] == PageLink("a/hit", "e=e0&outcome=hazard&severity=S1&sort=rank")
     assert missed.rows[0][0] == PageLink("b/miss", "e=e12&outcome=hazard&severity=no%20contact&sort=rank")
     assert hit.rows[0][2:5] == (
         ExplainedCodes(("H1", "H2")),
-        ExplainedCodes(("S1",), "severity"),
+        ExplainedCodes(("S1",), "severity", "S1 light"),
         "margin -2.00 s",
     )
     assert missed.rows[0][2:4] == (ExplainedCodes(("H1", "H2")), "margin -2.00 s")
-    assert len(most_dangerous_answer(frame[:12], metrics, has_alerts=True).tables[0].rows) == 10
+    assert len(most_dangerous_answer(frame[:12], metrics, {}, has_alerts=True).tables[0].rows) == 10
 
 
 def test_tolerated_faults_are_a_share_of_the_activated_ones(answer_by_name: dict[str, ReportAnswer]) -> None:
