@@ -50,7 +50,8 @@ const Report = (() => {
     const all = table.count.toLocaleString("en");
     const noun = `experiment${table.count === 1 ? "" : "s"}`, countText = state.isFiltered ? `${count.toLocaleString("en")} of ${all} ${noun}` : `${all} ${noun}`;
     const listed = table.of > table.count ? ` listed, the worst of ${table.of.toLocaleString("en")}` : "";
-    return [countText + listed, ...missing(table, state), ...table.unknown(state)].join(". ");
+    const unknown = table.unknown(state), reasons = table.count && !count && !unknown.length ? table.nothing(state) : [];
+    return [countText + listed, ...missing(table, state), ...unknown, ...reasons].join(". ");
   }
 
   /** The message for an open experiment that is not listed. */

@@ -21,8 +21,10 @@ const Rows = (() => {
     { name: "through", title: "Link passed", between: ";", none: "no link" },
   ];
   const OF_COMPONENTS = ["reached", "stopped_at", "through"];
-  const SEARCHED = ["experiment_id", "kind", "variant", "value", "unit", "scenario", "method", "trigger", "condition",
-    "ending", "hazards", "alerts", "detail"];
+  const SEARCHED = ["experiment_id", "fault", "kind", "variant", "value", "unit", "scenario", "method", "trigger", "condition",
+    "ending", "outcome", "severity", "hazards", "alerts", "warning", "detail"];
+  const SEARCHED_PARTS = "its id, fault, value, scenario, trigger, outcome, severity, hazards, alerts or error";
+  const SILENT = ["no alert at all", "alert only after the hazard"]; // hazards without an alert before them
 
   const COMPARISON = /^([a-z]\w*)(<=|>=|<|>|=)(.+)$/; // smallest_ttc<1, severity>=S2
   const COMPARED = { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b, "=": (a, b) => a === b };
@@ -60,6 +62,7 @@ const Rows = (() => {
       this.facets = FACETS.map((of) => facet(of, this.columns)).filter(Boolean);
       this.meanings = meanings; // by column and code
       this.byId = null;
+      this.phrases = null;
       const status = this.columns.get("status");
       const unusable = status && status.words ? status.words.map((w) => w === "harness_error" || w === "invalid_mutant") : [];
       // Counts leave out experiments without a valid result.
@@ -102,11 +105,36 @@ const Rows = (() => {
       const column = this.columns.get(name);
       if (!column) return null;
       if (column.words) {
-        const hit = column.words.map((word) => word.toLowerCase().includes(token));
+        const hit = column.words.map((word) => this.#fits(name, word, token));
         return hit.includes(true) ? (row) => hit[column.codes[row]] : null;
       }
       if (name === "experiment_id" && !/^[0-9a-f]+$/.test(token)) return null;
       return (row) => column.text(row).toLowerCase().includes(token);
+    }
+
+    /** Whether `token` finds a word of a column, as the page shows it. */
+    #fits(name, word, token) {
+      const none = FACETS.find((facet) => facet.name === name)?.none;
+      if (!word) return token === none;
+      // Only as a whole: "alert" must not find "no alert at all", nor "S2" a severity.
+      if (name === "warning") return token === word || (token === "silent" && SILENT.includes(word));
+      if (name === "severity") {
+        const label = this.called(name, word).toLowerCase();
+        return token === label || label.slice(word.length).includes(token);
+      }
+      return [word, word.replaceAll("_", " ")].some((text) => text.toLowerCase().includes(token));
+    }
+
+    /** The words of a query; phrases in quotes and names of several words that the page shows, such as `no alert`, are one. */
+    #tokens(query) {
+      if (!this.phrases) {
+        const searched = this.facets.filter((facet) => SEARCHED.includes(facet.name));
+        const names = searched.flatMap((facet) => facet.values.map((value) => this.called(facet.name, value).replaceAll("_", " ").toLowerCase()));
+        const several = [...new Set(names)].filter((text) => text.includes(" ")).sort((a, b) => b.length - a.length);
+        const escaped = several.map((text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"));
+        this.phrases = new RegExp(`"([^"]+)"|(?<!\\S)(?:${escaped.join("|") || "(?!)"})(?!\\S)|\\S+`, "g");
+      }
+      return [...query.toLowerCase().matchAll(this.phrases)].map(([token, quoted]) => quoted || token);
     }
 
     /** `smallest_ttc<1` as a function of the row; null: not a comparison with a column. An empty cell matches only `=none`. */
@@ -121,7 +149,7 @@ const Rows = (() => {
 
     /** The rows that have all words of `query` in any column and satisfy its comparisons; null: no query. */
     #searched(query) {
-      const tokens = query.toLowerCase().split(/\s+/).filter(Boolean);
+      const tokens = this.#tokens(query);
       if (!tokens.length) return null;
       const tests = tokens.map((token) => {
         const fits = this.#comparison(token);
@@ -173,7 +201,7 @@ const Rows = (() => {
     /** Sentences about a state's unknown columns and filters, and about filters for values that these results lack. */
     unknown({ query, chosen, unknown }) {
       const sentences = unknown.map((name) => `This page has no filter "${name}"`);
-      for (const token of query.toLowerCase().split(/\s+/)) {
+      for (const token of this.#tokens(query)) {
         const [, name] = COMPARISON.exec(token) || [];
         if (name && !this.columns.has(name)) sentences.push(`There is no column "${name}" to search`);
       }
@@ -183,6 +211,15 @@ const Rows = (() => {
         sentences.push(`No experiment has ${name} ${[...values].map((value) => `"${value}"`).join(" or ")}`);
       }
       return sentences;
+    }
+
+    /** Why no row matches a query and chosen values. */
+    nothing({ query, chosen }) {
+      const isEmpty = (matches) => matches && !matches.includes(1);
+      const words = this.#tokens(query).filter((token) => !COMPARISON.test(token) && isEmpty(this.#searched(`"${token}"`)));
+      if (words.length) return words.map((word) => `No experiment has "${word}" in ${SEARCHED_PARTS}`);
+      if (isEmpty(this.#searched(query))) return ["Each part of the search finds experiments, but none has all of them"];
+      return chosen.size ? ["No experiment has all of the chosen values" + (query ? " and matches the search" : "")] : [];
     }
 
     /** `rows` sorted by a column: text alphabetically, numbers by size, empty cells last; the sort is stable. */

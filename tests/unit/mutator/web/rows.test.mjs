@@ -90,3 +90,53 @@ test("unknown columns, filters and values are named", () => {
     'No experiment has kind "drift"',
   ]);
 });
+
+const DRIVES = new Rows.Table({
+  count: 4,
+  checked: [],
+  labels: {},
+  severities: { S1: "S1 light", S2: "S2 severe" },
+  columns: [
+    { name: "experiment_id", texts: ["aaaa11", "aaaa22", "bbbb33", "cccc44"] },
+    { name: "fault", texts: ["radar/chaff/distance 40 m", "radar/chaff/distance 40 m", "a/noise/x", "a/noise/x"] },
+    dictionary("kind", "radar/chaff", "radar/chaff", "a/noise", "a/noise"),
+    dictionary("scenario", "S1", "S2", "S2", "S1"),
+    dictionary("ending", "hazard", "hazard", "not_activated", "crashed"),
+    dictionary("outcome", "hazard", "hazard", "not_activated", ""),
+    dictionary("severity", "S2", "S1", "", ""),
+    dictionary("alerts", "", "fcw;late", "", "fcw"),
+    dictionary("warning", "no alert at all", "alert before the hazard", "", ""),
+  ],
+});
+const drives = (query) => DRIVES.filter(query, new Map()).rows;
+const state = (query, chosen = {}) => ({ query, chosen: new Map(Object.entries(chosen).map(([name, of]) => [name, new Set(of)])), unknown: [] });
+
+test("a search finds the words that the page shows", () => {
+  assert.deepEqual(drives("silent"), [0]);
+  assert.deepEqual(drives("silent hazard"), [0]);
+  assert.deepEqual(drives("no alert"), [0, 2]);
+  assert.deepEqual(drives("no alert at all"), [0]);
+  assert.deepEqual(drives("no contact"), [2, 3]);
+  assert.deepEqual(drives("not activated"), [2]);
+  assert.deepEqual(drives("no outcome"), [3]);
+  assert.deepEqual(drives("radar/chaff/distance s1"), [0]);
+  assert.deepEqual(drives('"distance 40 m" s2'), [1]);
+});
+
+test("a scenario and a severity class are not confused", () => {
+  assert.deepEqual(drives("s1"), [0, 3]);
+  assert.deepEqual(drives("severe"), [0]);
+  assert.deepEqual(drives("s2 severe"), [0]);
+  assert.deepEqual(drives("severity>=s2"), [0]);
+});
+
+test("a word for an alert does not find runs without one", () => {
+  assert.deepEqual(drives("alert"), []);
+  assert.deepEqual(drives("fcw"), [1, 3]);
+});
+
+test("a search without a result says why", () => {
+  assert.match(DRIVES.nothing(state("chaff xyz"))[0], /^No experiment has "xyz" in its id, fault, /);
+  assert.match(DRIVES.nothing(state("chaff crashed"))[0], /none has all/);
+  assert.match(DRIVES.nothing(state("", { scenario: ["S1"], outcome: ["not_activated"] }))[0], /chosen values/);
+});
