@@ -185,20 +185,20 @@ def _metric_values(metric: Metric, values: ValuesByName) -> np.ndarray:
 def _aggregate_metric(
     metric: Metric, numbers: np.ndarray, values: ValuesByName, t_end: float | None
 ) -> float | None:
-    """Return the aggregate of a metric up to the end of the drive, or None without values.
+    """Return the aggregate of a metric up to its end, or None without values.
 
     Sums are exact (`fsum`), so that they do not depend on the processor.
     """
-    time = values[TIME]
-    driven = time <= (math.inf if t_end is None else t_end + _TIME_SLACK_S)
+    time, end = values[TIME], metric.end_s(t_end)
+    driven = time <= end + _TIME_SLACK_S if metric.ends_before_s is None else time < end - _TIME_SLACK_S
     if metric.aggregate == "at_end":
         driven &= t_end is not None and time == time[driven].max(initial=-math.inf)
     counts = np.isfinite(numbers) & driven
     if metric.where:
         counts &= trace_formulas.condition_at_each_step(metric.where, values)
     if metric.aggregate in ("integral", "duration"):
-        until = np.append(time[1:], time[-1:])  # each value lasts until the next step or the end of the drive
-        lengths = np.minimum(until, math.inf if t_end is None else max(t_end, time[0])) - time
+        until = np.append(time[1:], time[-1:])  # each value lasts until the next step or the end
+        lengths = np.minimum(until, max(end, time[0])) - time
         return math.fsum((numbers[counts] * lengths[counts]).tolist())
     aggregated = numbers[counts]
     if not aggregated.size:

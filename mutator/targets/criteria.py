@@ -1,5 +1,6 @@
 """Hazards, which a run must avoid, and metrics, which measure how bad a run was."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,12 +14,15 @@ WorseDirection = Literal["higher", "lower"]
 class Metric:
     """A number for each run: an aggregate of `formula` over the steps in which `where` holds, up to the first
     terminal hazard. Both may name values of the golden run (`golden.gap`).
+
+    With `ends_before_s`, the metric ends that long before this hazard; 0 leaves out the hazard's step.
     """
 
     name: str
     aggregate: Aggregate
     step_formula: str
     where: str = ""
+    ends_before_s: float | None = None
     unit: str
     worse: WorseDirection
     about: str
@@ -27,6 +31,10 @@ class Metric:
     @property
     def uses_golden(self) -> bool:
         return GOLDEN_PREFIX in self.step_formula or GOLDEN_PREFIX in self.where
+
+    def end_s(self, drive_end_s: float | None) -> float:
+        """Return the time (s) at which the metric ends; infinite in a drive without a terminal hazard."""
+        return math.inf if drive_end_s is None else drive_end_s - (self.ends_before_s or 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -69,6 +69,14 @@ class MetricModel(StrictModel, title="A metric"):
         None, description="The value in the step of the first terminal hazard; empty if there is none."
     )
     where: str | None = Field(None, description="Use only the steps in which this condition holds.")
+    ends_before_s: float | None = Field(
+        None,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="How long before the first terminal hazard the metric ends, in s; 0 leaves out the step "
+        "of the hazard alone. For what means nothing at a contact, such as a time to collision. Default: the "
+        "step of the hazard is the last.",
+    )
     unit: str = Field(description="The unit; `-` for none.")
     worse: WorseDirection = Field(description="Which values are worse: `higher` or `lower`.")
     about: str = Field(description="What the metric measures.")
@@ -174,12 +182,20 @@ def _build_metric(name: str, model: MetricModel, names: Collection[str], source:
             remedy="give each metric exactly one aggregate",
         )
     (aggregate,) = aggregates
+    if aggregate == "at_end" and model.ends_before_s is not None:
+        raise source.error(
+            (*keys, "ends_before_s"),
+            f"metric '{name}' with `at_end` and `ends_before_s`",
+            expected="one of them, because `at_end` is the value in the step of the hazard",
+            remedy="remove one",
+        )
     canonical = manifest_condition if aggregate == "duration" else manifest_formula
     return Metric(
         name=name,
         aggregate=aggregate,
         step_formula=canonical(getattr(model, aggregate), names, source, (*keys, aggregate)),
         where=manifest_condition(model.where, names, source, (*keys, "where")),
+        ends_before_s=model.ends_before_s,
         unit=model.unit,
         worse=model.worse,
         about=model.about,

@@ -72,6 +72,11 @@ def test_a_hazard_occurs_when_its_condition_has_held_long_enough(
         ('{min: gap, where: "speed < 0"}', 2.0),
         ('{min: gap, where: "speed > 9"}', None),
         ("max: rate(speed)", 3.0),
+        ("{min: gap, ends_before_s: 0}", 1.0),  # without the step of the contact
+        ("{min: speed, ends_before_s: 2}", 1.0),  # the steps before 1 s
+        ("{integral: speed, ends_before_s: 0}", 2.0),  # the value before the contact lasts until it
+        ("{integral: speed, ends_before_s: 1.5}", 2.0),
+        ("{min: gap, ends_before_s: 3}", None),  # no step is left
         ("max: gap / (speed - speed)", None),  # NaN and infinities are left out
     ],
 )

@@ -33,7 +33,8 @@ OF_THE_GAP = ("margin_h1", "smallest_gap", "smallest_hwt", "smallest_ttc", "larg
     [
         # the car leaves its lane behind a vehicle, passes it, and returns behind the next one
         ([10, 6, 2, -3, -40, 30], [0, 2.75, BESIDE, 3, -BESIDE, -2.75], [6, 6, 0.6, 3, 4 / 12, None]),
-        ([10, 4, -1, -3], [0, 1, 2, 2], [-1, -1, -0.1, 2, 4 / 8, 2]),  # contact at 2 s, overlap until 3 s
+        # contact at 2 s, overlap until 3 s; time to collision and needed deceleration end 1 s before it
+        ([10, 4, -1, -3], [0, 1, 2, 2], [-1, -1, -0.1, 5, 4 / 20, 2]),
         ([3, 1, -1], [BESIDE, 3, 9], [None] * 6),  # the car is never behind the vehicle
     ],
 )
