@@ -3,7 +3,7 @@ import { readFileSync } from "node:fs";
 import js from "@eslint/js";
 import globals from "globals";
 
-const WEB = "mutator/web", PAGES = ["comparison", "report", "review", "serve"];
+const WEB = "mutator/web", PAGES = ["comparison", "report", "review", "serve", "golden"];
 const lines = (file) => readFileSync(`${WEB}/${file}`, "utf8").trim().split("\n");
 const orders = PAGES.map((page) => lines(`${page}/order.txt`).filter((name) => name.endsWith(".js")));
 orders[3].unshift(...orders[1]); // the server adds its scripts to a report

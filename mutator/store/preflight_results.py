@@ -18,6 +18,13 @@ class CheckResult:
     detail: str
 
 
+def check_results(folder: RunFolder) -> tuple[CheckResult, ...]:
+    """Return the results of the checks; none if they have not run."""
+    path = folder.path / CHECKS_FILE
+    stored = read_json(path, CHECKS_SCHEMA).get("results", ()) if path.is_file() else ()
+    return tuple(CheckResult(**result) for result in stored)
+
+
 def packages_loaded_by_golden_runs(folder: RunFolder) -> tuple[str, ...]:
     path = folder.path / CHECKS_FILE
     return tuple(read_json(path, CHECKS_SCHEMA).get("packages", ())) if path.is_file() else ()
