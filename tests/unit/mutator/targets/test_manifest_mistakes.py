@@ -92,6 +92,8 @@ def test_the_manifest_is_valid_without_the_mistakes(path: Path) -> None:
         ("alone: [--alone]", "alone: {arg: [--alone], same_in: [A, B]}", "unknown key 'arg'", "args"),
         ("margin: gap", "margin: gap > 0", "gap > 0", "gap"),
         ("min: gap", "min: gap, max: gap", "min and max", "one of"),
+        ("min: gap", "ends_before_s: 1, at_end: gap", "`at_end` and `ends_before_s`", "one of them"),
+        ("min: gap", "ends_before_s: -1, min: gap", "-1", "greater than or equal to 0"),
         ("worse: lower", "worse: smaller", "'smaller'", "lower"),
         ("  gap: {unit: m, role", "  rate: {unit: m, role", "'rate'", "from: rate"),
         ("  LATE: {}", "  LATE: {for_s: 1}", "judged by the record", "when"),
