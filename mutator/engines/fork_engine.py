@@ -5,7 +5,6 @@ and reruns those that crash. The `warm` engine forks before the first step. So d
 at its first terminal hazard and the golden run has one, too.
 """
 
-import hmac
 import marshal
 import os
 from collections.abc import Iterable, Iterator, Mapping
@@ -14,7 +13,6 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from secrets import token_bytes
-from typing import Any
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import (
@@ -22,12 +20,12 @@ from mutator._common.files import (
     raising_disk_full,
     remove_anything_at,
     remove_folder,
-    write_atomic,
 )
 from mutator._common.hashing import content_id
 from mutator.engines.code_swap import CodeSwap, plan_swap
 from mutator.engines.engine_jobs import EngineArguments, Job, JobResult, RunMode, harness_error_result
 from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
+from mutator.engines.fork_messages import check_fork_report, fork_request
 from mutator.engines.fork_server_client import (
     ForkServer,
     GoldenRunRequest,
@@ -35,6 +33,7 @@ from mutator.engines.fork_server_client import (
     raising_if_server_input_changes,
 )
 from mutator.engines.job_folder import PLAIN_OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
+from mutator.engines.observation_store import ObservationStore
 from mutator.engines.process_endings import (
     GUARD_PATIENCE_S,
     ProcessEnding,
@@ -47,9 +46,8 @@ from mutator.engines.thread_messages import describe_too_many_threads, remedy_fo
 from mutator.errors import ForkServerLost, MutantNotSwappable, NotForkable
 from mutator.model import Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
-from mutator.mutants.probe import ProbeSource, probe_attributes_after, probe_module, untriggered_report
+from mutator.mutants.probe import ProbeSource, untriggered_report
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stop_function import stop_function_source
 from mutator.triggers.trigger_kinds import always_trigger
 
 _GoldenKey = tuple[str, int, tuple[str, ...]]
@@ -80,7 +78,7 @@ class ForkEngine:
         self._parent_pid = parent_pid
         self._null_mutant = null_mutant
         self._forks_before_first_step = before_first_step
-        self._secret = secret or token_bytes(16)
+        self._observation_store = ObservationStore(self._work_folder, secret or token_bytes(16))
         self._patience_s = limits.wall_s + GUARD_PATIENCE_S
         self._server: ForkServer | None = None
         self._server_count = 0
@@ -237,27 +235,15 @@ class ForkEngine:
         fork_point: ForkPoint,
         observe: bool,
     ) -> ProcessEnding:
-        request = {
-            "home": str(home.path),
-            "out": str(home.output_folder),
-            "log": str(home.log_path),
-            "report": str(home.report_path),
-            "inactive": str(home.inactive_marker),
-            "args": None,
-            "cpu_s": self._limits.cpu_s,
-            "memory_mb": self._limits.memory_mb,
-            "disk_mb": self._limits.disk_mb,
-            "steps": self._limits.steps,
-            "probe_name": probe_module(self._manifest.probe_package),
-            "probe": swap.probe_code,
-            "functions": [(f.module, f.name_path, f.old_code, f.new_code) for f in swap.functions],
-            "settings": swap.probe_value_setters,
-            "probe_state": probe_attributes_after(
-                fork_point.observation_count, fork_point.earliest_time_s, fork_point.last_time_s
-            ),
-            "stop": stop_function_source(self._manifest) if job.stop_at_hazard else None,
-            "watch": [value.name for value in self._manifest.observation.values] if observe else None,
-        }
+        request = fork_request(
+            self._manifest,
+            self._limits,
+            home,
+            swap,
+            fork_point,
+            stop_at_hazard=job.stop_at_hazard,
+            observe=observe,
+        )
         # the child must begin the run; a watched run has the arguments of the waiting processes
         if waiting.key is None:
             request["args"] = self._target_arguments(
@@ -285,7 +271,7 @@ class ForkEngine:
         home.unlock()
         report = home.read_report(threads=list)
         if report is not None:
-            self._check_fork_report(job, report)
+            check_fork_report(job, report)
         status, detail = status_of_ending(self._limits, ended, report)
         if status is not Status.OK and was_disk_full(self._work_folder, report):
             raise disk_full_error(self._work_folder)
@@ -306,18 +292,6 @@ class ForkEngine:
             mode=RunMode.WARM if self._forks_before_first_step else RunMode.FORK,
         )
 
-    def _check_fork_report(self, job: Job, report: dict[str, Any]) -> None:
-        """Raise NotForkable if the child did not run the mutant's code, or if threads are left."""
-        if report["ended"] == "swap refused":
-            raise NotForkable(str(report.get("why")))
-        if report["outside"]:
-            raise NotForkable(f"the target was also imported from {', '.join(report['outside'])}")
-        if report["threads"]:
-            others = report["threads"]
-            raise NotForkable(f"at its end {describe_too_many_threads(others)}", remedy_for_threads(others))
-        if report["ended"] == "ok" and (problem := job.problem_of_probe_report(report["probe"])):
-            raise NotForkable(problem)
-
     def _golden_observations(self, job: Job, golden: Path) -> GoldenObservations:
         """Return what a probe observes in a job's golden run. The first call runs it."""
         key = _golden_key(job)
@@ -332,13 +306,10 @@ class ForkEngine:
         return observations
 
     def _observe_golden_run(self, job: Job, golden: Path) -> GoldenObservations:
-        cache_file = (
-            self._work_folder / f"observed-{content_id(_golden_key(job))}"
-        )  # shared by a session's workers
-        if cache_file.is_file() and (data := self._read_authenticated(cache_file)):
-            values, before, libraries = marshal.loads(data)
-            return GoldenObservations(values=values, counts_before_steps=before, imported_modules=libraries)
-        folder = self._runs_folder / f"watch-{content_id(_golden_key(job))}"
+        golden_id = content_id(_golden_key(job))
+        if stored := self._observation_store.load(golden_id):
+            return stored
+        folder = self._runs_folder / f"watch-{golden_id}"
         try:
             swap = self._plan_swap(job, self._null_mutant.files, self._null_mutant.probe_source)
             null = replace(job, mutant_id=None, stop_at_hazard=False)
@@ -356,32 +327,21 @@ class ForkEngine:
             observed_values, *counts_and_modules = (
                 execution.watch_report[name] for name in _OBSERVATION_KEYS
             )
-            content = (tuple(map(tuple, observed_values)), *map(tuple, counts_and_modules))
-            if content[0] and content[1][:1] != (0,):
+            values = tuple(map(tuple, observed_values))
+            counts_before_steps, imported_modules = map(tuple, counts_and_modules)
+            if values and counts_before_steps[:1] != (0,):
                 raise NotForkable("it observes before its first step")
-            data = marshal.dumps(content)
-            write_atomic(cache_file, self._authentication_code(cache_file, data) + data)
-            return GoldenObservations(
-                values=content[0], counts_before_steps=content[1], imported_modules=content[2]
+            observations = GoldenObservations(
+                values=values, counts_before_steps=counts_before_steps, imported_modules=imported_modules
             )
+            self._observation_store.save(golden_id, observations)
+            return observations
         except MutantNotSwappable as why:
             raise NotForkable(f"its observing statement cannot be inserted: {why}") from None
         finally:
             remove_folder(folder)
 
-    def _read_authenticated(self, path: Path) -> bytes:
-        """Return what an engine with the same secret wrote to a file; empty for what a mutant wrote."""
-        code, data = (
-            (content := read_bounded(path))[:_AUTHENTICATION_CODE_BYTES],
-            content[_AUTHENTICATION_CODE_BYTES:],
-        )
-        return data if hmac.compare_digest(code, self._authentication_code(path, data)) else b""
 
-    def _authentication_code(self, path: Path, data: bytes) -> bytes:
-        return hmac.digest(self._secret, path.name.encode() + data, "sha256")
-
-
-_AUTHENTICATION_CODE_BYTES = 32  # of SHA-256
 _OBSERVATION_KEYS = ("seen", "before", "libraries")
 _BEFORE_FIRST_STEP = ForkPoint(step=0, observation_count=0, earliest_time_s=None, last_time_s=None)
 

@@ -1,0 +1,61 @@
+"""Messages to and from a fork that becomes a mutant: the request, and the check of its report."""
+
+from typing import Any
+
+from mutator.engines.code_swap import CodeSwap
+from mutator.engines.engine_jobs import Job
+from mutator.engines.first_activation import ForkPoint
+from mutator.engines.job_folder import JobFolder
+from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
+from mutator.errors import NotForkable
+from mutator.model import Limits
+from mutator.mutants.probe import probe_attributes_after, probe_module
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.stop_function import stop_function_source
+
+
+def fork_request(
+    manifest: TargetManifest,
+    limits: Limits,
+    home: JobFolder,
+    swap: CodeSwap,
+    fork_point: ForkPoint,
+    *,
+    stop_at_hazard: bool,
+    observe: bool,
+) -> dict[str, Any]:
+    """Return what a fork needs to run the mutant. Without `args`, it continues a run that has begun."""
+    return {
+        "home": str(home.path),
+        "out": str(home.output_folder),
+        "log": str(home.log_path),
+        "report": str(home.report_path),
+        "inactive": str(home.inactive_marker),
+        "args": None,
+        "cpu_s": limits.cpu_s,
+        "memory_mb": limits.memory_mb,
+        "disk_mb": limits.disk_mb,
+        "steps": limits.steps,
+        "probe_name": probe_module(manifest.probe_package),
+        "probe": swap.probe_code,
+        "functions": [(f.module, f.name_path, f.old_code, f.new_code) for f in swap.functions],
+        "settings": swap.probe_value_setters,
+        "probe_state": probe_attributes_after(
+            fork_point.observation_count, fork_point.earliest_time_s, fork_point.last_time_s
+        ),
+        "stop": stop_function_source(manifest) if stop_at_hazard else None,
+        "watch": [value.name for value in manifest.observation.values] if observe else None,
+    }
+
+
+def check_fork_report(job: Job, report: dict[str, Any]) -> None:
+    """Raise NotForkable if the child did not run the mutant's code, or if threads are left."""
+    if report["ended"] == "swap refused":
+        raise NotForkable(str(report.get("why")))
+    if report["outside"]:
+        raise NotForkable(f"the target was also imported from {', '.join(report['outside'])}")
+    if report["threads"]:
+        others = report["threads"]
+        raise NotForkable(f"at its end {describe_too_many_threads(others)}", remedy_for_threads(others))
+    if report["ended"] == "ok" and (problem := job.problem_of_probe_report(report["probe"])):
+        raise NotForkable(problem)

@@ -1,0 +1,49 @@
+"""Stores what a probe observed in golden runs, for all workers of a session."""
+
+import hmac
+import marshal
+from pathlib import Path
+
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.files import write_atomic
+from mutator.engines.first_activation import GoldenObservations
+
+_AUTHENTICATION_CODE_BYTES = 32  # of SHA-256
+
+
+class ObservationStore:
+    """Observations of golden runs in files of `folder`.
+
+    Mutants can write there, too, so a file counts only if whoever wrote it had the `secret`.
+    """
+
+    def __init__(self, folder: Path, secret: bytes) -> None:
+        self._folder = folder
+        self._secret = secret
+
+    def load(self, golden_id: str) -> GoldenObservations | None:
+        """Return the observations of a golden run; None if no engine with the same secret stored them."""
+        path = self._path_of(golden_id)
+        if not path.is_file():
+            return None
+        content = read_bounded(path)
+        code, data = content[:_AUTHENTICATION_CODE_BYTES], content[_AUTHENTICATION_CODE_BYTES:]
+        if not data or not hmac.compare_digest(code, self._authentication_code(path, data)):
+            return None
+        values, counts_before_steps, imported_modules = marshal.loads(data)
+        return GoldenObservations(
+            values=values, counts_before_steps=counts_before_steps, imported_modules=imported_modules
+        )
+
+    def save(self, golden_id: str, observations: GoldenObservations) -> None:
+        path = self._path_of(golden_id)
+        data = marshal.dumps(
+            (observations.values, observations.counts_before_steps, observations.imported_modules)
+        )
+        write_atomic(path, self._authentication_code(path, data) + data)
+
+    def _path_of(self, golden_id: str) -> Path:
+        return self._folder / f"observed-{golden_id}"
+
+    def _authentication_code(self, path: Path, data: bytes) -> bytes:
+        return hmac.digest(self._secret, path.name.encode() + data, "sha256")
