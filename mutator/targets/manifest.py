@@ -17,7 +17,7 @@ from mutator.targets.channels import Channel, Role
 from mutator.targets.contact_severity import DELTA_V_NAME, ContactSettings
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.observed_values import Observation
-from mutator.targets.overhead_view import Scene
+from mutator.targets.overhead_view import OverheadView
 from mutator.targets.placeholders import fill_placeholders
 from mutator.targets.source_tree import SourceTree, matches_any_glob, read_tree
 from mutator.triggers import temporal_logic
@@ -97,7 +97,7 @@ class TargetManifest:
     hazard_rules: tuple[Hazard, ...]
     metrics: tuple[Metric, ...]
     contact: ContactSettings | None
-    scene: Scene | None
+    scene: OverheadView | None
     alerts: tuple[str, ...]  # other alerts are ignored
     source: YamlSource = field(repr=False, compare=False)  # the file's lines, for errors
     film: FilmCommands | None = None

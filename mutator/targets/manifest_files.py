@@ -15,7 +15,7 @@ from mutator.targets.criteria_model import HazardModel, MetricModel, build_hazar
 from mutator.targets.entry_model import EntryModel, ScenarioChangeModel, check_commands
 from mutator.targets.manifest import FilmCommands, TargetManifest
 from mutator.targets.observation_model import ObservationModel, build_observation
-from mutator.targets.overhead_view_model import SceneModel, build_scene
+from mutator.targets.overhead_view_model import OverheadViewModel, build_overhead_view
 from mutator.targets.process_environment import check_environment
 from mutator.targets.relative_paths import clean_relative_path
 from mutator.targets.required_packages import parse_requirements
@@ -114,7 +114,7 @@ class ManifestModel(StrictModel, title="The file"):
     severity: YamlRecord[ContactSettings] | None = Field(
         None, description="How severe a contact is. Without it, results have no severity class."
     )
-    scene: SceneModel | None = Field(None, description="How to draw a drive from above.")
+    scene: OverheadViewModel | None = Field(None, description="How to draw a drive from above.")
     alerts: list[str] = Field(
         default_factory=list,
         description="The names of the alerts to use; other alerts in a record are ignored.",
@@ -186,7 +186,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         hazard_rules=rules,
         metrics=metrics,
         contact=model.severity,
-        scene=None if model.scene is None else build_scene(model.scene, judgeable_names, source),
+        scene=None if model.scene is None else build_overhead_view(model.scene, judgeable_names, source),
         alerts=tuple(model.alerts),
         source=source,
         film=model.film,

@@ -7,7 +7,7 @@ ActorShape = Literal["box", "circle"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SceneActor:
+class ViewedActor:
     """Something that moves. Formulas over channels give its centre (`x`, `y`) in m and `heading` (rad, left
     positive).
 
@@ -37,12 +37,12 @@ class GroundLine:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
+class OverheadView:
     """The actors and lines of a drawing of the drive. `follow` is the actor that the view follows ('': none).
     `speed` is a formula for the speed (m/s) at which the origin moves along x.
     """
 
-    actors: tuple[SceneActor, ...]
+    actors: tuple[ViewedActor, ...]
     lines: tuple[GroundLine, ...]
     follow: str
     speed: str

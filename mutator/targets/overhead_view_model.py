@@ -8,7 +8,7 @@ from pydantic import Field
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.targets.manifest_formulas import manifest_condition, manifest_formula
-from mutator.targets.overhead_view import ActorShape, GroundLine, Scene, SceneActor
+from mutator.targets.overhead_view import ActorShape, GroundLine, OverheadView, ViewedActor
 
 
 class _ActorModel(StrictModel, title="An actor"):
@@ -43,7 +43,7 @@ class _LineModel(StrictModel, title="A line"):
     dashed: bool = Field(False, description="Whether the line is dashed.")
 
 
-class SceneModel(StrictModel, title="The scene"):
+class OverheadViewModel(StrictModel, title="The scene"):
     """How a drive looks from above: SI units, x ahead, y to the left."""
 
     actors: dict[str, _ActorModel] = Field(min_length=1, description="The things that move, by name.")
@@ -59,7 +59,7 @@ class SceneModel(StrictModel, title="The scene"):
     )
 
 
-def build_scene(model: SceneModel, names: Collection[str], source: YamlSource) -> Scene:
+def build_overhead_view(model: OverheadViewModel, names: Collection[str], source: YamlSource) -> OverheadView:
     if model.follow is not None and model.follow not in model.actors:
         raise source.error(
             ("scene", "follow"),
@@ -70,16 +70,16 @@ def build_scene(model: SceneModel, names: Collection[str], source: YamlSource) -
     actors = tuple(_build_actor(name, actor, names, source) for name, actor in model.actors.items())
     lines = tuple(_build_line(name, line, names, source) for name, line in model.lines.items())
     speed = manifest_formula(model.speed, names, source, ("scene", "speed"))
-    return Scene(actors=actors, lines=lines, follow=model.follow or "", speed=speed)
+    return OverheadView(actors=actors, lines=lines, follow=model.follow or "", speed=speed)
 
 
-def _build_actor(name: str, model: _ActorModel, names: Collection[str], source: YamlSource) -> SceneActor:
+def _build_actor(name: str, model: _ActorModel, names: Collection[str], source: YamlSource) -> ViewedActor:
     keys: KeyPath = ("scene", "actors", name)
     if model.shape == "circle" and model.width_m is not None:
         raise source.error(
             (*keys, "width_m"), "the width of a circle", expected="`length_m` alone", remedy="remove it"
         )
-    return SceneActor(
+    return ViewedActor(
         name=name,
         shape=model.shape,
         length=model.length_m,
