@@ -91,7 +91,7 @@ class Claim(StrictModel):
 
     claim_text: str = Field(alias="says")
     measure: str | None = None
-    of: str = ""
+    runs_query: str = Field("", alias="of")
     against: str | None = None
     part: str | None = None
     start: str | None = None
@@ -116,14 +116,15 @@ class Claim(StrictModel):
 
     def measure_calls(self) -> Iterator[tuple[str, dict[str, str]]]:
         """Yield each group with the arguments of the measure. A claim without groups has one group, ''."""
-        text_by_argument = {name: getattr(self, name) for name in ("of", "against", "part", "start", "end")}
+        text_by_argument = {"of": self.runs_query}
+        text_by_argument |= {name: getattr(self, name) for name in ("against", "part", "start", "end")}
         # an empty `of` means all runs
         arguments = {name: text for name, text in text_by_argument.items() if text is not None}
         if self.each is None:
             yield "", arguments
             return
         for value in self.each.values:
-            group_query = f'({self.of}) and {self.each.column} == "{value}"'
+            group_query = f'({self.runs_query}) and {self.each.column} == "{value}"'
             yield value, arguments | {"of": group_query}
 
     def published_estimate(self) -> Estimate | None:
