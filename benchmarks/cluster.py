@@ -29,7 +29,7 @@ from typing import Any
 from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.campaigns.run_provenance import append_stretch
+from mutator.campaigns.run_provenance import append_session_environment
 from mutator.execution.cluster import cluster_distributor, worker_roster, worker_tasks
 from mutator.execution.cluster import result_intake as intakes
 from mutator.execution.cluster.bundle import Bundle
@@ -155,7 +155,7 @@ def intake() -> None:
     for fake in (machine_facts, deliver_bundle, attend_run, leave_run, run_piece):
         setattr(worker_tasks, fake.__name__, fake)
     with planned() as (workspace, folder, left):
-        folder = append_stretch(folder, SessionEnvironment(python="", packages={}, platform=""))
+        folder = append_session_environment(folder, SessionEnvironment(python="", packages={}, platform=""))
         session: Any = SimpleNamespace(
             workspace=workspace,
             folder=folder,

@@ -26,7 +26,7 @@ from mutator.audit.seal import seals_of
 from mutator.campaigns import run_environment
 from mutator.campaigns.plan import SeedBySeedPlan
 from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.campaigns.run_provenance import append_stretch
+from mutator.campaigns.run_provenance import append_session_environment
 from mutator.execution.single_run import run_golden
 from mutator.model import Experiment, Record
 from mutator.mutants.mutant_building import build
@@ -72,7 +72,7 @@ def make(size: int, out: Path) -> str:
     equivalence_check.mark_check_as_needed(out)
     write_proof(folder, ids, records, patches)
     write_series(workspace, folder, ids, first)
-    append_stretch(
+    append_session_environment(
         folder,
         SessionEnvironment(
             python=run_environment.python_version(),

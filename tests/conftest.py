@@ -14,7 +14,7 @@ import pytest
 
 from mutator.campaigns.plan import Plan, build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.campaigns.run_provenance import append_stretch
+from mutator.campaigns.run_provenance import append_session_environment
 from mutator.model import (
     Anchor,
     AnchorKind,
@@ -399,7 +399,7 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
             for name, data in new.items():
                 (out / name).parent.mkdir(parents=True, exist_ok=True)
                 (out / name).write_bytes(data)
-        append_stretch(
+        append_session_environment(
             folder, SessionEnvironment(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform="Linux")
         )
         file_digests.add_segments_to_ledger(out, finished=True)

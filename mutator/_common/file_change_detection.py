@@ -7,7 +7,7 @@ _READ_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 _FileState = tuple[int, int, int, int]
 
 
-class UnchangedFiles:
+class FileChangeDetector:
     """Files that must stay as they are from now on: absolute path -> content.
 
     A changed file is found even if its bytes, size and times were put back, because only the kernel sets its

@@ -22,8 +22,13 @@ from urllib.parse import quote
 
 from mutator._common.hashing import content_id
 
-CHECKS, GOLDENS, RUNS = "checks", "goldens", "runs"
-LINES, PICTURES, PAGES, TARGETS = "lines", "pictures", "pages", "targets"
+CHECKS_CACHE, GOLDENS_CACHE, VERIFIED_RUNS_CACHE = "checks", "goldens", "runs"
+EXECUTED_LINES_CACHE, IMAGE_EFFECTS_CACHE, REPORTS_CACHE, TARGET_CACHES = (
+    "lines",
+    "pictures",
+    "pages",
+    "targets",
+)
 _MOST_FOLDER_NAME_LENGTH = 200  # file systems allow 255 bytes
 MOST_TARGET_CACHE_BYTES = 4_000_000_000  # size limit for one target, enforced between seeds
 MOST_CACHED_REPORTS_BYTES = 500_000_000  # size limit for all reports that the server built
@@ -63,46 +68,48 @@ def caches_folder() -> Path:
 
 
 def cached_checks_folder() -> Path:
-    return caches_folder() / CHECKS
+    return caches_folder() / CHECKS_CACHE
 
 
 def cached_goldens_folder() -> Path:
-    return caches_folder() / GOLDENS
+    return caches_folder() / GOLDENS_CACHE
 
 
 def cached_verifications_folder() -> Path:
-    return caches_folder() / RUNS
+    return caches_folder() / VERIFIED_RUNS_CACHE
 
 
 def cached_executed_lines_folder() -> Path:
-    return caches_folder() / LINES
+    return caches_folder() / EXECUTED_LINES_CACHE
 
 
 def cached_image_effects_folder() -> Path:
-    return caches_folder() / PICTURES
+    return caches_folder() / IMAGE_EFFECTS_CACHE
 
 
 def cached_reports_folder() -> Path:
-    return caches_folder() / PAGES
+    return caches_folder() / REPORTS_CACHE
 
 
 def target_cache_folder(name: str) -> Path:
     """Return the folder that all runs of a target share."""
     quoted = quote(name, safe="").replace(".", "%2E")
     return (
-        caches_folder() / TARGETS / (quoted if len(quoted) <= _MOST_FOLDER_NAME_LENGTH else content_id(name))
+        caches_folder()
+        / TARGET_CACHES
+        / (quoted if len(quoted) <= _MOST_FOLDER_NAME_LENGTH else content_id(name))
     )
 
 
 def list_entries() -> list[CacheEntry]:
     """List all cached entries. Each file that a target keeps is an entry."""
-    listed = [_build_entry(CHECKS, path) for path in _paths_in(cached_checks_folder())]
-    listed += [_build_entry(GOLDENS, path) for path in _paths_in(cached_goldens_folder())]
-    listed += [_build_entry(RUNS, path) for path in _paths_in(cached_verifications_folder())]
-    listed += [_build_entry(LINES, path) for path in _paths_in(cached_executed_lines_folder())]
-    listed += [_build_entry(PICTURES, path) for path in _paths_in(cached_image_effects_folder())]
-    listed += [_build_entry(PAGES, path) for path in _paths_in(cached_reports_folder())]
-    for target in _paths_in(caches_folder() / TARGETS):
+    listed = [_build_entry(CHECKS_CACHE, path) for path in _paths_in(cached_checks_folder())]
+    listed += [_build_entry(GOLDENS_CACHE, path) for path in _paths_in(cached_goldens_folder())]
+    listed += [_build_entry(VERIFIED_RUNS_CACHE, path) for path in _paths_in(cached_verifications_folder())]
+    listed += [_build_entry(EXECUTED_LINES_CACHE, path) for path in _paths_in(cached_executed_lines_folder())]
+    listed += [_build_entry(IMAGE_EFFECTS_CACHE, path) for path in _paths_in(cached_image_effects_folder())]
+    listed += [_build_entry(REPORTS_CACHE, path) for path in _paths_in(cached_reports_folder())]
+    for target in _paths_in(caches_folder() / TARGET_CACHES):
         listed += [_build_entry(f"target {target.name}", path) for path in _files_below(target)]
     return sorted(listed, key=lambda entry: (entry.what, entry.path))
 
@@ -129,7 +136,8 @@ def prune_cached_reports() -> list[CacheEntry]:
     return them.
     """
     return _prune_entries(
-        [_build_entry(PAGES, path) for path in _paths_in(cached_reports_folder())], MOST_CACHED_REPORTS_BYTES
+        [_build_entry(REPORTS_CACHE, path) for path in _paths_in(cached_reports_folder())],
+        MOST_CACHED_REPORTS_BYTES,
     )
 
 

@@ -14,7 +14,7 @@ from mutator._common.hashing import digest
 from mutator._common.message_text import describe_choices
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_triggers import build_listed_triggers
-from mutator.campaigns.operator_faults import OperatorFault, OperatorFaults
+from mutator.campaigns.operator_faults import OperatorFault, OperatorFaultFinder
 from mutator.campaigns.operator_selection import MutantActivity
 from mutator.campaigns.sampling import evenly_spread_indices
 from mutator.config.yaml_sources import KeyPath
@@ -46,7 +46,7 @@ class CampaignExpansion:
         self._scenario_digests: dict[str, str] = {}
         self._library_specs: list[tuple[FaultSpec, ...]] = []
         self._fault_models = workspace.fault_models()
-        self._operator_faults = OperatorFaults(manifest, self._fault_models, campaign.limits)
+        self._operator_faults = OperatorFaultFinder(manifest, self._fault_models, campaign.limits)
 
     def with_seed(self, seed: int) -> "CampaignExpansion":
         """Return the same expansion with another seed, without reading files again."""

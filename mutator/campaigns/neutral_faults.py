@@ -11,7 +11,7 @@ from mutator.model import Experiment, Fault
 _MOST_NAMED_FAULTS = 3  # how many faults a warning names
 
 
-class NeutralFaults:
+class NeutralFaultWarner:
     """Collects the faults whose value changes nothing, and counts their experiments."""
 
     def __init__(self, models: FaultModels) -> None:

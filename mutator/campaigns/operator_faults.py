@@ -24,7 +24,7 @@ class OperatorFault:
     executing_scenarios: frozenset[str]
 
 
-class OperatorFaults:
+class OperatorFaultFinder:
     """Creates the operator faults of selections. Mutants enumerated for one seed are reused for others."""
 
     def __init__(self, manifest: TargetManifest, models: FaultModels, limits: Limits) -> None:

@@ -15,7 +15,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_campaign_study
 from mutator.campaigns.chunks import chunk_lengths_of_runs
-from mutator.campaigns.neutral_faults import NeutralFaults
+from mutator.campaigns.neutral_faults import NeutralFaultWarner
 from mutator.campaigns.plan_tally import FaultTypeAndMethod, PlanPart, PlanTally, plan_digest
 from mutator.campaigns.row_filters import compile_filter
 from mutator.campaigns.sampling import draw_balanced, draw_balanced_pairs, draw_in_proportion
@@ -179,7 +179,7 @@ class SeedBySeedPlan:
         MutatorError if no seed has an experiment, or if there are more shards than chunks; MutatorWarning for
         values that change nothing.
         """
-        neutral_faults, chunks = NeutralFaults(self._workspace.fault_models()), 0
+        neutral_faults, chunks = NeutralFaultWarner(self._workspace.fault_models()), 0
         limit = self.choices.limit
         for number, seed in enumerate(self.seeds):
             if limit == 0:

@@ -90,7 +90,7 @@ def _versions_to_record(folder: RunFolder, more_packages: Iterable[str] = ()) ->
     )
 
 
-def begin_stretch(
+def begin_session_environment(
     folder: RunFolder,
     workspace: "Workspace",
     *,
@@ -118,7 +118,7 @@ def begin_stretch(
         name: find_clone_state(place)
         for name, place in ({"mutator": _HARNESS_FOLDER} | folder_by_name).items()
     }
-    return append_stretch(
+    return append_session_environment(
         folder,
         SessionEnvironment(
             accepted=accepted_version_differences(folder, accept=accept_versions),
@@ -134,16 +134,16 @@ def begin_stretch(
     )
 
 
-def append_stretch(folder: RunFolder, stretch: SessionEnvironment) -> RunFolder:
-    return _write_stretches(folder, (*folder.session_environments, stretch))
+def append_session_environment(folder: RunFolder, stretch: SessionEnvironment) -> RunFolder:
+    return _write_session_environments(folder, (*folder.session_environments, stretch))
 
 
-def append_machine(folder: RunFolder, machine: WorkerMachine) -> RunFolder:
+def append_worker_machine(folder: RunFolder, machine: WorkerMachine) -> RunFolder:
     *before, last = folder.session_environments
-    return _write_stretches(folder, (*before, replace(last, machines=(*last.machines, machine))))
+    return _write_session_environments(folder, (*before, replace(last, machines=(*last.machines, machine))))
 
 
-def _write_stretches(folder: RunFolder, stretches: tuple[SessionEnvironment, ...]) -> RunFolder:
+def _write_session_environments(folder: RunFolder, stretches: tuple[SessionEnvironment, ...]) -> RunFolder:
     """Write run.json with these stretches of work, and return the folder as it is then."""
     file_digests.rewrite_file(folder.path, HEAD, replace(folder.head, stretches=stretches).file_bytes())
     return RunFolder(folder.path)

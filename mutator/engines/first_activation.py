@@ -63,7 +63,7 @@ def _cached_fork_point(
     if not observations.values:
         return None
     active_observations = np.flatnonzero(
-        activity_at_observations((armed_time_s, condition), observations.columns)
+        is_active_at_observations((armed_time_s, condition), observations.columns)
     )
     if not active_observations.size:
         return None
@@ -81,7 +81,7 @@ def _cached_fork_point(
     )
 
 
-def activity_at_observations(armed_condition: tuple[float, str], columns: np.ndarray) -> np.ndarray:
+def is_active_at_observations(armed_condition: tuple[float, str], columns: np.ndarray) -> np.ndarray:
     """Return for each observation whether a probe with this `ProbeSource.armed_condition` is active.
 
     `columns` are the times (s) of all observations, then the observed values.

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.file_change_detection import UnchangedFiles
+from mutator._common.file_change_detection import FileChangeDetector
 from mutator._common.files import remove_folder
 from mutator.engines import pyc_files
 from mutator.engines.job_tree import JobTree
@@ -117,7 +117,7 @@ class WaitingProcess:
 @contextmanager
 def raising_if_server_input_changes(path: Path) -> Iterator[None]:
     """Raise ForkServerLost if a file is written to while the server uses it."""
-    used = UnchangedFiles({str(path.resolve()): read_bounded(path)})
+    used = FileChangeDetector({str(path.resolve()): read_bounded(path)})
     yield
     if used.first_changed_path():
         raise ForkServerLost(f"{path.name} was changed while it was in use")
@@ -154,7 +154,7 @@ class ForkServer:
         }
         start_path, data = scratch_folder / "start.marshal", marshal.dumps(start)
         start_path.write_bytes(data)
-        self._start_file = UnchangedFiles({str(start_path): data})
+        self._start_file = FileChangeDetector({str(start_path): data})
         harness_socket, server_socket = socket.socketpair()
         command = [
             sys.executable,

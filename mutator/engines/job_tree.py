@@ -11,7 +11,7 @@ from contextlib import suppress
 from importlib.machinery import all_suffixes
 from pathlib import Path
 
-from mutator._common.file_change_detection import UnchangedFiles
+from mutator._common.file_change_detection import FileChangeDetector
 
 _IMPORTABLE_SUFFIXES = tuple(all_suffixes())
 
@@ -31,7 +31,7 @@ class JobTree:
         self._inodes_by_folder = {
             folder: _inode_number(place / folder) for folder in self._expected_names_by_folder
         }
-        self._files = UnchangedFiles({f"{place}/{name}": data for name, data in files.items()})
+        self._files = FileChangeDetector({f"{place}/{name}": data for name, data in files.items()})
 
     def first_changed_path(self) -> str:
         """Return a file that was changed, removed, or added where an import finds it; empty if none was."""

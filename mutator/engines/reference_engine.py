@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.file_change_detection import UnchangedFiles
+from mutator._common.file_change_detection import FileChangeDetector
 from mutator._common.files import disk_full_error, raising_disk_full, remove_anything_at, remove_folder
 from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import (
@@ -132,7 +132,7 @@ class ReferenceEngine:
         path = folder / "job.json"
         path.write_bytes(request)
         scenario = job.scenario.resolve()
-        inputs = UnchangedFiles({str(path): request, str(scenario): read_bounded(scenario)})
+        inputs = FileChangeDetector({str(path): request, str(scenario): read_bounded(scenario)})
         ended = self._run_guarded(job, path, home)
         changed_input = tree.first_changed_path() or inputs.first_changed_path().removeprefix(f"{folder}/")
         if not (changed_input or fresh_tree):

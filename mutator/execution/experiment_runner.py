@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
-from mutator._common.file_change_detection import UnchangedFiles
+from mutator._common.file_change_detection import FileChangeDetector
 from mutator._common.hashing import digest
 from mutator.campaigns.shared_runs import group_by_run
 from mutator.engines.engine_jobs import Engine, Job, JobResult, RunMode
@@ -97,9 +97,9 @@ class LoadedGoldens:
         self.check_unchanged(folder)
         return loaded
 
-    def _read_verified_files(self, folder: Path) -> UnchangedFiles:
+    def _read_verified_files(self, folder: Path) -> FileChangeDetector:
         paths = [path for name in self._manifest.output_files if (path := path_below(folder, name)).is_file()]
-        files = UnchangedFiles({str(path): read_bounded(path) for path in paths})
+        files = FileChangeDetector({str(path): read_bounded(path) for path in paths})
         if self._digests is not None and output_digest_of(self._manifest, folder) != self._digests[folder]:
             raise _changed_file_error(folder)
         return files

@@ -25,7 +25,11 @@ from mutator.audit.seal import Seals, seals_of
 from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
 from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.run_inputs import RunInputs
-from mutator.campaigns.run_provenance import accepted_version_differences, append_machine, begin_stretch
+from mutator.campaigns.run_provenance import (
+    accepted_version_differences,
+    append_worker_machine,
+    begin_session_environment,
+)
 from mutator.engines.engine_choice import choose_engine, reason_not_to_fork
 from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import ensure_work_folder
@@ -164,7 +168,7 @@ class Session:
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
             for remark in describe_unreached_triggers(self.workspace, self.folder):
                 warnings.warn(remark, MutatorWarning, stacklevel=2)
-            self.folder = begin_stretch(
+            self.folder = begin_session_environment(
                 self.folder,
                 self.workspace,
                 records_glob=self.new_worker_name("*"),
@@ -177,7 +181,7 @@ class Session:
         self._records = None if pending_chunks else records
 
     def note_machine(self, machine: WorkerMachine) -> None:
-        self.folder = append_machine(self.folder, machine)
+        self.folder = append_worker_machine(self.folder, machine)
         self._ledger_at_start = file_digests.load_ledger(self.folder.path)
 
     def new_worker_name(self, name: str) -> str:

@@ -24,7 +24,7 @@ _MOST_DRAWN_NUMBER = 1e15  # limit of a drawn number: whole numbers up to it are
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Draw:
+class DrawSpec:
     """How a variant's values are made: one draw from each range, or a list.
 
     Values are in `unit`, the suffix of the YAML key (None for plain numbers). `key` and the campaign's seed
@@ -63,7 +63,7 @@ class Variant:
     name: str
     aim: str
     about: str
-    draw: Draw | None
+    draw: DrawSpec | None
     changes: tuple[str, ...]
     injections_by_reading: Mapping[str, tuple[InjectionSpec, ...]]
     hold_by_reading: Mapping[str, Hold | None]
@@ -296,7 +296,9 @@ def _build_injections(
     )
 
 
-def _build_draw(default_key: str, models: dict[str, _DrawModel], source: YamlSource, keys: KeyPath) -> Draw:
+def _build_draw(
+    default_key: str, models: dict[str, _DrawModel], source: YamlSource, keys: KeyPath
+) -> DrawSpec:
     if len(models) != 1:
         raise source.error(
             keys, f"{len(models)} draws", expected="one", remedy="use one draw for all injections"
@@ -321,7 +323,7 @@ def _build_draw(default_key: str, models: dict[str, _DrawModel], source: YamlSou
             f"decimals: {model.decimals}",
             expected="`decimals` only with reals_from",
         )
-    return Draw(
+    return DrawSpec(
         key=model.key or default_key,
         name=name,
         unit=unit.suffix if unit else None,

@@ -7,7 +7,7 @@ from mutator.config.location_syntax import is_assignable, is_dotted_name
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAME_PARAM_TYPES, UNIT_OF_CHANGED_VARIABLE, FaultModel, ParamSchema
-from mutator.faults.fault_specs import Draw
+from mutator.faults.fault_specs import DrawSpec
 from mutator.faults.injection_specs import (
     DIMENSIONLESS,
     DrawReference,
@@ -31,7 +31,7 @@ def resolve_injection(
     model: FaultModel,
     source: YamlSource,
     *,
-    draw: Draw | None = None,
+    draw: DrawSpec | None = None,
     value: float | int | None = None,
     seed: int = 0,
     key: str = "",
@@ -84,7 +84,7 @@ class _ParameterResolver:
         spec: InjectionSpec,
         model: FaultModel,
         source: YamlSource,
-        draw: Draw | None,
+        draw: DrawSpec | None,
         value: float | int | None,
     ) -> None:
         self.spec = spec

@@ -9,7 +9,7 @@ from mutator.config import units
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.faults.fault_specs import Draw, FaultSpec, Variant
+from mutator.faults.fault_specs import DrawSpec, FaultSpec, Variant
 from mutator.faults.import_checks import check_import_defined
 from mutator.faults.injection_parameters import resolve_injection
 from mutator.faults.injection_specs import InjectionSpec
@@ -41,7 +41,7 @@ def expand_spec(
     return tuple(fault for variant in spec for fault in expander.faults(variant))
 
 
-def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
+def draw_values(draw: DrawSpec, seed: int) -> tuple[int | float, ...]:
     """Return the values of `draw` for `seed`, in the draw's unit: one from each range, or the list unchanged.
 
     The value from a range depends only on seed, key, position and earlier values. Duplicates are drawn again,
@@ -65,7 +65,7 @@ def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
     return tuple(values)
 
 
-def _value_in_range(draw: Draw, index: int, fraction: float) -> int | float:
+def _value_in_range(draw: DrawSpec, index: int, fraction: float) -> int | float:
     low, high = draw.ranges[index]
     if draw.kind == "integers":
         whole = int(low) + math.floor(fraction * (int(high) - int(low) + 1))

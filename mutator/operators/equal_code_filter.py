@@ -11,7 +11,7 @@ from mutator.operators.mutations import Mutation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DistinctMutations:
+class DistinctAndEqualMutations:
     """Mutations with distinct code, and the numbers of those left out."""
 
     mutations: tuple[Mutation, ...]
@@ -20,7 +20,7 @@ class DistinctMutations:
     invalid_count: int  # does not compile
 
 
-def drop_equal_code(file: ParsedFile, mutations: Iterable[Mutation]) -> DistinctMutations:
+def drop_equal_code(file: ParsedFile, mutations: Iterable[Mutation]) -> DistinctAndEqualMutations:
     """Keep a file's mutations whose active code differs from the original and from earlier mutations."""
     codes_by_function: dict[range, list[object]] = {}  # by function, the original's code first
     distinct_mutations: list[Mutation] = []
@@ -40,7 +40,7 @@ def drop_equal_code(file: ParsedFile, mutations: Iterable[Mutation]) -> Distinct
         else:
             codes_by_function[function].append(code)
             distinct_mutations.append(mutation)
-    return DistinctMutations(
+    return DistinctAndEqualMutations(
         mutations=tuple(distinct_mutations),
         equal_to_original_count=equals,
         duplicate_count=duplicates,

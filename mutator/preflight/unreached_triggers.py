@@ -15,7 +15,7 @@ import numpy as np
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
 from mutator._common.message_text import counted
-from mutator.engines.first_activation import activity_at_observations
+from mutator.engines.first_activation import is_active_at_observations
 from mutator.model import Experiment, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest
@@ -50,7 +50,7 @@ def armed_condition_of(workspace: Workspace, manifest: TargetManifest, trigger: 
 
 
 def is_ever_active(condition: ArmedCondition, observations: Observations) -> bool:
-    return bool(len(observations) and activity_at_observations(condition, observations.T).any())
+    return bool(len(observations) and is_active_at_observations(condition, observations.T).any())
 
 
 def describe_unreached(

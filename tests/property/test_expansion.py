@@ -5,7 +5,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator.faults.fault_specs import Draw
+from mutator.faults.fault_specs import DrawSpec
 from mutator.faults.spec_expansion import draw_values, expand_spec
 from mutator.model import Fault
 from mutator.workspace import Workspace
@@ -35,7 +35,7 @@ def library(seed: int, reading: str) -> list[Fault]:
 def test_draws_lie_in_their_ranges(
     seed: int, key: str, ranges: tuple[tuple[float, float], ...], kind: str, cap: int | None
 ) -> None:
-    draw = Draw(key=key, name="x", unit="m", kind=kind, ranges=ranges, decimals=None, cap=cap)
+    draw = DrawSpec(key=key, name="x", unit="m", kind=kind, ranges=ranges, decimals=None, cap=cap)
     values = draw_values(draw, seed)
     assert len(values) == len(ranges)
     for value, (low, high) in zip(values, ranges, strict=True):
@@ -49,7 +49,7 @@ def test_draws_lie_in_their_ranges(
 @given(SEEDS, st.integers(1, 4))
 def test_values_are_unique_and_not_zero(seed: int, decimals: int) -> None:
     ranges = tuple((-2.5 + 0.5 * i, -1.5 + 0.5 * i) for i in range(10))
-    draw = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges, decimals=decimals)
+    draw = DrawSpec(key="k", name="x", unit="m", kind="reals", ranges=ranges, decimals=decimals)
     values = draw_values(draw, seed)
     assert len(set(values)) == 10 and 0.0 not in values
 
@@ -59,8 +59,8 @@ def test_values_are_unique_and_not_zero(seed: int, decimals: int) -> None:
 def test_more_ranges_do_not_change_earlier_values(
     seed: int, ranges: tuple[tuple[float, float], ...], count: int
 ) -> None:
-    whole = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges)
-    part = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges[:count])
+    whole = DrawSpec(key="k", name="x", unit="m", kind="reals", ranges=ranges)
+    part = DrawSpec(key="k", name="x", unit="m", kind="reals", ranges=ranges[:count])
     assert draw_values(part, seed) == draw_values(whole, seed)[:count]
 
 

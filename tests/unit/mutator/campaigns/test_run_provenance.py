@@ -11,7 +11,7 @@ from mutator.campaigns import run_environment
 from mutator.campaigns.git_clone import find_clone_state
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.campaigns.run_provenance import accepted_version_differences, begin_stretch
+from mutator.campaigns.run_provenance import accepted_version_differences, begin_session_environment
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
 from mutator.execution.distributor_choice import choose_distributor, packages_of_distributor
 from mutator.store.preflight_results import CHECKS_SCHEMA
@@ -41,7 +41,7 @@ def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
 
 
 def test_a_session_records_everything_that_affects_results(folder: RunFolder, toycar: Workspace) -> None:
-    folder = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False)
+    folder = begin_session_environment(folder, toycar, records_glob="0001-*", accept_versions=False)
     (stretch,) = RunFolder.open(folder.path).session_environments
     assert stretch == folder.session_environments[0]
     assert (
@@ -63,7 +63,9 @@ def _clone() -> dict[str, GitCloneState] | None:
 def test_a_later_session_only_appends_to_run_json(folder: RunFolder, toycar: Workspace) -> None:
     before = json.loads((folder.path / "run.json").read_text())
     for session in ("0001-*", "0002-*"):
-        begin_stretch(RunFolder.open(folder.path), toycar, records_glob=session, accept_versions=False)
+        begin_session_environment(
+            RunFolder.open(folder.path), toycar, records_glob=session, accept_versions=False
+        )
     after = json.loads((folder.path / "run.json").read_text())
     assert [stretch["records"] for stretch in after.pop("stretches")] == ["0001-*", "0002-*"]
     assert before.pop("stretches") == [] and before == after
@@ -75,14 +77,16 @@ def test_a_package_that_reads_the_traces_or_distributes_the_work_is_recorded(
     for cached in (run_environment._installed_packages, run_environment._packages_by_module):
         monkeypatch.setattr(run_environment, cached.__name__, cached.__wrapped__)
     manifest = toycar.manifest("toycar")
-    plain = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False).session_environments[
-        -1
-    ]
+    plain = begin_session_environment(
+        folder, toycar, records_glob="0001-*", accept_versions=False
+    ).session_environments[-1]
     assert "door-examples" not in plain.packages
     packages = packages_of_distributor(choose_distributor("here:"))
-    spread = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False, packages=packages)
+    spread = begin_session_environment(
+        folder, toycar, records_glob="0001-*", accept_versions=False, packages=packages
+    )
     monkeypatch.setattr(type(toycar), "manifest", lambda *_: replace(manifest, trace_file="log.jsonl"))
-    reading = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False)
+    reading = begin_session_environment(folder, toycar, records_glob="0001-*", accept_versions=False)
     for begun in (spread, reading):
         assert begun.session_environments[-1].packages == {**plain.packages, "door-examples": "1.0"}
     use(monkeypatch, **{"door-examples": "1.1"})
@@ -119,13 +123,13 @@ def test_different_versions_are_refused_unless_accepted(
     other: dict[str, str | None],
     told: str,
 ) -> None:
-    folder = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False)
+    folder = begin_session_environment(folder, toycar, records_glob="0001-*", accept_versions=False)
     use(monkeypatch, **other)
     with pytest.raises(MutatorError) as caught:
         accepted_version_differences(folder)
     assert caught.value.exit_code == EXIT_WRONG_INPUT
     assert caught.value.got == f"this run used other versions: {told}"
-    folder = begin_stretch(folder, toycar, records_glob="0002-*", accept_versions=True)
+    folder = begin_session_environment(folder, toycar, records_glob="0002-*", accept_versions=True)
     assert [list(stretch.accepted) for stretch in folder.session_environments] == [[], [told]]
     assert accepted_version_differences(folder) == ()  # from now on, these are the run's versions
 
@@ -134,7 +138,7 @@ def test_another_python_version_is_refused(
     folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("platform.python_version", lambda: "3.11.7")
-    folder = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False)
+    folder = begin_session_environment(folder, toycar, records_glob="0001-*", accept_versions=False)
     monkeypatch.setattr("platform.python_version", lambda: "3.12.1")
     with pytest.raises(MutatorError, match=r"CPython 3\.11\.7, here CPython 3\.12\.1"):
         accepted_version_differences(folder)
@@ -145,7 +149,7 @@ def test_another_machine_is_recorded_but_not_refused(
     folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch, changed: str
 ) -> None:
     """Golden runs show whether two machines compute the same results."""
-    folder = begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False)
+    folder = begin_session_environment(folder, toycar, records_glob="0001-*", accept_versions=False)
     other = {"threads": {"OMP_NUM_THREADS": "8"}}.get(changed, "another")
     name = {
         "cpu": "mutator.campaigns.run_environment.processor_name",
@@ -154,7 +158,7 @@ def test_another_machine_is_recorded_but_not_refused(
     }[changed]
     monkeypatch.setattr(name, lambda: other)
     assert accepted_version_differences(folder) == ()
-    folder = begin_stretch(folder, toycar, records_glob="0002-*", accept_versions=False)
+    folder = begin_session_environment(folder, toycar, records_glob="0002-*", accept_versions=False)
     assert (
         getattr(folder.session_environments[1], changed)
         == other

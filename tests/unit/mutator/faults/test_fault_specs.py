@@ -6,7 +6,7 @@ import pytest
 
 from mutator.config.units import UNIT_SUFFIXES_TEXT
 from mutator.errors import MutatorError
-from mutator.faults.fault_specs import Draw, load_spec
+from mutator.faults.fault_specs import DrawSpec, load_spec
 from mutator.faults.spec_expansion import draw_values, expand_spec
 from mutator.model import Fault, Hold
 from mutator.workspace import Workspace
@@ -91,9 +91,9 @@ def test_ids_depend_on_the_seed_and_are_unique(toy: Workspace) -> None:
 
 def test_drawn_values_depend_on_the_key_and_do_not_exceed_the_cap() -> None:
     ranges = tuple((float(i), float(i + 9)) for i in range(10, 70, 10))
-    draw = Draw(key="k", name="speed", unit="mph", kind="integers", ranges=ranges, cap=60)
-    same = Draw(key="k", name="fast", unit="mph", kind="integers", ranges=ranges, cap=60)
-    other = Draw(key="l", name="speed", unit="mph", kind="integers", ranges=ranges, cap=60)
+    draw = DrawSpec(key="k", name="speed", unit="mph", kind="integers", ranges=ranges, cap=60)
+    same = DrawSpec(key="k", name="fast", unit="mph", kind="integers", ranges=ranges, cap=60)
+    other = DrawSpec(key="l", name="speed", unit="mph", kind="integers", ranges=ranges, cap=60)
     assert draw_values(draw, 1)[-1] == 60
     assert draw_values(draw, 1) == draw_values(same, 1)
     assert {draw_values(draw, i) == draw_values(other, i) for i in range(20)} == {False}
@@ -324,5 +324,5 @@ def test_an_unknown_reading_is_refused(toy: Workspace) -> None:
 def test_ranges_with_too_few_different_values_are_not_drawn_again_for_ever() -> None:
     ranges = tuple((5.0 + i, 6.0 + i) for i in range(1000))
     is_cheap(
-        lambda: draw_values(Draw(key="k", name="n", unit=None, kind="integers", ranges=ranges, cap=1), 1)
+        lambda: draw_values(DrawSpec(key="k", name="n", unit=None, kind="integers", ranges=ranges, cap=1), 1)
     )

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mutator._common.hashing import digest
-from mutator.engines.first_activation import activity_at_observations
+from mutator.engines.first_activation import is_active_at_observations
 from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.probe_template_parts import CODE_TEMPLATE_FILE, SETTINGS_TEMPLATE_FILE
@@ -54,7 +54,7 @@ def test_the_decision_of_the_harness_agrees_with_the_probe(clone: Workspace) -> 
         (draw.uniform(0.0, 0.5), draw.uniform(0.0, 50.0), draw.choice((0.0, 20.0)), 15.0) for _ in range(200)
     ]
     for values, is_active in zip(
-        rows, activity_at_observations(made.armed_condition, np.array(rows).T), strict=True
+        rows, is_active_at_observations(made.armed_condition, np.array(rows).T), strict=True
     ):
         module["_run"] = module["_Run"]()
         module["observe"](*values)

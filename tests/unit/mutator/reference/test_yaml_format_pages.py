@@ -38,14 +38,14 @@ def test_the_page_lists_every_cache() -> None:
     table = PAGE.split("\n## Caches\n")[1].split("\n## ")[0]
     folders = set(re.findall(r"^\| `([^/`]+)/", table, re.MULTILINE))
     parts = {
-        shared_cache.CHECKS,
-        shared_cache.GOLDENS,
-        shared_cache.LINES,
-        shared_cache.PAGES,
-        shared_cache.PICTURES,
-        shared_cache.RUNS,
+        shared_cache.CHECKS_CACHE,
+        shared_cache.GOLDENS_CACHE,
+        shared_cache.EXECUTED_LINES_CACHE,
+        shared_cache.REPORTS_CACHE,
+        shared_cache.IMAGE_EFFECTS_CACHE,
+        shared_cache.VERIFIED_RUNS_CACHE,
     }
-    assert folders == {*parts, shared_cache.TARGETS}
+    assert folders == {*parts, shared_cache.TARGET_CACHES}
 
 
 def test_the_page_lists_the_schema_of_every_library_file() -> None:

@@ -9,7 +9,7 @@ import mutator
 from mutator.api.trials import try_fault
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.campaigns.run_provenance import accepted_version_differences, begin_stretch
+from mutator.campaigns.run_provenance import accepted_version_differences, begin_session_environment
 from mutator.checks.doctor import examine_machine
 from mutator.checks.findings import CheckState
 from mutator.checks.library_check import library_problems
@@ -67,7 +67,7 @@ def test_versions_are_stored_with_a_stretch_of_work(toycar: Workspace, tmp_path:
     """The versions of all required packages are stored, whether or not a run uses them."""
     requiring(toycar, "HypoThesis>=6")
     folder = freeze_plan(build_plan(toycar, "small"), tmp_path / "run", toycar)
-    begin_stretch(folder, toycar, records_glob="0001-*", accept_versions=False)
+    begin_session_environment(folder, toycar, records_glob="0001-*", accept_versions=False)
     (stretch,) = RunFolder.open(folder.path).session_environments
     assert stretch.packages["hypothesis"] == metadata.version("hypothesis")
     assert accepted_version_differences(RunFolder.open(folder.path)) == ()

@@ -17,7 +17,7 @@ from distributed.client import FutureCancelledError
 from mutator.campaigns.chunks import pending_chunks_of
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.campaigns.run_provenance import append_stretch
+from mutator.campaigns.run_provenance import append_session_environment
 from mutator.errors import MutatorWarning
 from mutator.execution.cluster import cluster_distributor
 from mutator.execution.cluster.bundle import Bundle
@@ -131,7 +131,7 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
     """A session in which every experiment is pending, and the versions of workers are not checked."""
     monkeypatch.setattr(Bundle, "pack_for_run", lambda *given: Bundle(b"", ""))
     monkeypatch.setattr(WorkerRoster, "reason_to_refuse", lambda *given: "")
-    folder = append_stretch(folder, SessionEnvironment(python="", packages={}, platform=""))
+    folder = append_session_environment(folder, SessionEnvironment(python="", packages={}, platform=""))
     return SimpleNamespace(
         workspace=toycar,
         folder=folder,
