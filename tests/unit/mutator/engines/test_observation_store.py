@@ -7,7 +7,9 @@ import pytest
 from mutator.engines.first_activation import GoldenObservations
 from mutator.engines.observation_store import ObservationStore
 
-OBSERVATIONS = GoldenObservations(values=((0.0, 1.5),), counts_before_steps=(0, 1), imported_modules=("json",))
+OBSERVATIONS = GoldenObservations(
+    values=((0.0, 1.5),), counts_before_steps=(0, 1), imported_modules=("json",)
+)
 
 
 def test_stored_observations_are_loaded(tmp_path: Path) -> None:
