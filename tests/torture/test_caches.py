@@ -114,7 +114,7 @@ def pictures(toy: Workspace, folder: Path) -> Cache:
     (frames / "camera.yaml").write_text(CAMERA)
     renderer = RoadRenderer(CameraModel(), "solid", 0, periods=1)
     for number in range(FRAMES):
-        cv2.imwrite(str(frames / f"{number}.png"), renderer.grey(number * RENDERED_SPACING))
+        cv2.imwrite(str(frames / f"{number}.png"), renderer.render_grey(number * RENDERED_SPACING))
     words = ["--scenario", str(CLONE / "fault_library" / "scenarios" / "S1.yaml"), "--seed", "0"]
     words += ["--pictures", "--frames", str(frames), "--detector", "robust", "--max-steps", "12"]
     kept = at / "mutator" / "targets" / "openpilot"
