@@ -86,9 +86,11 @@ class ReviewedGroups:
         """Approve groups in their current state, and write the decision into the library."""
         return self._record_actions(groups, ReviewActionKind.APPROVE, by, remark)
 
-    def reject(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
-        """Reject groups in their current state, and write the decision into the library."""
-        return self._record_actions(groups, ReviewActionKind.REJECT, by, remark)
+    def reject(
+        self, groups: Sequence[Group], by: str, remark: str = "", reason: str = ""
+    ) -> "ReviewedGroups":
+        """Reject groups in their current state, and write the decision and its `reason` into the library."""
+        return self._record_actions(groups, ReviewActionKind.REJECT, by, remark, reason)
 
     def clear(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
         """Withdraw the decisions about groups; remarks and flags stay."""
@@ -112,9 +114,9 @@ class ReviewedGroups:
         return Path(out)
 
     def _record_actions(
-        self, groups: Sequence[Group], kind: ReviewActionKind, by: str, text: str = ""
+        self, groups: Sequence[Group], kind: ReviewActionKind, by: str, text: str = "", reason: str = ""
     ) -> "ReviewedGroups":
-        actions = [ReviewAction(group=group, kind=kind, by=by, text=text) for group in groups]
+        actions = [ReviewAction(group=group, kind=kind, by=by, text=text, reason=reason) for group in groups]
         # a decision that somebody else has stored since is not overwritten
         revision_by_group = {group.id: self.review.revision(group.id) for group in groups}
         return replace(
@@ -168,6 +170,7 @@ def group_facts(review: Review, group: Group) -> dict[str, object]:
         "group": group.id,
         "state": review.state(group).value,
         "by": decision.by if decision else None,
+        "reason": decision.reason if decision else None,
         "flagged": review.flag(group.id) is not None,
         "file": ", ".join(group.files),
         "function": ", ".join(group.functions),

@@ -27,33 +27,43 @@ Yes = Annotated[
 Remark = Annotated[str, typer.Option(metavar="TEXT", help="Add this remark to each group.")]
 
 
-def _build_decision_command(action: str, help_text: str) -> Callable[..., None]:
-    @with_workspace_options
-    def verb(
-        groups: SomeGroups = None,
-        by: By = None,
-        remark: Remark = "",
-        only: OnlyGroups = None,
-        yes: Yes = False,
-        *,
-        mutant_options: MutantOptions,
-        as_json: Json = False,
-        workspace_options: WorkspaceOptions,
-    ) -> None:
-        terminal, by_name = Terminal(as_json), reviewer_or_git_user(workspace_options, by)
-        reviewed = mutant_options.load(terminal, workspace_options)
-        if groups_to_decide := _choose_groups(reviewed, action, groups, only, is_confirmed=yes):
-            decide = reviewed.approve if action == "approve" else reviewed.reject
-            _print_decided(terminal, decide(groups_to_decide, by_name, remark), groups_to_decide)
-
-    verb.__doc__ = help_text
-    return verb
+@with_workspace_options
+def approve(
+    groups: SomeGroups = None,
+    by: By = None,
+    remark: Remark = "",
+    only: OnlyGroups = None,
+    yes: Yes = False,
+    *,
+    mutant_options: MutantOptions,
+    as_json: Json = False,
+    workspace_options: WorkspaceOptions,
+) -> None:
+    """Approve groups in their current state, by id or by filter."""
+    terminal, by_name = Terminal(as_json), reviewer_or_git_user(workspace_options, by)
+    reviewed = mutant_options.load(terminal, workspace_options)
+    if selected := _choose_groups(reviewed, "approve", groups, only, is_confirmed=yes):
+        _print_decided(terminal, reviewed.approve(selected, by_name, remark), selected)
 
 
-approve = _build_decision_command("approve", "Approve groups in their current state, by id or by filter.")
-reject = _build_decision_command(
-    "reject", "Reject groups in their current state: `run --require-reviewed` refuses them."
-)
+@with_workspace_options
+def reject(
+    groups: SomeGroups = None,
+    by: By = None,
+    reason: Annotated[str, typer.Option(metavar="TEXT", help="Why, stored with the decision.")] = "",
+    remark: Remark = "",
+    only: OnlyGroups = None,
+    yes: Yes = False,
+    *,
+    mutant_options: MutantOptions,
+    as_json: Json = False,
+    workspace_options: WorkspaceOptions,
+) -> None:
+    """Reject groups in their current state: `run --require-reviewed` refuses them."""
+    terminal, by_name = Terminal(as_json), reviewer_or_git_user(workspace_options, by)
+    reviewed = mutant_options.load(terminal, workspace_options)
+    if selected := _choose_groups(reviewed, "reject", groups, only, is_confirmed=yes):
+        _print_decided(terminal, reviewed.reject(selected, by_name, remark, reason), selected)
 
 
 @with_workspace_options

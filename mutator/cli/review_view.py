@@ -71,6 +71,9 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
         # in a pipe, each group is one line
         flat = [(*row[:2], row[2].replace("\n", "; "), *row[3:]) for row in rows]
         terminal.print_table(["group", "state", "what", "when", "faults", "runs"], flat, right_aligned=(4, 5))
+    for group in groups:
+        if (decision := review.decision(group.id)) and decision.reason:
+            terminal.print_text(f"{group.id} {review.describe_decision(group)}")
     terminal.print_text(f"{counted(len(groups), 'group')}: {describe_counts(review, groups)}")
     unlisted = review.entry_by_group.keys() - {group.id for group in groups}
     if unlisted:

@@ -39,9 +39,14 @@ def walk_through(
             break
         if key == "s":
             continue
-        remark = typer.prompt("remark (Enter: none)", default="", show_default=False)
+        words = typer.prompt(
+            f"{'remark' if key == 'a' else 'reason'} (Enter: none)", default="", show_default=False
+        )
         try:
-            reviewed = (reviewed.approve if key == "a" else reviewed.reject)([group], by, remark)
+            if key == "a":
+                reviewed = reviewed.approve([group], by, words)
+            else:
+                reviewed = reviewed.reject([group], by, reason=words)
         except MutatorError as error:
             show_error(error)
             reviewed = reviewed.reread()

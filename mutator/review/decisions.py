@@ -54,12 +54,15 @@ _VERDICT_BY_ACTION = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReviewAction:
-    """An action of the reviewer `by` on a group in its current state. `text` is stored as a remark."""
+    """An action of the reviewer `by` on a group in its current state. `text` is stored as a remark,
+    `reason` with a rejection.
+    """
 
     group: Group
     kind: ReviewActionKind
     by: str
     text: str = ""
+    reason: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,7 +173,10 @@ def record_actions(
     `four_eyes` forbids, and for the library shipped with mutator, which is read-only.
     """
     actions = [
-        replace(change, by=_printable_line(change.by, "by"), text=_printable_line(change.text, "text"))
+        replace(
+            change,
+            **{name: _printable_line(getattr(change, name), name) for name in ("by", "text", "reason")},
+        )
         for change in requested
     ]
     for change in actions:
@@ -267,6 +273,7 @@ def _entry_after_action(entry: ReviewEntry, action: ReviewAction, at: str, commi
             at=at,
             commit=commit,
             tool=VERSION,
+            reason=action.reason or None,
             bound=group.basis_digests,
             values=group.value_ranges,
         )

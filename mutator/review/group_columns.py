@@ -4,6 +4,7 @@ GROUP_FILTER_COLUMNS = (
     "group",
     "state",
     "by",
+    "reason",
     "flagged",
     "file",
     "function",

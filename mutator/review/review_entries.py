@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 
-from mutator._common.hashing import content_id
+from mutator._common.hashing import added_field, content_id
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 
 # for each parameter: least and greatest number, then values that are not finite (`nan`), as text
@@ -47,7 +47,8 @@ class GroupDecision:
     """A decision about a group, made by the reviewer `by`, and the group's state at that time.
 
     `at` is the time (UTC, ISO 8601), `commit` the commit of the library, `tool` the version of mutator. In
-    decisions from older files, `at`, `commit`, `tool`, `values` and `bound.calls` are None.
+    decisions from older files, `at`, `commit`, `tool`, `values` and `bound.calls` are None. `reason` is why a
+    group was rejected, in the reviewer's words; None if they gave no reason.
     """
 
     group: str
@@ -59,6 +60,7 @@ class GroupDecision:
     tool: str | None = None
     bound: BasisDigests
     values: ValueRanges | None = None
+    reason: str | None = added_field(None)
 
     def changed_parts(self, bound: BasisDigests, values: ValueRanges) -> list[str]:
         """Return the parts of the group that changed since the decision, as text; empty if none did."""
@@ -67,8 +69,9 @@ class GroupDecision:
 
     @property
     def summary(self) -> str:
-        """Text such as `approved by Jane Doe on 2026-11-24`."""
-        return f"{self.verdict} by {self.by}" + (f" on {self.at[:10]}" if self.at else "")
+        """Text such as `rejected by Jane Doe on 2026-11-24 (too large)`."""
+        day = f" on {self.at[:10]}" if self.at else ""
+        return f"{self.verdict} by {self.by}{day}" + (f" ({self.reason})" if self.reason else "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,6 +35,7 @@ class _BlockModel(StrictModel):
     decision: Literal["approved", "rejected"] | None = None
     by: str | None = Field(None, pattern=r"\S")
     at: str | None = Field(None, pattern=TIME_PATTERN)
+    reason: str | None = Field(None, pattern=r"\S")
     commit: str | None = Field(None, pattern=r"^[0-9a-f]{40,64}(-dirty)?$")
     tool: str | None = None
     diff: str | None = Field(None, pattern=_DIGEST_PATTERN)
@@ -87,7 +88,7 @@ def render_review_file(target: str, content: ReviewFileContent) -> str:
 
 def _parse_entry(block: _BlockModel, source: YamlSource, i: int) -> ReviewEntry:
     decision_fields = block.model_dump(
-        include={"by", "at", "commit", "tool", "diff", "function", "template", "calls"}
+        include={"by", "at", "reason", "commit", "tool", "diff", "function", "template", "calls"}
     )
     decision_fields["values"] = block.values
     if block.decision is None:
@@ -104,6 +105,13 @@ def _parse_entry(block: _BlockModel, source: YamlSource, i: int) -> ReviewEntry:
             f"a decision without `{missing[0]}`",
             expected=f"{', '.join(f'`{name}`' for name in _REQUIRED_KEYS)} with it",
             remedy="decide again with `mutator review`, which computes the digests",
+        )
+    if block.reason is not None and block.decision != DecisionVerdict.REJECTED:
+        raise source.error(
+            ("decisions", i, "reason"),
+            "a reason for an approval",
+            expected="`reason` only with `decision: rejected`",
+            remedy="move the text to `remarks`",
         )
     return ReviewEntry(
         group=block.group,
@@ -122,6 +130,7 @@ def _parse_decision(block: _BlockModel) -> GroupDecision:
         verdict=DecisionVerdict(str(block.decision)),
         by=str(block.by),
         at=block.at,
+        reason=block.reason,
         commit=block.commit,
         tool=block.tool,
         bound=BasisDigests(
@@ -142,7 +151,7 @@ def _render_block(entry: ReviewEntry) -> str:
     facts: dict[str, Any] = {"group": entry.group, "what": entry.what}
     if entry.decision:
         decision = asdict(entry.decision)
-        names = ("by", "at", "commit", "tool")
+        names = ("by", "at", "reason", "commit", "tool")
         facts |= {
             "decision": decision["verdict"],
             **{name: decision[name] for name in names},

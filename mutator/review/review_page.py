@@ -82,7 +82,7 @@ def group_review_as_json(review: Review, group: Group) -> dict[str, Any]:
             "at": decision.at or "",
             "commit": decision.commit or "",
             "tool": decision.tool or "",
-            "text": "",
+            "reason": decision.reason or "",
             "changed": review.stale_parts(group),
         },
         "remarks": [

@@ -47,6 +47,12 @@ class _DecisionModel(StrictModel):
     kind: Annotated[ReviewActionKind, Field(strict=False)]
     text: ShortText = ""
 
+    def action_on(self, group: Group, by: str) -> ReviewAction:
+        """Return the action; the text of a rejection is its reason, that of all others a remark."""
+        is_rejection = self.kind is ReviewActionKind.REJECT
+        words = {"reason" if is_rejection else "text": self.text}
+        return ReviewAction(group=group, kind=self.kind, by=by, **words)
+
 
 class SentDecisions(StrictModel):
     """Changes that a page sends, with the revision and the diff's digest of each group, as the page shows it.
@@ -150,10 +156,7 @@ class ServedReviews:
             group_by_id[name] for name in dict.fromkeys(change.group for change in decisions.changes)
         ]
         self._check_diffs_unchanged(selection, changed_groups, decisions.digests)
-        changes = [
-            ReviewAction(group=group_by_id[change.group], kind=change.kind, by=decisions.by, text=change.text)
-            for change in decisions.changes
-        ]
+        changes = [change.action_on(group_by_id[change.group], decisions.by) for change in decisions.changes]
         try:
             review = record_actions(self.workspace, selection.target, changes, decisions.seen)
         except ReviewConflict as conflict:

@@ -76,11 +76,12 @@ def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
         page.keyboard.press(key)
     page.fill("#by", "Jane O'Neil")
     page.fill("#remark", "fine")
+    page.fill("#reason", "too large")
     ids = page.locator(".group:visible h2").all_inner_texts()
     said = "--spec 'sensor/*' --by 'Jane O'\\''Neil' --remark fine"
     assert page.locator("#commands code").all_inner_texts() == [
         f"mutator review approve {ids[0]} {said}",
-        f"mutator review reject {ids[1]} {said}",
+        f"mutator review reject {ids[1]} {said} --reason 'too large'",
     ]
     page.keyboard.press("Escape")
     page.keyboard.press("r")

@@ -105,6 +105,23 @@ def test_a_decision_and_a_flag_can_be_withdrawn(review: Callable[..., Any], libr
     assert not load_review(library, "toycar").entry_by_group
 
 
+def test_a_rejection_has_a_reason(review: Callable[..., Any], library: Workspace) -> None:
+    page = review("Jane")
+    page.keyboard.press("j")
+    group = current(page)
+    page.keyboard.press("r")
+    saved(page, group)
+    for reason in ("too <b>large</b>", "never left out"):
+        page.fill(f"#group-{group} .remark input", reason)
+        page.click(f"#group-{group} button:text('Reject for this reason')")
+        page.wait_for_selector(f"#group-{group} .decision:text({reason!r})")
+        saved(page, group)
+    kept = load_review(library, "toycar")
+    decision = kept.decision(group)
+    assert decision is not None
+    assert (decision.verdict, decision.reason, kept.remarks(group)) == ("rejected", "never left out", ())
+
+
 def test_a_decision_needs_a_name(review: Callable[..., Any], library: Workspace) -> None:
     page = review("")
     page.keyboard.press("j")

@@ -84,8 +84,11 @@ def test_a_review_covers_the_library_specs_or_a_campaign(cli: Cli, root: Path, k
 
 def test_decisions_are_stored(cli: Cli, root: Path, known: dict[str, str]) -> None:
     group = about(known, "omission()")
-    answer = cli("review", "reject", group[:6], *JANE, "--remark", "too much")
-    assert re.fullmatch(rf"{group} rejected by Jane Doe on 20..-..-..", answer.out.splitlines()[0])
+    answer = cli("review", "reject", group[:6], *JANE, "--remark", "too much", "--reason", "never  left out")
+    decided = rf"{group} rejected by Jane Doe on 20..-..-.. \(never left out\)"
+    assert re.fullmatch(decided, answer.out.splitlines()[0])
+    assert re.search(rf"^{decided}$", cli("review").out, re.MULTILINE)
+    assert [one["reason"] for one in cli("review", "--only", "reason", "--json").json] == ["never left out"]
     file = root / "fault_library/reviews/toycar.yaml"
     assert answer.out.splitlines()[1].endswith("4 new, 1 rejected")
     assert f'group: "{group}"' in file.read_text()
@@ -95,7 +98,9 @@ def test_decisions_are_stored(cli: Cli, root: Path, known: dict[str, str]) -> No
     assert (data["state"], data["changed"]) == ("changed", ["target function", "diff"])
     assert [(one["by"], one["text"]) for one in data["remarks"]] == [("Jane Doe", "too much")]
     shown = cli("review", "show", group).out
-    assert re.search(r"rejected by Jane Doe on \S+ \(changed since: target function, diff\)", shown)
+    assert re.search(
+        r"rejected by Jane Doe on \S+ \(never left out\) \(changed since: target function, diff\)", shown
+    )
     assert cli("review", "approve", group, *JANE, "--json").json[0]["state"] == "approved"
 
 
@@ -237,12 +242,13 @@ def test_a_walk_asks_about_each_group(
     cli: Cli, root: Path, keys: Callable[..., None], known: dict[str, str]
 ) -> None:
     first, second, third, *_ = known
-    keys("axrsq", "good", "")
+    keys("axrsq", "good", "too large")
     answer = cli("review", "walk", *JANE)
     assert answer.code == 0
     assert "1 of 5:  [a] approve  [r] reject  [s] skip  [q] quit" in answer.out
     states = {group["group"]: group["state"] for group in cli("review", "--json").json}
     assert [states[name] for name in (first, second, third)] == ["approved", "rejected", "new"]
+    assert f"{second} rejected by Jane Doe" in answer.out and "(too large)" in answer.out
     keys("q")
     again = cli("review", "walk", *JANE, "--only", 'model != "omission"').out
     assert f"group {first}" not in again

@@ -68,16 +68,20 @@ class Card {
   #remarkForm() {
     const { el } = Dom;
     const { id } = this.group;
-    const field = el("input", { "aria-label": `Remark about ${id}`, placeholder: "Remark", maxlength: 2000, autocomplete: "off" });
-    const save = (event) => {
-      event.preventDefault();
+    const field = el("input", { "aria-label": `Remark about ${id}, or reason to reject it`, placeholder: "Remark, or reason to reject", maxlength: 2000, autocomplete: "off" });
+    const save = (kind) => {
       const text = field.value.trim();
-      if (text && this.actions.mark([id], "remark", text)) {
+      if (text && this.actions.mark([id], kind, text)) {
         field.value = "";
         this.element.focus({ preventScroll: true });
       }
     };
-    return el("form.remark", { onsubmit: save }, field, el("button", {}, "Save remark"));
+    const saveRemark = (event) => {
+      event.preventDefault();
+      save("remark");
+    };
+    return el("form.remark", { onsubmit: saveRemark }, field, el("button", {}, "Save remark"),
+      el("button", { type: "button", onclick: () => save("reject") }, "Reject for this reason"));
   }
 
   /** Show the current state of the group. `pending` has the kinds of marks that are being sent. */
@@ -131,9 +135,9 @@ class Card {
   /** A decision in one line: who, when, for which commit, and changes since. */
   static describeDecision(decision) {
     if (!decision) return "";
-    const { verdict, by, at, text, commit, tool, changed } = decision;
+    const { verdict, by, at, reason, commit, tool, changed } = decision;
     const source = [commit && `commit ${commit.slice(0, 10)}`, tool && `mutator ${tool}`].filter(Boolean).join(", ");
-    return [`${verdict} by ${by}${at ? `, ${Card.moment(at)}` : ""}${source ? ` (${source})` : ""}${text ? `: ${text}` : ""}`,
+    return [`${verdict} by ${by}${at ? `, ${Card.moment(at)}` : ""}${source ? ` (${source})` : ""}${reason ? `: ${reason}` : ""}`,
       changed.length ? `changed since: ${changed.join(", ")}` : ""].filter(Boolean).join("; ");
   }
 

@@ -8,7 +8,7 @@ class Commands {
     this.data = data;
     this.changed = changed;
     this.marks = new Map(); // group id -> "approve" or "reject", in the order of marking
-    for (const id of ["by", "remark"]) document.getElementById(id).addEventListener("input", () => this.#show());
+    for (const id of ["by", "remark", "reason"]) document.getElementById(id).addEventListener("input", () => this.#show());
   }
 
   pending(id) {
@@ -32,11 +32,14 @@ class Commands {
     const { el, copyButton } = Dom;
     document.getElementById("decide").hidden = this.marks.size === 0;
     const by = Commands.quoted(document.getElementById("by").value.trim() || "NAME");
-    const remark = document.getElementById("remark").value.trim();
+    const option = (name) => {
+      const text = document.getElementById(name).value.trim();
+      return text && `--${name} ${Commands.quoted(text)}`;
+    };
     document.getElementById("commands").replaceChildren(...["approve", "reject"].flatMap((kind) => {
       const ids = [...this.marks].filter(([, k]) => k === kind).map(([id]) => id);
       if (!ids.length) return [];
-      const parts = ["mutator review", kind, ...ids, this.data.options, `--by ${by}`, remark && `--remark ${Commands.quoted(remark)}`];
+      const parts = ["mutator review", kind, ...ids, this.data.options, `--by ${by}`, option("remark"), kind === "reject" && option("reason")];
       const text = parts.filter(Boolean).join(" ");
       return [el("div.command", {}, el("code", {}, text), copyButton(() => text))];
     }));

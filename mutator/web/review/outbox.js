@@ -156,6 +156,7 @@ class Outbox {
 
   /** Whether the group already has the mark's state because an answer was lost. */
   static #isThere({ kind, by, text }, { state, decision, remarks, flag }) {
+    if (kind === "reject" && (decision?.reason ?? "") !== text) return false;
     if (kind === "approve" || kind === "reject") return decision?.by === by && state === { approve: "approved", reject: "rejected" }[kind];
     if (kind === "clear") return decision === null;
     if (kind === "remark") return remarks.at(-1)?.by === by && remarks.at(-1).text === text;

@@ -127,7 +127,7 @@ const Review = (() => {
       this.#apply({ isKept: true });
     }
 
-    /** Mark groups. Repeating the decision on a single group withdraws it. Returns false if nothing was marked. */
+    /** Mark groups. Repeating the decision on a single group without a text withdraws it. Returns false if nothing was marked. */
     mark(all, kind, text = "") {
       const { marks } = this;
       if (marks instanceof Commands) return marks.mark(all, kind);
@@ -140,7 +140,7 @@ const Review = (() => {
         find("by").reportValidity();
         return false;
       }
-      const [id] = ids, isDown = ids.length === 1 && this.cards.get(id).isMarked(kind, marks.pending(id));
+      const [id] = ids, isDown = !text && ids.length === 1 && this.cards.get(id).isMarked(kind, marks.pending(id));
       const changeKind = isDown ? (kind === "flag" ? "unflag" : "clear") : kind;
       for (const groupId of ids) {
         this.#settle(groupId);

@@ -1,10 +1,12 @@
 """The review file."""
 
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from mutator._common.hashing import as_json_types
 from mutator.errors import MutatorError
 from mutator.review import review_file
 from mutator.review.review_entries import (
@@ -57,6 +59,18 @@ def test_a_review_file_round_trips(tmp_path: Path) -> None:
     assert path.read_text() == text
 
 
+def test_a_reason_is_stored_with_its_rejection(tmp_path: Path) -> None:
+    decision = entry("a").decision
+    assert decision is not None
+    rejected = replace(decision, verdict=DecisionVerdict.REJECTED, reason='Ünï: #1 "y"')
+    entries = {"a" * 12: replace(entry("a"), decision=rejected)}
+    path = tmp_path / "toycar.yaml"
+    path.write_text(review_file.render_review_file("toycar", ReviewFileContent(entry_by_group=entries)))
+    assert review_file.load_review_file(path, "toycar").entry_by_group == entries
+    assert as_json_types(rejected)["reason"] == rejected.reason
+    assert "reason" not in as_json_types(decision)  # so approvals keep their digest
+
+
 def test_decisions_about_different_groups_merge(tmp_path: Path) -> None:
     files = [written(tmp_path / f"{i}", *names) for i, names in enumerate(("018f", "08f", "08ef"))]
     merged = subprocess.run(["git", "merge-file", "-p", *files], capture_output=True, check=True).stdout
@@ -85,6 +99,7 @@ def test_decisions_about_different_groups_merge(tmp_path: Path) -> None:
         ('"bbbbbbbbbbbb"', '"aaaaaaaaaaaa"', 23, "appears twice"),
         ('    decision: "approved"\n', "", 9, "'by' without a decision"),
         ('    by: "Jane Doe"\n', "", 7, "a decision without `by`"),
+        ("    commit:", '    reason: "too large"\n    commit:', 12, "a reason for an approval"),
     ],
 )
 def test_mistakes_are_reported_with_their_line(

@@ -54,6 +54,15 @@ def test_a_decision_is_in_the_file_and_on_the_reloaded_page(
     assert client.get("/review/toycar?spec=sensor/*").status == 200
 
 
+def test_the_text_of_a_rejection_is_its_reason(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
+    client, (first, *_) = reviewed
+    answer = decided(client, (first, "reject"), text="too large")
+    assert answer.json["groups"][first]["decision"]["reason"] == "too large"
+    assert not answer.json["groups"][first]["remarks"]
+    decision = load_review(toycar, "toycar").decision(first)
+    assert decision is not None and decision.reason == "too large"
+
+
 def test_a_decision_that_the_reviewer_has_not_seen_is_not_overwritten(
     reviewed: tuple[Client, list[str]], toycar: Workspace
 ) -> None:
