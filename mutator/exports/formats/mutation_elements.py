@@ -1,8 +1,9 @@
 """Write a run as a mutation testing report (the mutation-testing-elements schema, version 2).
 
-A mutant is a fault at its first location; its tests are runs. *Killed* means that a run ended in a hazard,
-because fault-free runs pass the hazard checks. A high score is therefore bad for the controller, and
-thresholds are set so that no score is green.
+A mutant is a fault at its first location; its tests are runs. A fault that led to a hazard *survived*,
+because the controller did not handle it; one that was active without a hazard was *killed*. A high score is
+therefore good for the controller, and only a score of 100 % is green. A drive that did not end is a
+*RuntimeError*, because viewers count a *Timeout* as detected.
 """
 
 import json
@@ -24,6 +25,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 
 SCHEMA_VERSION = "2.0"
+_MOST_LISTED_DRIVES = 5  # in the reason of a mutant's status
 
 
 def _report_json(request: ExportRequest) -> bytes:
@@ -141,7 +143,9 @@ def _replacement_of_lines(
 
 
 def mutant_status_as_json(experiments: Sequence[Experiment], records: Mapping[str, Record]) -> dict[str, Any]:
-    """Return a fault's status over its runs, its reason, and the runs that activated it or had a hazard."""
+    """Return a fault's status over its runs, its reason, the runs that activated it and, if it was killed,
+    those that withstood it.
+    """
     record_by_experiment = {e: records[e.id] for e in experiments if e.id in records}
     records_by_status = {
         status: [r for r in record_by_experiment.values() if r.status is status] for status in Status
@@ -149,17 +153,19 @@ def mutant_status_as_json(experiments: Sequence[Experiment], records: Mapping[st
     hazardous = [e for e, r in record_by_experiment.items() if r.hazards]
     active = [e for e, r in record_by_experiment.items() if r.activation]
     drives = counted(len(experiments), "drive")
+    missing = len(experiments) - len(record_by_experiment)
     if hazardous:
         names = sorted({name for e in hazardous for name, _ in record_by_experiment[e].hazards})
-        status, reason = "Killed", f"{', '.join(names)} in {len(hazardous)} of {drives}"
-    elif not record_by_experiment:
-        status, reason = "Pending", f"not run yet: {drives}"
+        status, reason = "Survived", f"{', '.join(names)} in {len(hazardous)} of {drives}"
+        reason += f": {_listed([e.drive_label for e in hazardous])}"
+    elif missing:
+        status, reason = "Pending", f"not run yet: {missing} of {drives}"
     elif records_by_status[Status.INVALID_MUTANT]:
         status, reason = "CompileError", records_by_status[Status.INVALID_MUTANT][0].detail
     elif records_by_status[Status.CRASHED]:
         status, reason = "RuntimeError", records_by_status[Status.CRASHED][0].detail
     elif records_by_status[Status.TIMEOUT]:
-        status, reason = "Timeout", records_by_status[Status.TIMEOUT][0].detail
+        status, reason = "RuntimeError", records_by_status[Status.TIMEOUT][0].detail
     elif not records_by_status[Status.OK]:
         status, reason = (
             "Ignored",
@@ -167,16 +173,22 @@ def mutant_status_as_json(experiments: Sequence[Experiment], records: Mapping[st
         )
     elif active:
         differing = sum(r.outcome is Outcome.SDC for r in records_by_status[Status.OK])
-        status, reason = "Survived", f"no hazard; an actuator output differed in {differing} of {drives}"
+        status, reason = "Killed", f"no hazard; an actuator output differed in {differing} of {drives}"
     else:
         status, reason = "NoCoverage", f"never active in {drives}"
     return {
         "status": status,
         "statusReason": reason,
         "coveredBy": [e.drive_label for e in active],
-        "killedBy": [e.drive_label for e in hazardous],
+        "killedBy": [e.drive_label for e in active] if status == "Killed" else [],
         "testsCompleted": len(records_by_status[Status.OK]),
     }
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return the names joined by `; `; only the first few of many."""
+    more = len(names) - _MOST_LISTED_DRIVES
+    return "; ".join(names[:_MOST_LISTED_DRIVES]) + (f"; and {more} more" if more > 0 else "")
 
 
 def _test_files_as_json(experiments: Sequence[Experiment]) -> dict[str, Any]:
