@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
+from mutator.campaigns.campaign_files import load_campaign_study
 from mutator.campaigns.plan import Plan, SeedBySeedPlan, build_plan, load_plan
 from mutator.campaigns.plan_freezing import freeze_plan_with_tally
 from mutator.engines.forkable import reasons_by_unforkable_variant
@@ -25,7 +26,9 @@ def plan(
     """
     opened_workspace = open_workspace(workspace)
     if out is None:
-        return build_plan(opened_workspace, campaign, choices)
+        plan = build_plan(opened_workspace, campaign, choices)
+        load_campaign_study(plan.campaign)
+        return plan
     planning = SeedBySeedPlan(opened_workspace, campaign, choices)
     folder, tally = freeze_plan_with_tally(planning, Path(out), opened_workspace)
     return load_plan(folder, tally)  # reading it back adds the cost measured in this folder, if any

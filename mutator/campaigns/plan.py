@@ -13,7 +13,7 @@ from mutator._common.argument_checks import check_type
 from mutator._common.message_text import counted, describe_seeds
 from mutator._common.table_rendering import TextTable
 from mutator.campaigns.campaign_expansion import CampaignExpansion
-from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_campaign_study
+from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign
 from mutator.campaigns.chunks import chunk_lengths_of_runs
 from mutator.campaigns.neutral_faults import NeutralFaultWarner
 from mutator.campaigns.plan_tally import FaultTypeAndMethod, PlanPart, PlanTally, plan_digest
@@ -149,7 +149,6 @@ class SeedBySeedPlan:
         self.seeds = _selected_seeds(self.campaign, self.choices)
         readings = workspace.readings()
         check_readings(self.campaign, readings)
-        load_campaign_study(self.campaign)
         self.reading = self.choices.reading or self.campaign.reading or readings.default_name
         if self.choices.reading is not None:
             readings.check_name(self.choices.reading)

@@ -17,6 +17,7 @@ from mutator._common.files import (
 from mutator._common.folder_locks import lock_run_folder
 from mutator._common.hashing import as_json_types, digest
 from mutator._common.version import VERSION
+from mutator.campaigns.campaign_files import load_campaign_study
 from mutator.campaigns.plan import Plan, SeedBySeedPlan
 from mutator.campaigns.plan_tally import PlanDigestBuilder, PlanPart, PlanTally
 from mutator.campaigns.run_inputs import RunInputs
@@ -92,6 +93,7 @@ def freeze_plan_in_owned_folder(
     plan: Plan | SeedBySeedPlan, out: Path, workspace: Workspace
 ) -> tuple[RunFolder, PlanTally]:
     """Like `freeze_plan_with_tally`, for a caller that owns the folder."""
+    load_campaign_study(plan.campaign)  # a plan that is not run does without: a study imports much
     if RunFolder.exists(out):
         folder = RunFolder.open(out)
         tally, plan_digest = _tally_and_digest(plan)

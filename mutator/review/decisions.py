@@ -175,7 +175,9 @@ def record_actions(
     actions = [
         replace(
             change,
-            **{name: _printable_line(getattr(change, name), name) for name in ("by", "text", "reason")},
+            by=_printable_line(change.by, "by"),
+            text=_printable_line(change.text, "text"),
+            reason=_printable_line(change.reason, "reason"),
         )
         for change in requested
     ]

@@ -106,7 +106,7 @@ def _parse_entry(block: _BlockModel, source: YamlSource, i: int) -> ReviewEntry:
             expected=f"{', '.join(f'`{name}`' for name in _REQUIRED_KEYS)} with it",
             remedy="decide again with `mutator review`, which computes the digests",
         )
-    if block.reason is not None and block.decision != DecisionVerdict.REJECTED:
+    if block.reason is not None and block.decision != "rejected":
         raise source.error(
             ("decisions", i, "reason"),
             "a reason for an approval",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import mutator
 from mutator.campaigns.campaign_files import check_readings, load_campaign, load_campaign_study
 from mutator.campaigns.plan import build_plan
 from mutator.checks.library_check import library_problems
@@ -169,6 +170,6 @@ def test_an_unknown_study_is_refused_with_its_line(toycar: Workspace, tmp_path: 
     path.write_text(TEXT.replace("target: toycar", "target: toycar\nstudy: moon_landing"))
     said = "mine.yaml:5: no study 'moon_landing'; expected one of driving_agent_resilience"
     with pytest.raises(MutatorError, match=said):
-        build_plan(toycar, path)
+        mutator.plan(path, workspace=toycar)
     with pytest.raises(MutatorError, match=said):
         load_campaign_study(load_campaign(path))

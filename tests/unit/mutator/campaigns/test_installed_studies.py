@@ -127,13 +127,15 @@ def asking(toycar: Workspace, study: str) -> Path:
 
 @pytest.mark.parametrize("study", STRANGERS)
 def test_an_invalid_study_is_reported_at_its_line_in_the_campaign(
-    strangers: None, toycar: Workspace, study: str
+    strangers: None, toycar: Workspace, study: str, tmp_path: Path
 ) -> None:
     before = [str(problem) for problem in library_problems(toycar, "toycar")]
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
+    plan = build_plan(toycar, "small")  # as for a review, which needs no study
     with pytest.raises(MutatorError) as error:
-        build_plan(toycar, "small")
+        freeze_plan(plan, tmp_path / "run", toycar)
+    assert not (tmp_path / "run").exists()
     told = str(error.value)
     assert told.startswith(f"{path}:{line}: study '{study}' ")
     assert re.search(STRANGERS[study][1], told)
