@@ -180,4 +180,4 @@ def test_a_run_can_be_opened_without_its_study(
     with pytest.raises(
         MutatorError, match="no study 'crash_tests'; expected no study, because none is installed"
     ):
-        build_plan(toycar, "small")
+        freeze_plan(build_plan(toycar, "small"), tmp_path / "planned", toycar)
