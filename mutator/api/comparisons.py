@@ -37,9 +37,10 @@ class RunComparison:
     def _repr_html_(self) -> str:
         names = self.comparison.names
         differing = [[f.name, f.a, f.b] for f in self.comparison.facts if f.is_different]
-        facts = TextTable(heads=("what differs", names.a, names.b), rows=differing).as_html()
+        facts = str(TextTable(heads=("what differs", names.a, names.b), rows=differing).as_html())
+        # as `str`, because Markup would escape the text before it once more
         sheets = [
-            text_html(s.title) + s.table().as_html() for s in self.comparison.sheets[:MOST_TABLES_SHOWN]
+            text_html(s.title) + str(s.table().as_html()) for s in self.comparison.sheets[:MOST_TABLES_SHOWN]
         ]
         remarks = "".join(map(text_html, self.comparison.remarks))
         return text_html(self.summary) + remarks + facts + "".join(sheets)

@@ -47,7 +47,8 @@ def test_a_campaign_can_be_run_resumed_and_compared(toycar: Workspace, tmp_path:
     assert (hazards["pairs"], hazards["a: rate"], hazards["b: rate"]) == (2, 0.5, 0.5)
     assert same.findings(["new-hazard", mutator.Gate.UNMATCHED]) == ()
     assert "2 experiments" in repr(same)
-    assert "What changed" in same._repr_html_()
+    assert "<p>What changed</p>" in same._repr_html_()
+    assert "&lt;p&gt;" not in same._repr_html_()
     assert same.write().pairs == tmp_path / "b" / "report" / "compare-a" / "pairs.csv"
     with pytest.raises(MutatorError, match="gate 'bad'"):
         same.findings(["bad"])
