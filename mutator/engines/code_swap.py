@@ -8,6 +8,7 @@ statement.
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from dis import hasconst
 from functools import lru_cache
 from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_OPTIMIZED
 from types import CodeType
@@ -229,6 +230,21 @@ def behaviour_key(code: CodeType) -> tuple[object, ...]:
 
 def _behaviour_key_without_nested(code: CodeType) -> tuple[object, ...]:
     # types and texts, because 1 == True and 0.0 == -0.0; no line numbers, because insertions move lines
-    values = tuple((type(c), None if isinstance(c, CodeType) else repr(c)) for c in code.co_consts)
+    values = tuple(
+        (type(c), None if isinstance(c, CodeType) else repr(c)) for c in _constants_that_matter(code)
+    )
     names = (code.co_name, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
     return (*names, _signature(code), code.co_code, code.co_exceptiontable, values)
+
+
+def _constants_that_matter(code: CodeType) -> tuple[object, ...]:
+    """Return the constants, but without a first one that is no docstring and that nothing loads.
+
+    Since Python 3.14, the compiler keeps it: `while False` differs from `while not True` in nothing else.
+    """
+    constants = code.co_consts
+    instructions = zip(code.co_code[::2], code.co_code[1::2], strict=True)
+    is_first_loaded = any(operation in hasconst and index == 0 for operation, index in instructions)
+    if not constants or is_first_loaded or isinstance(constants[0], str):
+        return constants
+    return (None, *constants[1:])

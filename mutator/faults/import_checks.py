@@ -39,7 +39,10 @@ def _sorted_top_level_names(path: str, data: bytes, root: Path) -> list[str]:
     except (SyntaxError, ValueError, RecursionError) as error:
         message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
         raise MutatorError(
-            f"not valid Python: {message}", where=root / path, line=line, remedy="correct the target's source"
+            f"not valid Python: {message}",
+            where=root / path,
+            line=line,
+            remedy="correct the target's source, or use the Python that it is written for",
         ) from None
 
 

@@ -11,6 +11,11 @@ ExpressionInFunction = tuple[str, ast.expr, tuple[AnchorRole, ...]]
 # a star or a slice is no value, a generator expression can share its parentheses with a call, and
 # templates refuse `yield`
 _UNCHANGEABLE_NODES = ast.Starred | ast.Slice | ast.GeneratorExp | ast.Yield | ast.YieldFrom
+# f-strings and, since Python 3.14, t-strings
+FORMATTED_STRING_NODES: tuple[type[ast.expr], ...] = (
+    ast.JoinedStr,
+    getattr(ast, "TemplateStr", ast.JoinedStr),
+)
 # lists of statements; handlers and cases are nodes with a body of their own
 _BLOCK_FIELDS = ("body", "orelse", "finalbody")
 
@@ -125,7 +130,7 @@ def _expressions_in_accessed_object(node: ast.expr) -> _ExpressionsWithRoles:
 
 
 def _expression_and_nested(node: ast.expr, *roles: AnchorRole) -> _ExpressionsWithRoles:
-    if isinstance(node, ast.JoinedStr):
+    if isinstance(node, FORMATTED_STRING_NODES):
         yield node, roles  # before Python 3.12, the expressions inside it have no positions
         return
     if isinstance(node, ast.Call):

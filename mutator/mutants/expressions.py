@@ -173,13 +173,14 @@ def _closing_bracket_ends(tokens: Iterable[tokenize.TokenInfo]) -> dict[_LineCol
 def _untaggable_lines(data: bytes, tokens: Iterable[tokenize.TokenInfo]) -> frozenset[int]:
     """Return the lines (from 0) that cannot end in a comment."""
     lines = {i for i, line in enumerate(data.splitlines()) if line.endswith(b"\\")}
-    starts: list[int] = []  # first lines of the f-strings that are still open
+    starts: list[int] = []  # first lines of the f-strings and t-strings that are still open
     for token in tokens:
         kind = tokenize.tok_name[token.type]
-        if kind == "FSTRING_START":
+        if kind in ("FSTRING_START", "TSTRING_START"):
             starts.append(token.start[0])
-        first = starts.pop() if kind == "FSTRING_END" else token.start[0]
-        if kind in ("STRING", "FSTRING_END"):
+        is_end = kind in ("FSTRING_END", "TSTRING_END")
+        first = starts.pop() if is_end else token.start[0]
+        if is_end or kind == "STRING":
             lines.update(range(first - 1, token.end[0] - 1))
     return frozenset(lines)
 

@@ -88,9 +88,17 @@ def _rescoped_between(
                 scope_before=home,
                 scope_after=homes.get(name, "unknown"),
             )
-    unchanged = [child for child in after.get_children() if child.get_lineno() not in inserted_lines]
-    for child_before, child_after in zip(before.get_children(), unchanged, strict=False):
+    unchanged = [child for child in _scopes_in(after) if child.get_lineno() not in inserted_lines]
+    for child_before, child_after in zip(_scopes_in(before), unchanged, strict=False):
         yield from _rescoped_between(child_before, child_after, inserted_lines)
+
+
+def _scopes_in(table: SymbolTable) -> list[SymbolTable]:
+    """Return the functions and classes in a scope.
+
+    Since Python 3.14, annotations have scopes, too. They bind no names and run only when somebody asks.
+    """
+    return [child for child in table.get_children() if child.get_type() != "annotation"]
 
 
 def _scope_kind(symbol: Symbol) -> str:

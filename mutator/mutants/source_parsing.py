@@ -50,7 +50,7 @@ def parse_with_python(data: bytes, where: Path) -> ast.Module:
             f"not valid Python: {message or 'nested too deeply'}",
             where=where,
             line=line,
-            remedy="correct the target's source",
+            remedy="correct the target's source, or use the Python that it is written for",
         ) from None
     _check_tree_size(tree, where)
     return tree

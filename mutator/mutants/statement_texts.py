@@ -8,6 +8,7 @@ from functools import lru_cache
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import TemplateNeed
 from mutator.mutants.anchors import ParsedFile, ResolvedAnchor
+from mutator.mutants.expression_roles import FORMATTED_STRING_NODES
 
 # statements without a block: only these can be repeated or moved as one line
 _SMALL_STATEMENTS = (
@@ -54,7 +55,7 @@ def _extend_to_next_statement(
 
 def _has_multiline_string(statement: ast.stmt) -> bool:
     return any(
-        isinstance(node, ast.JoinedStr | ast.Constant) and node.lineno != node.end_lineno
+        isinstance(node, (*FORMATTED_STRING_NODES, ast.Constant)) and node.lineno != node.end_lineno
         for node in ast.walk(statement)
     )
 

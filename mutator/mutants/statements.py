@@ -290,7 +290,7 @@ def _has_multiline_string(small: cst.BaseSmallStatement, positions: RangeByNode)
     stack: list[cst.CSTNode] = [small]
     while stack:
         node = stack.pop()
-        if isinstance(node, cst.SimpleString | cst.FormattedString):
+        if isinstance(node, cst.SimpleString | cst.FormattedString | cst.TemplatedString):
             span = positions[node]
             if span.start.line != span.end.line:
                 return True

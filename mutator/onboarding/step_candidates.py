@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from mutator.mutants.expression_roles import FORMATTED_STRING_NODES
 from mutator.onboarding.source_survey import SourceModule, SourceSurvey
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -208,7 +209,11 @@ def _statements_in(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
 def _number_score(value: ast.expr | None) -> int:
     """Score how likely an expression is to be a computed number; 0: impossible."""
     if isinstance(value, ast.BinOp):
-        return 0 if any(isinstance(n, ast.JoinedStr) or _is_text_constant(n) for n in ast.walk(value)) else 4
+        return (
+            0
+            if any(isinstance(n, FORMATTED_STRING_NODES) or _is_text_constant(n) for n in ast.walk(value))
+            else 4
+        )
     if isinstance(value, ast.UnaryOp):
         return _number_score(value.operand) if not isinstance(value.op, ast.Not) else 0
     if isinstance(value, ast.Call):

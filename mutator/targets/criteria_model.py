@@ -30,7 +30,7 @@ class HazardModel(StrictModel, title="A hazard"):
         None,
         alias="stl",
         description="Instead of `when`: a formula of signal temporal logic that must hold. rtamt evaluates "
-        "it (`pip install rtamt`), and steps must be evenly spaced. The hazard occurs at the "
+        "it (extra `stl`, Python 3.11 or 3.12), and steps must be evenly spaced. The hazard occurs at the "
         "first step at which the formula does not hold. If the formula looks ahead, the hazard "
         "occurs that much later.",
     )

@@ -1,4 +1,4 @@
-"""Signal temporal logic, evaluated by the optional package rtamt (`pip install rtamt`)."""
+"""Signal temporal logic, evaluated by the optional package rtamt (extra `stl`)."""
 
 import logging
 import re
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mutator._common.message_text import spelling_suggestion
+from mutator._common.version import extra_install_command
 from mutator.errors import MutatorError
 from mutator.triggers.conditions import TIME
 
@@ -80,8 +81,8 @@ def _new_specification(step_s: float) -> Any:
     except ImportError:
         raise MutatorError(
             "a formula of signal temporal logic, but rtamt is not installed",
-            expected="the package rtamt",
-            remedy="pip install rtamt, or write the condition with `when`",
+            expected="the package rtamt, which needs Python 3.11 or 3.12",
+            remedy=f"{extra_install_command('stl')}, or write the condition with `when`",
         ) from None
     specification = rtamt.StlDiscreteTimeSpecification()
     specification.set_sampling_period(Fraction(step_s).limit_denominator(10**9), "s", 0.1)

@@ -237,7 +237,7 @@ def test_shards_of_other_machines_merge_if_their_golden_runs_agree(
 
 def _other_pythons() -> Iterator[str]:
     places = [*map(Path, os.environ["PATH"].split(os.pathsep)), *Path.home().glob(".pyenv/versions/*/bin")]
-    for minor in (11, 12, 13):
+    for minor in (11, 12, 13, 14):
         name = f"python3.{minor}"
         for path in (place / name for place in places if minor != sys.version_info.minor):
             if shutil.which(path) and not subprocess.run([path, "-c", ""], capture_output=True).returncode:

@@ -50,7 +50,10 @@ def interrupt_after_first_record(*words: object, here: Path, out: Path) -> None:
     process = subprocess.Popen(
         command, cwd=here, env=environment(here), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
-    while process.poll() is None and not any(p.stat().st_size for p in out.glob("records/*.jsonl")):
+    while process.poll() is None and not any(
+        p.read_bytes().count(b"\n") > 1  # the first line is a head
+        for p in out.glob("records/*.jsonl")
+    ):
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)
     assert process.wait(60) != 0, "it ended before it could be interrupted"

@@ -34,7 +34,10 @@ def _homes(code: types.CodeType, lines: Lines) -> Iterator[tuple[tuple[str, int,
         one = stack.pop()
         # not from `co_consts`, which can contain unreachable functions
         steps = dis.get_instructions(one)
-        stack += [step.argval for step in steps if isinstance(step.argval, types.CodeType)]
+        nested = [step.argval for step in steps if isinstance(step.argval, types.CodeType)]
+        stack += [
+            code for code in nested if code.co_name != "__annotate__"
+        ]  # since Python 3.14; has no home line
         if one is not code and one.co_firstlineno in lines.injected:
             continue
         key = (one.co_qualname, lines.original[one.co_firstlineno] if one is not code else 0)

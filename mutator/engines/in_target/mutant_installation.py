@@ -11,7 +11,6 @@ from typing import Any
 
 # attributes that lead to the function of a method, property or wrapper
 _WRAPPING_ATTRIBUTES = ("__func__", "fget", "fset", "fdel", "func", "__wrapped__")
-_EXPECTED_REFERENCE_COUNT = 3  # references to a code object: from its function, a local, an argument
 
 
 class SwapRefused(Exception):
@@ -67,10 +66,19 @@ def find_live_function(module: str, name_path: Sequence[str], code: types.CodeTy
     if len(matches) != 1:
         raise SwapRefused(f"{where} is not found")
     (live,) = matches.values()
-    live_code = live.__code__
-    if sys.getrefcount(live_code) > _EXPECTED_REFERENCE_COUNT:
+    if _count_references_to_code(live) > _REFERENCES_TO_IDLE_CODE:
         raise SwapRefused(f"{where} is running, or exists more than once")
     return live
+
+
+def _count_references_to_code(function: types.FunctionType) -> int:
+    """Count the references to a function's code: its own, those in this call, one for each running call."""
+    code = function.__code__
+    return sys.getrefcount(code)
+
+
+# counted, because a call such as `getrefcount` adds a reference before Python 3.14 but not since
+_REFERENCES_TO_IDLE_CODE = _count_references_to_code(types.FunctionType((lambda: 0).__code__.replace(), {}))
 
 
 def _functions_wrapped_in(named: Any) -> Iterator[types.FunctionType]:

@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Iterator
 
+from mutator.mutants.expression_roles import FORMATTED_STRING_NODES
 from mutator.mutants.expressions import Expression
 from mutator.operators import MutationRule, Operator, mutation_rule
 from mutator.operators.statement_facts import StatementFacts, extent_of
@@ -30,7 +31,7 @@ _OPERAND_PREFIX_BY_OPERATOR: dict[type[ast.operator], str] = {
     ast.Div: "1 /",
 }
 # another operator on these nearly always raises TypeError, which tests nothing but the crash
-_NON_NUMBER_NODES = (ast.List, ast.ListComp, ast.Dict, ast.Set, ast.Tuple, ast.JoinedStr)
+_NON_NUMBER_NODES = (ast.List, ast.ListComp, ast.Dict, ast.Set, ast.Tuple, *FORMATTED_STRING_NODES)
 
 
 def _rules(expression: Expression, facts: StatementFacts) -> Iterator[MutationRule]:

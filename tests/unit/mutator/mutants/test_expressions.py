@@ -1,5 +1,6 @@
 """Expressions that anchors can name, and how a mutant changes their values."""
 
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -92,6 +93,28 @@ def test_every_value_has_a_name_for_each_role() -> None:
     assert not {"self", "self.pid", "command", "1", "n := len(rest)", "1 + 2", "f'{gap} is wrong'"} & set(
         values
     )
+
+
+def places_of_strings(prefix: str) -> list[object]:
+    """The places of a function whose formatted strings have this prefix."""
+    file = parsed(
+        f"""def f(x):
+    y = g({prefix}'{{x + 1}} {{h(x)!r:>{{x}}}}')
+    z = {prefix}'''
+    {{x}}''' + str(x)
+    return y, {prefix}'{{y}}'
+"""
+    )
+    statements = [
+        s.has_multiline_string for function in file.functions_by_name["f"] for s in function.statements
+    ]
+    return [*statements, *((e.start, e.end, len(e.roles)) for e in file.expressions_by_function["f"])]
+
+
+@pytest.mark.skipif(sys.version_info < (3, 14), reason="t-strings need Python 3.14")
+def test_a_t_string_is_a_place_as_an_f_string_is() -> None:
+    """It can be replaced as a whole; the values inside it are no places."""
+    assert places_of_strings("t") == places_of_strings("f")
 
 
 @pytest.mark.parametrize(

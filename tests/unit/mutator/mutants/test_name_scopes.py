@@ -66,6 +66,7 @@ CLASS = "class C:\n    def f(self):\n        #\n        return __x\n"
         ("def f(x):\n    def g():\n        nonlocal x\n        #\n        x\n    return g\n", "x = 1", None),
         ("def f(x):\n    #\n    return x.limit(limit=1)\n", "limit = 1", None),
         (CLASS, "__y = 1", None),
+        ("def f(x):\n    #\n    y: int = limit\n    g = lambda: limit\n", "_: int = 1", None),
     ],
 )  # fmt: skip
 def test_an_inserted_binding_can_change_the_scope_of_a_name(

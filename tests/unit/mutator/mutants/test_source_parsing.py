@@ -1,5 +1,6 @@
 """A file is refused if Python or LibCST cannot read it, or if LibCST does not reproduce all of it."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,12 @@ def test_unreadable_files_are_refused(source: str, line: int | None, said: str) 
     assert said in error.got
     assert (error.where, error.line) == ("root/m.py", line)
     assert error.remedy
+
+
+@pytest.mark.skipif(sys.version_info >= (3, 14), reason="this Python has t-strings")
+def test_syntax_of_a_newer_python_is_refused_with_its_line() -> None:
+    with pytest.raises(MutatorError, match=r"m\.py:2: not valid Python: .*the Python that it is written for"):
+        parse_file("m.py", b'x = 1\ny = t"{x}"\n', Path())
 
 
 @pytest.mark.parametrize(
