@@ -55,7 +55,9 @@ def _extend_to_next_statement(
 
 def _has_multiline_string(statement: ast.stmt) -> bool:
     return any(
-        isinstance(node, (*FORMATTED_STRING_NODES, ast.Constant)) and node.lineno != node.end_lineno
+        isinstance(node, ast.expr)
+        and isinstance(node, (*FORMATTED_STRING_NODES, ast.Constant))
+        and node.lineno != node.end_lineno
         for node in ast.walk(statement)
     )
 
