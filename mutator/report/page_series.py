@@ -15,13 +15,33 @@ if TYPE_CHECKING:
 
 
 def series_facts_for_page(folder: RunFolder) -> dict[str, Any]:
-    """Whether series are packed, which experiments have their own file, and the columns with the largest
-    deviation of each channel, which its curves must have. The page must not request a missing file, because
-    the browser's console would show an error.
+    """Whether series are packed, which experiments have their own file, why others have none, and the columns
+    with the largest deviation of each channel, which its curves must have. The page must not request a
+    missing file, because the browser's console would show an error.
     """
     series = SeriesFolder(folder.path)
     columns = dict(deviation_column_by_channel(folder.head.compared))
-    return {"packed": series.is_packed, "kept": series.rerun_ids(), "deviations": columns}
+    return {
+        "packed": series.is_packed,
+        "kept": series.rerun_ids(),
+        "reason_if_missing": reason_for_missing_series(folder, is_packed=series.is_packed),
+        "deviations": columns,
+    }
+
+
+def reason_for_missing_series(folder: RunFolder, *, is_packed: bool) -> str:
+    """Return why an experiment that finished normally has no series in this run folder."""
+    budget_mb = folder.series_budget_mb
+    if not budget_mb:
+        return "This run kept no channels, because it was made with --series-mb 0."
+    if is_packed:
+        return f"The channels of other experiments fill the run's {budget_mb:,} MB for them (--series-mb)."
+    if not folder.is_finished:
+        return (
+            "The run was not finished when this page was written, and channels can be read when it is. "
+            "Finish the run, then rebuild its report."
+        )
+    return "This run folder has no channels: its folder `series` was removed, or an older mutator wrote it."
 
 
 def write_missing_series_of_traces(folder: RunFolder, workspace: "Workspace") -> None:

@@ -1,5 +1,8 @@
 """Opening an experiment that did not end well, and closing an experiment."""
 
+import shutil
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -33,6 +36,23 @@ def test_a_failed_experiment_shows_no_activation_and_no_replay_command(
     assert "never active" not in text
     assert "--trace" not in text
     assert said in page.page.inner_text("#experiment .happened")
+
+
+def test_a_missing_series_is_explained(
+    open_report: Callable[[Path], "Page"], run: Path, tmp_path: Path
+) -> None:
+    """A page that was sent without its run folder says so; it does not say that there was no room."""
+    (tmp_path / "sent").mkdir()
+    shutil.copytree(run / "report", tmp_path / "sent" / "report")
+    sent = open_report(tmp_path / "sent")
+    sent.open("outcome=hazard")
+    sent.page.click(FIRST)
+    sent.page.wait_for_selector("#experiment .replay p:text('not next to this page')")
+    sent.open("status=crashed")
+    sent.page.click(FIRST)
+    sent.page.wait_for_selector("#experiment .replay p:text('The run crashed')")
+    assert all("ERR_FILE_NOT_FOUND" in error for error in sent.errors)  # the browser's note on the lost file
+    sent.errors.clear()
 
 
 def test_a_closed_experiment_is_removed_from_the_page(page: "Page") -> None:

@@ -38,6 +38,8 @@ const SeriesFile = (() => {
     });
   }
 
+  const missing = (name) => Object.assign(new Error(`series/${name}.js is missing`), { isMissingFile: true });
+
   const damaged = (what) => new Error(`${what} is damaged`);
 
   async function inflated(bytes) {
@@ -45,7 +47,7 @@ const SeriesFile = (() => {
     return new Response(stream).arrayBuffer(); // this also verifies the checksum
   }
 
-  /** Each experiment's entry, and the entries' positions; null if nothing was packed. */
+  /** Each experiment's entry, and the entries' positions; null if the file is not there. */
   async function readIndex() {
     const bytes = await read("index", "index");
     if (!bytes) return null;
@@ -73,7 +75,7 @@ const SeriesFile = (() => {
     chunks.set(name, promise);
     if (chunks.size > CHUNKS) chunks.delete(chunks.keys().next().value);
     const bytes = await promise;
-    if (!bytes) throw new Error(`series/${name}.js is missing`);
+    if (!bytes) throw missing(name);
     return bytes.subarray(at, at + size);
   }
 
@@ -195,6 +197,7 @@ const SeriesFile = (() => {
       if (series) return series;
     }
     if (there.packed) index ??= readIndex();
+    if (there.packed && !(await index)) throw missing("index");
     const place = (await index)?.of.get(id);
     if (!place) return null;
     const { places } = await index, [entry, reference] = place;

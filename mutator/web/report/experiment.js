@@ -3,6 +3,10 @@
 // An open experiment next to the list: events, path, replay, diff, and commands to run it again.
 
 class Experiment {
+  static ENDINGS = { // why an experiment has no channels, by its status
+    crashed: "The run crashed", timeout: "The run did not end in time", invalid_mutant: "The mutant could not be built", harness_error: "The harness failed",
+  };
+
   static open = null; // {id, experiment} for scripts that add buttons; the event `filled` notifies them
 
   /** `actions`: `move(by)` moves within the list, `place()` returns the position in the list, `close()` closes the panel. */
@@ -240,7 +244,7 @@ class Experiment {
     const { el } = Dom;
     const place = this.#content("replay");
     if (!this.#endedWell) {
-      place.replaceChildren(el("p", {}, "The run did not finish normally, so it has no channels."));
+      place.replaceChildren(el("p", {}, `${Experiment.ENDINGS[this.text("status")] ?? "The run did not finish normally"}, so there are no channels.`));
       return;
     }
     const status = el("p", { role: "status" });
@@ -250,8 +254,10 @@ class Experiment {
       if (!series || series instanceof Error) status.textContent = series ? series.message : "The series does not exist yet.";
       else Replay.show(place, series, this.facts);
     };
-    const why = "The run folder does not have this experiment's channels: there was no room for them, or an older version of mutator ran the experiment.";
-    place.replaceChildren(error ? el("p", { role: "alert" }, error.message) : el("p", {}, why), el("p", {}, "This command reruns it:"),
+    const isApart = error?.cause?.isMissingFile;
+    const why = isApart ? "The channels are not next to this page: it lies outside its run folder, or the folder's `series` was removed. Open report/index.html in the whole run folder."
+      : this.facts.series.reason_if_missing;
+    place.replaceChildren(error && !isApart ? el("p", { role: "alert" }, error.message) : el("p", {}, why), el("p", {}, "This command reruns it:"),
       this.command(`mutator rerun ${id} --trace --run ${this.facts.run()}`),
       el("p", {}, el("button", { type: "button", onclick: load }, "Show them"), " after the rerun."), status);
   }
