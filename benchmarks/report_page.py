@@ -160,8 +160,10 @@ def write(size: int, out: Path) -> dict[str, float]:
     details = report_browse.details_data(shown, shapes_of_patches(patches(workspace, shown)), ids, traces)
     detail = packed_script_element(details, "details")
     index_kb = write_series(workspace, records, out)
+    # no column of deviations: the synthetic records do not state those of the series
+    series_facts = {"packed": True, "kept": [], "deviations": {}}
     browse = ExperimentListData(
-        facts_json=Markup(json.dumps({"filmed": True, "series": {"packed": True, "kept": []}})),
+        facts_json=Markup(json.dumps({"filmed": True, "series": series_facts})),
         scripts=tuple(map(Markup, (table, detail, paths, packed_script_element({}, "media")))),
     )
     content = ReportContent(
