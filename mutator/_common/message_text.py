@@ -46,6 +46,23 @@ def operator_hint(text: str) -> str:
     return ", ".join(f"write '{_PYTHON_OPERATORS[operator]}' for '{operator}'" for operator in operators)
 
 
+NO_BREAK_SPACE = "\u00a0"  # printed as a space at which text is not folded
+_UNIT_PATTERN = re.compile(r"(?<=\d) (?=[A-Za-z%°][\w/^²]{0,4}(?![\w/]))")
+
+
+def bind_units(text: str) -> str:
+    """Return the text with spaces that no line may be folded at: between a number and a short word, which can
+    be its unit, and in commands in backticks.
+    """
+    text = _UNIT_PATTERN.sub(NO_BREAK_SPACE, text)
+    return _COMMAND_PATTERN.sub(lambda command: command[0].replace(" ", NO_BREAK_SPACE), text)
+
+
+def unbreakable_parts(text: str) -> list[str]:
+    """Return the parts of a text between which a line can be folded."""
+    return re.split(r"[ \n]", bind_units(text))
+
+
 _NAME_BEFORE_VALUE_PATTERN = re.compile(r"[^\s:]+(?: [^\s:]+)*  +")  # `name   ` before a value
 _COMMAND_PATTERN = re.compile(r"`[^`]*`")
 _UNBREAKABLE_SPACE = "\0"  # no message contains it, and textwrap does not break lines there
@@ -67,6 +84,8 @@ def _wrap_line(line: str, width: int) -> str:
     # values far to the right would leave too little room for their lines
     indent = len(start[0]) if start and len(start[0]) <= width // 2 else _indentation(line) + 2
     unbroken = _COMMAND_PATTERN.sub(lambda command: command[0].replace(" ", _UNBREAKABLE_SPACE), line)
+    if indent + max(map(len, unbroken.split(" "))) > width:  # e.g. a digest in a narrow terminal
+        indent = _indentation(line) + 2
     lines = textwrap.wrap(
         unbroken,
         max(width, indent + 1),

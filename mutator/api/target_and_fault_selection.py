@@ -1,6 +1,7 @@
 """Find the workspace, target, faults and triggers that a user names."""
 
 import dataclasses
+import re
 import warnings
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from mutator._common.argument_checks import check_number, check_whole_number
+from mutator._common.message_text import spelling_suggestion
 from mutator.campaigns.neutral_faults import is_neutral_fault
 from mutator.checks.library_check import spec_problems
 from mutator.config import units
@@ -26,6 +28,8 @@ from mutator.workspace import Workspace
 WorkspaceLike: TypeAlias = "Workspace | str | PathLike[str] | None"
 FaultLike: TypeAlias = "Fault | str | PathLike[str]"
 TriggerLike: TypeAlias = "Trigger | str | float"
+
+_CONTEXT_NAME_PATTERN = re.compile(r"(?!nan$|inf)(?:[A-Za-z_]\w*/)?[A-Za-z_]\w*")  # but not a number
 
 
 def open_workspace(workspace: WorkspaceLike) -> Workspace:
@@ -158,10 +162,14 @@ def context_or_parsed_trigger(
     try:
         return parse_trigger(trigger_text, armed_after_s, variables)
     except MutatorError as e:
-        names = ", ".join(row.id for table in tables for row in table.rows)
-        contexts = f"a context ({names}), " if names else ""
+        context_names = [row.id for table in tables for row in table.rows]
+        contexts = f"a context ({', '.join(context_names)}), " if context_names else ""
+        got, remedy = e.got, e.remedy
+        if _CONTEXT_NAME_PATTERN.fullmatch(trigger_text) and trigger_text not in variables:
+            got = f"no context '{trigger_text}'"
+            remedy = "correct the name" + spelling_suggestion(trigger_text, [*context_names, *variables])
         raise MutatorError(
-            e.got, argument="trigger", expected=f"{contexts}{TRIGGER_FORMS}", remedy=e.remedy
+            got, argument="trigger", expected=f"{contexts}{TRIGGER_FORMS}", remedy=remedy
         ) from e
 
 

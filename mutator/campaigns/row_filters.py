@@ -9,7 +9,7 @@ import operator
 from collections.abc import Callable, Collection, Mapping
 from fnmatch import fnmatchcase
 
-from mutator._common.message_text import operator_hint
+from mutator._common.message_text import operator_hint, spelling_suggestion
 from mutator.errors import MutatorError
 
 FilterRow = Mapping[str, object]
@@ -132,7 +132,9 @@ class _FilterCompiler:
             if name not in self.columns:
                 new_name = RENAMED_COLUMNS.get(name)
                 remedy = (
-                    f"write `{new_name}`, the name of this column now" if new_name in self.columns else ""
+                    f"write `{new_name}`, the name of this column now"
+                    if new_name in self.columns
+                    else "correct the name" + spelling_suggestion(name, list(self.columns))
                 )
                 raise _filter_error(
                     self.text, f"unknown column `{name}`", "one of " + ", ".join(self.columns), remedy

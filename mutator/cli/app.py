@@ -3,6 +3,7 @@
 import errno
 import io
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -18,6 +19,7 @@ from typer.main import get_command
 from mutator._common import progress_events
 from mutator._common.files import disk_full_error, is_disk_full_error
 from mutator._common.interrupts import raising_keyboard_interrupts
+from mutator._common.message_text import spelling_suggestion
 from mutator._common.resource_shortages import find_shortage
 from mutator._common.version import VERSION
 from mutator.cli import (
@@ -37,6 +39,7 @@ from mutator.cli import (
     try_diff_generate,
 )
 from mutator.cli.console import Terminal, discard_output, ignoring_stderr_errors, show_error
+from mutator.cli.help_pages import NamedValuesCommand
 from mutator.cli.options import Library, Root, Sandbox, Target, Templates, WorkspaceOptions
 from mutator.errors import (
     EXIT_CHECK_FAILED,
@@ -79,6 +82,9 @@ Exit codes: {", ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items
 mutator looks for the library, templates and target in this order: options (before or after the command),
 environment variables, the nearest parent folder with a fault_library/, the copies that ship with mutator.
 """
+
+
+_WRONG_CHOICE_PATTERN = re.compile(r"'([^']*)' is not one of (.*)", re.DOTALL)  # in Typer's message
 
 
 class GroupedSubcommands(TyperGroup):
@@ -141,6 +147,8 @@ for module in (
     caches,
 ):
     module.register(app)
+for subcommand in app.registered_commands:
+    subcommand.cls = NamedValuesCommand
 
 
 def program() -> int:
@@ -268,6 +276,8 @@ def _report_usage_error(error: typer.TyperException) -> int:
     remedy = f"see `{ctx.command_path} --help`" if ctx else "see `mutator --help`"
     # a prefix that Pydantic adds
     message = error.format_message().rstrip(".").replace("Value error, ", "")
+    if choice := _WRONG_CHOICE_PATTERN.search(message):
+        remedy += spelling_suggestion(choice[1], re.findall(r"'([^']*)'", choice[2]))
     if message:
         show_error(MutatorError(message, remedy=remedy))
     return EXIT_WRONG_INPUT

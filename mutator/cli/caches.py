@@ -9,7 +9,7 @@ import typer
 import mutator
 from mutator._common.message_text import counted
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json
+from mutator.cli.options import Json, Wide
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ def cache(
         ),
     ] = None,
     clear: Annotated[bool, typer.Option("--clear", help="Delete everything.")] = False,
+    wide: Wide = False,
     as_json: Json = False,
 ) -> None:
     """List or delete the cached data on this machine.
@@ -56,7 +57,7 @@ def cache(
     if path:
         typer.echo(mutator.cache_folder())  # nothing else, for `$(mutator cache --path)`
         return
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     deleted = mutator.clear_caches() if clear else None
     if max_size is not None:
         deleted = mutator.prune_caches(parse_size_bytes(max_size))

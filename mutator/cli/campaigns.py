@@ -29,6 +29,7 @@ from mutator.cli.options import (
     Seed,
     SeriesMb,
     Shard,
+    Wide,
     WorkspaceOptions,
     with_workspace_options,
 )
@@ -80,6 +81,7 @@ def plan(
     limit: Limit = None,
     seed: Seed = None,
     reading: Reading = None,
+    wide: Wide = False,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,
@@ -90,7 +92,7 @@ def plan(
     """
     from mutator.api.plans import reasons_not_to_fork
 
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     workspace = workspace_options.workspace()
     choices = mutator.Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
     with terminal.show_spinner("planning"):
@@ -104,7 +106,7 @@ def plan(
     # enough to compare by eye; run.json has all digits
     terminal.print_text(f"plan: {short_path(folder / 'plan.csv')} (digest {new_plan.digest[:16]})")
     command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
-    terminal.print_text(f"run it: {shlex.join(command)}", without_folding=True)
+    terminal.print_command("run it:", command)
 
 
 def _print_plan_as_json(
@@ -215,6 +217,7 @@ def run(
             "Takes about two minutes."
         ),
     ] = True,
+    wide: Wide = False,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,
@@ -222,7 +225,7 @@ def run(
     """Run or resume a campaign; print its results and write its report."""
     from mutator.cli.progress_display import campaign_progress
 
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     workspace = workspace_options.workspace()
     choices = mutator.Choices(
         seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard
@@ -308,12 +311,13 @@ def _print_summary(
         terminal.print_text(
             f"harness errors: {len(summary.harness_errors)} (not in rates; the same command retries them)"
         )
+        length = terminal.id_length(run.folder.experiment_ids())
         for name, detail in summary.harness_errors[:5]:  # often the same error; --json has all
-            terminal.print_text(f"  {name}: {detail}", style="red")
+            terminal.print_text(f"  {name[:length]}: {detail}", style="red")
     if summary.problem:
         terminal.print_error(summary.problem)
     if summary.interrupted or summary.done < summary.planned:
-        terminal.print_text(f"resume: {resume_command()}", style="bold", without_folding=True)
+        terminal.print_command("resume:", ["mutator", *sys.argv[1:]])
 
 
 def resume_command() -> str:

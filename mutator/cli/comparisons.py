@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import mutator
-from mutator._common.message_text import counted
+from mutator._common.message_text import counted, spelling_suggestion
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, Only
+from mutator.cli.options import Json, Only, Wide
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 
 if TYPE_CHECKING:
@@ -64,8 +64,14 @@ def compare(
     only: Only = None,
     fail_on: Annotated[
         list[str] | None,
-        typer.Option("--fail-on", metavar="KIND,...", help=f"Fail on these changes: {GATES_HELP}."),
+        typer.Option(
+            "--fail-on",
+            metavar="KIND,...",
+            help=f"Fail on these changes: {GATES_HELP}.",
+            autocompletion=completion.gates,
+        ),
     ] = None,
+    wide: Wide = False,
     as_json: Json = False,
 ) -> None:
     """Compare two runs, experiment by experiment.
@@ -74,7 +80,7 @@ def compare(
     Reports which experiments became better, worse or hazardous, with paired statistics. Writes HTML, Markdown
     and CSV.
     """
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     gates = _parse_gates(fail_on or [])
     with terminal.show_spinner("comparing"):
         run_comparison = mutator.compare(run_a, run_b, only=only)
@@ -95,7 +101,12 @@ def _parse_gates(texts: list[str]) -> "list[mutator.Gate]":
     names = [name.strip() for text in texts for name in text.split(",")]
     gate_names = [gate.value for gate in mutator.Gate]
     if unknown := [name for name in names if name not in gate_names]:
-        raise MutatorError(f"'{unknown[0]}'", where="--fail-on", expected=f"one of {', '.join(gate_names)}")
+        raise MutatorError(
+            f"no kind '{unknown[0]}'",
+            where="--fail-on",
+            expected=f"one of {', '.join(gate_names)}",
+            remedy="correct the name" + spelling_suggestion(unknown[0], gate_names),
+        )
     return [mutator.Gate(name) for name in dict.fromkeys(names)]
 
 

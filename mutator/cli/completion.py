@@ -3,6 +3,7 @@ is fast.
 """
 
 import csv
+import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ import typer
 
 from mutator._common.doors import EXPORTS
 from mutator._common.folder_search import library_folder, library_yaml_files, run_folders
+from mutator.engines.engine_kinds import OFFERED_ENGINES
 from mutator.errors import MutatorError
 
+_LAST_NAME_PATTERN = re.compile(r"[A-Za-z_]\w*$|$")
 Completer = Callable[[typer.Context, str], list[str]]
 
 
@@ -42,10 +45,59 @@ def formats(ctx: typer.Context, incomplete: str) -> list[str]:
     return _names_starting(EXPORTS.names(), incomplete)
 
 
+def engines(ctx: typer.Context, incomplete: str) -> list[str]:
+    return _names_starting(OFFERED_ENGINES, incomplete)
+
+
+def triggers(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Complete the names of contexts. Times and conditions are the user's."""
+    from mutator.config.yaml_files import load_yaml
+
+    names = {"always"}
+    try:
+        for path in library_yaml_files(_library_folder(ctx), "stpa/contexts").values():
+            data = load_yaml(path).data
+            contexts = data.get("contexts") if isinstance(data, dict) else None
+            names |= set(map(str, contexts)) if isinstance(contexts, dict) else set()
+    except MutatorError:  # a file that every command refuses
+        return []
+    return _names_starting(names, incomplete)
+
+
+def gates(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Complete the last kind of a list with commas."""
+    import mutator  # which loads its parts only as they are used
+
+    before, comma, last = incomplete.rpartition(",")
+    return [before + comma + name for name in _names_starting((gate.value for gate in mutator.Gate), last)]
+
+
+def plan_columns(ctx: typer.Context, incomplete: str) -> list[str]:
+    from mutator.results.plan_columns import PLAN_COLUMN_NAMES
+
+    return _expressions_with_column(PLAN_COLUMN_NAMES, incomplete)
+
+
+def result_columns(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Complete a column of the results of the named run, or of the newest one."""
+    return [
+        text
+        for folder in _run_folders(ctx)
+        for text in _expressions_with_column(_heads_of(folder / "results.csv"), incomplete)
+    ]
+
+
+def group_columns(ctx: typer.Context, incomplete: str) -> list[str]:
+    from mutator.review.group_columns import GROUP_FILTER_COLUMNS
+
+    return _expressions_with_column(GROUP_FILTER_COLUMNS, incomplete)
+
+
 def experiments(ctx: typer.Context, incomplete: str) -> list[str]:
     """Complete the experiment ids of the named run, or of the newest one."""
-    folders = [Path(run)] if (run := ctx.params.get("run")) else run_folders(_library_folder(ctx).parent)[:1]
-    return [name for folder in folders for name in _names_starting(_experiment_ids(folder), incomplete)]
+    return [
+        name for folder in _run_folders(ctx) for name in _names_starting(_experiment_ids(folder), incomplete)
+    ]
 
 
 def specs_and_experiments(ctx: typer.Context, incomplete: str) -> list[str]:
@@ -73,6 +125,27 @@ def _experiment_ids(run: Path) -> list[str]:
             return [line["experiment_id"] for line in csv.DictReader(file)]
     except (OSError, KeyError, UnicodeDecodeError):
         return []
+
+
+def _run_folders(ctx: typer.Context) -> list[Path]:
+    """Return the named run folder, or the newest one, if there is any."""
+    run = ctx.params.get("run")
+    return [Path(run)] if run else list(run_folders(_library_folder(ctx).parent)[:1])
+
+
+def _heads_of(table: Path) -> list[str]:
+    try:
+        with table.open(encoding="utf-8", newline="") as file:
+            return next(csv.reader(file), [])
+    except (OSError, UnicodeDecodeError):
+        return []
+
+
+def _expressions_with_column(columns: Iterable[str], incomplete: str) -> list[str]:
+    """Complete the name at the end of an expression."""
+    name = _LAST_NAME_PATTERN.search(incomplete)
+    assert name is not None  # it also matches the empty end
+    return [incomplete[: name.start()] + column for column in _names_starting(columns, name[0])]
 
 
 def _names_starting(names: Iterable[str], incomplete: str) -> list[str]:

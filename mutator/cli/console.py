@@ -8,7 +8,9 @@ import json
 import math
 import os
 import re
+import shlex
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,15 +21,16 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from mutator._common import progress_events
 from mutator._common.hashing import as_json_types
-from mutator._common.message_text import wrap_text
+from mutator._common.message_text import NO_BREAK_SPACE, bind_units, wrap_text
 from mutator._common.table_rendering import TextTable
+from mutator.cli.terminal_tables import TerminalTable
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table as RichTable
+    from rich.progress import Progress as Bars
+    from rich.progress import ProgressColumn
 
-NO_BREAK_SPACE = "\u00a0"  # printed as a space at which text is not folded
 _CONTROL_PATTERN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")  # not tabs and new lines
 PIPE_LINE_WIDTH = 100  # line width outside a terminal, unless COLUMNS is set
 
@@ -44,19 +47,31 @@ STYLE_BY_ENDING = {
 }
 
 
+SHORT_ID_LENGTH = 8  # characters of an id in a terminal, or as many as make it unique
+# the consoles of progress bars; what is printed by the same console stands above its bar
+_live_consoles: "list[Console]" = []
+
+
 @dataclass
 class Terminal:
-    """Standard output and standard error of a command. With `as_json`, only `print_json` writes output."""
+    """Standard output and standard error of a command. With `as_json`, only `print_json` writes output; with
+    `wide`, tables keep all columns and whole ids, as in a pipe.
+    """
 
     as_json: bool = False
+    wide: bool = False
 
     @cached_property
     def out(self) -> "Console":
         return _build_console(stderr=False)
 
     @cached_property
-    def err(self) -> "Console":
+    def _own_err(self) -> "Console":
         return _build_console(stderr=True)
+
+    @property
+    def err(self) -> "Console":
+        return _live_consoles[-1] if _live_consoles else self._own_err
 
     def print_text(self, text: str = "", style: str | None = None, *, without_folding: bool = False) -> None:
         """Print text; fold it unless `without_folding` is set, as for a command to copy."""
@@ -73,10 +88,10 @@ class Terminal:
         progress_events.report_written_file(kind, path)
         self.print_text(text or f"{kind}: {short_path(path)}")
 
-    def print_note(self, text: str) -> None:
+    def print_note(self, text: str, *, without_folding: bool = False) -> None:
         """Print a remark to standard error, so that a pipe gets only the result."""
         with ignoring_stderr_errors():
-            _print_text(self.err, text, "dim")
+            _print_text(self.err, text, "dim", without_folding=without_folding)
 
     def print_error(self, text: str) -> None:
         """Print an error to standard error."""
@@ -96,19 +111,61 @@ class Terminal:
         rows: Iterable[Sequence[object]],
         *,
         right_aligned: Sequence[int] = (),
+        priorities: Sequence[int] = (),
         last_is_total: bool = False,
     ) -> None:
-        """Print a table. `right_aligned` numbers columns from 0; `last_is_total` sets the last row apart."""
+        """Print a table. Numbers of columns begin with 0; `last_is_total` sets the last row apart.
+
+        A terminal that is too narrow shows the columns in `priorities` first, then those from left to right.
+        """
         cells = [[_cell_text(c) for c in row] for row in rows]
         if self.as_json:
             return
-        if self.out.is_terminal:
-            self.out.print(_build_rich_table(heads, cells, right_aligned, last_is_total))
-        else:
+        if not self.out.is_terminal:
             self.print_text(
                 TextTable(heads=heads, rows=cells, right_aligned=right_aligned).as_text(),
                 without_folding=True,
             )
+            return
+        self._print_in_terminal(
+            TerminalTable(
+                heads=heads,
+                rows=cells,
+                right_aligned=right_aligned,
+                priorities=priorities,
+                last_is_total=last_is_total,
+            )
+        )
+
+    def _print_in_terminal(self, table: TerminalTable) -> None:
+        from rich.text import Text
+
+        layout = table.layout(None if self.wide else self.out.width)
+        rule = "-" if self.out.options.ascii_only else "─"
+        for line in table.as_lines(layout, STYLE_BY_ENDING, rule):
+            self.out.print(Text.assemble(*line), soft_wrap=True)
+        if layout.dropped:
+            names = "; ".join(table.heads[index] for index in layout.dropped)
+            self.print_text(f"not shown: {names} (`--wide` shows all columns)", style="dim")
+
+    def id_length(self, ids: Iterable[str]) -> int | None:
+        """Return how many characters of each id to show: in a terminal 8, or as many as make it unique; else
+        None, for all.
+        """
+        if self.as_json or self.wide or not self.out.is_terminal:
+            return None
+        names = set(ids)
+        lengths = range(SHORT_ID_LENGTH, max(map(len, names), default=0))
+        return next((n for n in lengths if len({name[:n] for name in names}) == len(names)), None)
+
+    def print_command(self, introduction: str, words: Sequence[str]) -> None:
+        """Print a command to copy, if it fits in the same line as its introduction."""
+        line = f"{introduction} {shlex.join(words)}"
+        if not self.out.is_terminal or len(line) <= self.out.width:
+            self.print_text(line, without_folding=True)
+            return
+        self.print_text(introduction)
+        self.print_text(_folded_command(words, self.out.width), without_folding=True)
 
     def print_diff(self, patch: str) -> None:
         """Print a unified diff: coloured in a terminal, elsewhere unchanged, as `patch` needs it."""
@@ -123,8 +180,21 @@ class Terminal:
 
         text = Text()
         for line in patch.splitlines():
-            text.append(line + "\n", style=_diff_style(line))
+            text.append(_fold_code(line, self.out.width) + "\n", style=_diff_style(line))
         self.out.print(text, soft_wrap=True, end="")
+
+    @contextmanager
+    def show_bars(self, *columns: "ProgressColumn") -> "Iterator[Bars]":
+        """Show progress bars on standard error; what is printed there in the meantime stands above them."""
+        from rich.progress import Progress as Bars
+
+        console = self.err
+        with Bars(*columns, console=console, transient=True) as bars:
+            _live_consoles.append(console)
+            try:
+                yield bars
+            finally:
+                _live_consoles.remove(console)
 
     @contextmanager
     def show_spinner(self, text: str) -> Iterator[None]:
@@ -132,11 +202,11 @@ class Terminal:
         if self.as_json or not self.err.is_terminal:
             yield
             return
-        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
         columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-        with Progress(*columns, console=self.err, transient=True) as progress:
-            progress.add_task(text, total=None)
+        with self.show_bars(*columns) as bars:
+            bars.add_task(text, total=None)
             yield
 
     @contextmanager
@@ -145,7 +215,7 @@ class Terminal:
         if self.as_json or not self.err.is_terminal:
             yield lambda: None
             return
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
         columns = (
             TextColumn("{task.description}"),
@@ -153,9 +223,9 @@ class Terminal:
             MofNCompleteColumn(),
             TimeRemainingColumn(compact=True),
         )
-        with Progress(*columns, console=self.err, transient=True) as progress:
-            task = progress.add_task(label, total=total)
-            yield lambda: progress.advance(task)
+        with self.show_bars(*columns) as bars:
+            task = bars.add_task(label, total=total)
+            yield lambda: bars.advance(task)
 
 
 # options whose name differs from the API's argument
@@ -211,24 +281,6 @@ def error_text(error: MutatorError) -> str:
     )
 
 
-def _build_rich_table(
-    heads: Sequence[str], rows: list[list[str]], right_aligned: Sequence[int], last_is_total: bool
-) -> "RichTable":
-    from rich import box
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
-    table = RichTable(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold")
-    for i, head in enumerate(heads):
-        table.add_column(Text(head), justify="right" if i in right_aligned else "left", overflow="fold")
-    for i, row in enumerate(rows):
-        is_total = last_is_total and i == len(rows) - 1
-        if is_total:
-            table.add_section()
-        table.add_row(*(Text(c, style=STYLE_BY_ENDING.get(c, "bold" if is_total else "")) for c in row))
-    return table
-
-
 def short_path(location: str | Path | None) -> str:
     """Return a path as the user would type it: relative if it lies below the current folder."""
     if not location:
@@ -273,9 +325,39 @@ def _print_text(console: "Console", text: str, style: str | None, *, without_fol
     text = _escape_controls(text)
     if not without_folding:
         width = console.width if console.is_terminal else _pipe_line_width()
-        text = wrap_text(text, width).replace(NO_BREAK_SPACE, " ")
+        text = wrap_text(bind_units(text) if console.is_terminal else text, width).replace(
+            NO_BREAK_SPACE, " "
+        )
     # Rich must not fold again
     console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+
+def _fold_code(line: str, width: int) -> str:
+    """Fold a line of a diff between words; what follows is indented deeper than the line."""
+    if len(line) <= width:
+        return line
+    indent = len(line) - len(line[1:].lstrip()) + 4
+    return textwrap.fill(
+        line,
+        max(width, indent + 1),
+        subsequent_indent=" " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+        expand_tabs=False,
+        replace_whitespace=False,
+    )
+
+
+def _folded_command(words: Sequence[str], width: int) -> str:
+    """Return the command in lines that a shell reads as one."""
+    lines = ["  " + shlex.quote(words[0])]
+    for word in map(shlex.quote, words[1:]):
+        if len(lines[-1]) + len(word) + len("  \\") > width:
+            lines[-1] += " \\"
+            lines.append("    " + word)
+        else:
+            lines[-1] += " " + word
+    return "\n".join(lines)
 
 
 def _pipe_line_width() -> int:

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import mutator
-from mutator._common.message_text import counted
+from mutator._common.message_text import NO_BREAK_SPACE, counted
 from mutator.api.experiment_results import experiment_facts
 from mutator.api.results_worst_first import worst_results
 from mutator.api.stored_experiments import StoredExperiment, find_newest_run, open_stored_run
-from mutator.cli.console import NO_BREAK_SPACE, STYLE_BY_ENDING, Terminal, short_path
+from mutator.cli.console import STYLE_BY_ENDING, Terminal, short_path
 from mutator.errors import MutatorError
 from mutator.mutants.file_patches import patch_without_new_files
 
@@ -47,7 +47,8 @@ def print_worst_experiments(
     folder = run or find_newest_run(workspace.library.parent)
     stored_run = open_stored_run(folder)
     worst_rows, count = worst_results(stored_run.path, only, limit)
-    rows = [_row_facts(row) for row in worst_rows]
+    length = terminal.id_length(stored_run.folder.experiment_ids())
+    rows = [_row_facts(row, length) for row in worst_rows]
     if terminal.as_json:
         terminal.print_json({"run": str(folder), "count": count, "worst": rows})
         return
@@ -55,15 +56,20 @@ def print_worst_experiments(
     if scale:
         rows = [row | {"severity": scale.labels.get(str(row["severity"]), "")} for row in rows]
     heads = tuple(rows[0]) if rows else ()
-    terminal.print_table(heads, [tuple(row.values()) for row in rows], right_aligned=(3, 5))
+    terminal.print_table(
+        heads,
+        [tuple(row.values()) for row in rows],
+        right_aligned=(3, 5),
+        priorities=[i for i, head in enumerate(heads) if head not in ("margin", "first alert")],
+    )
     terminal.print_text(
         f"{len(rows)} of {counted(count, 'experiment')} in {short_path(folder)}, the worst first"
     )
 
 
-def _row_facts(row: "ResultRow") -> dict[str, object]:
+def _row_facts(row: "ResultRow", id_length: int | None) -> dict[str, object]:
     return {
-        "experiment": row.experiment_id,
+        "experiment": row.experiment_id[:id_length],
         "ending": row.ending,
         "severity": row.severity,
         "delta-v [m/s]": None if row.delta_v is None or not row.severity else round(row.delta_v, 2),
@@ -92,6 +98,33 @@ def print_experiment(
     terminal.print_text()
 
 
+def print_answer(terminal: Terminal, result: "ExperimentResult") -> None:
+    """Print what came out in one sentence: the ending, the first hazard, and whether an alert preceded it."""
+    record = result.record
+    if record is None:
+        return
+    ending = _ending_of(record)
+    parts = [ending]
+    if record.hazards:
+        name, t = min(record.hazards, key=lambda hazard: hazard[1])
+        after = f", {t - record.activation.first:.2f} s after activation" if record.activation else ""
+        parts[0] += f": {name} at {t:.2f} s{after}"
+    manifest = _manifest_if_any(result)
+    reaction_s = result.verdict["reaction_time_s"]
+    if record.hazards and reaction_s is not None:
+        parts.append(f"first alert {reaction_s:.2f} s before it")
+    elif record.alerts and not record.hazards:
+        parts.append(f"alert {record.alerts[0][0]} at {record.alerts[0][1]:.2f} s")
+    elif manifest and (note := _missing_alert_note(record, manifest, reaction_s)):
+        parts.append(note)
+    terminal.print_text("; ".join(parts), style=STYLE_BY_ENDING.get(ending))
+    terminal.print_text()
+
+
+def _ending_of(record: "Record") -> str:
+    return record.outcome.value if record.outcome else record.status.value
+
+
 def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     """Print the verdict of an experiment that has run, its events, differences up to the end of the drive,
     and metrics.
@@ -99,7 +132,7 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     record = result.record
     assert record is not None
     manifest = _manifest_if_any(result)
-    ending = record.outcome.value if record.outcome else record.status.value
+    ending = _ending_of(record)
     terminal.print_result(f"verdict: {ending}", style=STYLE_BY_ENDING.get(ending))
     if record.detail:
         terminal.print_text(record.detail)

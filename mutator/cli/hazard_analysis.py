@@ -9,7 +9,7 @@ import typer
 import mutator
 from mutator._common.message_text import counted
 from mutator.cli.console import Terminal, error_text, short_path
-from mutator.cli.options import Json, Manifest, WorkspaceOptions, with_workspace_options
+from mutator.cli.options import Json, Manifest, Wide, WorkspaceOptions, with_workspace_options
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ def stpa(
     svg: Annotated[
         Path | None, typer.Option("--svg", metavar="FILE", help="Write a diagram of the control structure.")
     ] = None,
+    wide: Wide = False,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,
@@ -42,7 +43,7 @@ def stpa(
 
     Prints each gap or contradiction with its file and line; the exit code is then 1.
     """
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     workspace = workspace_options.workspace()
     problems = mutator.check_hazard_analysis(workspace, target=manifest)
     analysis = workspace.analysis()

@@ -12,7 +12,7 @@ import mutator
 from mutator._common.message_text import counted
 from mutator.cli import completion
 from mutator.cli.console import Terminal, error_text, short_path, with_option_names
-from mutator.cli.options import Json, Manifest, WorkspaceOptions, with_workspace_options
+from mutator.cli.options import Json, Manifest, Wide, WorkspaceOptions, with_workspace_options
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ class EntryKind(StrEnum):
     TARGETS = "targets"
 
 
+KIND_NAMES = ", ".join(EntryKind)
 ColumnsAndRows = tuple[list[str], list[dict[str, Any]]]
 
 
@@ -50,13 +51,16 @@ Examples:
 
 @with_workspace_options
 def list_library(
-    kind: Annotated[EntryKind | None, typer.Argument(help="Only this kind. Default: all.")] = None,
+    kind: Annotated[
+        EntryKind | None, typer.Argument(metavar="KIND", help=f"Only this kind: {KIND_NAMES}. Default: all.")
+    ] = None,
+    wide: Wide = False,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,
 ) -> None:
     """List specs, scenarios, campaigns, models, triggers, targets."""
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     workspace = workspace_options.workspace()
     tables = {k.value: LIST_BY_KIND[k](workspace) for k in ([kind] if kind else list(EntryKind))}
     if as_json:
@@ -65,7 +69,12 @@ def list_library(
         numbers = [i for i, c in enumerate(columns) if all(isinstance(r[c], int) for r in rows)]
         terminal.print_text(f"{name} ({len(rows)})", style="bold")
         if rows:
-            terminal.print_table(columns, [[r[c] for c in columns] for r in rows], right_aligned=numbers)
+            terminal.print_table(
+                columns,
+                [[r[c] for c in columns] for r in rows],
+                right_aligned=numbers,
+                priorities=[i for i, column in enumerate(columns) if column != "file"],
+            )
         terminal.print_text()
 
 
@@ -222,13 +231,13 @@ def _as_one_line(text: str) -> str:
 
 
 @with_workspace_options
-def doctor(as_json: Json = False, *, workspace_options: WorkspaceOptions) -> None:
+def doctor(as_json: Json = False, wide: Wide = False, *, workspace_options: WorkspaceOptions) -> None:
     """Check whether this machine can run campaigns.
 
     Checks the interpreter, packages, machine, library and target. The exit code is 1 if a campaign could not
     run.
     """
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     with terminal.show_spinner("checking"):
         try:
             findings = mutator.doctor(workspace_options.workspace())
@@ -237,7 +246,9 @@ def doctor(as_json: Json = False, *, workspace_options: WorkspaceOptions) -> Non
     if as_json:
         terminal.print_json(findings)
     terminal.print_table(
-        ["what", "state", "found", "to do"], [(f.name, f.level.value, f.found, f.remedy) for f in findings]
+        ["what", "state", "found", "to do"],
+        [(f.name, f.level.value, f.found, f.remedy) for f in findings],
+        priorities=(0, 1, 3),
     )
     failed = [f.name for f in findings if f.level == "failed"]
     if failed:

@@ -1,6 +1,5 @@
 """`merge`, `report` and `clean`: work with run folders."""
 
-import shlex
 import sys
 from contextlib import suppress
 from dataclasses import asdict
@@ -13,7 +12,14 @@ import mutator
 from mutator._common.message_text import counted
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import AcceptVersions, Json, OutRunFolder, WorkspaceOptions, with_workspace_options
+from mutator.cli.options import (
+    AcceptVersions,
+    Json,
+    OutRunFolder,
+    Wide,
+    WorkspaceOptions,
+    with_workspace_options,
+)
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -29,8 +35,13 @@ def register(app: typer.Typer) -> None:
 
 def print_outcome_counts(terminal: Terminal, run: "Run") -> None:
     counts = run.counts()
+    important = {"any hazard", "hazard, no alert"}
     terminal.print_table(
-        counts.heads, counts.rows, right_aligned=tuple(counts.right_aligned), last_is_total=True
+        counts.heads,
+        counts.rows,
+        right_aligned=tuple(counts.right_aligned),
+        priorities=[0, *(i for i, head in enumerate(counts.heads) if head in important)],
+        last_is_total=True,
     )
     score = run.mutation_totals()
     if score.rows:
@@ -74,7 +85,7 @@ def merge(
     terminal.print_text(f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {results}")
     for name, value in seals.digest_by_name().items():
         terminal.print_text(f"{name}: {value}")
-    terminal.print_text(f"report: {shlex.join(['mutator', 'report', str(out)])}", without_folding=True)
+    terminal.print_command("report:", ["mutator", "report", str(out)])
 
 
 REPORT_EXAMPLES = """\b
@@ -93,6 +104,7 @@ def report(
             metavar="DIR", help="A run folder, or a folder of runs.", autocompletion=completion.runs
         ),
     ],
+    wide: Wide = False,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,
@@ -102,7 +114,7 @@ def report(
     The report of an unfinished run covers the results so far. If the library cites published results, they
     appear next to yours. If the run's equivalence check failed, the command writes the report and then fails.
     """
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     if not (run / "run.json").exists() and any(run.glob("*/run.json")):
         _write_history(terminal, run)
         return

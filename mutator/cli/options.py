@@ -17,6 +17,12 @@ if TYPE_CHECKING:
     from mutator.workspace import Workspace
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of text.")]
+Wide = Annotated[
+    bool,
+    typer.Option(
+        "--wide", help="In a terminal: show all columns of tables and whole ids, even if lines get too long."
+    ),
+]
 Manifest = Annotated[
     str | None,
     typer.Option(
@@ -52,9 +58,18 @@ ExperimentId = Annotated[
 ]
 Only = Annotated[
     str | None,
-    typer.Option(metavar="EXPR", help="Only experiments that match, e.g. 'value > 100'."),
+    typer.Option(
+        metavar="EXPR",
+        help="Only experiments that match, e.g. 'value > 100'.",
+        autocompletion=completion.plan_columns,
+    ),
 ]
-Exclude = Annotated[str | None, typer.Option(metavar="EXPR", help="Leave out experiments that match.")]
+Exclude = Annotated[
+    str | None,
+    typer.Option(
+        metavar="EXPR", help="Leave out experiments that match.", autocompletion=completion.plan_columns
+    ),
+]
 Limit = Annotated[
     int | None,
     typer.Option(
@@ -82,6 +97,7 @@ Engine = Annotated[
         metavar="NAME",
         help="; ".join(f"{kind.name}: {kind.about}" for kind in map(ENGINES.__getitem__, OFFERED_ENGINES))
         + f". All give the same results. Default: {FORK}, where possible and worthwhile.",
+        autocompletion=completion.engines,
     ),
 ]
 AcceptVersions = Annotated[

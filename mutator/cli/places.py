@@ -9,7 +9,7 @@ import typer
 import mutator
 from mutator._common.message_text import counted
 from mutator.cli.console import Terminal
-from mutator.cli.options import Json, Manifest, WorkspaceOptions, with_workspace_options
+from mutator.cli.options import Json, Manifest, Wide, WorkspaceOptions, with_workspace_options
 
 if TYPE_CHECKING:
     from mutator.mutants.possible_places import ListedPlace
@@ -32,6 +32,7 @@ def list_places(
         str, typer.Argument(metavar="FILE[::FUNCTION]", help="A file of the target, or one function in it.")
     ],
     manifest: Manifest = None,
+    wide: Wide = False,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,
@@ -41,7 +42,7 @@ def list_places(
     Each line shows an anchor as you write it under `at` in a spec: a statement, a value changed in place, a
     constant, or a default.
     """
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     places = mutator.find_places(where, workspace_options.workspace(), target=manifest)
     if as_json:
         terminal.print_json(

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from mutator._common import progress_events
 from mutator.cli.console import Terminal
@@ -19,14 +20,15 @@ if TYPE_CHECKING:
     from mutator.store.run_progress import Progress
 
 
+_BAR_AND_CLOCK_WIDTH = 10 + 7 + 6  # the shortest bar, the elapsed time, and the spaces between columns
+
+
 @contextmanager
 def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
     """Show progress; yield the function that the campaign calls, from any thread."""
-    with (
-        _live_progress_bar(terminal)
-        if terminal.err.is_terminal
-        else nullcontext(ProgressLines(terminal.print_note)) as show
-    ):
+    # one line for each message, however long: a log is searched line by line
+    lines = ProgressLines(partial(terminal.print_note, without_folding=True))
+    with _live_progress_bar(terminal) if terminal.err.is_terminal else nullcontext(lines) as show:
 
         def notify(progress: "Progress") -> None:
             progress_events.report_phase(
@@ -40,7 +42,6 @@ def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], Non
 @contextmanager
 def _live_progress_bar(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import Progress as Bars
 
     columns = (
         TextColumn("{task.description}"),
@@ -51,7 +52,7 @@ def _live_progress_bar(terminal: Terminal) -> Iterator[Callable[["Progress"], No
         TimeElapsedColumn(),
         TextColumn("{task.fields[remaining]}"),
     )
-    with Bars(*columns, console=terminal.err, transient=True) as bars:
+    with terminal.show_bars(*columns) as bars:
         task = bars.add_task("starting", total=None, count="", rate="", outcomes="", remaining="")
 
         def notify(progress: "Progress") -> None:
@@ -60,10 +61,24 @@ def _live_progress_bar(terminal: Terminal) -> Iterator[Callable[["Progress"], No
                 description=stage_title(progress),
                 completed=progress.done,
                 total=progress.total or 1,  # a stage without a count has an empty bar
-                count=describe_count(progress),
-                rate=describe_rate(progress),
-                outcomes=", ".join(filter(None, (describe_outcomes(progress.outcomes), progress.detail))),
-                remaining=describe_remaining_time(progress),
+                **_fields_that_fit(progress, terminal.err.width),
             )
 
         yield notify
+
+
+def _fields_that_fit(progress: "Progress", width: int) -> dict[str, Any]:
+    """Return what to show beside the bar, empty where the terminal is too narrow for it."""
+    texts = {
+        "count": describe_count(progress),
+        "remaining": describe_remaining_time(progress),
+        "outcomes": ", ".join(filter(None, (describe_outcomes(progress.outcomes), progress.detail))),
+        "rate": describe_rate(progress),
+    }
+    room = width - len(stage_title(progress)) - _BAR_AND_CLOCK_WIDTH
+    for name, text in texts.items():
+        if len(text) > room:
+            texts[name] = ""
+        else:
+            room -= len(text)
+    return texts

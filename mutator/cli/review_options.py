@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 import mutator
+from mutator.cli import completion
 from mutator.cli.console import Terminal
 from mutator.cli.options import Manifest, Reading, Seed, WorkspaceOptions
 from mutator.errors import MutatorError
@@ -22,11 +23,20 @@ Specs = Annotated[
 OnlyGroups = Annotated[
     str | None,
     typer.Option(
-        "--only", metavar="EXPR", help=f"Only groups that match. Columns: {', '.join(GROUP_FILTER_COLUMNS)}."
+        "--only",
+        metavar="EXPR",
+        help=f"Only groups that match. Columns: {', '.join(GROUP_FILTER_COLUMNS)}.",
+        autocompletion=completion.group_columns,
     ),
 ]
 ExcludeGroups = Annotated[
-    str | None, typer.Option("--exclude", metavar="EXPR", help="Leave out groups that match.")
+    str | None,
+    typer.Option(
+        "--exclude",
+        metavar="EXPR",
+        help="Leave out groups that match.",
+        autocompletion=completion.group_columns,
+    ),
 ]
 Groups = Annotated[
     list[str], typer.Argument(metavar="GROUP...", help="Ids of groups, or the start of each id.")

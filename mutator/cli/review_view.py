@@ -54,26 +54,24 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
     if terminal.as_json:
         terminal.print_json([group_as_json(review, group) for group in groups])
         return
+    length = terminal.id_length({*review.entry_by_group, *(g.id for g in groups)})
+    # in a pipe, each group is one line
+    separator = "\n" if terminal.out.is_terminal else "; "
     rows = [
         (
-            g.id,
+            g.id[:length],
             review.state(g).value,
-            "\n".join(map(_shorten_injection, g.injection_labels)),
+            separator.join(map(_shorten_injection, g.injection_labels)),
             _describe_trigger(g),
             len(g.faults),
             g.experiment_count,
         )
         for g in groups
     ]
-    if terminal.out.is_terminal:
-        terminal.print_table(["group", "state", "what", "when", "faults", "runs"], rows, right_aligned=(4, 5))
-    else:
-        # in a pipe, each group is one line
-        flat = [(*row[:2], row[2].replace("\n", "; "), *row[3:]) for row in rows]
-        terminal.print_table(["group", "state", "what", "when", "faults", "runs"], flat, right_aligned=(4, 5))
+    terminal.print_table(["group", "state", "what", "when", "faults", "runs"], rows, right_aligned=(4, 5))
     for group in groups:
         if (decision := review.decision(group.id)) and decision.reason:
-            terminal.print_text(f"{group.id} {review.describe_decision(group)}")
+            terminal.print_text(f"{group.id[:length]} {review.describe_decision(group)}")
     terminal.print_text(f"{counted(len(groups), 'group')}: {describe_counts(review, groups)}")
     unlisted = review.entry_by_group.keys() - {group.id for group in groups}
     if unlisted:

@@ -11,7 +11,8 @@ import mutator
 from mutator._common.message_text import counted
 from mutator.cli import review_actions, review_view
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, WorkspaceOptions, with_workspace_options
+from mutator.cli.help_pages import NamedValuesCommand
+from mutator.cli.options import Json, Wide, WorkspaceOptions, with_workspace_options
 from mutator.cli.review_options import (
     By,
     ExcludeGroups,
@@ -77,7 +78,7 @@ def register(app: typer.Typer) -> None:
         ("walk", walk),
         ("page", page),
     ):
-        reviews.command(name)(verb)
+        reviews.command(name, cls=NamedValuesCommand)(verb)
     app.add_typer(reviews, name="review")
 
 
@@ -91,11 +92,12 @@ def list_groups(
     exclude: ExcludeGroups = None,
     *,
     mutant_options: MutantOptions,
+    wide: Wide = False,
     as_json: Json = False,
     workspace_options: WorkspaceOptions,
 ) -> None:
     """List groups, new and changed ones first (the default)."""
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     reviewed = mutant_options.load(terminal, workspace_options).matching(only, exclude)
     review_view.print_list(terminal, reviewed.review, reviewed.groups)
 
@@ -112,11 +114,12 @@ def show(
     ] = None,
     *,
     mutant_options: MutantOptions,
+    wide: Wide = False,
     as_json: Json = False,
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Show a group: its diff with holes, and the values that fill them."""
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     reviewed = mutant_options.load(terminal, workspace_options)
     selected = reviewed.find(groups)
     for group in () if as_json else selected:
@@ -163,6 +166,7 @@ def _write_pictures(
 def status(
     *,
     mutant_options: MutantOptions,
+    wide: Wide = False,
     as_json: Json = False,
     workspace_options: WorkspaceOptions,
 ) -> None:
@@ -171,7 +175,7 @@ def status(
     """
     from mutator.cli.review_status import print_status
 
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     reviewed = mutant_options.load(terminal, workspace_options)
     print_status(terminal, reviewed, mutant_options.campaign)
 

@@ -1,7 +1,6 @@
 """`show` and `rerun`: one experiment of a run."""
 
 import math
-import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +10,14 @@ import typer
 import mutator
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import ExperimentId, Json, RunFolderOption, WorkspaceOptions, with_workspace_options
+from mutator.cli.options import (
+    ExperimentId,
+    Json,
+    RunFolderOption,
+    Wide,
+    WorkspaceOptions,
+    with_workspace_options,
+)
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
@@ -45,7 +51,7 @@ def show(
     experiment: Annotated[
         str | None,
         typer.Argument(
-            metavar="[EXPERIMENT]",
+            metavar="EXPERIMENT",
             help="An experiment's id, or the start of the id. Default: list the worst.",
             show_default=False,
             autocompletion=completion.experiments,
@@ -71,13 +77,18 @@ def show(
     ] = None,
     only: Annotated[
         str | None,
-        typer.Option(metavar="EXPR", help="List only experiments whose results match, e.g. 'delta_v > 5'."),
+        typer.Option(
+            metavar="EXPR",
+            help="List only experiments whose results match, e.g. 'delta_v > 5'.",
+            autocompletion=completion.result_columns,
+        ),
     ] = None,
     limit: Annotated[int, typer.Option(min=1, help="List at most this many experiments.")] = 10,
     patch_alone: Annotated[
         bool,
         typer.Option("--patch", help="Print only the whole patch, including the probe."),
     ] = False,
+    wide: Wide = False,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,
@@ -90,7 +101,7 @@ def show(
     """
     from mutator.cli import experiment_view
 
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     if experiment is None:
         experiment_view.print_worst_experiments(terminal, workspace_options.workspace(), run, only, limit)
         return
@@ -114,13 +125,10 @@ def show(
     for path in film_paths:
         terminal.print_link("film", path)
     if stored.record and not plot_path and not film_paths:
-        terminal.print_text(
-            f"no plot is stored; to rerun and plot it: {_plot_command(stored)}", without_folding=True
+        run_words = ["--run", short_path(stored.run.path), "--plot"]
+        terminal.print_command(
+            "no plot is stored; to rerun and plot it:", ["mutator", "show", stored.id, *run_words]
         )
-
-
-def _plot_command(experiment: "StoredExperiment") -> str:
-    return shlex.join(["mutator", "show", experiment.id, "--run", short_path(experiment.run.path), "--plot"])
 
 
 def _experiment_facts(
@@ -137,6 +145,7 @@ def _experiment_facts(
 def _print_stored(terminal: Terminal, experiment: "StoredExperiment", patch: str) -> None:
     from mutator.cli import experiment_view
 
+    experiment_view.print_answer(terminal, experiment)
     experiment_view.print_experiment(terminal, experiment.experiment, patch)
     if experiment.record is None:
         terminal.print_text(str(experiment.not_run_error()))
@@ -198,6 +207,7 @@ def rerun(
     experiment: ExperimentId,
     trace: Annotated[bool, typer.Option("--trace", help="Keep trace and plot in the run folder.")] = False,
     run: RunFolderOption = None,
+    wide: Wide = False,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,
@@ -209,7 +219,7 @@ def rerun(
     from mutator.api.experiment_results import experiment_facts
     from mutator.cli import experiment_view
 
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     run_experiment = experiment_view.find_run_experiment(workspace_options.workspace(), run, experiment)
     with terminal.show_spinner(f"rerunning {run_experiment.experiment.scenario}"):
         trial = run_experiment.rerun(keep=trace)

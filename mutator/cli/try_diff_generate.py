@@ -20,6 +20,7 @@ from mutator.cli.options import (
     Seed,
     Value,
     Variant,
+    Wide,
     WorkspaceOptions,
     with_workspace_options,
 )
@@ -41,6 +42,7 @@ TriggerText = Annotated[
         "--trigger",
         metavar="WHEN",
         help="A context (C1), a time in s (10), `always`, or a condition on observed values.",
+        autocompletion=completion.triggers,
     ),
 ]
 
@@ -91,6 +93,7 @@ def try_spec(
         Path, typer.Option("--out", metavar="DIR", help="Folder for patch, traces and plot.")
     ] = _DEFAULT_OUT,
     manifest: Manifest = None,
+    wide: Wide = False,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,
@@ -99,7 +102,7 @@ def try_spec(
     from mutator.api.target_and_fault_selection import FaultChoice, SelectedTarget, middle_of_each_variant
     from mutator.cli.experiment_view import print_trial
 
-    terminal = Terminal(as_json)
+    terminal = Terminal(as_json, wide)
     if out == _DEFAULT_OUT and not is_inside(Path(), out):  # the current folder can be somebody's library
         raise MutatorError(
             "a link that leads out of the current folder",
@@ -229,7 +232,12 @@ def generate(
     trees: Annotated[bool, typer.Option("--trees", help="Also write each mutated source tree.")] = False,
     triggers: Annotated[
         list[str] | None,
-        typer.Option("--trigger", metavar="WHEN", help="As for `try`; repeatable. Default: every context."),
+        typer.Option(
+            "--trigger",
+            metavar="WHEN",
+            help="As for `try`; repeatable. Default: every context.",
+            autocompletion=completion.triggers,
+        ),
     ] = None,
     operators: Annotated[
         str | None,

@@ -4,6 +4,7 @@ import os
 import sys
 from pkgutil import resolve_name
 
+from mutator._common.message_text import spelling_suggestion
 from mutator.engines.engine_jobs import Engine, EngineArguments
 from mutator.engines.engine_kinds import ENGINES, FORK, OFFERED_ENGINES, REFERENCE
 from mutator.errors import MutatorError
@@ -31,7 +32,10 @@ def check_engine_is_offered(engine: str | None) -> None:
     """Raise MutatorError for an engine that users cannot choose; None leaves the choice to the harness."""
     if engine is not None and engine not in OFFERED_ENGINES:
         raise MutatorError(
-            f"engine '{engine}'", argument="engine", expected=f"one of {', '.join(OFFERED_ENGINES)}"
+            f"no engine '{engine}'",
+            argument="engine",
+            expected=f"one of {', '.join(OFFERED_ENGINES)}",
+            remedy="correct the name" + spelling_suggestion(engine, list(OFFERED_ENGINES)),
         )
 
 

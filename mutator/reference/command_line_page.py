@@ -10,6 +10,7 @@ from typer.main import get_command
 
 from mutator._common.table_rendering import TextTable
 from mutator.cli.app import EXIT_CODES, SUBCOMMAND_GROUPS, app
+from mutator.cli.help_pages import help_record
 from mutator.cli.options import WorkspaceOptions
 from mutator.execution import pytest_plugin
 from mutator.reference.yaml_key_tables import generated_page_head
@@ -80,7 +81,7 @@ def _options_table(command: Any, params: Iterable[Any]) -> Iterator[str]:
     rows = []
     with command.make_context("mutator", [], resilient_parsing=True) as ctx:
         for param in params:
-            if record := param.get_help_record(ctx):
+            if record := help_record(param, ctx):
                 left, right = (" ".join(text.replace("|", r"\|").split()) for text in record)
                 rows.append((f"`{left}`", right))
     if rows:

@@ -3,7 +3,7 @@
 docs/reference/run-folder.md describes its files.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -29,6 +29,7 @@ from mutator.targets.contact_severity import SeverityScale
 
 STOP_AT_HAZARD_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
 DEFAULT_SERIES_BUDGET_MB = 500  # budget of a run's series, unless the plan sets another: some 80,000 of 6 kB
+MOST_LISTED_IDS = 20  # experiments that an ambiguous id could mean
 _MOST_READS = 3  # attempts to read a folder that its owner is writing
 
 
@@ -253,15 +254,26 @@ class RunFolder:
         """Scratch folder. It can be deleted while no command owns the run folder."""
         return self.path / SCRATCH_FOLDER
 
+    def experiment_ids(self) -> Iterator[str]:
+        """Yield the ids of the planned experiments, in plan order, without reading the experiments."""
+        return plan_file.experiment_ids(self.path)
+
     def experiment_id_from(self, prefix: str) -> str:
         """Return the only planned experiment whose id starts with `prefix`; MutatorError if not unique."""
-        hits = [name for name in plan_file.experiment_ids(self.path) if name.startswith(prefix)]
-        if len(hits) != 1 or not prefix:
-            got = f"{len(hits)} experiments start with '{prefix}'" if hits else f"no experiment '{prefix}'"
+        hits = [name for name in self.experiment_ids() if name.startswith(prefix)]
+        if len(hits) == 1 and prefix:
+            return hits[0]
+        if not hits:
             raise MutatorError(
-                got,
+                f"no experiment '{prefix}'",
                 where=self.path,
                 expected="an id in plan.csv, or the beginning of exactly one",
-                remedy="give more of the id" if hits else "see plan.csv or results.csv",
+                remedy="see plan.csv or results.csv",
             )
-        return hits[0]
+        more = f", and {len(hits) - MOST_LISTED_IDS} more" if len(hits) > MOST_LISTED_IDS else ""
+        raise MutatorError(
+            f"{len(hits)} experiments start with '{prefix}'",
+            where=self.path,
+            expected=f"one of {', '.join(hits[:MOST_LISTED_IDS])}{more}",
+            remedy="give more of the id",
+        )

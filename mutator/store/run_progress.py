@@ -19,26 +19,29 @@ class Progress:
     done: int = 0  #: completed steps of the stage
     total: int = 0  #: total steps of the stage; 0: nothing to count
     outcomes: Counter[str] = field(default_factory=Counter)  #: experiments by outcome or status
-    per_s: float | None = None  #: steps per second since the stage began
+    per_s: float | None = None  #: steps per second since the first was finished
     remaining_s: float | None = None  #: estimated time in s to the end of the stage
 
 
+FIRST_STEPS_S = 1.0  # workers that started together finish their first steps within this time
+
+
 class StagePace:
-    """Measure the rate of a stage from now on; `finished_before` of `total` steps were completed earlier."""
+    """Measure the rate of a stage; `finished_before` of `total` steps were completed earlier.
+
+    The clock starts with the first finished steps, because the time before includes the workers' start. There
+    is a rate as soon as as many steps again are finished.
+    """
 
     def __init__(self, stage: str, total: int, finished_before: int = 0) -> None:
-        self._stage, self._total, self._finished_before = stage, total, finished_before
-        self._began_at = time.monotonic()
+        self._stage, self._total = stage, total
+        self._finished_before = self._finished_first = finished_before
+        self._started_at: float | None = None
 
     def progress_at(
         self, finished: int, *, detail: str = "", outcomes: Counter[str] | None = None
     ) -> Progress:
-        elapsed = time.monotonic() - self._began_at
-        per_s = (
-            (finished - self._finished_before) / elapsed
-            if finished > self._finished_before and elapsed
-            else None
-        )
+        per_s = self._measure(finished, time.monotonic())
         return Progress(
             stage=self._stage,
             detail=detail,
@@ -48,6 +51,19 @@ class StagePace:
             per_s=per_s,
             remaining_s=(self._total - finished) / per_s if per_s else None,
         )
+
+    def _measure(self, finished: int, now: float) -> float | None:
+        """Return the number of steps per second since the first ones were finished; None if not yet known."""
+        if finished == self._finished_before:
+            return None
+        if self._started_at is None:
+            self._started_at = now
+        elapsed_s = now - self._started_at
+        if elapsed_s < FIRST_STEPS_S:
+            self._finished_first = finished
+        finished_since = finished - self._finished_first
+        is_measured = finished_since and finished_since >= self._finished_first - self._finished_before
+        return finished_since / elapsed_s if is_measured else None
 
 
 class RecordTail:

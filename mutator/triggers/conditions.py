@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from functools import lru_cache
 
-from mutator._common.message_text import counted, operator_hint
+from mutator._common.message_text import counted, operator_hint, spelling_suggestion
 from mutator.errors import MutatorError
 
 TIME = "t"  # s; every target has it
@@ -243,9 +243,10 @@ class _ExpressionWriter:
             GOLDEN_PREFIX not in name if self.variables is None else name in self.variables
         ):
             return name
+        names = [*self.constants, *(self.variables or ())]
         remedy = (
             f"the known constants are {', '.join(self.constants)}" if self.constants else "check its spelling"
-        )
+        ) + spelling_suggestion(name, names)
         raise self._error_in_text(f"unknown name '{name}'", remedy)
 
     def _write_call(self, node: ast.Call) -> str:

@@ -41,6 +41,12 @@ def complete(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> Complete:
         (["check", "--manifest", "t"], ["toycar"]),
         (["run", "nothing_like_it"], []),
         (["export", "runs/x", "--format", "mut"], ["mutation-elements"]),
+        (["try", "sensor/lane", "--trigger", ""], ["always", "far", "near"]),
+        (["run", "small", "--engine", "f"], ["fork"]),
+        (["compare", "a", "b", "--fail-on", "new-hazard,new-c"], ["new-hazard,new-crash"]),
+        (["plan", "small", "--only", "fault_t"], ["fault_type"]),
+        (["plan", "small", "--only", "value>1and_not_in(scen"], ["value>1and_not_in(scenario"]),
+        (["review", "list", "--only", "stat"], ["state"]),
     ],
 )
 def test_names_are_completed_from_their_first_letters(
@@ -62,6 +68,8 @@ def test_run_folders_and_their_experiments_are_completed(complete: Complete, cli
     assert complete("show", "") == new
     assert complete("show", new[0][:6]) == new[:1]
     assert complete("rerun", "--run", "runs/old", "") == old
+    Path("runs/new/results.csv").write_text("experiment_id,delta_v,detail\n")
+    assert complete("show", "--only", "de") == ["delta_v", "detail"]
     Path("runs/old/plan.csv").write_bytes(b"\xff")
     assert complete("rerun", "--run", "runs/old", "") == []
 

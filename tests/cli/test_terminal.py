@@ -84,6 +84,15 @@ def test_a_log_shows_lines_of_progress(capsys: pytest.CaptureFixture[str]) -> No
     ]
 
 
+def test_a_message_of_progress_in_a_log_is_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    with campaign_progress(Terminal()) as notify:
+        notify(Progress(stage="experiments", done=3, total=60, per_s=0.28, remaining_s=615.0))
+    assert capsys.readouterr().err == "experiments 3/60, 16.8 a minute, 10 min 15 s left\n"
+
+
 @pytest.mark.parametrize(
     ("seconds", "words"),
     [(0.4, "0 s"), (59.4, "59 s"), (59.6, "1 min 00 s"), (3599, "59 min 59 s"), (7500, "2 h 05 min")],

@@ -196,6 +196,7 @@ SHOWN_BY_THE_COMMAND_LINE = {
     "mutator.execution.progress_text",
     "mutator.exports",
     "mutator.mutants.file_patches",
+    "mutator.results.plan_columns",
     "mutator.review.group_columns",
     "mutator.review.group_display",
 }

@@ -77,7 +77,13 @@ def test_an_old_column_name_is_answered_with_the_new_one() -> None:
     assert caught.value.remedy == "write `time_to_hazard`, the name of this column now"
     with pytest.raises(MutatorError) as caught:
         compile_filter(old, ["value"])
-    assert not caught.value.remedy
+    assert caught.value.remedy == "correct the name"
+
+
+def test_a_misspelt_column_is_answered_with_the_nearest_one() -> None:
+    with pytest.raises(MutatorError) as caught:
+        compile_filter("modul == 'radar'", ["module", "value"])
+    assert caught.value.remedy == "correct the name; did you mean 'module'?"
 
 
 @pytest.mark.parametrize("text", ['value > "S1"', "scenario in 5"])
