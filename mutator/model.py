@@ -310,3 +310,7 @@ class Record:
     metrics: tuple[tuple[str, float], ...] = added_field(())
     #: (channel, first time in s, largest deviation) of each channel that left its tolerance in the drive
     left: tuple[tuple[str, float, float], ...] = added_field(())
+    #: compared channel that first left its tolerance, and whether it was then `higher` or `lower` than golden
+    first_change: tuple[str, str] | None = added_field(None)
+    #: speeds in m/s by their names in the results, from the activation to the first hazard
+    speeds: tuple[tuple[str, float], ...] = added_field(())

@@ -9,6 +9,7 @@ from mutator.api.notebook_html import diff_html, facts_html, text_html
 from mutator.figures.golden_and_faulty_plot import draw_golden_and_faulty, event_marks
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.file_patches import patch_without_new_files
+from mutator.outcomes.fault_paths import FaultPathFinder
 from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.trace_loading import Trace, values_on_steps
 from mutator.outcomes.verdict_rules import (
@@ -17,6 +18,9 @@ from mutator.outcomes.verdict_rules import (
     severity_class_of,
     time_to_hazard,
 )
+from mutator.results.experiment_sentence import ExperimentSentences
+from mutator.results.plan_columns import PlanColumn
+from mutator.results.table_columns import FinishedExperiment, ResultColumn, row_of
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import ChannelFacts
@@ -57,7 +61,12 @@ class ExperimentResult(ABC):
         return f"<{type(self).__name__} {self.id}: {self.experiment.label}: {self.ending}>"
 
     def _repr_html_(self) -> str:
-        return text_html(repr(self)) + diff_html(self.diff) + facts_html(self._notebook_facts())
+        return (
+            text_html(repr(self))
+            + text_html(self.sentence)
+            + diff_html(self.diff)
+            + facts_html(self._notebook_facts())
+        )
 
     def _notebook_facts(self) -> list[tuple[str, object]]:
         facts = experiment_facts(self.experiment) | (self.verdict if self.record else {"status": "not run"})
@@ -118,6 +127,17 @@ class ExperimentResult(ABC):
         return self.scale.labels[name] if self.scale and name else ""
 
     @property
+    def sentence(self) -> str:
+        """What happened, in words: the fault, what the car did, hazards and alerts; until it has run, what
+        the fault does.
+        """
+        sentences = self._sentences()
+        if self.record is None:
+            return sentences.fault_clause(self.fault)
+        finished = FinishedExperiment(self.experiment, self.record, self.scale, self._fault_paths())
+        return sentences.sentence(row_of(self._columns(), finished), self.fault)
+
+    @property
     @abstractmethod
     def scale(self) -> SeverityScale | None:
         """The severity scale; None for a target without one."""
@@ -153,6 +173,15 @@ class ExperimentResult(ABC):
         marks = event_marks(self.record) if self.record else ()
         end = self.record.t_end if self.record else None
         return draw_golden_and_faulty(golden, faulty, self._manifest(), title=title, marks=marks, end=end)
+
+    @abstractmethod
+    def _sentences(self) -> ExperimentSentences: ...
+
+    @abstractmethod
+    def _columns(self) -> Sequence[PlanColumn | ResultColumn]: ...
+
+    def _fault_paths(self) -> FaultPathFinder | None:
+        return None
 
     @abstractmethod
     def _channels(self) -> Sequence[ChannelFacts]: ...

@@ -3,10 +3,12 @@
 from pathlib import Path
 
 from mutator.campaigns.row_filters import compile_filter
+from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.result_rows import ResultRow, cells_by_row, rows_of
 from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.store import plan_file
+from mutator.store.run_head import load_head
 
 _ROWS_PER_BATCH = 10_000  # to filter; as dictionaries, all rows of a large run would fill the memory
 
@@ -32,4 +34,6 @@ def worst_results(
             for row in rows
         ]
         row_indices = [row for row in row_indices if is_match[row]]
-    return rows_of(frame.iloc[row_indices[:limit]], plan_file.load_faults(run)), len(row_indices)
+    sentences = ExperimentSentences.of_run(load_head(run))
+    worst = rows_of(frame.iloc[row_indices[:limit]], plan_file.load_faults(run), sentences)
+    return worst, len(row_indices)

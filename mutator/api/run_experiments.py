@@ -61,6 +61,7 @@ class RunExperiment(StoredExperiment):
             single,
             manifest,
             scale=self.scale,
+            phrases=run.folder.head.phrases,
             same_as_record=is_same if self.record else None,
             temporary=temporary,
         )

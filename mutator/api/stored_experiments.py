@@ -16,6 +16,9 @@ from mutator.model import Experiment, Fault, Record
 from mutator.outcomes.fault_paths import FaultPath, FaultPathFinder, fault_paths_of
 from mutator.outcomes.series_sampling import traces_of_series
 from mutator.outcomes.trace_loading import Trace
+from mutator.results.experiment_sentence import ExperimentSentences
+from mutator.results.plan_columns import PlanColumn
+from mutator.results.table_columns import ResultColumn, result_columns_of
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, rerun_command
@@ -83,6 +86,11 @@ class StoredRun:
     def fault_paths(self) -> FaultPathFinder | None:
         """The paths of faults through the target; None if unknown."""
         return fault_paths_of(self.folder)
+
+    @cached_property
+    def sentences(self) -> ExperimentSentences:
+        """Writes the sentences about the run's experiments."""
+        return ExperimentSentences.of_run(self.folder.head)
 
     def experiment(self, id: str) -> "StoredExperiment":
         """Return the planned experiment whose id starts with `id`; MutatorError for none or several."""
@@ -156,6 +164,15 @@ class StoredExperiment(ExperimentResult):
         """
         fault_paths = self.run.fault_paths
         return fault_paths.fault_path(self.experiment, self.record) if fault_paths and self.record else None
+
+    def _sentences(self) -> ExperimentSentences:
+        return self.run.sentences
+
+    def _columns(self) -> Sequence[PlanColumn | ResultColumn]:
+        return result_columns_of(self.run.folder.head)
+
+    def _fault_paths(self) -> FaultPathFinder | None:
+        return self.run.fault_paths
 
     def _channels(self) -> Sequence[ChannelFacts]:
         return self.run.folder.head.channels

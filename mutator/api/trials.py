@@ -10,15 +10,20 @@ from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
 from mutator.api.target_and_fault_selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
+from mutator.campaigns.phrase_collection import phrases_of_fault
 from mutator.errors import MutatorError
 from mutator.execution.single_run import SingleRun, run_single
 from mutator.figures.golden_and_faulty_plot import save_figure
 from mutator.model import Experiment, Method, Record
 from mutator.outcomes.hazards_and_metrics import load_judged_run
 from mutator.outcomes.trace_loading import Trace, load_trace
+from mutator.results.experiment_sentence import ExperimentSentences
+from mutator.results.plan_columns import PlanColumn
+from mutator.results.table_columns import ResultColumn, result_columns, severity_and_time_columns
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stored_target_facts import ChannelFacts, channel_facts
+from mutator.targets.stored_phrases import Phrases
+from mutator.targets.stored_target_facts import ChannelFacts, channel_facts, metric_facts
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -32,6 +37,7 @@ class Trial(ExperimentResult):
     single: SingleRun  #: the run and its files
     manifest: TargetManifest  #: the target's manifest
     scale: SeverityScale | None = None  #: the severity scale; None for a target without one
+    phrases: Phrases = field(default_factory=Phrases)  #: the words of the library for the sentence
     #: whether the record equals the campaign's; None: the campaign has none
     same_as_record: bool | None = None
     _temporary: ScratchFolder | None = field(default=None)  # deletes the folder together with this object
@@ -77,6 +83,17 @@ class Trial(ExperimentResult):
             return None
         save_figure(self.plot(), [path])
         return path
+
+    def _sentences(self) -> ExperimentSentences:
+        return ExperimentSentences.of_target(self.manifest, self.phrases, self.scale)
+
+    def _columns(self) -> Sequence[PlanColumn | ResultColumn]:
+        compared = [channel.name for channel in self.manifest.compared_channels]
+        severity = severity_and_time_columns(has_classes=self.scale is not None)
+        metrics = metric_facts(self.manifest)
+        return result_columns(
+            self.manifest.hazard_names, compared, metrics, severity, speed=bool(self.manifest.speed)
+        )
 
     def _channels(self) -> Sequence[ChannelFacts]:
         return channel_facts(self.manifest)
@@ -132,7 +149,8 @@ def try_fault(
     check_only_plain_files(folder)
     single = run_single(selected_target.workspace, selected_target.manifest, experiment, folder)
     scale = selected_target.workspace.scale_of(selected_target.manifest)
-    return build_trial(single, selected_target.manifest, scale=scale, temporary=temporary)
+    phrases = phrases_of_fault(selected_target.workspace, selected_target.manifest, experiment.fault)
+    return build_trial(single, selected_target.manifest, scale=scale, phrases=phrases, temporary=temporary)
 
 
 def build_trial(
@@ -140,6 +158,7 @@ def build_trial(
     manifest: TargetManifest,
     *,
     scale: SeverityScale | None,
+    phrases: Phrases,
     same_as_record: bool | None = None,
     temporary: ScratchFolder | None = None,
 ) -> Trial:
@@ -149,6 +168,7 @@ def build_trial(
         single=single,
         manifest=manifest,
         scale=scale,
+        phrases=phrases,
         same_as_record=same_as_record,
         _temporary=temporary,
     )

@@ -18,6 +18,7 @@ from mutator._common.folder_locks import lock_run_folder
 from mutator._common.hashing import as_json_types, digest
 from mutator._common.version import VERSION
 from mutator.campaigns.campaign_files import load_campaign_study
+from mutator.campaigns.phrase_collection import UsedPhraseSources, phrases_of_campaign
 from mutator.campaigns.plan import Plan, SeedBySeedPlan
 from mutator.campaigns.plan_tally import PlanDigestBuilder, PlanPart, PlanTally
 from mutator.campaigns.run_inputs import RunInputs
@@ -107,8 +108,9 @@ def freeze_plan_in_owned_folder(
         check_version(folder)
         check_sources(out, folder.head.sources, _source_digests(tally, plan, workspace))
         return folder, tally
-    tally, plan_digest, places, files = _write_plan_files(plan, out)
-    head = _build_head(plan, tally, plan_digest, workspace, places).file_bytes()
+    used = UsedPhraseSources()
+    tally, plan_digest, places, files = _write_plan_files(plan, out, used)
+    head = _build_head(plan, tally, plan_digest, workspace, places, used).file_bytes()
     file_digests.save_ledger(out, DigestLedger(files=files | {HEAD: FileDigest.of_bytes(head)}))
     write_atomic(out / HEAD, head)  # last, because this file makes the folder a run folder
     return RunFolder.open(out), tally
@@ -131,7 +133,7 @@ def _tally_and_digest(
 
 
 def _write_plan_files(
-    plan: Plan | SeedBySeedPlan, out: Path
+    plan: Plan | SeedBySeedPlan, out: Path, used: UsedPhraseSources
 ) -> tuple[PlanTally, str, list[plan_file.Chunk], dict[str, FileDigest]]:
     """Write the plan's files part by part; return totals, digest, chunk positions and file digests."""
     plan_file.create_plan_folder(out)
@@ -147,6 +149,7 @@ def _write_plan_files(
         def write(part: PlanPart) -> None:
             rows.write(plan_csv_lines(part.experiments))
             writer.append(part.experiments, part.chunk_lengths)
+            used.add(experiment.fault for experiment in part.experiments)
 
         tally, plan_digest = _tally_and_digest(plan, write)
     files = {
@@ -171,6 +174,7 @@ def _build_head(
     plan_digest: str,
     workspace: Workspace,
     chunks: list[plan_file.Chunk],
+    used: UsedPhraseSources,
 ) -> RunHead:
     manifest = workspace.manifest(plan.campaign.target)
     canary = plan_file.experiment_as_json(plan.canary) | {"fault": as_json_types(plan.canary.fault)}
@@ -190,6 +194,7 @@ def _build_head(
         runs=tally.run_count,
         limits=plan.campaign.limits,
         **vars(collect_target_facts(workspace, manifest)),
+        phrases=phrases_of_campaign(workspace, plan.campaign, manifest, plan.reading, used),
         goldens=tuple(golden.to_stored() for golden in tally.golden_runs()),
         canary=canary,
         canary_hazard=plan.campaign.canary.hazard,
@@ -213,6 +218,7 @@ def collect_target_facts(workspace: Workspace, manifest: TargetManifest) -> Targ
         structure=structure.model_dump(mode="json", by_alias=True) if structure else None,
         golden_files=tuple(manifest.output_files),
         target_files=manifest.tree.digest_by_path,
+        speed=manifest.speed,
     )
 
 

@@ -163,13 +163,13 @@ def _fail_on_findings(
     gates: "list[mutator.Gate]",
     failing: "tuple[GateFinding, ...]",
 ) -> None:
-    gates_by_experiment: dict[tuple[str, str], list[str]] = {}  # an experiment can fail several gates
+    gates_by_experiment: dict[tuple[str, str, str], list[str]] = {}  # an experiment can fail several gates
     for finding in failing:
-        experiment = (finding.description, finding.experiment_id)
+        experiment = (finding.description, finding.experiment_id, finding.sentence)
         gates_by_experiment.setdefault(experiment, []).append(finding.gate.value)
     lines = [
-        f"{', '.join(kinds)}: {description} [{experiment_id}]"
-        for (description, experiment_id), kinds in gates_by_experiment.items()
+        f"{', '.join(kinds)}: {description} [{experiment_id}]{sentence and f': {sentence}'}"
+        for (description, experiment_id, sentence), kinds in gates_by_experiment.items()
     ]
     for line in lines[:MOST_LISTED_FINDINGS]:
         terminal.print_error(line)

@@ -55,6 +55,7 @@ def print_worst_experiments(
     scale = stored_run.folder.severity_scale
     if scale:
         rows = [row | {"severity": scale.labels.get(str(row["severity"]), "")} for row in rows]
+    sentences = [(row["experiment"], row.pop("sentence")) for row in rows]
     heads = tuple(rows[0]) if rows else ()
     terminal.print_table(
         heads,
@@ -62,6 +63,8 @@ def print_worst_experiments(
         right_aligned=(3, 5),
         priorities=[i for i, head in enumerate(heads) if head not in ("margin", "first alert")],
     )
+    for name, sentence in sentences:
+        terminal.print_text(f"{name}: {sentence}")
     terminal.print_text(
         f"{len(rows)} of {counted(count, 'experiment')} in {short_path(folder)}, the worst first"
     )
@@ -78,6 +81,7 @@ def _row_facts(row: "ResultRow", id_length: int | None) -> dict[str, object]:
         "first alert": row.alerts[0] if row.alerts else "",
         "fault": row.fault,
         "drive": f"{row.scenario}, {row.trigger}",
+        "sentence": row.sentence,
     }
 
 
@@ -133,6 +137,7 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     assert record is not None
     manifest = _manifest_if_any(result)
     ending = _ending_of(record)
+    terminal.print_text(result.sentence)
     terminal.print_result(f"verdict: {ending}", style=STYLE_BY_ENDING.get(ending))
     if record.detail:
         terminal.print_text(record.detail)
@@ -237,6 +242,7 @@ def print_trial(terminal: Terminal, trial: "Trial", *, with_plot: bool) -> None:
     plot_path = _replace_plot(terminal, trial, with_plot=with_plot)
     if terminal.as_json:
         facts = {**experiment_facts(trial.experiment), **trial.verdict, "patch": trial.patch}
+        facts |= {"sentence": trial.sentence}
         facts |= {"golden_hazards_s": dict(trial.golden_hazards)}
         terminal.print_json(
             facts | {"traces": str(trial.single.faulty), "plot": str(plot_path) if plot_path else None}

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 STYLE_BY_STATE = {"new": "yellow", "changed": "bold yellow", "rejected": "bold red", "approved": "green"}
 MOST_VALUE_ROWS = 24  # rows of values shown in a terminal
+MOST_WORDS = 3  # faults described in a terminal
 MOST_CONDITIONS = 6  # conditions shown in a terminal; a group can have one for each context
 
 
@@ -23,7 +24,12 @@ def group_as_json(review: "Review", group: "Group", *, with_diff_and_values: boo
     from mutator.review.group_display import fault_value_table
 
     decision, flag = review.decision(group.id), review.flag(group.id)
-    facts = {**group_facts(review, group), "what": group.label, "injections": group.injection_labels}
+    facts = {
+        **group_facts(review, group),
+        "what": group.label,
+        "injections": group.injection_labels,
+        "words": group.fault_words,
+    }
     facts |= {"at": decision.at if decision else None, "changed": review.stale_parts(group)}
     facts |= {"remarks": [asdict(remark) for remark in review.remarks(group.id)]}
     facts |= {
@@ -120,6 +126,10 @@ def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
     _print_head(terminal, review, group)
     for injection in group.injection_labels:
         terminal.print_text(f"  {injection}", style="bold")
+    for words in group.fault_words[:MOST_WORDS]:
+        terminal.print_text(f"  {words}")
+    if (more_words := len(group.fault_words) - MOST_WORDS) > 0:
+        terminal.print_text(f"  and {more_words} more")
     runs = "" if group.experiment_count is None else f", {counted(group.experiment_count, 'experiment')}"
     if group.value_ranges:
         terminal.print_text(f"values: {describe_value_ranges(group)}")

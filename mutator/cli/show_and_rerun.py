@@ -138,7 +138,11 @@ def _experiment_facts(
 
     facts = {**experiment_facts(experiment.experiment), **experiment.verdict, "patch": patch}
     facts |= {"run": str(experiment.run.path), "plot": str(plot_path) if plot_path else None}
-    facts |= {"run_with": experiment.stretch, "has_series": experiment.has_series}
+    facts |= {
+        "sentence": experiment.sentence,
+        "run_with": experiment.stretch,
+        "has_series": experiment.has_series,
+    }
     return facts | {"path": asdict(experiment.fault_path) if experiment.fault_path else None}
 
 

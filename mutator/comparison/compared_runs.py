@@ -7,6 +7,7 @@ from typing import NamedTuple
 from mutator.campaigns.row_filters import compile_filter
 from mutator.model import Experiment, Record, Value
 from mutator.preflight import equivalence_check
+from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import frame_of_experiments
@@ -68,11 +69,13 @@ def load_compared_run(run: Path, only: str | None = None) -> ComparedRun:
         e for e in plan_file.load_experiments(folder.path) if accepts is None or accepts(plan_row(e))
     )
     faults = {e.fault.id: e.fault for e in experiments}
+    sentences = ExperimentSentences.of_run(folder.head)
     return ComparedRun(
         folder=folder,
         experiments=experiments,
         row_by_id={
-            row.experiment_id: row for row in rows_of(frame_of_experiments(folder, experiments), faults)
+            row.experiment_id: row
+            for row in rows_of(frame_of_experiments(folder, experiments), faults, sentences)
         },
         metrics_by_id={e.id: _metrics_of(records[e.id]) for e in experiments if e.id in records},
     )

@@ -120,6 +120,7 @@ def render_markdown(comparison: Comparison) -> str:
 def _pair_list(pairs: tuple[ExperimentPair, ...]) -> str:
     lines = [
         f"- {p.b.label}: {markdown_line(describe_ending_change(p))} (`{p.a.id}`, `{p.b.id}`)"
+        + (f" {markdown_line(p.row_b.sentence)}" if p.row_b.sentence else "")
         for p in pairs[:MOST_LISTED_EXPERIMENTS]
     ]
     more = len(pairs) - MOST_LISTED_EXPERIMENTS
@@ -200,7 +201,8 @@ def _ending_html(row: ResultRow) -> str:
         details.insert(0, row.severity_label)
     if row.detail:
         details.append(row.detail)
-    return Markup('<span class="ending {0}">{0}</span> {1}').format(row.ending, ", ".join(details))
+    ending = Markup('<span class="ending {0}">{0}</span> {1}').format(row.ending, ", ".join(details))
+    return ending + Markup('<p class="sentence">{}</p>').format(row.sentence) if row.sentence else ending
 
 
 def _hazard_time_text(row: ResultRow) -> str:

@@ -74,6 +74,7 @@ class GateFinding:
     gate: Gate
     experiment_id: str
     description: str
+    sentence: str = ""  # about the second run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,7 +215,10 @@ def findings_of_gates(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Ga
         )
         gate_findings += [
             GateFinding(
-                gate=gate, experiment_id=p.b.id, description=f"{p.b.label}: {describe_ending_change(p)}"
+                gate=gate,
+                experiment_id=p.b.id,
+                description=f"{p.b.label}: {describe_ending_change(p)}",
+                sentence=p.row_b.sentence,
             )
             for p in pairs
         ]

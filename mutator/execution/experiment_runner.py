@@ -22,6 +22,7 @@ from mutator.outcomes import golden_comparison, trace_loading
 from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.failure_cause import judge_failure, run_error
 from mutator.outcomes.hazards_and_metrics import RunJudgement, load_judged_run, load_manifest_channels
+from mutator.outcomes.reaction_and_speeds import first_actuator_change, speeds_after_activation
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.outcomes.trace_loading import Trace
 from mutator.outcomes.verdict_rules import first_events_after, outcome_of
@@ -298,6 +299,12 @@ class ExperimentRunner:
             dev=() if judged.t_end is None else difference.max_dev_in_drive,
             metrics=judged.metrics,
             left=departures_from_golden(reference, faulty, self.manifest.channels, time, judged.t_end),
+            first_change=first_actuator_change(
+                reference, faulty, self.manifest.compared_channels, time, difference.t_first
+            ),
+            speeds=speeds_after_activation(
+                self.manifest, reference, faulty, activation, hazards[0][1] if hazards else judged.t_end
+            ),
         )
 
     def _record_of_failed_run(self, experiment: Experiment, mutant: Mutant, execution: JobResult) -> Record:

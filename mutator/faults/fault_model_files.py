@@ -11,6 +11,7 @@ from mutator._common import hashing
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import checked_path_inside
 from mutator.config import units
+from mutator.config.phrases import build_phrase
 from mutator.config.yaml_files import MOST_YAML_BYTES, StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
@@ -27,6 +28,7 @@ from mutator.faults.fault_models import (
     UnnamedParamSchema,
 )
 from mutator.faults.injection_model import InjectionModel
+from mutator.faults.phrase_holes import model_holes
 from mutator.faults.probe_template_parts import ProbeTemplates
 
 SCHEMA = "fault_model/1"
@@ -73,6 +75,13 @@ class FaultModelModel(StrictModel, title="The file"):
         "of an expression, passed as `original`.",
     )
     about: str = Field(description="What the model does, in one sentence.")
+    phrase: str | list[str] | None = Field(
+        None,
+        description="What an injection does, as a clause, for experiments whose spec has no phrase: `{by} is "
+        "added to {changed} in {function}`. Holes: `changed` (the variable or expression), `function`, "
+        "`file`, the parameters, and the numbers without their sign (`abs_by`). Of several texts, the first "
+        "whose parameters are all set is used.",
+    )
     raises: bool = Field(
         False,
         description="Whether the model's lines raise on purpose. If so, an exception in them is a crash of "
@@ -165,6 +174,7 @@ def _load_model(path: Path) -> FaultModel:
         expression_template=template.removesuffix("\n") if kind is SnippetKind.VALUE else model.expression,
         source=source,
         template_path=template_path,
+        phrase=build_phrase(model.phrase, model_holes(params), source, ("phrase",)),
     )
 
 

@@ -13,6 +13,7 @@ from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.faults.probe_template_parts import ProbeTemplates
+from mutator.targets.stored_phrases import PhraseByCase
 
 TEMPLATE_FOLDER_GLOBS = ("*.yaml", "*.j2")  # what a templates folder consists of
 UNIT_OF_CHANGED_VARIABLE = "target"
@@ -105,7 +106,8 @@ class FaultModel:
 
     `raises`: the injected lines raise on purpose, so an exception in them is a crash of the target.
     `expression_template` is that of a changed value, or None if the model cannot change an expression.
-    `needs`: what the templates need, which not every kind of anchor provides.
+    `needs`: what the templates need, which not every kind of anchor provides. `phrase`: what an injection
+    does, in words, for specs without a phrase.
     """
 
     name: str
@@ -119,6 +121,7 @@ class FaultModel:
     expression_template: str | None = None
     source: YamlSource  # the YAML
     template_path: Path
+    phrase: PhraseByCase = field(default_factory=dict)
 
     def param(self, name: str) -> ParamSchema | None:
         return next((p for p in self.params if p.name == name), None)

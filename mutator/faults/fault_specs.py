@@ -10,12 +10,14 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, create_model, model_validator
 
 from mutator.config import units
+from mutator.config.phrases import SignedPhraseModel, build_phrase
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.faults.injection_model import InjectionModel
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.faults.library_readings import SpecReadings
 from mutator.model import Hold
+from mutator.targets.stored_phrases import PhraseByCase
 
 SCHEMA = "fault_spec/1"
 _NAME_PATTERN = re.compile(r"[a-z][a-z0-9_]*\Z")
@@ -57,7 +59,7 @@ class Variant:
     """One row of the library: for each reading, injections that share a trigger and a draw.
 
     `injections_by_reading` starts with the default reading. `hold_by_reading` overrides how long the fault
-    stays active.
+    stays active; `phrase_by_reading` says what the fault does, in words.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Variant:
     changes: tuple[str, ...]
     injections_by_reading: Mapping[str, tuple[InjectionSpec, ...]]
     hold_by_reading: Mapping[str, Hold | None]
+    phrase_by_reading: Mapping[str, PhraseByCase]
     keys: KeyPath
 
     def injections_in_reading(self, reading: str) -> tuple[InjectionSpec, ...]:
@@ -75,6 +78,9 @@ class Variant:
     def hold_in_reading(self, reading: str) -> Hold | None:
         """Return how long the fault stays active; None: the trigger decides."""
         return self.hold_by_reading[self._reading_or_default(reading)]
+
+    def phrase_in_reading(self, reading: str) -> PhraseByCase:
+        return self.phrase_by_reading[self._reading_or_default(reading)]
 
     def _reading_or_default(self, reading: str) -> str:
         return reading if reading in self.injections_by_reading else next(iter(self.injections_by_reading))
@@ -166,6 +172,12 @@ class _DrawModel(StrictModel, title="A draw"):
     )
 
 
+_PHRASE_DESCRIPTION = (
+    "What the fault does, as a clause, for the [sentence](../how-to/word-results.md) about an experiment: "
+    "`the speed sensor reads {abs_value} too low`. Holes: `value` (the drawn value with its unit), "
+    "`abs_value` (without its sign), and the injections' numbers in the unit of the source, such as `by_kph` "
+    "and `abs_by_kph`"
+)
 _HOLD_DESCRIPTION = (
     "How long the fault stays active, if the trigger does not determine it: `to_end` for a fault that latches"
 )
@@ -174,6 +186,9 @@ _HOLD_DESCRIPTION = (
 class _VariantReadingModel(StrictModel, title="A reading"):
     hold: Literal["while", "to_end"] | None = Field(
         None, description=f"{_HOLD_DESCRIPTION} in this reading; default: the variant's `hold`."
+    )
+    phrase: str | SignedPhraseModel | None = Field(
+        None, description=f"{_PHRASE_DESCRIPTION}, in this reading; default: the variant's `phrase`."
     )
     injections: list[InjectionModel] = Field(
         description="At least one. The fault is activated if any of them runs while the fault is active."
@@ -191,6 +206,7 @@ class _VariantModelBase(StrictModel, title="A variant"):
         "manifest.",
     )
     hold: Literal["while", "to_end"] | None = Field(None, description=f"{_HOLD_DESCRIPTION}.")
+    phrase: str | SignedPhraseModel | None = Field(None, description=f"{_PHRASE_DESCRIPTION}.")
     draw: dict[str, _DrawModel] | None = Field(
         None,
         description="Exactly one draw: name and unit -> draw. Without a draw, the variant is a single fault.",
@@ -281,6 +297,11 @@ def _build_variant(
             if reading_model
         },
         hold_by_reading={reading: hold and Hold(hold) for reading, hold in holds.items()},
+        phrase_by_reading={
+            reading: build_phrase(reading_model.phrase or model.phrase, None, source, keys)
+            for reading, reading_model in models_by_reading.items()
+            if reading_model
+        },
         keys=keys,
     )
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from mutator._common.message_text import describe_choices
 from mutator._common.random_streams import random_generator
 from mutator.config import units
+from mutator.config.phrases import check_holes
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
@@ -13,6 +14,7 @@ from mutator.faults.fault_specs import DrawSpec, FaultSpec, Variant
 from mutator.faults.import_checks import check_import_defined
 from mutator.faults.injection_parameters import resolve_injection
 from mutator.faults.injection_specs import InjectionSpec
+from mutator.faults.phrase_holes import fault_holes
 from mutator.model import Fault, Injection
 from mutator.targets.allowed_locations import check_location_allowed
 from mutator.targets.manifest import TargetManifest
@@ -132,6 +134,17 @@ class _SpecExpander:
                 )
         for injection in variant.injections_in_reading(self.reading):
             self._check_injection(injection)
+        if phrase := variant.phrase_in_reading(self.reading):
+            check_holes(
+                phrase,
+                fault_holes(variant, self.reading, self.models),
+                self.spec.source,
+                self._phrase_keys(variant),
+            )
+
+    def _phrase_keys(self, variant: Variant) -> KeyPath:
+        in_reading: KeyPath = (*variant.keys, self.reading, "phrase")
+        return in_reading if in_reading in self.spec.source.lines else (*variant.keys, "phrase")
 
     def _check_injection(self, injection: InjectionSpec) -> None:
         keys: KeyPath = (*injection.keys, "model")

@@ -54,7 +54,7 @@ def _result_columns_section(manifest: TargetManifest) -> Iterator[str]:
     compared = [channel.name for channel in manifest.compared_channels]
     severity = severity_and_time_columns(has_classes=manifest.contact is not None)
     columns = (manifest.hazard_names, compared, metric_facts(manifest), severity)
-    yield from _columns_table(result_columns(*columns, paths=True))
+    yield from _columns_table(result_columns(*columns, paths=True, speed=True))
 
 
 def _columns_table(columns: Iterable[TableColumn]) -> Iterator[str]:

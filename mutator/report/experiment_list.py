@@ -27,6 +27,7 @@ from mutator.report.page_series import series_facts_for_page
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines import SourceLines
+from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.outcome_counting import (
     checked_hazard_names,
     fault_types_of,
@@ -128,7 +129,12 @@ def _listed_results(run: ReportedRun) -> "DataFrame":
 
 def _list_table_data(run: ReportedRun, listed: "DataFrame") -> dict[str, Any]:
     data = results_table_data(
-        listed, run.faults, run.run_fault_paths, has_alerts=run.folder.has_alerts, source=run.source_lines
+        listed,
+        run.faults,
+        run.run_fault_paths,
+        has_alerts=run.folder.has_alerts,
+        source=run.source_lines,
+        sentences=ExperimentSentences.of_run(run.folder.head),
     )
     if scale := run.folder.severity_scale:
         data["severities"] = scale.labels
@@ -152,6 +158,7 @@ def results_table_data(
     *,
     has_alerts: bool = True,
     source: SourceLines | None = None,
+    sentences: ExperimentSentences | None = None,
 ) -> dict[str, Any]:
     """Return the results by column, with derived columns such as `rank` (1: the worst). Alert columns need a
     target with `alerts`; `line` (of the fault) and `lasting` need a `source`. `faults` are those of the plan.
@@ -161,7 +168,8 @@ def results_table_data(
         str(name): results[name] for name in results.columns if name not in omitted_columns
     }
     columns["kind"] = fault_types_of(results)
-    rows = rows_of(results, faults)
+    rows = rows_of(results, faults, sentences)
+    columns["sentence"] = [row.sentence for row in rows]
     columns["fault"] = [row.fault for row in rows]
     columns["ending"] = outcome_or_status_of_rows(results)
     columns["hazards"] = joined_occurred_hazards(results)
@@ -214,7 +222,7 @@ def column_data(name: str, values: Iterable[Any]) -> dict[str, Any]:
         if any(number is not None for number in numbers):
             return {"numbers": numbers}
         cells = [""] * len(cells)
-    if name == "experiment_id":  # all values are distinct, so codes would save nothing
+    if name in ("experiment_id", "sentence"):  # nearly all are distinct, so codes would save nothing
         return {"texts": cells}
     words = sorted(set(cells))
     code = {word: i for i, word in enumerate(words)}

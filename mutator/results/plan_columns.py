@@ -5,7 +5,7 @@ how a cell follows from an experiment.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mutator.model import Experiment, Fault, Value, fault_label
+from mutator.model import Experiment, Fault, Hold, Value, fault_label
 from mutator.results.table_writers import TableColumn
 
 
@@ -26,6 +26,10 @@ def _variant(experiment: Experiment) -> str:
     fault = experiment.fault
     variant = fault.spec.split("/", 2)[-1]
     return fault_label(variant, fault.value, fault.unit) if isinstance(fault.value, str) else variant
+
+
+def _hold(experiment: Experiment) -> Hold:
+    return experiment.fault.hold or experiment.trigger.hold
 
 
 FIRST_PLAN_COLUMNS = (
@@ -87,6 +91,22 @@ LAST_PLAN_COLUMNS = (
     ),
     PlanColumn("aim", "text", "", "the hazard that the fault aims at", lambda e: e.fault.aim),
     PlanColumn("condition", "text", "", "the condition of the trigger", lambda e: e.trigger.condition),
+)
+HOLD_COLUMNS = (  # of results.csv alone
+    PlanColumn(
+        "hold",
+        "text",
+        "",
+        "how long the fault stays active: `while` the condition holds, `for` a time, or `to_end`",
+        lambda e: _hold(e).value,
+    ),
+    PlanColumn(
+        "hold_s",
+        "number",
+        "s",
+        "how long it stays active with the hold `for`",
+        lambda e: e.trigger.hold_s if _hold(e) is Hold.FOR else None,
+    ),
 )
 _ALL_PLAN_COLUMNS = (*FIRST_PLAN_COLUMNS, *LAST_PLAN_COLUMNS)
 PLAN_COLUMN_NAMES = tuple(column.name for column in _ALL_PLAN_COLUMNS)

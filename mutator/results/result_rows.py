@@ -6,6 +6,7 @@ from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Fault, Outcome, Status, Value, fault_label
+from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.outcome_counting import (
     UNUSABLE_STATUSES,
     fault_types_of,
@@ -48,6 +49,7 @@ class ResultRow:
     delta_v: float | None = None  # delta-v of that contact in m/s
     t_end: float | None = None  # when a terminal hazard ended the drive
     margins: tuple[tuple[str, float], ...] = ()  # by hazard: those that occurred or, if none did, all
+    sentence: str = ""  # what happened, in words; '' if the phrases are unknown
 
     @property
     def margin(self) -> float | None:
@@ -72,15 +74,17 @@ def cells_by_row(frame: "pd.DataFrame") -> list[dict[str, Any]]:
     return [dict(zip(columns, cells, strict=True)) for cells in zip(*columns.values(), strict=True)]
 
 
-def rows_of(frame: "pd.DataFrame", faults: Mapping[str, Fault]) -> list[ResultRow]:
+def rows_of(
+    frame: "pd.DataFrame", faults: Mapping[str, Fault], sentences: ExperimentSentences | None = None
+) -> list[ResultRow]:
     """Return the rows of a frame of results. `faults` are those of the plan, by id, which has the digits of
-    each value (35), while the table has a float.
+    each value (35), while the table has a float. Rows have a sentence only with `sentences`.
     """
     lines = cells_by_row(frame.assign(kind=fault_types_of(frame), ending=outcome_or_status_of_rows(frame)))
     hazards, margins = _cells_with_value(first_hazard_times(frame)), _cells_with_value(hazard_margins(frame))
     rows = zip(lines, hazards, margins, strict=True)
     return [
-        _build_row(cells, row_hazards, row_margins, faults.get(cells["fault_id"]))
+        _build_row(cells, row_hazards, row_margins, faults.get(cells["fault_id"]), sentences)
         for cells, row_hazards, row_margins in rows
     ]
 
@@ -99,6 +103,7 @@ def _build_row(
     hazards: tuple[tuple[str, float], ...],
     margins: tuple[tuple[str, float], ...],
     fault: Fault | None,
+    sentences: ExperimentSentences | None,
 ) -> ResultRow:
     return ResultRow(
         experiment_id=cells["experiment_id"],
@@ -122,4 +127,5 @@ def _build_row(
         delta_v=cells.get(DELTA_V_NAME),
         t_end=cells.get(DRIVE_END_COLUMN),
         margins=margins,
+        sentence=sentences.sentence(cells, fault) if sentences and fault else "",
     )

@@ -6,7 +6,7 @@ Hazards, compared channels and metrics of a target add columns; the others are t
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
@@ -17,10 +17,17 @@ from mutator.outcomes.verdict_rules import (
     severity_class_of,
     time_to_hazard,
 )
-from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
+from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, HOLD_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
 from mutator.results.table_writers import TableColumn
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.stored_phrases import (
+    GOLDEN_HIGHEST_SPEED,
+    GOLDEN_LOWEST_SPEED,
+    HIGHEST_SPEED,
+    LOWEST_SPEED,
+    SPEED_AT_ACTIVATION,
+)
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN, MetricFacts
 
 if TYPE_CHECKING:
@@ -60,6 +67,10 @@ class ResultColumn(TableColumn):
 
 def _rounded_time(value: float | None) -> float | None:
     return None if value is None else round(value, _TIME_DIGITS)
+
+
+def _speed(name: str, finished: FinishedExperiment) -> float | None:
+    return dict(finished.record.speeds).get(name)
 
 
 _COLUMNS_TO_MANIFESTATION = (
@@ -155,6 +166,35 @@ TIME_TO_HAZARD_COLUMNS = (
         lambda f: _rounded_time(manifestation_to_hazard_time(f.record)),
     ),
 )
+FIRST_CHANGE_COLUMNS = (
+    ResultColumn(
+        "first_actuator",
+        "text",
+        "",
+        "the actuator output that first differed from golden; of several, the manifest's first",
+        lambda f: f.record.first_change[0] if f.record.first_change else None,
+    ),
+    ResultColumn(
+        "first_change",
+        "text",
+        "",
+        "whether it was then `higher` or `lower` than in the golden run",
+        lambda f: f.record.first_change[1] if f.record.first_change else None,
+    ),
+)
+SPEED_COLUMNS = tuple(
+    ResultColumn(name, "number", "m/s", about, partial(_speed, name))
+    for name, about in (
+        (SPEED_AT_ACTIVATION, "the car's speed at the activation"),
+        (
+            HIGHEST_SPEED,
+            "its highest speed from the activation to the first hazard, or to the end of the drive",
+        ),
+        (LOWEST_SPEED, "its lowest speed in this time"),
+        (GOLDEN_HIGHEST_SPEED, "the highest speed of the golden run in this time"),
+        (GOLDEN_LOWEST_SPEED, "the lowest speed of the golden run in this time"),
+    )
+)
 PATH_COLUMNS = (
     ResultColumn(
         "reached",
@@ -203,10 +243,12 @@ def result_columns(
     severity: Sequence[ResultColumn] = (),
     *,
     paths: bool = False,
+    speed: bool = False,
 ) -> tuple[PlanColumn | ResultColumn, ...]:
     """Return the columns of results.csv, in order.
 
-    `severity` is from `severity_columns`. `paths` adds the columns of the fault's path.
+    `severity` is from `severity_columns`. `paths` adds the columns of the fault's path, `speed` those of the
+    car's speed.
     """
     ends = DRIVE_END_COLUMN in (metric.name for metric in metrics)
     return (
@@ -224,6 +266,9 @@ def result_columns(
         *severity,
         *(PATH_COLUMNS if paths else ()),
         *LAST_PLAN_COLUMNS,
+        *HOLD_COLUMNS,
+        *FIRST_CHANGE_COLUMNS,
+        *(SPEED_COLUMNS if speed else ()),
         DETAIL_COLUMN,
     )
 
@@ -232,7 +277,9 @@ def result_columns_of(head: "RunHead") -> tuple[PlanColumn | ResultColumn, ...]:
     """Return the columns of a run's results.csv, in order."""
     paths = any(channel.component for channel in head.channels)
     severity = severity_and_time_columns(has_classes=head.severity is not None)
-    return result_columns(head.hazards, head.compared, head.metrics, severity, paths=paths)
+    return result_columns(
+        head.hazards, head.compared, head.metrics, severity, paths=paths, speed=bool(head.speed)
+    )
 
 
 def cells_by_column(
@@ -246,6 +293,14 @@ def cells_by_column(
         else list(map(column.cell_of, finished))
         for column in columns
     ]
+
+
+def row_of(columns: Iterable[PlanColumn | ResultColumn], finished: FinishedExperiment) -> dict[str, object]:
+    """Return the cells of one experiment by column."""
+    return {
+        column.name: column.cell_of(finished.experiment if isinstance(column, PlanColumn) else finished)  # type: ignore[arg-type]
+        for column in columns
+    }
 
 
 def severity_and_time_columns(*, has_classes: bool) -> tuple[ResultColumn, ...]:
@@ -341,7 +396,9 @@ def check_column_names(manifest: TargetManifest) -> None:
     column could be taken for a hazard's.
     """
     compared = [channel.name for channel in manifest.compared_channels]
-    used_names = {column.name for column in result_columns((), compared, paths=True)}
+    used_names = {
+        column.name for column in result_columns((), compared, paths=True, speed=bool(manifest.speed))
+    }
     used_names |= {SEVERITY_COLUMN.name, *(column.name for column in TIME_TO_HAZARD_COLUMNS)}
     used_names |= {
         *DERIVED_COLUMN_NAMES,

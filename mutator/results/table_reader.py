@@ -14,6 +14,7 @@ from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bou
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
 from mutator.results import table_building
+from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_columns import FinishedExperiment, cells_by_column, result_columns_of
 from mutator.results.table_writers import TableColumn, parquet_batch, parquet_schema
@@ -90,7 +91,9 @@ class Results:
         return len(self.frame("experiment_id"))
 
     def rows(self) -> tuple[ResultRow, ...]:
-        return tuple(rows_of(self.frame(), plan_file.load_faults(self.run)))
+        frame = self.frame()
+        sentences = ExperimentSentences.of_run(load_head(self.run))
+        return tuple(rows_of(frame, plan_file.load_faults(self.run), sentences))
 
     def frame(self, *names: str) -> "pd.DataFrame":
         """Return a frame with the types of results.parquet, of all columns or only those named. Without a

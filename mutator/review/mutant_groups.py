@@ -27,6 +27,7 @@ from mutator.operators.statement_facts import statement_facts_of
 from mutator.review import patch_shapes
 from mutator.review.called_code import CalledCode
 from mutator.review.decision_basis import BasisTexts, distinct_diffs, fault_hunks, function_sources
+from mutator.review.fault_words import words_of_faults
 from mutator.review.patch_shapes import PatchShape
 from mutator.review.review_entries import BasisDigests, ValueRanges
 from mutator.review.reviewed_texts import render_reviewed_text
@@ -45,7 +46,7 @@ class Group:
     numbers. The members of the shapes are the ids of `faults`. `experiment_count` is that of the group in a
     campaign; None if no campaign is given. `trigger_kinds` and `hold_kinds` list the kinds that occur, joined
     by `or`. `value_ranges` has the range of each parameter in the specs. `reviewed_text` is the text that a
-    decision is bound to. `source_files` are the specs and templates.
+    decision is bound to. `source_files` are the specs and templates. `fault_words` say what the faults do.
     """
 
     id: str
@@ -64,6 +65,7 @@ class Group:
     value_ranges: ValueRanges = field(default_factory=dict)
     reviewed_text: str = ""
     source_files: tuple[Path, ...] = ()
+    fault_words: tuple[str, ...] = ()
 
     @property
     def diff(self) -> str:
@@ -207,6 +209,7 @@ class _GroupBuilder:
             value_ranges=values,
             reviewed_text=render_reviewed_text(material.digests, values, material.sections),
             source_files=self._source_files(faults.values(), models),
+            fault_words=words_of_faults(faults.values(), self.specs.values(), self.models),
         )
 
     def _source_files(self, faults: Iterable[Fault], models: Iterable[str]) -> tuple[Path, ...]:

@@ -50,6 +50,8 @@ def record_from_json(data: Mapping[str, Any]) -> Record:
         dev=_name_value_pairs(data.get("dev", [])),
         metrics=_name_value_pairs(data.get("metrics", [])),
         left=tuple([(name, first, largest) for name, first, largest in data.get("left", ())]),
+        first_change=tuple(data["first_change"]) if data.get("first_change") else None,
+        speeds=_name_value_pairs(data.get("speeds", [])),
     )
 
 

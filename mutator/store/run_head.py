@@ -15,6 +15,7 @@ from mutator.model import Limits
 from mutator.store.plan_choices import Choices
 from mutator.store.plan_file import Chunk
 from mutator.store.session_environments import SessionEnvironment
+from mutator.targets.stored_phrases import Phrases
 from mutator.targets.stored_target_facts import TargetFacts
 
 RUN_SCHEMA = "run/3"
@@ -61,6 +62,7 @@ class RunHead(TargetFacts, PlanFacts):
     `PlanFacts`, the last base, come first.
     """
 
+    phrases: Phrases = added_field(Phrases())
     goldens: tuple[StoredGolden, ...]
     canary: Mapping[str, Any]
     canary_hazard: str

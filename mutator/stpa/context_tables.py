@@ -8,11 +8,13 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
+from mutator.config.phrases import build_phrase
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
 from mutator.stpa.context_coverage import TableCoverage, measure_coverage
+from mutator.targets.stored_phrases import PhraseByCase
 from mutator.triggers.conditions import TIME, canonical_condition, names_in
 
 CONTEXT_TABLE_SCHEMA = "context_table/1"
@@ -40,6 +42,7 @@ class ContextRow:
     id: str
     condition: str
     about: str
+    phrase: PhraseByCase
     hazards_by_action: Mapping[str, ActionHazards]
 
 
@@ -95,6 +98,11 @@ class _ContextModel(StrictModel, title="A context"):
         description="A condition. It may use `t` (s), the values observed in the target, and the constants."
     )
     about: str = Field(description="A description.")
+    phrase: str | None = Field(
+        None,
+        description="The context as a clause, for the [sentence](../how-to/word-results.md) about an "
+        "experiment: `while the car is close behind a slower vehicle`. Default: `while`, and the condition.",
+    )
     actions: dict[str, YamlRecord[ActionHazards]] = Field(
         description="Control action -> its hazards. All contexts must have the same actions."
     )
@@ -130,6 +138,7 @@ def load_context_table(path: Path, variables: Collection[str] | None = None) -> 
             id=name,
             condition=_canonical_condition(row.when, model.constants, source, name),
             about=row.about,
+            phrase=build_phrase(row.phrase, (), source, ("contexts", name, "phrase")),
             hazards_by_action=row.actions,
         )
         for name, row in model.contexts.items()

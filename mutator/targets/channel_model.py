@@ -5,9 +5,11 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator._common.doors import IMPORTERS
+from mutator.config.phrases import ChangePhraseModel, build_phrase
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import YamlSource
 from mutator.targets.channels import ROUNDING_TOLERANCE, Channel, Role
+from mutator.targets.stored_phrases import HIGHEST_SPEED, LOWEST_SPEED
 from mutator.triggers.conditions import RESERVED_NAMES
 
 
@@ -37,6 +39,13 @@ class ChannelModel(StrictModel, title="A channel"):
         "rounding.",
     )
     about: str = Field("", description="What the channel contains.")
+    phrase: ChangePhraseModel | None = Field(
+        None,
+        description="Only for an actuator: what the car does if it is the first to differ from the golden "
+        'run, as a clause: `{higher: "the car accelerates to {highest_speed}", lower: ...}`. Holes: '
+        "`highest_speed` and `lowest_speed`, which have a value only if the fault made the car faster or "
+        "slower. Each direction is a text or a list, as for hazards.",
+    )
     times_channel: str = Field(
         "",
         alias="time",
@@ -115,6 +124,14 @@ def _build_channel(name: str, model: ChannelModel, trace: TraceModel, source: Ya
             expected="no `time` for an .mcap file, in which each message has its own",
             remedy="leave it out",
         )
-    plain = model.model_dump(exclude={"from_", "tolerance"})
+    if model.phrase and model.role is not Role.ACTUATOR:
+        raise source.error(
+            (*keys, "phrase"),
+            f"a phrase of a channel with the role {model.role.value}",
+            expected="`phrase` only for an actuator",
+            remedy="remove it",
+        )
+    plain = model.model_dump(exclude={"from_", "tolerance", "phrase"})
+    phrase = build_phrase(model.phrase, (HIGHEST_SPEED, LOWEST_SPEED), source, (*keys, "phrase"))
     tolerance = model.role.default_tolerance if model.tolerance is None else model.tolerance
-    return Channel(name=name, other_trace_name=model.from_, tolerance=tolerance, **plain)
+    return Channel(name=name, other_trace_name=model.from_, tolerance=tolerance, phrase=phrase, **plain)

@@ -1,7 +1,9 @@
 """What a target records: channels, their roles, and the trace file."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+
+from mutator.targets.stored_phrases import PhraseByCase
 
 ROUNDING_TOLERANCE = 1e-9  # in a channel's unit; smaller differences can come from the order of sums
 
@@ -29,6 +31,7 @@ class Channel:
     * `component`: the part of the controller to which the channel belongs
     * `time`: the channel that holds its times, if it is not recorded in each step
     * `other_trace_name`: its name in the trace, if that differs
+    * `phrase`: of an actuator, what the car does if it is `higher` or `lower` than in the golden run
     """
 
     name: str
@@ -39,6 +42,7 @@ class Channel:
     about: str = ""
     times_channel: str = ""
     other_trace_name: str = ""
+    phrase: PhraseByCase = field(default_factory=dict, hash=False)
 
     @property
     def name_in_trace(self) -> str:

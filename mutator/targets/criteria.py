@@ -1,9 +1,10 @@
 """Hazards, which a run must avoid, and metrics, which measure how bad a run was."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+from mutator.targets.stored_phrases import PhraseByCase
 from mutator.triggers.conditions import GOLDEN_PREFIX
 
 Aggregate = Literal["min", "max", "mean", "last", "integral", "duration", "at_end"]
@@ -46,7 +47,7 @@ class Hazard:
     hold, is violated and all values that the formula needs are known. `margin` is a step's distance from the
     hazard, in `unit`; for `required_stl` it is the robustness. Once `terminal_condition` holds, the drive is
     over, and metrics ignore later steps ('': never; `True`: from the hazard on). Later hazards are still
-    recorded.
+    recorded. `phrase` is the hazard as a clause.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Hazard:
     margin: str = ""
     unit: str = "-"
     terminal_condition: str = ""
+    phrase: PhraseByCase = field(default_factory=dict)
 
     @property
     def is_in_record(self) -> bool:

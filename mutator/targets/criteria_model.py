@@ -6,10 +6,12 @@ from typing import get_args
 
 from pydantic import Field
 
+from mutator.config.phrases import build_phrase
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.targets.criteria import Aggregate, Hazard, Metric, WorseDirection
 from mutator.targets.manifest_formulas import manifest_condition, manifest_formula
+from mutator.targets.stored_phrases import LATER_HOLE
 from mutator.triggers import temporal_logic
 from mutator.triggers.conditions import GOLDEN_PREFIX, TIME, parse_expression
 
@@ -46,6 +48,12 @@ class HazardModel(StrictModel, title="A hazard"):
         "is a single comparison, the default is the difference of its two sides.",
     )
     unit: str = Field("-", description="The unit of the margin.")
+    phrase: str | list[str] | None = Field(
+        None,
+        description="The hazard as a clause, for the [sentence](../how-to/word-results.md) about an "
+        "experiment: `the car touches the vehicle ahead {later} at {contact_speed}`. Holes: `later` and the "
+        "metrics. Of several texts, the first whose holes all have a value is used.",
+    )
     terminal: bool | str = Field(
         False,
         description="Whether the hazard ends the drive, as a collision does; or the condition that ends it.",
@@ -90,16 +98,19 @@ def build_hazards(
     *,
     has_record: bool,
     step_s: float,
+    metrics: Collection[str] = (),
 ) -> tuple[Hazard, ...]:
     """Read a manifest's hazards; MutatorError, with the line, for a mistake.
 
-    `names` are those that formulas may use, `has_record` says whether the target writes a record, and
-    `step_s` is the length of a step in seconds.
+    `names` are those that formulas may use, `metrics` those that phrases may use. `has_record` says whether
+    the target writes a record, and `step_s` is the length of a step in seconds.
     """
     if isinstance(models, list):
         hazards = tuple(Hazard(name=name) for name in models)
     else:
-        hazards = tuple(_build_hazard(name, model, names, source, step_s) for name, model in models.items())
+        hazards = tuple(
+            _build_hazard(name, model, names, source, step_s, metrics) for name, model in models.items()
+        )
     if not has_record and (unreported := [hazard.name for hazard in hazards if hazard.is_in_record]):
         keys: KeyPath = ("hazards", unreported[0]) if isinstance(models, dict) else ("hazards",)
         raise source.error(
@@ -112,7 +123,12 @@ def build_hazards(
 
 
 def _build_hazard(
-    name: str, model: HazardModel, names: Collection[str], source: YamlSource, step_s: float
+    name: str,
+    model: HazardModel,
+    names: Collection[str],
+    source: YamlSource,
+    step_s: float,
+    metrics: Collection[str],
 ) -> Hazard:
     keys: KeyPath = ("hazards", name)
     if model.when is not None and model.required_stl is not None:
@@ -140,6 +156,7 @@ def _build_hazard(
         for_s=model.for_s,
         margin=manifest_formula(model.margin, names, source, (*keys, "margin")) or _margin_of(when),
         unit=model.unit,
+        phrase=build_phrase(model.phrase, (LATER_HOLE, *metrics), source, (*keys, "phrase")),
         terminal_condition=manifest_condition(terminal, names, source, (*keys, "terminal"))
         if isinstance(terminal, str)
         else ("True" if terminal else ""),

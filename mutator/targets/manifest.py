@@ -103,6 +103,7 @@ class TargetManifest:
     film: FilmCommands | None = None
     # change -> scenarios that it makes identical, e.g. because they differ only in traffic that it removes
     same_scenarios_by_change: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    speed: str = ""  # formula of the car's speed in m/s
     sandbox: bool = False  # whether the target's code runs in a sandbox
 
     @property
@@ -146,11 +147,11 @@ class TargetManifest:
 
     @cached_property
     def criteria_channels(self) -> tuple[Channel, ...]:
-        """The channels that hazards and metrics use."""
+        """The channels that hazards, metrics and the speed use."""
         channels = [channel.name for channel in self.channels]
         names = self.observation.names_for_trace_formulas(channels)
         needed = self.observation.names_with_inputs(
-            _names_in_criteria(self.hazard_rules, self.metrics, names)
+            _names_in_criteria(self.hazard_rules, self.metrics, names) | set(names_in(self.speed or "0"))
         )
         return tuple(channel for channel in self.channels if channel.name in needed)
 

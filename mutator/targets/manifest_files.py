@@ -14,6 +14,7 @@ from mutator.targets.contact_severity import ContactSettings
 from mutator.targets.criteria_model import HazardModel, MetricModel, build_hazards, build_metrics
 from mutator.targets.entry_model import EntryModel, ScenarioChangeModel, check_commands
 from mutator.targets.manifest import FilmCommands, TargetManifest
+from mutator.targets.manifest_formulas import manifest_formula
 from mutator.targets.observation_model import ObservationModel, build_observation
 from mutator.targets.overhead_view_model import OverheadViewModel, build_overhead_view
 from mutator.targets.process_environment import check_environment
@@ -115,6 +116,11 @@ class ManifestModel(StrictModel, title="The file"):
         None, description="How severe a contact is. Without it, results have no severity class."
     )
     scene: OverheadViewModel | None = Field(None, description="How to draw a drive from above.")
+    speed: str | None = Field(
+        None,
+        description="The speed of the car in m/s: a formula over channels and derived values. With it, "
+        "results have the highest and lowest speed after an activation.",
+    )
     alerts: list[str] = Field(
         default_factory=list,
         description="The names of the alerts to use; other alerts in a record are ignored.",
@@ -150,10 +156,15 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
     observation = build_observation(model.observation, source)
     judgeable_names = observation.names_for_trace_formulas(channel.name for channel in channels)
     _check_criteria_recorded(source, set(observation.variables) - set(judgeable_names))
-    rules = build_hazards(
-        model.hazards, judgeable_names, source, has_record=model.record is not None, step_s=model.step_s
-    )
     metrics = build_metrics(model.metrics, judgeable_names, source)
+    rules = build_hazards(
+        model.hazards,
+        judgeable_names,
+        source,
+        has_record=model.record is not None,
+        step_s=model.step_s,
+        metrics=[metric.name for metric in metrics],
+    )
     if model.severity:
         check_contact(model.severity, rules, metrics, source)
     return TargetManifest(
@@ -190,6 +201,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         alerts=tuple(model.alerts),
         source=source,
         film=model.film,
+        speed=manifest_formula(model.speed, judgeable_names, source, ("speed",)),
     )
 
 

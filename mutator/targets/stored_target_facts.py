@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from mutator._common.hashing import added_field
 from mutator.targets.channels import Role
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
@@ -56,6 +57,7 @@ class TargetFacts:
     structure: Mapping[str, Any] | None
     golden_files: tuple[str, ...]
     target_files: Mapping[str, str]
+    speed: str = added_field("")
 
 
 def channel_facts(manifest: TargetManifest) -> tuple[ChannelFacts, ...]:

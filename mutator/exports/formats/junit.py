@@ -51,6 +51,7 @@ def _test_case_element(
     if row:
         facts |= {f"hazard {name} [s]": f"{t:.2f}" for name, t in row.hazards}
         facts |= {"alerts": ", ".join(row.alerts)} if row.alerts else {}
+        facts |= {"sentence": row.sentence} if row.sentence else {}
     properties = ET.SubElement(case, "properties")
     for name, value in facts.items():
         ET.SubElement(properties, "property", name=name, value=_xml_text(value))
@@ -63,7 +64,10 @@ def _test_case_element(
     elif row.ending in failures:
         hazards = ", ".join(f"{name} at {t:.2f} s" for name, t in row.hazards)
         ET.SubElement(
-            case, "failure", type=row.ending, message=_xml_text(hazards or row.detail or row.ending)
+            case,
+            "failure",
+            type=row.ending,
+            message=_xml_text(row.sentence or hazards or row.detail or row.ending),
         )
     return case
 

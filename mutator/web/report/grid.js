@@ -181,13 +181,13 @@ class Grid {
     const cells = this.columns.map((column) => {
       const classes = `td.${Grid.#classes(column)}`;
       if (column.isNumber) return el(classes, {}, Grid.number(this.table.number(row, column.name)));
-      const title = this.table.meaning(column.name, this.table.text(row, column.name));
+      const title = this.table.meaning(column.name, this.table.text(row, column.name)) || null; // without one, the row's
       if (!column.time) return el(classes, { title }, column.cell ? column.cell(this.table, row) : this.table.called(column.name, this.table.text(row, column.name)));
       const value = this.table.number(row, column.name);
       return el(classes, {}, Number.isNaN(value) ? "" : value.toFixed(2));
     });
     return el("tr", { "data-at": at, "aria-rowindex": at + 2, tabindex: isCurrent ? 0 : -1, class: isOpen ? "open" : null,
-      "aria-selected": String(isOpen), title: this.table.text(row, "detail") || null }, cells);
+      "aria-selected": String(isOpen), title: this.table.text(row, "sentence") || this.table.text(row, "detail") || null }, cells);
   }
 
   #element(at) {

@@ -36,6 +36,7 @@ class Card {
       el("p.decision.quiet", { hidden: true }),
       el("div.conflict", { role: "alert", hidden: true }),
       el("ul.what", {}, group.injections.map((text) => el("li", {}, Card.#injection(text)))),
+      Card.#words(group.words ?? []),
       el("p.facts.quiet", {}, this.#facts()),
       this.isServed && group.pictures ? el("div.pictures", { role: "group", "aria-label": "Images" }, el("p.quiet", {}, "Drawing images …")) : null,
       el("div.typical", { hidden: true }),
@@ -46,6 +47,15 @@ class Card {
       el("ul.remarks", { "aria-label": "Remarks", hidden: true }),
       this.isServed ? this.#remarkForm() : null,
       el("div.alike", { hidden: true }));
+  }
+
+  /** What the faults do, in words: the first and the last of them, and how many there are. */
+  static #words(words) {
+    const { el } = Dom;
+    if (!words.length) return null;
+    const shown = words.length > 3 ? [words[0], words[words.length - 1]] : words;
+    const more = words.length - shown.length;
+    return el("ul.words", { "aria-label": "In words" }, shown.map((text) => el("li", {}, text)), more ? el("li.quiet", {}, `and ${more} more`) : null);
   }
 
   #buttons() {

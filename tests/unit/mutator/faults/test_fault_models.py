@@ -88,14 +88,14 @@ def test_a_wrong_example_is_reported_with_its_line(folder: Path) -> None:
     path = folder / "scale.py.j2"
     path.write_text(path.read_text().replace(" * ", " / "))
     (problem,) = example_problems(load_fault_models(folder))
-    assert problem.where == str(folder / "scale.yaml") and problem.line == 11
+    assert problem.where == str(folder / "scale.yaml") and problem.line == 12
     assert all(f"self.yaw_rate {sign} _fi.like(" in str(problem) for sign in "*/")
 
 
 def test_a_template_that_does_not_parse_is_reported(folder: Path) -> None:
     (folder / "scale.py.j2").write_text("if {{ target:\n")
     (problem,) = example_problems(load_fault_models(folder))
-    assert "scale.yaml:11: the example fails" in str(problem) and "scale.py.j2:1: the template fails" in str(
+    assert "scale.yaml:12: the example fails" in str(problem) and "scale.py.j2:1: the template fails" in str(
         problem
     )
 
@@ -119,18 +119,18 @@ def test_the_digest_covers_everything_that_determines_a_mutant(folder: Path) -> 
             "kind: wrap",
             "3: 'wrap' for 'kind'; expected one of 'insert', 'guard'",
         ),
-        ("scale.yaml", "type: number", "type: float", "7: 'float' for 'type'; expected one of 'variable'"),
-        ("scale.yaml", "factor:", "left:", "7: parameter 'left'; expected a name other than these"),
-        ("scale.yaml", "factor:", "factor_m:", "7: parameter 'factor_m'; expected an identifier without"),
+        ("scale.yaml", "type: number", "type: float", "8: 'float' for 'type'; expected one of 'variable'"),
+        ("scale.yaml", "factor:", "left:", "8: parameter 'left'; expected a name other than these"),
+        ("scale.yaml", "factor:", "factor_m:", "8: parameter 'factor_m'; expected an identifier without"),
         (
             "wrong_branch.yaml",
             "choices: [inverted, always, never], ",
             "",
-            "7: parameter 'holds' of type choice has no `choices`; expected `choices` for a choice",
+            "8: parameter 'holds' of type choice has no `choices`; expected `choices` for a choice",
         ),
         ("slow_call.yaml", "needs: call", "needs: rest", "4: 'rest' for 'needs'; expected one of 'call'"),
-        ("offset.yaml", "unit: target", "unit: feet", "8: 'feet'; expected target or one of m, mm, cm"),
-        ("scale.yaml", "examples:", "samples:", "10: unknown key 'samples'"),
+        ("offset.yaml", "unit: target", "unit: feet", "9: 'feet'; expected target or one of m, mm, cm"),
+        ("scale.yaml", "examples:", "samples:", "11: unknown key 'samples'"),
         (
             "scale.yaml",
             "before: |",

@@ -284,7 +284,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         (
             "as_coded:",
             "as_built:",
-            "43: unknown key 'as_built'; expected one of aim, about, changes, hold, draw, "
+            "43: unknown key 'as_built'; expected one of aim, about, changes, hold, phrase, draw, "
             "as_described, as_coded",
         ),
         ("integers_from", "integers_form", "11: unknown key 'integers_form'; expected one of integers_"),

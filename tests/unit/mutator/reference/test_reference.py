@@ -84,7 +84,9 @@ def test_every_model_and_key_is_described(kind: YamlFormat) -> None:
 
 def test_models_are_in_reading_order() -> None:
     names = order_models(schema_by_model(build_spec_model(Workspace.find(CLONE).readings())))
-    assert names == ["Spec", "Variant", "Draw", "Sweep", "VariantReading", "Injection", "Location"]
+    assert names == [
+        "Spec", "Variant", "SignedPhrase", "Draw", "Sweep", "VariantReading", "Injection", "Location",
+    ]  # fmt: skip
 
 
 def test_every_command_is_in_a_group() -> None:

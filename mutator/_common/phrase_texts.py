@@ -1,0 +1,51 @@
+"""Texts with holes, `the sensor reads {value} too low`, and the numbers that fill them."""
+
+import re
+from collections.abc import Mapping, Sequence
+
+PhraseTexts = tuple[str, ...]  # the first one whose holes all have values is used
+VALUE_HOLE, ABSOLUTE_PREFIX = "value", "abs_"
+CHANGED_HOLE, FUNCTION_HOLE, FILE_HOLE = "changed", "function", "file"  # in phrases of fault models
+
+_HOLE_PATTERN = re.compile(r"\{([^{}]*)\}")
+_WHOLE_FROM = 100.0  # from here on, measured numbers have no decimals
+_ROUNDING = 1e-9  # measured numbers below this are 0
+_LARGEST_EXACT = 1e15
+
+
+def holes_of(text: str) -> list[str]:
+    return _HOLE_PATTERN.findall(text)
+
+
+def has_single_brace(text: str) -> bool:
+    return bool(set("{}") & set(_HOLE_PATTERN.sub("", text)))
+
+
+def fill_phrase(texts: Sequence[str], values: Mapping[str, str]) -> str:
+    """Return the first text whose holes all have a value, filled in; '' if there is none."""
+    for text in texts:
+        if all(values.get(name) for name in holes_of(text)):
+            return _HOLE_PATTERN.sub(lambda hole: values[hole[1]], text)
+    return ""
+
+
+def measured_number(number: float, unit: str = "") -> str:
+    """Return a measured number as one says it: `124 s`, `24.6 s`, `0.46 s`."""
+    size = abs(number)
+    if size >= _WHOLE_FROM:
+        text = f"{number:.0f}"
+    elif size >= 1.0:
+        text = f"{number:.1f}".removesuffix(".0")
+    else:
+        text = f"{number if size >= _ROUNDING else 0.0:.2g}"
+    return with_unit(text, unit)
+
+
+def planned_number(number: float, unit: str = "") -> str:
+    """Return a number of the plan with all its digits: `50 mph`."""
+    text = str(int(number)) if float(number).is_integer() and abs(number) < _LARGEST_EXACT else repr(number)
+    return with_unit(text, unit)
+
+
+def with_unit(text: str, unit: str) -> str:
+    return text if unit in ("", "-") else f"{text} {unit}"

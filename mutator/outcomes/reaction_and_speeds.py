@@ -1,0 +1,83 @@
+"""How the car reacted to a fault: the first actuator that left golden, in which direction, and the speeds
+that followed.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from mutator.model import ObservedActivation
+from mutator.outcomes.golden_comparison import channel_deviation, signed_difference
+from mutator.outcomes.hazards_and_metrics import formula_variables
+from mutator.outcomes.trace_loading import Trace
+from mutator.targets.channels import Channel
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.stored_phrases import (
+    GOLDEN_HIGHEST_SPEED,
+    GOLDEN_LOWEST_SPEED,
+    HIGHER,
+    HIGHEST_SPEED,
+    LOWER,
+    LOWEST_SPEED,
+    SPEED_AT_ACTIVATION,
+)
+from mutator.triggers import trace_formulas
+from mutator.triggers.conditions import TIME
+
+_TIME_SLACK_S = 1e-9  # s; times are sums of steps
+
+
+def first_actuator_change(
+    golden: Trace, faulty: Trace, channels: Sequence[Channel], time_channel: str, t_manifest: float | None
+) -> tuple[str, str] | None:
+    """Return the compared channel that left golden at `t_manifest`, and `higher` or `lower`: where its faulty
+    value was. The first of `channels` if there are several.
+
+    None without a manifestation, or if no channel has a direction: one of the runs ended, or has no number.
+    """
+    if t_manifest is None:
+        return None
+    for channel in channels:
+        if channel_deviation(golden, faulty, channel, time_channel).t_first == t_manifest:
+            difference = signed_difference(golden, faulty, channel, time_channel, t_manifest)
+            if difference:
+                return channel.name, HIGHER if difference > 0.0 else LOWER
+    return None
+
+
+def speeds_after_activation(
+    manifest: TargetManifest,
+    golden: Trace,
+    faulty: Trace,
+    activation: ObservedActivation | None,
+    end: float | None,
+) -> tuple[tuple[str, float], ...]:
+    """Return the speed at the activation, and the highest and lowest speed of both runs from then to `end`
+    (s; None: the end of the run), in m/s. Empty without an activation or without a speed in the manifest.
+    """
+    if activation is None or not manifest.speed:
+        return ()
+    last = (math.inf if end is None else end) + _TIME_SLACK_S
+    first = activation.first - _TIME_SLACK_S
+    speeds, golden_speeds = (_speeds_between(manifest, trace, first, last) for trace in (faulty, golden))
+    named: list[tuple[str, float]] = []
+    if speeds.size:
+        named += [
+            (SPEED_AT_ACTIVATION, float(speeds[0])),
+            (HIGHEST_SPEED, float(speeds.max())),
+            (LOWEST_SPEED, float(speeds.min())),
+        ]
+    if golden_speeds.size:
+        named += [
+            (GOLDEN_HIGHEST_SPEED, float(golden_speeds.max())),
+            (GOLDEN_LOWEST_SPEED, float(golden_speeds.min())),
+        ]
+    return tuple(named)
+
+
+def _speeds_between(manifest: TargetManifest, trace: Trace, first: float, last: float) -> np.ndarray:
+    values = formula_variables(manifest, trace)
+    speeds = trace_formulas.formula_at_each_step(manifest.speed, values)
+    between = (values[TIME] >= first) & (values[TIME] <= last)
+    return np.asarray(speeds[between & np.isfinite(speeds)])

@@ -1,0 +1,263 @@
+"""The sentence about an experiment: what was injected, what the car did, what followed, whether anybody was
+warned.
+
+It follows from the experiment's row in the results, its fault and the phrases that the run stores. What a row
+lacks is left out, never guessed.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+from mutator._common.phrase_texts import fill_phrase, measured_number
+from mutator.model import Fault, Hold, Outcome, Status
+from mutator.results.fault_phrases import describe_fault
+from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.stored_phrases import (
+    GOLDEN_HIGHEST_SPEED,
+    GOLDEN_LOWEST_SPEED,
+    HIGHEST_SPEED,
+    LATER_HOLE,
+    LOWEST_SPEED,
+    SPEED_AT_ACTIVATION,
+    Phrases,
+)
+from mutator.targets.stored_target_facts import DRIVE_END_COLUMN, HazardFacts, hazard_facts
+
+if TYPE_CHECKING:
+    from mutator.store.run_head import RunHead
+
+Row = Mapping[str, Any]  # cells by column; None, NaN or '': no value
+
+_LEAST_SPEED_CHANGE_MPS = 0.5  # a smaller one is not worth a word
+_TIME_CONDITION_PATTERN = re.compile(r"t >= ([0-9.]+)\Z")
+_SUBJECT_PATTERN = re.compile(r"(the \w+) ")
+_FAILURES = {
+    Status.CRASHED: "The controller crashes",
+    Status.TIMEOUT: "The run was stopped at a limit",
+    Status.INVALID_MUTANT: "The mutant cannot run",
+    Status.HARNESS_ERROR: "The harness failed, so nothing is known about the fault",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExperimentSentences:
+    """Writes the sentences about the experiments of a run, or of a target."""
+
+    phrases: Phrases
+    hazards: Sequence[HazardFacts]
+    unit_by_metric: Mapping[str, str]
+    has_alerts: bool
+    words_by_severity: Mapping[str, str]
+
+    @classmethod
+    def of_run(cls, head: "RunHead") -> "ExperimentSentences":
+        """Return the writer for a run, from what the run stores."""
+        hazards = head.about_hazards or [
+            HazardFacts(name=name, about="", terminal=False) for name in head.hazards
+        ]
+        units = {metric.name: metric.unit for metric in head.metrics}
+        return cls(
+            phrases=head.phrases,
+            hazards=hazards,
+            unit_by_metric=units,
+            has_alerts=bool(head.alerts),
+            words_by_severity=dict(head.severity.words) if head.severity else {},
+        )
+
+    @classmethod
+    def of_target(
+        cls, manifest: TargetManifest, phrases: Phrases, scale: SeverityScale | None
+    ) -> "ExperimentSentences":
+        """Return the writer for runs of a target outside a campaign."""
+        units = {metric.name: metric.unit for metric in manifest.all_metrics}
+        return cls(
+            phrases=phrases,
+            hazards=hazard_facts(manifest),
+            unit_by_metric=units,
+            has_alerts=bool(manifest.alerts),
+            words_by_severity=dict(scale.words) if scale else {},
+        )
+
+    def fault_clause(self, fault: Fault) -> str:
+        """Return what a fault does, without a drive: `the speed sensor reads 50 mph too low`."""
+        return describe_fault(fault, self.phrases)
+
+    def sentence(self, row: Row, fault: Fault) -> str:
+        """Return the sentence about the experiment of a row."""
+        status = Status(row["status"])
+        clause = self.fault_clause(fault)
+        if status is not Status.OK:
+            parts = [self._fault_sentence(clause, row), _failure(status, row)]
+        elif row["outcome"] == Outcome.NOT_ACTIVATED:
+            parts = [self._fault_sentence(clause, row), _why_not_active(row)]
+        else:
+            parts = [self._fault_sentence(clause, row), self._effect(row), *self._consequences(row)]
+        return " ".join(filter(None, parts))
+
+    def _fault_sentence(self, clause: str, row: Row) -> str:
+        """Say what was injected and when it was active; if it never was, what was planned."""
+        begin, situation = _number(row, "t_activation"), self._situation(row)
+        if begin is not None:
+            return _as_sentence(f"{clause} from {measured_number(begin, 's')}{situation}")
+        return f"Planned: {_decapitalized(clause)}{_planned_begin(row)}{situation}."
+
+    def _situation(self, row: Row) -> str:
+        """` for 2 s`, ` while the car is close behind a slower vehicle`; '' for a fault that stays."""
+        hold, condition = row.get("hold") or "", str(row.get("condition") or "")
+        if hold == Hold.FOR:
+            seconds = _number(row, "hold_s")
+            return "" if seconds is None else f" for {measured_number(seconds, 's')}"
+        if hold != Hold.WHILE or condition == "True" or _TIME_CONDITION_PATTERN.match(condition):
+            return ""
+        phrase = self.phrases.situations.get(str(row.get("trigger") or ""), {}).get("", ())
+        return f" {fill_phrase(phrase, {}) or f'while {condition}'}"
+
+    def _effect(self, row: Row) -> str:
+        """Say what the car did, and which hazards followed."""
+        hazards = self._hazard_times(row)
+        if row["outcome"] == Outcome.MASKED:
+            return _where_stopped(row)
+        clauses = [] if _is_after_hazard(row, hazards) else [self._actuator_clause(row)]
+        before = _number(row, "t_activation")
+        for hazard, time in hazards:
+            clauses.append(self._hazard_clause(hazard, time, before, row, is_first=hazard == hazards[0][0]))
+            before = time
+        text = _as_sentence(_joined(list(filter(None, clauses))))
+        if not hazards:
+            return f"{text} No hazard follows.".strip()
+        severity_class = row.get("severity") or ""
+        severity = self.words_by_severity.get(severity_class) or severity_class
+        if not severity:
+            return text
+        return f"{text[:-1]} ({severity})." if len(hazards) == 1 else f"{text} Severity: {severity}."
+
+    def _hazard_times(self, row: Row) -> list[tuple[HazardFacts, float]]:
+        times = [(hazard, _number(row, f"t_{hazard.name.lower()}")) for hazard in self.hazards]
+        return sorted(((h, t) for h, t in times if t is not None), key=lambda item: item[1])
+
+    def _actuator_clause(self, row: Row) -> str:
+        name, change = row.get("first_actuator") or "", row.get("first_change") or ""
+        if not (name and change):
+            return ""
+        phrase = self.phrases.actuators.get(name, {}).get(change, ())
+        return fill_phrase(phrase, _speed_texts(row)) or f"`{name}` is {change} than in the golden run"
+
+    def _hazard_clause(
+        self, hazard: HazardFacts, time: float, before: float | None, row: Row, *, is_first: bool
+    ) -> str:
+        later = _later(time, before, is_first=is_first)
+        metrics = {name: _number(row, name) for name in self.unit_by_metric}
+        if hazard.terminal and _number(row, DRIVE_END_COLUMN) != time:
+            metrics = {}  # they were measured up to another end of the drive
+        values = {
+            name: measured_number(value, self.unit_by_metric[name])
+            for name, value in metrics.items()
+            if value is not None
+        }
+        phrase = self.phrases.hazards.get(hazard.name, {}).get("", ())
+        text = fill_phrase(phrase, values | {LATER_HOLE: later})
+        about = f" ({hazard.about})" if hazard.about else ""
+        return text or f"hazard {hazard.name}{about} occurs {later}"
+
+    def _consequences(self, row: Row) -> list[str]:
+        return [_alert(row, self._hazard_times(row))] if self.has_alerts else []
+
+
+def _number(row: Row, name: str) -> float | None:
+    value = row.get(name)
+    return None if value is None or value == "" or value != value else float(value)
+
+
+def _as_sentence(clause: str) -> str:
+    return f"{clause[0].upper()}{clause[1:]}." if clause else ""
+
+
+def _decapitalized(clause: str) -> str:
+    return clause[0].lower() + clause[1:] if clause[1:2].islower() else clause
+
+
+def _planned_begin(row: Row) -> str:
+    """` from 24.6 s`, ` once gap < 30`; '' for a fault that is active while a condition holds."""
+    condition = str(row.get("condition") or "")
+    if time := _TIME_CONDITION_PATTERN.match(condition):
+        return f" from {measured_number(float(time[1]), 's')}"
+    return "" if row.get("hold") == Hold.WHILE or condition in ("", "True") else f" once {condition}"
+
+
+def _failure(status: Status, row: Row) -> str:
+    detail = str(row.get("detail") or "").rstrip(".")
+    return f"{_FAILURES[status]}{f': {detail}' if detail else ''}."
+
+
+def _why_not_active(row: Row) -> str:
+    when = "then" if row.get("hold") == Hold.TO_END else "at any such time"
+    return f"It was never active: the changed code did not run {when}."
+
+
+def _where_stopped(row: Row) -> str:
+    places = str(row.get("stopped_at") or "").replace(";", " and ")
+    return f"It changes no actuator{f': it stops at {places}' if places else ''}. No hazard follows."
+
+
+def _is_after_hazard(row: Row, hazards: Sequence[tuple[HazardFacts, float]]) -> bool:
+    """Whether the first hazard came before an actuator differed."""
+    manifested = _number(row, "t_manifest")
+    return bool(hazards) and (manifested is None or manifested > hazards[0][1])
+
+
+def _speed_texts(row: Row) -> dict[str, str]:
+    """Return the highest speed if the fault made the car faster, the lowest if it made it slower."""
+    texts = {}
+    start = _number(row, SPEED_AT_ACTIVATION)
+    for name, golden_name, sign in (
+        (HIGHEST_SPEED, GOLDEN_HIGHEST_SPEED, 1.0),
+        (LOWEST_SPEED, GOLDEN_LOWEST_SPEED, -1.0),
+    ):
+        speed, golden = _number(row, name), _number(row, golden_name)
+        if None not in (start, speed, golden) and all(
+            sign * (speed - other) >= _LEAST_SPEED_CHANGE_MPS  # type: ignore[operator]
+            for other in (start, golden)
+        ):
+            texts[name] = measured_number(speed, "m/s")  # type: ignore[arg-type]
+    return texts
+
+
+def _later(time: float, before: float | None, *, is_first: bool) -> str:
+    """`4.5 s later`; after another hazard, `4.5 s after that`."""
+    if before is None:
+        return f"at {measured_number(time, 's')}"
+    gap = round(time - before, 6)
+    if gap <= 0.0:
+        return "at once" if is_first else "at the same time"
+    return f"{measured_number(gap, 's')} {'later' if is_first else 'after that'}"
+
+
+def _joined(clauses: Sequence[str]) -> str:
+    """Join clauses. One with the subject of the clause before loses it: `the car slows and stops`."""
+    shortened = list(clauses[:1])
+    for before, clause in pairwise(clauses):
+        subject, earlier = _SUBJECT_PATTERN.match(clause), _SUBJECT_PATTERN.match(before)
+        is_same = subject and earlier and subject[1] == earlier[1]
+        shortened.append(clause[len(subject[0]) :] if subject and is_same else clause)
+    return " and ".join(filter(None, (", ".join(shortened[:-1]), *shortened[-1:])))
+
+
+def _alert(row: Row, hazards: Sequence[tuple[HazardFacts, float]]) -> str:
+    """`No alert.`, or when the first alert came, relative to the first hazard."""
+    time, name = _number(row, "t_alert"), str(row.get("alerts") or "").split(";")[0]
+    if time is None:
+        return "No alert."
+    if not hazards:
+        return f"Alert {name} at {measured_number(time, 's')}."
+    ahead = round(hazards[0][1] - time, 6)
+    hazard = "the hazard" if len(hazards) == 1 else "the first hazard"
+    if ahead == 0.0:
+        return f"Alert {name} only in the moment of {hazard}."
+    gap = measured_number(abs(ahead), "s")
+    return (
+        f"Alert {name} {gap} before {hazard}." if ahead > 0.0 else f"Alert {name} only {gap} after {hazard}."
+    )

@@ -1,0 +1,33 @@
+"""Texts with holes, and numbers in them."""
+
+import pytest
+
+from mutator._common.phrase_texts import fill_phrase, measured_number, planned_number
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [(123.7, "124 s"), (24.63, "24.6 s"), (37.02, "37 s"), (0.4567, "0.46 s"), (1e-12, "0 s")],
+)  # fmt: skip
+def test_a_measured_number_is_rounded_as_one_says_it(number: float, text: str) -> None:
+    assert measured_number(number, "s") == text
+
+
+@pytest.mark.parametrize(
+    ("number", "text"), [(50, "50 mph"), (8.0, "8 mph"), (-12.34, "-12.34 mph"), (1e20, "1e+20 mph")]
+)
+def test_a_planned_number_has_all_its_digits(number: float, text: str) -> None:
+    assert planned_number(number, "mph") == text
+
+
+def test_a_number_without_a_unit_stands_alone() -> None:
+    """`-` is a unit that means none."""
+    assert (measured_number(2.0), planned_number(2.0, "-")) == ("2", "2")
+
+
+def test_the_first_text_whose_holes_have_values_is_used() -> None:
+    """A text with an empty or missing hole is skipped; without any text there is none."""
+    texts = ("at {speed}, {later}", "{later}")
+    assert fill_phrase(texts, {"speed": "3 m/s", "later": "now"}) == "at 3 m/s, now"
+    assert fill_phrase(texts, {"speed": "", "later": "now"}) == "now"
+    assert fill_phrase(texts, {}) == ""
