@@ -103,10 +103,13 @@ def print_experiment(
 
 
 def print_answer(terminal: Terminal, result: "ExperimentResult") -> None:
-    """Print what came out in one sentence: the ending, the first hazard, and whether an alert preceded it."""
+    """Print what came out, in words and in short: the ending, the first hazard, and whether an alert preceded
+    it.
+    """
     record = result.record
     if record is None:
         return
+    terminal.print_text(result.sentence, style="bold")
     ending = _ending_of(record)
     parts = [ending]
     if record.hazards:
@@ -137,7 +140,6 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     assert record is not None
     manifest = _manifest_if_any(result)
     ending = _ending_of(record)
-    terminal.print_text(result.sentence)
     terminal.print_result(f"verdict: {ending}", style=STYLE_BY_ENDING.get(ending))
     if record.detail:
         terminal.print_text(record.detail)
@@ -249,6 +251,7 @@ def print_trial(terminal: Terminal, trial: "Trial", *, with_plot: bool) -> None:
         )
         return
     print_experiment(terminal, trial.experiment, trial.patch, is_trial=True)
+    terminal.print_text(trial.sentence, style="bold")
     print_verdict(terminal, trial)
     if trial.golden_hazards:
         reached = ", ".join(f"{name} at {t:.2f} s" for name, t in trial.golden_hazards)

@@ -107,7 +107,7 @@ def test_the_list_stays_next_to_an_opened_experiment(page: "Page") -> None:
     assert page.page.inner_text("#experiment .place") == f"2 of {count}"
     assert (
         page.page.title()
-        == f"{page.page.inner_text('#experiment h2')} in {page.column('scenario')[1]} - {title}"
+        == f"{page.page.inner_text('#experiment .fault')} in {page.column('scenario')[1]} - {title}"
     )
     boxes = [page.page.locator(name).bounding_box() for name in ("#grid", "#experiment")]
     assert boxes[0]["x"] + boxes[0]["width"] <= boxes[1]["x"], "the experiment is not beside the list"

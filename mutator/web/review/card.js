@@ -53,9 +53,9 @@ class Card {
   static #words(words) {
     const { el } = Dom;
     if (!words.length) return null;
-    const shown = words.length > 3 ? [words[0], words[words.length - 1]] : words;
-    const more = words.length - shown.length;
-    return el("ul.words", { "aria-label": "In words" }, shown.map((text) => el("li", {}, text)), more ? el("li.quiet", {}, `and ${more} more`) : null);
+    const listed = words.length > 3 ? [words[0], words[words.length - 1]] : words;
+    const more = words.length - listed.length;
+    return el("ul.words", { "aria-label": "In words" }, listed.map((text) => el("li", {}, text)), more ? el("li.quiet", {}, `and ${more} more`) : null);
   }
 
   #buttons() {
@@ -110,7 +110,7 @@ class Card {
     this.#remarks();
   }
 
-  /** Whether a button is shown as pressed, for a mark that is being sent or else for a valid decision. */
+  /** Whether a button is listed as pressed, for a mark that is being sent or else for a valid decision. */
   isMarked(kind, pending) {
     const { state, flag } = this.group;
     if (kind === "flag") return pending.has("flag") || (Boolean(flag) && !pending.has("unflag"));
