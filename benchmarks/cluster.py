@@ -36,6 +36,7 @@ from mutator.execution.cluster.bundle import Bundle
 from mutator.execution.cluster.cluster_choice import parse_cluster_choice
 from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceResult
 from mutator.execution.cluster.piece_queue import PieceQueue
+from mutator.execution.written_files import WrittenFiles
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.patch_files import pack_patches
 from mutator.store.run_folder import RunFolder
@@ -162,6 +163,7 @@ def intake() -> None:
             manifest=workspace.manifest(folder.head.target),
             pending=left,
             proof=(),
+            written=WrittenFiles(),
             engine="fork",
             accept_versions=True,
             new_worker_name=lambda name: f"0001-{name}",
