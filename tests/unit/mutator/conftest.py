@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator.campaigns import run_environment
 from mutator.workspace import Workspace
 
 from .fork_on_toy import Edit, Fork
@@ -16,7 +17,7 @@ CLONE = HERE.parents[2]
 
 
 @pytest.fixture
-def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Path], None]]:
     """Install a project as pip would: its folder and a dist-info with its entry points on the path."""
 
     def installed(project: Path) -> None:
@@ -31,7 +32,8 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Path],
         monkeypatch.syspath_prepend(info.parent)
         monkeypatch.syspath_prepend(project)
 
-    return installed
+    yield installed
+    run_environment._installed_packages.cache_clear()  # or later tests see the project
 
 
 @pytest.fixture
