@@ -110,7 +110,7 @@ class Card {
     this.#remarks();
   }
 
-  /** Whether a button is listed as pressed, for a mark that is being sent or else for a valid decision. */
+  /** Whether a button is shown as pressed, for a mark that is being sent or else for a valid decision. */
   isMarked(kind, pending) {
     const { state, flag } = this.group;
     if (kind === "flag") return pending.has("flag") || (Boolean(flag) && !pending.has("unflag"));
