@@ -22,7 +22,7 @@ from mutator.campaigns.plan import build_plan
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment
 from mutator.mutants.anchors import parse_file
-from mutator.mutants.mutant_building import build, build_without_reuse
+from mutator.mutants.mutant_building import build, build_without_reusing_changed_files
 from mutator.operators.mutation_selection import sample_mutations, select_mutations
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
@@ -69,7 +69,7 @@ def main() -> None:
         build(manifest, models, experiment.fault, experiment.trigger)
 
     def spliced(experiment: Experiment) -> None:
-        build_without_reuse(manifest, models, experiment.fault, experiment.trigger)
+        build_without_reusing_changed_files(manifest, models, experiment.fault, experiment.trigger)
 
     def parsed(experiment: Experiment) -> None:
         changed = {manifest.observation.location, *(i.location for i in experiment.fault.injections)}

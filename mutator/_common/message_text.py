@@ -18,7 +18,7 @@ def describe_choices(names: Iterable[str]) -> str:
     return f"one of {listed}" if listed else "a known name, but there is none"
 
 
-def describe_value(value: Any) -> str:
+def shortened_repr(value: Any) -> str:
     """Return a value as errors show it: at most 60 characters; text is quoted, numbers are not."""
     if value is None:
         return "nothing"

@@ -7,7 +7,7 @@ import numpy as np
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
-from mutator._common.message_text import describe_value
+from mutator._common.message_text import shortened_repr
 from mutator.errors import BadOutput
 from mutator.outcomes import trace_loading
 from mutator.targets.manifest import TargetManifest
@@ -61,6 +61,6 @@ def _describe_record_difference(first_folder: Path, second_folder: Path, name: s
     for key in dict.fromkeys((*first, *second)):
         if first.get(key) != second.get(key):
             return (
-                f"in {name}, '{key}': {describe_value(first.get(key))} and {describe_value(second.get(key))}"
+                f"in {name}, '{key}': {shortened_repr(first.get(key))} and {shortened_repr(second.get(key))}"
             )
     return ""

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
-from mutator._common.message_text import describe_value, spelling_suggestion
+from mutator._common.message_text import shortened_repr, spelling_suggestion
 
 _EXPECTED_AND_REMEDY_BY_ERROR = {
     "float_type": ("a number", "write it as a number, without quotes or unit"),
@@ -45,7 +45,7 @@ def explain_error(
         )
     if kind == "missing":
         return f"key '{keys[-1]}' is missing", f"`{keys[-1]}` here", f"add `{keys[-1]}: ...`", keys
-    got = f"{describe_value(problem['input'])} for '{key}'"
+    got = f"{shortened_repr(problem['input'])} for '{key}'"
     if kind == "value_error":
         return got, str(context.get("error", problem["msg"])), "correct the value", keys
     if kind in _EXPECTED_AND_REMEDY_BY_ERROR:

@@ -15,7 +15,7 @@ from pydantic_core import CoreSchema
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import check_schema
-from mutator._common.message_text import counted, describe_value
+from mutator._common.message_text import counted, shortened_repr
 from mutator.config import validation_messages
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.errors import MutatorError
@@ -225,7 +225,7 @@ def load_yaml_model(
     if not isinstance(source.data, dict):
         raise source.error(
             (),
-            f"{describe_value(source.data)}",
+            f"{shortened_repr(source.data)}",
             expected="a mapping of keys to values",
             remedy="write `key: value` lines",
         )

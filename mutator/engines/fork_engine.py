@@ -50,7 +50,7 @@ from mutator.mutants.probe import ProbeSource, untriggered_report
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 
-_GoldenKey = tuple[str, int, tuple[str, ...]]
+_GoldenRunKey = tuple[str, int, tuple[str, ...]]
 
 
 class ForkEngine:
@@ -86,7 +86,7 @@ class ForkEngine:
             None if manifest.stepwise_function else NotForkable(f"target {manifest.name} is not stepwise")
         )
         self._observations_by_golden: dict[
-            _GoldenKey, GoldenObservations | NotForkable
+            _GoldenRunKey, GoldenObservations | NotForkable
         ] = {}  # observations, or why there are none
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, JobResult]]:
@@ -196,7 +196,7 @@ class ForkEngine:
 
     def _process_before_step(self, job: Job, step: int, swap: CodeSwap) -> WaitingProcess:
         pool = self._ensure_server(job)
-        key = _golden_key(job)
+        key = _golden_run_key(job)
         golden = GoldenRunRequest(
             key=key, scenario=job.scenario, arguments=lambda: self._target_arguments(job, pool.scratch_folder)
         )
@@ -294,7 +294,7 @@ class ForkEngine:
 
     def _golden_observations(self, job: Job, golden: Path) -> GoldenObservations:
         """Return what a probe observes in a job's golden run. The first call runs it."""
-        key = _golden_key(job)
+        key = _golden_run_key(job)
         if key not in self._observations_by_golden:
             try:
                 self._observations_by_golden[key] = self._observe_golden_run(job, golden)
@@ -306,7 +306,7 @@ class ForkEngine:
         return observations
 
     def _observe_golden_run(self, job: Job, golden: Path) -> GoldenObservations:
-        golden_id = content_id(_golden_key(job))
+        golden_id = content_id(_golden_run_key(job))
         if stored := self._observation_store.load(golden_id):
             return stored
         folder = self._runs_folder / f"watch-{golden_id}"
@@ -350,7 +350,7 @@ def _modules_to_load(swap: CodeSwap) -> list[str]:
     return [*dict.fromkeys(function.module for function in swap.functions), *swap.imported_modules]
 
 
-def _golden_key(job: Job) -> _GoldenKey:
+def _golden_run_key(job: Job) -> _GoldenRunKey:
     return (_resolved_path(job.scenario), job.seed, job.scenario_changes)
 
 

@@ -63,7 +63,7 @@ class Variant:
     """
 
     name: str
-    aim: str
+    aimed_hazard: str
     about: str
     draw: DrawSpec | None
     changes: tuple[str, ...]
@@ -285,7 +285,7 @@ def _build_variant(
     }
     return Variant(
         name=name,
-        aim=model.aim,
+        aimed_hazard=model.aim,
         about=model.about,
         draw=_build_draw(f"{spec}/{name}", model.draw, source, (*keys, "draw"))
         if model.draw is not None

@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import Field
 
-from mutator._common.message_text import describe_value
+from mutator._common.message_text import shortened_repr
 from mutator.config import units
 from mutator.config.instance_conditions import canonical_instance_condition
 from mutator.config.location_model import LocationModel
@@ -108,7 +108,7 @@ class InjectionModel(StrictModel, title="An injection"):
         except ValueError:
             raise source.error(
                 (*keys, "where"),
-                describe_value(self.where),
+                shortened_repr(self.where),
                 expected="names, attributes, items, constants, comparisons, `and`, `or` and `not`",
                 remedy="use something that the function knows, e.g. `where: index == 2`",
             ) from None
@@ -121,7 +121,7 @@ def _parse_param_value(value: Any, source: YamlSource, keys: KeyPath) -> ParamVa
     if not isinstance(value, dict) or set(value) != {"draw", "written_in", "read_as"}:
         raise source.error(
             keys,
-            f"{describe_value(value)} for '{key}'",
+            f"{shortened_repr(value)} for '{key}'",
             expected="a number, a name, or {draw: ..., written_in: ..., read_as: ...}",
             remedy="write a plain value",
         )
@@ -129,12 +129,12 @@ def _parse_param_value(value: Any, source: YamlSource, keys: KeyPath) -> ParamVa
         if value[name] not in units.UNITS:
             raise source.error(
                 (*keys, name),
-                f"{describe_value(value[name])} for '{name}'",
+                f"{shortened_repr(value[name])} for '{name}'",
                 expected=f"one of {units.UNIT_SUFFIXES_TEXT}",
             )
     drawn = parse_draw_reference(str(value["draw"]))
     if not drawn:
         raise source.error(
-            (*keys, "draw"), f"{describe_value(value['draw'])} for 'draw'", expected="the draw's name"
+            (*keys, "draw"), f"{shortened_repr(value['draw'])} for 'draw'", expected="the draw's name"
         )
     return replace(drawn, written_unit=value["written_in"], misread_unit=value["read_as"])

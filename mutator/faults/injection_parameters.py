@@ -1,6 +1,6 @@
 """Check an injection's parameters and convert them from the spec's form to the template's."""
 
-from mutator._common.message_text import describe_choices, describe_value, spelling_suggestion
+from mutator._common.message_text import describe_choices, shortened_repr, spelling_suggestion
 from mutator._common.random_streams import random_generator
 from mutator.config import units
 from mutator.config.location_syntax import is_assignable, is_dotted_name
@@ -221,7 +221,7 @@ class _ParameterResolver:
 
     def _value_error(self, param: ParamSpec, expected: str, got: str | None = None) -> MutatorError:
         value = param.value.name if isinstance(param.value, DrawReference) else param.value
-        text = got or describe_value(value)
+        text = got or shortened_repr(value)
         return self.source.error(
             param.keys, f"{text} for '{param.key}'", expected=expected, remedy="correct the value"
         )

@@ -101,7 +101,7 @@ class _SpecExpander:
                 reading=self.reading,
                 value=value,
                 unit=unit,
-                aim=variant.aim,
+                aim=variant.aimed_hazard,
                 injections=self._injections(variant, value, number),
                 hold=variant.hold_in_reading(self.reading),
                 changes=variant.changes,
@@ -122,9 +122,9 @@ class _SpecExpander:
         )
 
     def _check_variant(self, variant: Variant) -> None:
-        if variant.aim not in self.manifest.hazard_names:
+        if variant.aimed_hazard not in self.manifest.hazard_names:
             raise self._unknown_name_error(
-                (*variant.keys, "aim"), f"aim '{variant.aim}'", self.manifest.hazard_names
+                (*variant.keys, "aim"), f"aim '{variant.aimed_hazard}'", self.manifest.hazard_names
             )
         for i, change in enumerate(variant.changes):
             if change not in self.manifest.args_by_change:

@@ -173,8 +173,8 @@ def _resolve_statement(file: ParsedFile, location: FaultLocation) -> ResolvedAnc
     function, statement = _choose_statement(file, location, functions)
     _check_anchor_fits_statement(file, location.anchor, statement)
     _check_position_matches_ast(file, statement.position)
-    if statement.headed_block_first_line is not None:
-        return _resolve_block_start(file, statement.headed_block_first_line, function.used_names)
+    if statement.block_start_of_head_binding is not None:
+        return _resolve_block_start(file, statement.block_start_of_head_binding, function.used_names)
     first = statement.first_line
     return ResolvedAnchor(
         first_line=first,
@@ -264,9 +264,9 @@ def _choose_statement(
     # heads of blocks are numbered last, so that `nth` in older specs selects the same statements
     matches = sorted(
         (pair for pair in pairs if pair[1].unanchorable_reason is None),
-        key=lambda pair: pair[1].headed_block_first_line is not None,
+        key=lambda pair: pair[1].block_start_of_head_binding is not None,
     )
-    statements = sum(s.headed_block_first_line is None for _, s in matches)
+    statements = sum(s.block_start_of_head_binding is None for _, s in matches)
     nth = anchor.nth
     # one statement is no ambiguity, even if heads of blocks bind the same name
     if matches and (1 in (len(matches), statements) if nth is None else nth <= len(matches)):
@@ -335,7 +335,7 @@ def _describe_candidates(functions: tuple[Function, ...], verb: str) -> str:
 def _check_anchor_fits_statement(file: ParsedFile, anchor: Anchor, statement: Statement) -> None:
     after = anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL)
     reason = None
-    if statement.headed_block_first_line is not None and not after:
+    if statement.block_start_of_head_binding is not None and not after:
         reason = "is the head of a block"
     elif statement.is_in_one_line_suite:
         reason = "is on the line of its `if`, `for` or `def`"

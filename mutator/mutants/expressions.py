@@ -23,7 +23,7 @@ from mutator.mutants.expression_roles import (
 from mutator.mutants.node_positions import RangeByNode
 
 # line and column, from 0; in `Expression`, columns count bytes, elsewhere characters
-_LineColumn = tuple[int, int]
+_ZeroBasedPosition = tuple[int, int]
 
 # no operator beside these binds a part of them, so they need no parentheses
 _UNSPLITTABLE_NODES = (
@@ -40,8 +40,8 @@ class Expression:
     """
 
     function: str
-    start: _LineColumn
-    end: _LineColumn
+    start: _ZeroBasedPosition
+    end: _ZeroBasedPosition
     roles: tuple[AnchorRole, ...]
     one_line_source: str  # source on one line, in parentheses if an adjacent operator could split it
     is_bare_tuple_or_walrus: (
@@ -109,8 +109,8 @@ def _build_expression(
     lines: Sequence[str],
     encoding: str,
     expression: ExpressionInFunction,
-    start: _LineColumn,
-    end: _LineColumn,
+    start: _ZeroBasedPosition,
+    end: _ZeroBasedPosition,
     *,
     is_bare_tuple_or_walrus: bool,
 ) -> Expression:
@@ -131,11 +131,11 @@ def _build_expression(
     )
 
 
-def _extent_of(lines: Sequence[str], node: ast.expr) -> tuple[_LineColumn, _LineColumn]:
+def _extent_of(lines: Sequence[str], node: ast.expr) -> tuple[_ZeroBasedPosition, _ZeroBasedPosition]:
     """Return where a node begins and ends: line and character column, from 0. `ast` counts UTF-8 bytes."""
     assert node.end_lineno is not None and node.end_col_offset is not None
 
-    def point(line: int, column: int) -> _LineColumn:
+    def point(line: int, column: int) -> _ZeroBasedPosition:
         text = lines[line - 1]
         return line - 1, column if text.isascii() else len(text.encode()[:column].decode())
 
@@ -151,7 +151,7 @@ def _nodes_libcst_must_have(node: ast.expr) -> Iterator[ast.expr]:
         yield node
 
 
-def _libcst_extents(positions: RangeByNode) -> frozenset[tuple[_LineColumn, _LineColumn]]:
+def _libcst_extents(positions: RangeByNode) -> frozenset[tuple[_ZeroBasedPosition, _ZeroBasedPosition]]:
     return frozenset(
         ((span.start.line - 1, span.start.column), (span.end.line - 1, span.end.column))
         for node, span in positions.items()
@@ -159,9 +159,11 @@ def _libcst_extents(positions: RangeByNode) -> frozenset[tuple[_LineColumn, _Lin
     )
 
 
-def _closing_bracket_ends(tokens: Iterable[tokenize.TokenInfo]) -> dict[_LineColumn, _LineColumn]:
+def _closing_bracket_ends(
+    tokens: Iterable[tokenize.TokenInfo],
+) -> dict[_ZeroBasedPosition, _ZeroBasedPosition]:
     """Map the position of each opening bracket to the end of its closing bracket; lines from 0."""
-    ends, starts = {}, list[_LineColumn]()
+    ends, starts = {}, list[_ZeroBasedPosition]()
     for token in tokens:
         if token.type == tokenize.OP and token.string in "([{":
             starts.append((token.start[0] - 1, token.start[1]))

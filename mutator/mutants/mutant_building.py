@@ -69,10 +69,13 @@ def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, tr
     return _build_with(manifest, models, fault, trigger, _ReusingSplicer(manifest.tree))
 
 
-def build_without_reuse(
+def build_without_reusing_changed_files(
     manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger
 ) -> Mutant:
-    """Like `build`, but splice and compile every file without reuse; `build` must return the same bytes."""
+    """Like `build`, but splice and compile every file, even if an earlier mutant changed it in the same way.
+
+    `build` must return the same bytes.
+    """
     return _build_with(manifest, models, fault, trigger, _Splicer())
 
 

@@ -68,7 +68,7 @@ class _PlaceLister:
         for verb, kinds in _ANCHOR_KINDS_BY_VERB.items():
             anchorable = (s for f in functions for s in f.statements if not s.unanchorable_reason)
             statements = sorted(
-                anchorable, key=lambda s: s.headed_block_first_line is not None
+                anchorable, key=lambda s: s.block_start_of_head_binding is not None
             )  # in the order of `nth`
             totals, numbers = (Counter[str]() for _ in range(2))
             totals.update(n for s in statements for n in s.names_for(verb))

@@ -37,7 +37,8 @@ class Statement:
     is_in_one_line_suite: bool = False
     has_multiline_string: bool = False
     unanchorable_reason: str | None = None  # why nothing can be anchored at this construct
-    headed_block_first_line: int | None = None  # for a binding in the head of a block: the block's first line
+    # for names that the head of an indented block binds: the first line of the block
+    block_start_of_head_binding: int | None = None
 
     def names_for(self, verb: str) -> tuple[str, ...]:
         return {"assign": self.assigned_names, "call": self.called_names, "return": self.returned_names}[verb]
@@ -202,7 +203,7 @@ class _FunctionCollector(cst.CSTVisitor):
                 first_line=line,
                 end_line=opens,
                 assigned_names=tuple(_unique_stable_names(names)),
-                headed_block_first_line=opens,
+                block_start_of_head_binding=opens,
             )
         )
 

@@ -82,7 +82,9 @@ def _omission_mutations(
 ) -> Iterator[Mutation]:
     every = ((f.def_line + 1, s) for f in file.functions_by_name.get(function, ()) for s in f.statements)
     anchorable = [
-        (line, s) for line, s in every if s.unanchorable_reason is None and s.headed_block_first_line is None
+        (line, s)
+        for line, s in every
+        if s.unanchorable_reason is None and s.block_start_of_head_binding is None
     ]
     numbers: Counter[tuple[str, str]] = Counter()
     for line, statement in anchorable:

@@ -117,7 +117,7 @@ class UntimedPath:
         )
 
 
-class PathInputs(NamedTuple):
+class UntimedPathInputs(NamedTuple):
     """The facts about an experiment that determine its untimed path."""
 
     injected: frozenset[str]
@@ -198,13 +198,13 @@ class FaultPathFinder:
 
     def untimed_path(self, fault: Fault, record: Record) -> UntimedPath | None:
         """Return the untimed path of an experiment; None in the same cases as `fault_path`."""
-        inputs = self.path_inputs(fault, record)
+        inputs = self.untimed_path_inputs(fault, record)
         return inputs and self.untimed_path_from(inputs)
 
-    def untimed_path_from(self, inputs: PathInputs) -> UntimedPath | None:
+    def untimed_path_from(self, inputs: UntimedPathInputs) -> UntimedPath | None:
         return self._cached_untimed_path(*inputs)
 
-    def path_inputs(self, fault: Fault, record: Record) -> PathInputs | None:
+    def untimed_path_inputs(self, fault: Fault, record: Record) -> UntimedPathInputs | None:
         """Return the inputs of an untimed path; None if the fault was not active or without an outcome."""
         if record.outcome in (None, Outcome.NOT_ACTIVATED):
             return None
@@ -215,7 +215,7 @@ class FaultPathFinder:
                 firsts[component] = first
         rank = {time: i for i, time in enumerate(sorted(set(firsts.values())))}
         order = tuple(sorted((name, rank[time]) for name, time in firsts.items()))
-        return PathInputs(self._injected_components(fault), order, record.outcome is Outcome.MASKED)
+        return UntimedPathInputs(self._injected_components(fault), order, record.outcome is Outcome.MASKED)
 
     def _build_untimed_path(
         self, injected: frozenset[str], departure_ranks: tuple[tuple[str, int], ...], masked: bool

@@ -182,20 +182,29 @@ class JudgedObservation:
 
 
 def judge_observations(
-    path: Path, runs: pd.DataFrame, mixture_gaps: Sequence[str], *, only_needed: bool = False
+    path: Path,
+    runs: pd.DataFrame,
+    differences_from_papers_mixture: Sequence[str],
+    *,
+    only_needed: bool = False,
 ) -> tuple[JudgedObservation, ...]:
     """Judge the observations in a file against a frame of results.
 
-    With `only_needed`, judge only the claims on which observations depend. `mixture_gaps` says how the runs
-    differ from the paper's mixture of faults. MutatorError with file and line if the file or a query is
-    invalid.
+    With `only_needed`, judge only the claims on which observations depend. With differences from the paper's
+    mixture of faults, claims that need this mixture stay undecided. MutatorError with file and line if the
+    file or a query is invalid.
     """
     model, source = load_yaml_model(path, ObservationsFile, SCHEMA)
     judged = []
     for i, observation in enumerate(model.observations):
         claims = tuple(
             _judge_claim(
-                f"{i + 1}.{k + 1}", claim, runs, mixture_gaps, source, ("observations", i, "claims", k)
+                f"{i + 1}.{k + 1}",
+                claim,
+                runs,
+                differences_from_papers_mixture,
+                source,
+                ("observations", i, "claims", k),
             )
             for k, claim in enumerate(observation.claims)
             if claim.needed or not only_needed
@@ -221,7 +230,7 @@ def _judge_claim(
     number: str,
     claim: Claim,
     runs: pd.DataFrame,
-    mixture_gaps: Sequence[str],
+    differences_from_papers_mixture: Sequence[str],
     source: YamlSource,
     yaml_keys: tuple[str | int, ...],
 ) -> JudgedClaim:
@@ -239,8 +248,8 @@ def _judge_claim(
         for group, arguments in claim.measure_calls()
     )
     verdict, reason = combined_verdict([answer.verdict for answer in answers]), ""
-    if claim.mixture and mixture_gaps:
-        verdict, reason = ClaimVerdict.UNDECIDED, "; ".join(mixture_gaps)
+    if claim.mixture and differences_from_papers_mixture:
+        verdict, reason = ClaimVerdict.UNDECIDED, "; ".join(differences_from_papers_mixture)
     published = claim.published_estimate()
     return JudgedClaim(
         number=number,

@@ -73,13 +73,17 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
     file_words = re.findall(r"\w+", read_bounded(file, MOST_YAML_BYTES).decode())
     frame = select_common_columns(run.frame, *file_words)  # the queries use only columns that the file names
     frame = frame.assign(t_end=frame["scenario"].map(ends))  # `median_time` needs the ends of the runs
-    judged = observation_judging.judge_observations(file, frame, list(_mixture_gaps(run, missing)))
+    judged = observation_judging.judge_observations(
+        file, frame, list(_differences_from_papers_mixture(run, missing))
+    )
     coverage = _describe_coverage(run, len(fault_types), missing)
     if all(observation.verdict is ClaimVerdict.UNDECIDED for observation in judged):
         return None
     ends_by_scenario = tuple(sorted(ends.items()))
     by_seed = observations_by_seed.judge_by_seed(
-        file, frame, lambda runs: list(_mixture_gaps(run, _missing_fault_types(fault_types, runs)))
+        file,
+        frame,
+        lambda runs: list(_differences_from_papers_mixture(run, _missing_fault_types(fault_types, runs))),
     )
     seeds_table = observations_by_seed.verdicts_by_seed_table(judged, by_seed) if by_seed else None
     sheets = [
@@ -123,10 +127,10 @@ def _missing_fault_types(fault_types: Sequence[str], runs: "pd.DataFrame") -> li
     return sorted(set(fault_types) - set(runs["kind"].unique()))
 
 
-def _mixture_gaps(run: ReportedRun, missing: list[str]) -> Iterator[str]:
+def _differences_from_papers_mixture(run: ReportedRun, missing_fault_types: list[str]) -> Iterator[str]:
     """Yield how the run differs from the paper's mixture of faults. A shard is always incomplete."""
-    if missing:
-        yield f"no runs of {counted(len(missing), 'fault type')} of the paper"
+    if missing_fault_types:
+        yield f"no runs of {counted(len(missing_fault_types), 'fault type')} of the paper"
     if run.ran_count < (planned := run.folder.head.experiments):
         yield f"only {run.ran_count} of {planned} planned experiments were run"
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from mutator._common.helper_processes import map_in_processes, process_count_for
 from mutator.model import Fault, Record
-from mutator.outcomes.fault_paths import FaultPathFinder, PathInputs, UntimedPath
+from mutator.outcomes.fault_paths import FaultPathFinder, UntimedPath, UntimedPathInputs
 from mutator.outcomes.verdict_rules import was_active_at_hazard
 from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.statistics.event_times import FirstAlertsByHazardRun
@@ -23,7 +23,7 @@ _EXPERIMENTS_IN_BATCH = (
 # extra columns of a frame of results; no metric has such a name
 RANK_COLUMN, UNTIMED_PATH_COLUMN = "#place", "#untimed_path"
 _TimedAlerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
-_BatchFacts = tuple[list[PathInputs | None], dict[str, _TimedAlerts], set[str]]
+_BatchFacts = tuple[list[UntimedPathInputs | None], dict[str, _TimedAlerts], set[str]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,13 +82,13 @@ def _path_inputs_and_hazards_by_batch(
     faults: Mapping[str, Fault],
     fault_paths: FaultPathFinder | None,
 ) -> Iterator[_BatchFacts]:
-    """Yield, for each batch of experiments, their `PathInputs`, the alerts of those with a hazard, and the
-    ids of those whose fault still acted then.
+    """Yield, for each batch of experiments, their `UntimedPathInputs`, the alerts of those with a hazard, and
+    the ids of those whose fault still acted then.
     """
     pairs = results[["experiment_id", "fault_id"]]
 
     def inputs_and_hazards(piece: "DataFrame") -> _BatchFacts:
-        all_inputs: list[PathInputs | None] = []
+        all_inputs: list[UntimedPathInputs | None] = []
         alerts, active_ids = {}, set()
         for name, fault in zip(piece["experiment_id"], piece["fault_id"], strict=True):
             record, inputs = records.get(name), None
@@ -98,7 +98,7 @@ def _path_inputs_and_hazards_by_batch(
                 if was_active_at_hazard(record):
                     active_ids.add(name)
                 if fault_paths and fault in faults:
-                    inputs = fault_paths.path_inputs(faults[fault], record)
+                    inputs = fault_paths.untimed_path_inputs(faults[fault], record)
             all_inputs.append(inputs)
         return all_inputs, alerts, active_ids
 

@@ -259,10 +259,10 @@ def _wrong_aims(
     hazards = {hazard for action in factor.leads_to for hazard in analysis.unsafe_actions[action].hazards}
     for i, fault in enumerate(factor.faults):
         for variant in specs[fault]:
-            if variant.aim not in hazards:
+            if variant.aimed_hazard not in hazards:
                 yield analysis.factors_source.error(
                     (*keys, "faults", i),
-                    f"{fault}/{variant.name} aims at {variant.aim}",
+                    f"{fault}/{variant.name} aims at {variant.aimed_hazard}",
                     expected=f"a hazard that {keys[1]} leads to: {', '.join(sorted(hazards))}",
                     remedy="correct `leads_to` or the spec's `aim`",
                 )

@@ -5,7 +5,7 @@ import keyword
 
 from pydantic import Field
 
-from mutator._common.message_text import describe_value
+from mutator._common.message_text import shortened_repr
 from mutator.config.location_model import LocationModel
 from mutator.config.location_syntax import PROBE_MODULE_NAME, is_dotted_name
 from mutator.config.yaml_files import StrictModel
@@ -17,7 +17,7 @@ from mutator.triggers.conditions import RESERVED_NAMES, TIME, canonical_formula
 
 _MOST_LENGTH = 1000  # characters in an expression, at most
 # an expression runs in the target at every step, and must not change anything there
-_ALLOWED_NODES = (
+_UNCONDITIONALLY_ALLOWED_NODES = (
     *(ast.BinOp, ast.UnaryOp, ast.Compare, ast.Load, ast.Subscript, ast.Call),
     *(ast.operator, ast.unaryop, ast.cmpop),
 )
@@ -126,7 +126,7 @@ def _checked_expression(text: str, source: YamlSource, keys: tuple[str, ...]) ->
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise source.error(
             keys,
-            describe_value(text),
+            shortened_repr(text),
             expected="names, attributes, items with constant keys, numbers, arithmetic, comparisons, and "
             f"calls of {', '.join(_ALLOWED_CALLS)}",
             remedy="write an expression that gives the value at that statement",
@@ -167,7 +167,7 @@ def _is_allowed_node(node: ast.AST) -> bool:
         return is_dotted_name(node.id)
     if isinstance(node, ast.Attribute):
         return is_dotted_name(node.attr)
-    return isinstance(node, _ALLOWED_NODES)
+    return isinstance(node, _UNCONDITIONALLY_ALLOWED_NODES)
 
 
 class _HypotToProbeRewriter(ast.NodeTransformer):

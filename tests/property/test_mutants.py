@@ -15,7 +15,7 @@ from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
 from mutator.mutants.anchors import parsed_file
-from mutator.mutants.mutant_building import Mutant, build, build_without_reuse
+from mutator.mutants.mutant_building import Mutant, build, build_without_reusing_changed_files
 from mutator.store.plan_choices import Choices
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -115,7 +115,7 @@ def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, st
 @given(varied() | others(), triggers())
 def test_reused_changes_give_the_same_mutants_as_splicing(fault: Fault, trigger: Trigger) -> None:
     made(build, fault, trigger)  # leaves a reusable change if it is the first of its kind
-    assert made(build, fault, trigger) == made(build_without_reuse, fault, trigger)
+    assert made(build, fault, trigger) == made(build_without_reusing_changed_files, fault, trigger)
 
 
 @pytest.mark.slow
@@ -126,4 +126,4 @@ def test_mutants_of_the_papers_campaign_equal_spliced_ones(reading: str) -> None
     assert len(pairs) > 6000
     for experiment in pairs.values():
         key = experiment.fault, experiment.trigger
-        assert build(*paper(), *key) == build_without_reuse(*paper(), *key)
+        assert build(*paper(), *key) == build_without_reusing_changed_files(*paper(), *key)

@@ -42,7 +42,7 @@ def locations(file: ParsedFile) -> Iterator[FaultLocation]:
             s
             for one in found
             for s in one.statements
-            if s.unanchorable_reason is None and s.headed_block_first_line is None
+            if s.unanchorable_reason is None and s.block_start_of_head_binding is None
         ):
             for verb in ("assign", "call", "return"):
                 for name in dict.fromkeys(statement.names_for(verb)):

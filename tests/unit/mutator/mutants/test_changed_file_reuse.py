@@ -17,7 +17,7 @@ from mutator.mutants.changed_file_reuse import (
     reuse_cache,
     reuse_key,
 )
-from mutator.mutants.mutant_building import build, build_without_reuse
+from mutator.mutants.mutant_building import build, build_without_reusing_changed_files
 from mutator.mutants.patch_rendering import render_changed_file
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
@@ -114,7 +114,7 @@ def test_a_change_is_reused_for_another_number(toy: Workspace) -> None:
     known = reuse_cache(manifest.tree, SENSOR)
     counts = []
     for value in (1.0, 2.5, 1e-9, -1.0, float("nan"), 3, None):
-        assert build(manifest, models, fault(value), always_trigger()) == build_without_reuse(
+        assert build(manifest, models, fault(value), always_trigger()) == build_without_reusing_changed_files(
             manifest, models, fault(value), always_trigger()
         )
         counts.append(len(known))
@@ -136,7 +136,7 @@ def test_a_reused_change_gives_the_same_errors(toy: Workspace, tmp_path: Path) -
         fault(2, path="../x"),
     ):
         said = []
-        for way in (build, build_without_reuse):
+        for way in (build, build_without_reusing_changed_files):
             with pytest.raises(MutatorError) as caught:
                 way(manifest, models, wrong, always_trigger())
             said.append((type(caught.value), str(caught.value)))

@@ -9,7 +9,7 @@ import pytest
 from mutator._common.doors import OPERATORS
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import parsed_file
-from mutator.mutants.mutant_building import build, build_without_reuse
+from mutator.mutants.mutant_building import build, build_without_reusing_changed_files
 from mutator.operators.equal_code_filter import drop_equal_code
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutation_selection import SelectedMutations, sample_mutations, select_mutations
@@ -146,4 +146,4 @@ def test_every_mutant_of_the_toy_can_be_built(toycar: Workspace) -> None:
     assert len({fault.id for fault in faults}) == len(faults)
     for fault in faults:
         mutant = build(manifest, models, fault, always_trigger())
-        assert mutant == build_without_reuse(manifest, models, fault, always_trigger())
+        assert mutant == build_without_reusing_changed_files(manifest, models, fault, always_trigger())
