@@ -21,13 +21,14 @@ MOST_CONDITIONS = 6  # conditions shown in a terminal; a group can have one for 
 def group_as_json(review: "Review", group: "Group", *, with_diff_and_values: bool = False) -> dict[str, Any]:
     """Return a group as JSON data, on request also its diff and values."""
     from mutator.api.reviews import group_facts as group_facts
-    from mutator.review.group_display import fault_value_table
+    from mutator.review.group_display import fault_value_table, title_lines
 
     decision, flag = review.decision(group.id), review.flag(group.id)
     facts = {
         **group_facts(review, group),
         "what": group.label,
         "injections": group.injection_labels,
+        "about": title_lines(group),
         "words": group.fault_words,
     }
     facts |= {"at": decision.at if decision else None, "changed": review.stale_parts(group)}
@@ -36,6 +37,7 @@ def group_as_json(review: "Review", group: "Group", *, with_diff_and_values: boo
         "flag": asdict(flag) if flag else None,
         "bound": asdict(group.basis_digests),
         "ranges": group.value_ranges,
+        "units": group.unit_by_parameter,
     }
     if not with_diff_and_values:
         return facts
@@ -61,13 +63,11 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
         terminal.print_json([group_as_json(review, group) for group in groups])
         return
     length = terminal.id_length({*review.entry_by_group, *(g.id for g in groups)})
-    # in a pipe, each group is one line
-    separator = "\n" if terminal.out.is_terminal else "; "
     rows = [
         (
             g.id[:length],
             review.state(g).value,
-            separator.join(map(_shorten_injection, g.injection_labels)),
+            _describe_group(g, in_terminal=terminal.out.is_terminal),
             _describe_trigger(g),
             len(g.faults),
             g.experiment_count,
@@ -84,6 +84,14 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
         terminal.print_note(f"blocks of the review file for groups that are not listed: {len(unlisted)}")
 
 
+def _describe_group(group: "Group", *, in_terminal: bool) -> str:
+    """Return what the group's faults are, and where; outside a terminal, each group is one line."""
+    from mutator.review.group_display import title_lines
+
+    titles, injections = title_lines(group), list(map(_shorten_injection, group.injection_labels))
+    return "\n".join([*titles, *injections]) if in_terminal else " ".join([*titles, "; ".join(injections)])
+
+
 def _shorten_injection(injection: str) -> str:
     """Shorten the file's path to its name."""
     path, space, rest = injection.partition(" ")
@@ -95,8 +103,12 @@ def _describe_trigger(group: "Group") -> str:
 
 
 def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
+    from mutator.review.group_display import title_lines
+
     state, flag = review.state(group).value, review.flag(group.id)
     terminal.print_text(f"group {group.id}: {state}", style=STYLE_BY_STATE[state])
+    for title in title_lines(group):
+        terminal.print_text(title)
     if decision := review.describe_decision(group):
         terminal.print_text(decision)
     if flag:
@@ -144,6 +156,9 @@ def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
     terminal.print_text()
     heads, rows = fault_value_table(group)
     if rows:
+        heads = [
+            f"{head} ({unit})" if (unit := group.unit_by_parameter.get(head)) else head for head in heads
+        ]
         terminal.print_table(heads, rows[:MOST_VALUE_ROWS], right_aligned=range(2, len(heads)))
         if len(rows) > MOST_VALUE_ROWS:
             terminal.print_text(f"{len(rows) - MOST_VALUE_ROWS} more; `--json` has all of them")

@@ -31,7 +31,7 @@ from mutator.review.fault_words import words_of_faults
 from mutator.review.patch_shapes import PatchShape
 from mutator.review.review_entries import BasisDigests, ValueRanges
 from mutator.review.reviewed_texts import render_reviewed_text
-from mutator.review.value_ranges import value_ranges_of
+from mutator.review.value_ranges import find_variant, units_of_parameters, value_ranges_of
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
@@ -45,8 +45,10 @@ class Group:
     `shapes` are the group's diffs with holes, several if a template writes different lines for different
     numbers. The members of the shapes are the ids of `faults`. `experiment_count` is that of the group in a
     campaign; None if no campaign is given. `trigger_kinds` and `hold_kinds` list the kinds that occur, joined
-    by `or`. `value_ranges` has the range of each parameter in the specs. `reviewed_text` is the text that a
-    decision is bound to. `source_files` are the specs and templates. `fault_words` say what the faults do.
+    by `or`. `value_ranges` has the range of each parameter in the specs, and `unit_by_parameter` its unit in
+    the injected code. `about_by_variant` says what each variant of a spec does. `reviewed_text` is the text
+    that a decision is bound to. `source_files` are the specs and templates. `fault_words` say
+    what each fault does.
     """
 
     id: str
@@ -63,6 +65,8 @@ class Group:
     experiment_count: int | None
     basis_digests: BasisDigests
     value_ranges: ValueRanges = field(default_factory=dict)
+    unit_by_parameter: Mapping[str, str] = field(default_factory=dict)
+    about_by_variant: Mapping[str, str] = field(default_factory=dict)
     reviewed_text: str = ""
     source_files: tuple[Path, ...] = ()
     fault_words: tuple[str, ...] = ()
@@ -207,10 +211,19 @@ class _GroupBuilder:
             else experiment_count_by_label.get(label, 0),
             basis_digests=material.digests,
             value_ranges=values,
+            unit_by_parameter={}
+            if operator
+            else units_of_parameters(faults.values(), self.specs, self.models),
+            about_by_variant=self._about_by_variant(faults.values()),
             reviewed_text=render_reviewed_text(material.digests, values, material.sections),
             source_files=self._source_files(faults.values(), models),
             fault_words=words_of_faults(faults.values(), self.specs.values(), self.models),
         )
+
+    def _about_by_variant(self, faults: Iterable[Fault]) -> dict[str, str]:
+        names = dict.fromkeys(fault.spec for fault in faults)
+        variants = {name: variant for name in names if (variant := find_variant(name, self.specs))}
+        return {name: " ".join(variant.about.split()) for name, (_, variant) in variants.items()}
 
     def _source_files(self, faults: Iterable[Fault], models: Iterable[str]) -> tuple[Path, ...]:
         names = dict.fromkeys(fault.spec.rpartition("/")[0] for fault in faults)

@@ -116,14 +116,14 @@ class ReviewEntry:
 
 def describe_ranges(values: ValueRanges) -> str:
     """Return the ranges as text: `by: -40 to 40; seed: 3`."""
-    return "; ".join(f"{name}: {_describe_range(value)}" for name, value in values.items())
+    return "; ".join(f"{name}: {describe_range(value)}" for name, value in values.items())
 
 
 def _describe_wider_ranges(approved_ranges: ValueRanges, now: ValueRanges) -> str:
     """Return the values outside the approved ranges, as text."""
     wider = [name for name in now if not _is_within(now[name], approved_ranges.get(name, ()))]
     descriptions = (
-        f"{name}: {_describe_range(now[name])}; approved {_describe_range(approved_ranges.get(name, ()))}"
+        f"{name}: {describe_range(now[name])}; approved {describe_range(approved_ranges.get(name, ()))}"
         for name in wider
     )
     return "; ".join(descriptions)
@@ -137,7 +137,8 @@ def _is_within(inner: tuple[float | str, ...], outer: tuple[float | str, ...]) -
     )
 
 
-def _describe_range(values: tuple[float | str, ...]) -> str:
+def describe_range(values: tuple[float | str, ...]) -> str:
+    """Return the least and the greatest number, then the other values: `-40 to 40, nan`."""
     numbers = [f"{value:g}" for value in values if not isinstance(value, str)]
     words = [value for value in values if isinstance(value, str)]
     return ", ".join(filter(None, (" to ".join(dict.fromkeys(numbers)), *words))) or "none"

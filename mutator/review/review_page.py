@@ -14,7 +14,7 @@ from mutator.errors import MutatorError
 from mutator.mutants.injected_lines import tags_for_page_scripts
 from mutator.review.decisions import Review, ReviewState
 from mutator.review.effect_pictures import can_have_pictures
-from mutator.review.group_display import fault_value_table, trigger_condition_lines
+from mutator.review.group_display import fault_value_table, title_lines, trigger_condition_lines
 from mutator.review.mutant_groups import Group
 from mutator.web import asset_text, json_script_element, load_order, packed_script_element
 
@@ -118,6 +118,7 @@ def _group_as_json(review: Review, group: Group, stack_number: int) -> dict[str,
     return group_review_as_json(review, group) | {
         "id": group.id,
         "like": stack_number,
+        "titles": title_lines(group),
         "injections": group.injection_labels,
         "words": group.fault_words,
         "specs": group.specs,
@@ -131,4 +132,5 @@ def _group_as_json(review: Review, group: Group, stack_number: int) -> dict[str,
         "pictures": can_have_pictures(group),
         "heads": heads,
         "rows": rows,
+        "units": group.unit_by_parameter,
     }

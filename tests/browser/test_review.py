@@ -1,5 +1,6 @@
 """The review page in the browser."""
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -120,7 +121,16 @@ def test_a_diff_shows_its_holes_and_their_values(open_page: Callable[..., Any]) 
     assert page.locator(".group:visible mark.hole").all_inner_texts() == ["⟨by⟩"]
     page.keyboard.press("v")
     assert page.locator(".group:visible .values tbody tr:visible").count() == 8
-    assert page.inner_text(".group:visible .values summary").startswith("Values (8): by + ")
+    summary = page.inner_text(".group:visible .values summary")
+    assert summary.startswith("Values (8): by + ") and summary.endswith(" m")
+    assert "by (m)" in page.locator(".group:visible .values th").all_inner_texts()
+
+
+def test_a_title_says_what_the_faults_are(open_page: Callable[..., Any]) -> None:
+    """The sentence of the spec stands above the place, and the search finds it."""
+    page = open_page("q=further away")
+    title = page.inner_text(".group:visible .about")
+    assert re.fullmatch(r"sensor/distance/longer \d+ to \d+ m: The other car seems further away\.", title)
 
 
 def test_wide_content_scrolls_in_its_own_box(open_page: Callable[..., Any]) -> None:

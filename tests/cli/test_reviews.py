@@ -68,9 +68,14 @@ def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dic
     assert "+            gap = gap ⟨by⟩  # fi:⟨id⟩" in answer.out
     assert re.search(r"^sensor/distance/longer \d m +as_described +\+ \d$", answer.out, re.MULTILINE)
     assert re.search(r"^  hwt .*\(near\)$", answer.out, re.MULTILINE)
-    assert "\nvalues: by: 1 to 65\n" in answer.out
+    assert "\nvalues: by: 1 to 65 m\n" in answer.out
+    assert re.search(r"^fault +reading +by \(m\)$", answer.out, re.MULTILINE)
+    title = r"sensor/distance/longer \d+ to \d+ m: The other car seems further away\."
+    assert re.search(rf"^{title}$", answer.out, re.MULTILINE)
+    assert re.search(rf" new +{title} sensing\.py ", cli("review").out)
     [group] = cli("review", "show", longer, "--json").json
     assert group["values"][0]["by"].startswith("+ ")
+    assert (group["units"]["by"], re.fullmatch(title, group["about"][0]) is not None) == ("m", True)
     assert len(group["values"]) == group["faults"] == 8  # four faults in each of two readings
 
 

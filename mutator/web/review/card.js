@@ -35,6 +35,7 @@ class Card {
         el("span.state"), el("span.flagged", { hidden: true }, "flagged"), el("span.kept.quiet", { role: "status" }), this.#buttons()),
       el("p.decision.quiet", { hidden: true }),
       el("div.conflict", { role: "alert", hidden: true }),
+      group.titles.length ? el("ul.about", {}, group.titles.map((text) => el("li", {}, text))) : null,
       el("ul.what", {}, group.injections.map((text) => el("li", {}, Card.#injection(text)))),
       Card.#words(group.words ?? []),
       el("p.facts.quiet", {}, this.#facts()),
@@ -187,7 +188,7 @@ class Card {
   /** The text in which the search looks for words. */
   get words() {
     const g = this.group;
-    return [g.id, g.state, Card.describeDecision(g.decision), ...g.injections, ...g.specs, g.trigger, g.hold, ...g.remarks.map((r) => `${r.by} ${r.text}`)]
+    return [g.id, g.state, Card.describeDecision(g.decision), ...g.titles, ...g.injections, ...g.specs, g.trigger, g.hold, ...g.remarks.map((r) => `${r.by} ${r.text}`)]
       .join(" ").toLowerCase();
   }
 
@@ -207,7 +208,7 @@ class Card {
       const cells = g.rows.map((row) => [Number(row[i + 2].replaceAll(" ", "") || NaN), row[i + 2]]);
       if (head.endsWith("seed") || cells.some(([n]) => Number.isNaN(n))) return [];
       cells.sort(([a], [b]) => a - b);
-      return [`${head} ${cells[0][1]} to ${cells.at(-1)[1]}`];
+      return [`${head} ${cells[0][1]} to ${cells.at(-1)[1]}${g.units[head] ? ` ${g.units[head]}` : ""}`];
     });
     return spans.length ? `: ${spans.join(", ")}` : "";
   }
@@ -217,7 +218,7 @@ class Card {
     const g = this.group;
     return el("div.scroll", { tabindex: 0, role: "region", "aria-label": `Values of ${g.id}` },
       el("table", {},
-        el("thead", {}, el("tr", {}, g.heads.map((head) => el("th", { scope: "col" }, head)))),
+        el("thead", {}, el("tr", {}, g.heads.map((head) => el("th", { scope: "col" }, g.units[head] ? `${head} (${g.units[head]})` : head)))),
         el("tbody", {}, g.rows.map((row) => el("tr", {}, row.map((cell, i) => el(i < 2 ? "td" : "td.value", {}, cell)))))));
   }
 }

@@ -1,4 +1,4 @@
-"""The possible values of a group, which do not depend on the seed."""
+"""The possible values of a group, which do not depend on the seed, and their units."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import pytest
 
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault, Value
-from mutator.review.value_ranges import value_ranges_of
+from mutator.review.value_ranges import units_of_parameters, value_ranges_of
 from mutator.workspace import Workspace
 
 
@@ -59,3 +59,15 @@ def test_the_selected_execution_and_instance_are_values(toycar: Workspace) -> No
     seeded = replace(injection, model="image_effect", params=(("amount", 2.0), ("seed", 9)))
     found = value_ranges_of([replace(fault, injections=(seeded,))], {}, toycar.fault_models())
     assert found == {"amount": (2.0, 2.0)}
+
+
+def test_units_are_those_of_the_injected_code(toycar: Workspace) -> None:
+    """A range of a parameter has the unit of the changed variable, if all specs agree on it."""
+    specs, models = {spec.name: spec for spec in toycar.specs()}, toycar.fault_models()
+    distance = faults(toycar, "sensor/distance")
+    assert units_of_parameters(distance, specs, models) == {"by": "m", "low": "m", "high": "m"}
+    assert units_of_parameters(distance, {}, models) == {}
+    file = toycar.library / "faults/sensor/distance.yaml"
+    file.write_text(file.read_text().replace("unit: m\n", "unit: cm\n", 1))
+    disagreeing = {spec.name: spec for spec in toycar.specs()}
+    assert units_of_parameters(distance, disagreeing, models) == {}
