@@ -18,7 +18,7 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.execution.worker import Worker
 
 inputs, assignment, pending, proof = pickle.load(sys.stdin.buffer)
-worker = Worker(RunInputs.unpacked(inputs), assignment)
+worker = Worker(RunInputs.from_bytes(inputs), assignment)
 for piece in pending:
     worker.run(piece)
 for sample in proof:
