@@ -38,7 +38,7 @@ from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceRe
 from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.execution.written_files import WrittenFiles
 from mutator.store.checksummed_blocks import block_bytes
-from mutator.store.patch_files import pack_patches
+from mutator.store.packed_patches import pack_patches
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import EXPERIMENT_BLOCK
 from mutator.store.session_environments import SessionEnvironment

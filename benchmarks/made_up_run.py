@@ -37,7 +37,7 @@ from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store import file_digests, plan_file
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.file_digests import FileDigest
-from mutator.store.patch_files import _PatchPacker
+from mutator.store.packed_patches import _PatchPacker
 from mutator.store.preflight_results import CHECKS_FILE as CHECKS
 from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.records import PROOF_FOLDER, RECORDS_SCHEMA, record_as_json
@@ -55,7 +55,7 @@ KINDS = 480  # different records, used in turn
 PATCHES = 240  # different patches
 SERIES, SERIES_MOST = 48, 150_000  # different series; experiments with a series, limited to fit 500 MB
 WORKERS, PIECE = 2, 20  # number of files; consecutive experiments per file
-_WHOLE_EVERY = 256  # the first of this many patches is stored whole, as in mutator.store.patch_files
+_WHOLE_EVERY = 256  # the first of this many patches is stored whole, as in mutator.store.packed_patches
 _NO_ID = "0" * 16
 
 

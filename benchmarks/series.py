@@ -21,7 +21,7 @@ sys.path.insert(0, str(ROOT))
 
 from mutator.execution import experiment_runner  # noqa: E402
 from mutator.execution.campaign_running import run_campaign  # noqa: E402
-from mutator.store.patch_files import PatchWriter  # noqa: E402
+from mutator.store.packed_patches import PatchWriter  # noqa: E402
 from mutator.store.plan_choices import Choices  # noqa: E402
 from mutator.store.run_folder import RunFolder  # noqa: E402
 from mutator.store.series_folder import SeriesFolder  # noqa: E402

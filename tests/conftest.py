@@ -34,7 +34,7 @@ from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter, read_segment
 from mutator.store.file_digests import FileDigest
-from mutator.store.patch_files import PatchFolder, PatchWriter, rewrite_patch_file
+from mutator.store.packed_patches import PatchFolder, PatchWriter, rewrite_patch_file
 from mutator.store.plan_choices import Choices
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder

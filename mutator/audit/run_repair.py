@@ -34,7 +34,7 @@ from mutator.store.allowed_contents import DAMAGED_FOLDER
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.checksummed_lines import Segment, line_file_bytes, read_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
-from mutator.store.patch_files import rewrite_patch_file
+from mutator.store.packed_patches import rewrite_patch_file
 from mutator.store.records import LINE_SCHEMA_BY_FOLDER
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

@@ -22,10 +22,10 @@ from mutator._common.files import read_json
 from mutator._common.hashing import canonical_json, digest
 from mutator.campaigns.plan_freezing import PLAN_CSV
 from mutator.store import file_digests, plan_file
-from mutator.store.approvals import review_digest
 from mutator.store.checksummed_lines import intact_lines, unread_segment
 from mutator.store.preflight_results import CHECKS_FILE as CHECKS
 from mutator.store.preflight_results import CHECKS_SCHEMA
+from mutator.store.recorded_approvals import review_digest
 from mutator.store.records import PROOF_FOLDER, parse_ending
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD

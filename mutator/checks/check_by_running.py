@@ -16,7 +16,7 @@ from mutator._common.cpu_cores import usable_cores
 from mutator._common.files import ScratchFolder
 from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.campaign_files import Campaign, load_campaign
-from mutator.checks import fast_engine_check, nondeterminism_causes
+from mutator.checks import fast_engine_check, nondeterminism_suspects
 from mutator.checks.findings import CheckState, Finding
 from mutator.checks.first_difference import describe_first_difference
 from mutator.checks.reachability import ReachTracker
@@ -183,7 +183,7 @@ class _RunningCheck:
         self, name: str, golden: _GoldenRuns, *, depends_on_hash_seed: bool
     ) -> Finding:
         where = describe_first_difference(self.manifest, golden.first.out, golden.again.out)
-        places, remedy = nondeterminism_causes.likely_causes(
+        places, remedy = nondeterminism_suspects.likely_causes(
             self.manifest, self._notes_with_target_lines(golden), depends_on_hash_seed=depends_on_hash_seed
         )
         which = ", but only if their hash seeds differ" if depends_on_hash_seed else ""
@@ -215,7 +215,7 @@ class _RunningCheck:
         places = [
             place
             for golden in goldens.values()
-            for place in nondeterminism_causes.places_of_kind(self._notes_with_target_lines(golden), CLOCK)
+            for place in nondeterminism_suspects.places_of_kind(self._notes_with_target_lines(golden), CLOCK)
         ]
         if not places:
             return []
@@ -264,7 +264,7 @@ class _RunningCheck:
         places = dict.fromkeys(
             place
             for golden_runs in noted
-            for place in nondeterminism_causes.places_of_kind(golden_runs, THREAD)
+            for place in nondeterminism_suspects.places_of_kind(golden_runs, THREAD)
         )
         return replace(finding, places=tuple(places))
 

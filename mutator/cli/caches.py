@@ -13,7 +13,7 @@ from mutator.cli.options import Json, Wide
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
-    from mutator._common.shared_cache import CacheEntry
+    from mutator._common.cache_layout_and_pruning import CacheEntry
 
 # powers of 1,000, as disks are measured
 _BYTES_BY_UNIT = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}

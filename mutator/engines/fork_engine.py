@@ -22,11 +22,11 @@ from mutator._common.files import (
     remove_folder,
 )
 from mutator._common.hashing import content_id
-from mutator.engines.code_swap import CodeSwap, plan_swap
+from mutator.engines.code_swap_planning import CodeSwap, plan_swap
 from mutator.engines.engine_jobs import EngineArguments, Job, JobResult, RunMode, harness_error_result
 from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
 from mutator.engines.fork_messages import check_fork_report, fork_request
-from mutator.engines.fork_server_client import (
+from mutator.engines.fork_server_processes import (
     ForkServer,
     GoldenRunRequest,
     WaitingProcess,

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mutator.engines.code_swap import CodeSwap
+from mutator.engines.code_swap_planning import CodeSwap
 from mutator.engines.engine_jobs import Job
 from mutator.engines.first_activation import ForkPoint
 from mutator.engines.job_folder import JobFolder

@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from mutator.engines.code_swap import plan_swap
+from mutator.engines.code_swap_planning import plan_swap
 from mutator.engines.engine_choice import reason_not_forkable
-from mutator.engines.fork_server_client import ForkServer
+from mutator.engines.fork_server_processes import ForkServer
 from mutator.errors import ForkServerLost, MutantNotSwappable, MutatorError, NotForkable
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault

@@ -11,8 +11,8 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.errors import MutatorError
 from mutator.review import approval_gate
-from mutator.store.approvals import write_approvals
 from mutator.store.plan_choices import Choices
+from mutator.store.recorded_approvals import write_approvals
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

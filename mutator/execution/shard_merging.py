@@ -20,12 +20,12 @@ from mutator.results import table_building
 from mutator.results.table_reader import frame_of_experiments
 from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experiment
 from mutator.store import file_digests, integrity, plan_file, run_deletion
-from mutator.store.approvals import APPROVALS_FILE as REVIEWED
 from mutator.store.file_digests import DigestLedger, FileDigest
-from mutator.store.patch_files import PatchWriter
+from mutator.store.packed_patches import PatchWriter
 from mutator.store.plain_contents_check import check_plain_contents
 from mutator.store.preflight_results import CHECKS_FILE as CHECKS
 from mutator.store.preflight_results import CHECKS_SCHEMA
+from mutator.store.recorded_approvals import APPROVALS_FILE as REVIEWED
 from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD

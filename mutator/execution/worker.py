@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import PendingChunk
@@ -94,7 +94,7 @@ class Worker:
     def _prune_cached_images(self, seed: int) -> None:
         """Delete images of earlier seeds, which would fill the disk."""
         if len(self.folder.seeds) > 1 and seed != self._current_seed:
-            shared_cache.prune_target_cache(self._manifest.cache_name)
+            cache_layout_and_pruning.prune_target_cache(self._manifest.cache_name)
         self._current_seed = seed
 
     def prove(self, sample: SampledExperiment) -> list[tuple[str, str]]:

@@ -20,7 +20,7 @@ from mutator.mutants.constants_and_defaults import (
 )
 from mutator.mutants.expressions import Expression, list_expressions
 from mutator.mutants.name_scopes import normalize_identifier, used_names_by_function
-from mutator.mutants.node_positions import NodePosition, ast_node_positions
+from mutator.mutants.positions_of_both_parsers import NodePosition, ast_node_positions
 from mutator.mutants.source_parsing import (
     check_line_ends_and_uninstrumented,
     import_insertion_line,

@@ -20,7 +20,7 @@ from mutator.mutants.expression_roles import (
     expressions_in_functions,
     source_of,
 )
-from mutator.mutants.node_positions import RangeByNode
+from mutator.mutants.positions_of_both_parsers import RangeByNode
 
 # line and column, from 0; in `Expression`, columns count bytes, elsewhere characters
 _ZeroBasedPosition = tuple[int, int]

@@ -12,7 +12,7 @@ from libcst.metadata import MetadataWrapper, PositionProvider
 
 from mutator.errors import MutatorError
 from mutator.mutants.injected_lines import find_instrumented_line
-from mutator.mutants.node_positions import RangeByNode, line_after_statements
+from mutator.mutants.positions_of_both_parsers import RangeByNode, line_after_statements
 
 MOST_SYNTAX_NODES = 50_000  # of a file's syntax tree; LibCST takes about 0.1 ms and 4 kB for each
 MOST_CHAIN_LINKS = 500  # LibCST recurses once for each link, and thousands would end the process

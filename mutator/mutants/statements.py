@@ -8,7 +8,7 @@ import libcst as cst
 
 from mutator.config.location_syntax import is_assignable
 from mutator.mutants.name_scopes import UsedNamesByFunction, normalize_identifier
-from mutator.mutants.node_positions import (
+from mutator.mutants.positions_of_both_parsers import (
     NodePosition,
     RangeByNode,
     function_position,

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from mutator.engines.code_swap import behaviour_key
+from mutator.engines.code_swap_planning import behaviour_key
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.expressions import Expression
 from mutator.mutants.standalone_compilation import compile_standalone

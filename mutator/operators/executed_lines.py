@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import ScratchFolder, json_bytes, write_atomic
 from mutator._common.hashing import digest
@@ -84,7 +84,7 @@ def _cache_key(manifest: TargetManifest, golden_run: GoldenRunInputs) -> str:
 
 
 def _load_cached(key: str) -> ExecutedLines | None:
-    path = shared_cache.cached_executed_lines_folder() / f"{key}.json"
+    path = cache_layout_and_pruning.cached_executed_lines_folder() / f"{key}.json"
     try:
         data: dict[str, Any] = json.loads(read_bounded(path))
         if data["sum"] == digest([key, data["lines"]]):
@@ -97,7 +97,7 @@ def _load_cached(key: str) -> ExecutedLines | None:
 
 def _save_cached(key: str, executed: ExecutedLines) -> None:
     lines = {file: sorted(numbers) for file, numbers in executed.items()}
-    path = shared_cache.cached_executed_lines_folder() / f"{key}.json"
+    path = cache_layout_and_pruning.cached_executed_lines_folder() / f"{key}.json"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomic(path, json_bytes({"sum": digest([key, lines]), "lines": lines}))

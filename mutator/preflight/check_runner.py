@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator._common.confined_files import path_below
 from mutator._common.files import remove_folder
 from mutator.engines.engine_jobs import Job
@@ -118,7 +118,7 @@ class CheckRunner:
             execution = engine.execute(job, scratch)
             run = read_check_run(self.manifest, execution)
             if name[0] == GOLDEN and name[1].seed is not None:
-                shared_cache.prune_target_cache(self.manifest.cache_name)
+                cache_layout_and_pruning.prune_target_cache(self.manifest.cache_name)
             if name[0] == NULL_MUTANT:
                 unreached_triggers.save_observations(
                     self.pending_folder, name[1].key, execution.watch_report.get("seen", ())

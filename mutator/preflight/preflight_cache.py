@@ -4,7 +4,7 @@ import platform
 import shutil
 from pathlib import Path
 
-from mutator._common import cached_folders, shared_cache
+from mutator._common import cache_layout_and_pruning, cached_folders
 from mutator._common.confined_files import path_below
 from mutator._common.hashing import digest
 from mutator.preflight.unreached_triggers import OBSERVATIONS_FOLDER
@@ -14,7 +14,7 @@ def cached_checks_path(key: str) -> Path:
     """Return the path for checks with this digest. Machines with a shared home folder have separate entries,
     because the digest might not cover everything that changes last digits.
     """
-    return path_below(shared_cache.cached_checks_folder(), digest([key, platform.node()]))
+    return path_below(cache_layout_and_pruning.cached_checks_folder(), digest([key, platform.node()]))
 
 
 def store_passed_checks(entry: Path, run: Path, checks_file: str, observation_folder: Path) -> None:

@@ -10,7 +10,7 @@ from mutator.campaigns.plan import Plan
 from mutator.errors import CheckFailed
 from mutator.review.decisions import Review, ReviewState, load_review
 from mutator.review.mutant_groups import Group, groups_of_plan
-from mutator.store.approvals import APPROVALS_SCHEMA
+from mutator.store.recorded_approvals import APPROVALS_SCHEMA
 from mutator.workspace import Workspace
 
 _MOST_PRINTED_IDS = 10  # maximum number of ids in one printed command
@@ -18,7 +18,7 @@ _MOST_PRINTED_IDS = 10  # maximum number of ids in one printed command
 
 def require_approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
     """Return the decisions that allow the plan to run (canary and probe included), for
-    `mutator.store.approvals`.
+    `mutator.store.recorded_approvals`.
 
     CheckFailed unless every group has a valid approval.
     """

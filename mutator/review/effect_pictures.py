@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import ScratchFolder, json_bytes, write_atomic
 from mutator._common.hashing import content_id, digest
@@ -293,7 +293,7 @@ def _jpeg_bytes(picture: np.ndarray) -> bytes:
 
 
 def _load_cached(key: str) -> EffectPictures | None:
-    path = shared_cache.cached_image_effects_folder() / f"{key}.json"
+    path = cache_layout_and_pruning.cached_image_effects_folder() / f"{key}.json"
     try:
         data: dict[str, Any] = json.loads(read_bounded(path))
         before, levels = data["before"], data["levels"]
@@ -312,7 +312,7 @@ def _load_cached(key: str) -> EffectPictures | None:
 
 
 def _save_cached(key: str, pictures: EffectPictures) -> None:
-    path = shared_cache.cached_image_effects_folder() / f"{key}.json"
+    path = cache_layout_and_pruning.cached_image_effects_folder() / f"{key}.json"
     before = base64.b64encode(pictures.before_jpeg).decode()
     levels = [
         [level.name, level.label, base64.b64encode(level.after_jpeg).decode()] for level in pictures.levels

@@ -7,7 +7,7 @@ written it.
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator._common.confined_files import read_below, write_below
 from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.hashing import digest
@@ -43,7 +43,7 @@ class ReportCache:
 
 def _read_cached(key: str) -> Mapping[str, bytes] | None:
     """Read a report from the cache; None if it is missing or damaged."""
-    folder = shared_cache.cached_reports_folder() / key
+    folder = cache_layout_and_pruning.cached_reports_folder() / key
     try:
         stored = parse_json_object(read_below(folder, DIGESTS_FILE), folder / DIGESTS_FILE, PAGES_SCHEMA)
         digests = stored["files"]
@@ -54,7 +54,7 @@ def _read_cached(key: str) -> Mapping[str, bytes] | None:
 
 
 def _write_cached(key: str, files: Mapping[str, bytes]) -> None:
-    folder = shared_cache.cached_reports_folder() / key
+    folder = cache_layout_and_pruning.cached_reports_folder() / key
     folder.mkdir(parents=True, exist_ok=True)
     for name, data in files.items():
         write_below(folder, name, data)
@@ -62,4 +62,4 @@ def _write_cached(key: str, files: Mapping[str, bytes]) -> None:
     write_below(
         folder, DIGESTS_FILE, json_bytes({"schema": PAGES_SCHEMA, "files": digests})
     )  # last: marks it as complete
-    shared_cache.prune_cached_reports()
+    cache_layout_and_pruning.prune_cached_reports()

@@ -16,7 +16,7 @@ from mutator.errors import MutatorError
 from mutator.store import file_digests, plan_file, verified_runs_cache
 from mutator.store.checksummed_lines import Segment, intact_lines, read_segment, unread_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
-from mutator.store.patch_files import PatchFolder
+from mutator.store.packed_patches import PatchFolder
 from mutator.store.records import RECORDS_SCHEMA, parse_ending, second_record_error
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RunHead
 from mutator.store.shards import Shard

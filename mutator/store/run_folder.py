@@ -18,7 +18,7 @@ from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import file_digests, integrity, plan_file
 from mutator.store.allowed_contents import SCRATCH_FOLDER, TRACES_FOLDER
-from mutator.store.patch_files import PatchFolder
+from mutator.store.packed_patches import PatchFolder
 from mutator.store.plain_contents_check import check_plain_contents
 from mutator.store.records import load_records
 from mutator.store.run_head import HEAD, RunHead, StoredGolden, load_head

@@ -7,7 +7,7 @@ from typing import Any
 from mutator._common.confined_files import path_below
 from mutator.model import Record
 from mutator.store.checksummed_lines import LineWriter, verified_lines, write_lines_with_new_head
-from mutator.store.patch_files import PatchWriter
+from mutator.store.packed_patches import PatchWriter
 from mutator.store.records import LINE_SCHEMA_BY_FOLDER, PROOF_FOLDER, RECORDS_FOLDER, record_as_json
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import EncodedSeries, SeriesWriter

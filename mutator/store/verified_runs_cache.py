@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
 from mutator._common.files import json_bytes, write_atomic
@@ -56,4 +56,4 @@ def remember_facts(key: str, **facts: Any) -> None:
 
 
 def _entry_path(key: str) -> Path:
-    return path_below(shared_cache.cached_verifications_folder(), f"{key}.json")
+    return path_below(cache_layout_and_pruning.cached_verifications_folder(), f"{key}.json")

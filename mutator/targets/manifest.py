@@ -7,7 +7,7 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import digest
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
@@ -210,7 +210,7 @@ class TargetManifest:
     @property
     def cache_folder(self) -> Path:
         """The folder `{cache}`, which need not exist."""
-        return shared_cache.target_cache_folder(self.cache_name)
+        return cache_layout_and_pruning.target_cache_folder(self.cache_name)
 
     def paths_read_by_runs(self) -> tuple[Path, ...]:
         """Return what runs read besides their tree, scenario and cache: the target's root, if an argument

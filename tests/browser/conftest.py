@@ -24,7 +24,7 @@ from mutator.report import report_builder
 from mutator.report.panels import figures_panel
 from mutator.results import table_building
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.patch_files import PatchWriter
+from mutator.store.packed_patches import PatchWriter
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series

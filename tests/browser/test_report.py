@@ -11,7 +11,7 @@ import pytest
 from mutator.report import report_builder
 from mutator.report.panels import figures_panel
 from mutator.store import plan_file
-from mutator.store.patch_files import PatchFolder
+from mutator.store.packed_patches import PatchFolder
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.usefixtures("nowhere")
 @pytest.fixture
 def filled() -> Path:
     """A cache of three files of a target. Each takes 12 kB on any disk."""
-    place = shared_cache.target_cache_folder("car")
+    place = cache_layout_and_pruning.target_cache_folder("car")
     place.mkdir(parents=True)
     for name in "abc":
         (place / name).write_bytes(b"1" * 12_288)
@@ -32,14 +32,14 @@ def test_cached_files_are_listed(cli: Cli, filled: Path) -> None:
         ["total", "3", "36.9", "kB"],
     ]
     data = cli("cache", "--json").json
-    assert data["path"] == str(shared_cache.caches_folder())
+    assert data["path"] == str(cache_layout_and_pruning.caches_folder())
     assert [(e["what"], e["path"], e["bytes"]) for e in data["kept"]] == [
         ("target car", str(filled / name), 12_288) for name in "abc"
     ]
 
 
 def test_path_prints_only_the_folder(cli: Cli) -> None:
-    assert cli("cache", "--path").out == f"{shared_cache.caches_folder()}\n"
+    assert cli("cache", "--path").out == f"{cache_layout_and_pruning.caches_folder()}\n"
 
 
 @pytest.mark.parametrize(

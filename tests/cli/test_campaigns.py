@@ -17,7 +17,7 @@ import pytest
 
 from mutator.cli import campaigns
 from mutator.errors import MutatorError
-from mutator.store import approvals
+from mutator.store import recorded_approvals
 from mutator.store.allowed_contents import ALLOWED_FILE_GLOBS
 from mutator.store.series_folder import SeriesFolder, load_rerun_series
 
@@ -367,7 +367,9 @@ def test_clean_deletes_everything_that_commands_wrote_into_a_run(cli: Cli, run: 
         ["compare", other, copy],
     ):
         assert cli(*words).code == 0, words
-    approvals.write_approvals(copy, {"schema": approvals.APPROVALS_SCHEMA, "target": "toycar", "groups": []})
+    recorded_approvals.write_approvals(
+        copy, {"schema": recorded_approvals.APPROVALS_SCHEMA, "target": "toycar", "groups": []}
+    )
     for file in (next((copy / "records").iterdir()), next((copy / "patches").iterdir())):
         file.write_bytes(file.read_bytes()[:-9])
     assert cli("verify", copy, "--repair").code == 1

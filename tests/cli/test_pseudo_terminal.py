@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 import mutator
-from mutator._common.shared_cache import CacheEntry
+from mutator._common.cache_layout_and_pruning import CacheEntry
 from mutator.checks.findings import CheckState, Finding, FindingPlace
 from mutator.cli.console import Terminal
 from mutator.cli.progress_display import campaign_progress

@@ -19,8 +19,8 @@ from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
 from mutator.execution.shard_merging import merge_shards
 from mutator.results import table_building
-from mutator.store import approvals
-from mutator.store.patch_files import PatchFolder
+from mutator.store import recorded_approvals
+from mutator.store.packed_patches import PatchFolder
 from mutator.store.plan_choices import Choices
 from mutator.store.records import load_records
 from mutator.store.run_folder import RunFolder
@@ -105,17 +105,17 @@ def test_the_whole_plan_decides_the_engine_of_a_shard(
 
 def test_an_approval_is_merged_if_every_shard_has_it(copies: Runs, tmp_path: Path) -> None:
     said = {
-        "schema": approvals.APPROVALS_SCHEMA,
+        "schema": recorded_approvals.APPROVALS_SCHEMA,
         "target": "toycar",
         "groups": [{"group": "0" * 12, "by": "Jane Doe"}],
     }
     shards = [copies["1/2"], copies["2/2"]]
-    approvals.write_approvals(shards[0], said)
+    recorded_approvals.write_approvals(shards[0], said)
     merge_shards(shards, tmp_path / "half")
-    assert approvals.approval_summary(tmp_path / "half") == ""
-    approvals.write_approvals(shards[1], said)
+    assert recorded_approvals.approval_summary(tmp_path / "half") == ""
+    recorded_approvals.write_approvals(shards[1], said)
     merge_shards(shards, tmp_path / "out")
-    assert approvals.approval_summary(tmp_path / "out") == "1 group approved by Jane Doe (1)"
+    assert recorded_approvals.approval_summary(tmp_path / "out") == "1 group approved by Jane Doe (1)"
 
 
 def test_each_experiment_is_in_exactly_one_shard(runs: Runs) -> None:

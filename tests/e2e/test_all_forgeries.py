@@ -21,8 +21,8 @@ from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.report import report_builder
 from mutator.store import file_digests
-from mutator.store.approvals import write_approvals
 from mutator.store.file_digests import FileDigest
+from mutator.store.recorded_approvals import write_approvals
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 from tests.made_up_results import edit_results

@@ -22,7 +22,7 @@ from mutator.execution.single_run import rerun_experiment, run_single
 from mutator.execution.worker import Worker
 from mutator.model import Status
 from mutator.store import plan_file
-from mutator.store.patch_files import PatchFolder
+from mutator.store.packed_patches import PatchFolder
 from mutator.store.plan_choices import Choices
 from mutator.store.run_progress import Progress
 from mutator.workspace import Workspace

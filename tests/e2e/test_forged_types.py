@@ -11,7 +11,7 @@ import pytest
 
 from mutator.execution.campaign_running import run_campaign
 from mutator.report import report_builder
-from mutator.store.approvals import write_approvals
+from mutator.store.recorded_approvals import write_approvals
 from mutator.store.series_script import read_script, write_script
 from mutator.workspace import Workspace
 from tests.torture.readers import cli

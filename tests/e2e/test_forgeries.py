@@ -24,8 +24,8 @@ from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment
 from mutator.results import table_building
 from mutator.store import plan_file
-from mutator.store.patch_files import PatchFolder
-from mutator.store.patch_files import rewrite_patch_file as rewrite_patches
+from mutator.store.packed_patches import PatchFolder
+from mutator.store.packed_patches import rewrite_patch_file as rewrite_patches
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 from tests.made_up_results import edit_results

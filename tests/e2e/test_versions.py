@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mutator import load_run
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator.campaigns import run_environment
 from mutator.cli.app import main
 from mutator.engines.engine_jobs import Job, JobResult
@@ -230,7 +230,7 @@ def test_shards_of_other_machines_merge_if_their_golden_runs_agree(
     assert cli("merge", one, shard(2), "--out", tmp_path / "out")[0] == 0
     shutil.rmtree(tmp_path / "part2")
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
-    shutil.rmtree(shared_cache.cached_checks_folder())  # simulate another machine
+    shutil.rmtree(cache_layout_and_pruning.cached_checks_folder())  # simulate another machine
     code, _, err = cli("merge", one, shard(2), "--out", tmp_path / "other")
     assert code == 1 and "the golden run A differs from the one in" in err
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.store.patch_files import PatchFolder
+from mutator.store.packed_patches import PatchFolder
 from mutator.workspace import Workspace
 
 from ..differential.command import Command

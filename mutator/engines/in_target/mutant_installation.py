@@ -1,7 +1,7 @@
 """Put a mutant's code into the loaded modules of this process. Standard library only.
 
-`mutator.engines.code_swap` decides what can be swapped; this module checks that the loaded program is the one
-that was analysed.
+`mutator.engines.code_swap_planning` decides what can be swapped; this module checks that the loaded program
+is the one that was analysed.
 """
 
 import sys

@@ -9,7 +9,7 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
-from mutator._common import cached_folders, shared_cache
+from mutator._common import cache_layout_and_pruning, cached_folders
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
@@ -57,4 +57,4 @@ class GoldenRunCache:
         scenario = digest(read_bounded(self._bundle.scenario_path(golden.scenario)))
         seed = self._bundle.meta["seed"] if golden.seed is None else golden.seed
         content = [*self._common_key_parts, scenario, seed, list(golden.changes)]
-        return shared_cache.cached_goldens_folder() / digest(content)
+        return cache_layout_and_pruning.cached_goldens_folder() / digest(content)

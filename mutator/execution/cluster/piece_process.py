@@ -17,7 +17,7 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator._common.hashing import canonical_json
@@ -37,7 +37,7 @@ from mutator.execution.worker import timing_of
 from mutator.model import Experiment
 from mutator.preflight.check_run_problems import read_check_run
 from mutator.store.checksummed_blocks import block_bytes
-from mutator.store.patch_files import pack_patches
+from mutator.store.packed_patches import pack_patches
 from mutator.store.records import record_as_json
 from mutator.store.run_folder import GoldenRun
 from mutator.store.series_packing import series_block
@@ -146,7 +146,7 @@ class PieceRunner:
                 raise WorkerGoldenRunsDiffer(f"golden run {golden.key} {problem}")
             execution.out.rename(destination)
             if golden.seed is not None:  # the images of a hundred seeds would fill the disk
-                shared_cache.prune_target_cache(self._manifest.cache_name)
+                cache_layout_and_pruning.prune_target_cache(self._manifest.cache_name)
 
     def _golden_of(self, experiment: Experiment) -> GoldenRun:
         return GoldenRun.for_experiment(experiment, several_seeds=self._bundle.meta["several_seeds"])

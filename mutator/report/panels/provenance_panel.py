@@ -5,7 +5,7 @@ from mutator.audit.seal import UNSEALED_KEYS_BY_FILE, digests_or_why_no_seal, un
 from mutator.campaigns.installed_studies import study_problems
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
-from mutator.store.approvals import approval_summary
+from mutator.store.recorded_approvals import approval_summary
 from mutator.store.run_head import HEAD
 from mutator.store.session_environments import describe_environments, version_texts_by_package
 

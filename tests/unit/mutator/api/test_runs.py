@@ -23,7 +23,7 @@ from mutator.execution.single_run import rerun_experiment, run_single
 from mutator.model import Experiment, Outcome, Status
 from mutator.store import plan_file
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.patch_files import PatchWriter
+from mutator.store.packed_patches import PatchWriter
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder

@@ -13,7 +13,7 @@ from mutator.errors import MutatorError, UnsafePath
 from mutator.store import file_digests, plan_file
 from mutator.store.checksummed_lines import line_file_bytes, read_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
-from mutator.store.patch_files import PatchFolder
+from mutator.store.packed_patches import PatchFolder
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesIndex, save_index

@@ -11,8 +11,8 @@ import pytest
 from mutator._common.hashing import canonical_json
 from mutator.audit.seal import digests_or_why_no_seal, seals_of, unsealed_facts
 from mutator.store import file_digests
-from mutator.store.approvals import write_approvals
 from mutator.store.checksummed_lines import line_file_bytes
+from mutator.store.recorded_approvals import write_approvals
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

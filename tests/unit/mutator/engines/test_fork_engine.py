@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines import fork_server_client
+from mutator.engines import fork_server_processes
 from mutator.engines.engine_jobs import RunMode
 from mutator.engines.first_activation import GoldenObservations
 from mutator.model import Status, Trigger
@@ -164,7 +164,7 @@ def test_a_server_whose_first_message_was_exchanged_is_not_used(
     fork: Fork, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another run writes to the file before the server reads it, and puts it back afterwards."""
-    start, welcome = subprocess.Popen, fork_server_client.ForkServer._receive_welcome
+    start, welcome = subprocess.Popen, fork_server_processes.ForkServer._receive_welcome
     originals: dict[Path, bytes] = {}
 
     def forging(command: list[str], **more: object) -> object:
@@ -174,7 +174,7 @@ def test_a_server_whose_first_message_was_exchanged_is_not_used(
             path.write_bytes(marshal.dumps(marshal.loads(originals[path]) | {"packages": []}))
         return start(command, **more)  # type: ignore[call-overload]
 
-    def putting_back(pool: fork_server_client.ForkServer) -> None:
+    def putting_back(pool: fork_server_processes.ForkServer) -> None:
         reply = pool.first_process.receive_reply
         monkeypatch.setattr(
             pool.first_process, "receive_reply", lambda patience_s: (reply(patience_s), restore())[0]
@@ -185,8 +185,8 @@ def test_a_server_whose_first_message_was_exchanged_is_not_used(
         for path, data in originals.items():
             path.write_bytes(data)
 
-    monkeypatch.setattr(fork_server_client.subprocess, "Popen", forging)
-    monkeypatch.setattr(fork_server_client.ForkServer, "_receive_welcome", putting_back)
+    monkeypatch.setattr(fork_server_processes.subprocess, "Popen", forging)
+    monkeypatch.setattr(fork_server_processes.ForkServer, "_receive_welcome", putting_back)
     execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert execution.status is Status.HARNESS_ERROR and originals
     assert execution.detail == "the tree of the fork server is not the pristine one"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
@@ -53,7 +53,7 @@ def test_executed_lines_are_cached(
     )
     [first] = measure_executed_lines(manifest, [drive], LIMITS)
     assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 1
-    [entry] = shared_cache.cached_executed_lines_folder().iterdir()
+    [entry] = cache_layout_and_pruning.cached_executed_lines_folder().iterdir()
     entry.write_text(entry.read_text().replace("[", "[1,", 1))
     assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 2
     broken = tmp_path / "broken.yaml"

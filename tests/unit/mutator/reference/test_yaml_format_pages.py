@@ -4,7 +4,7 @@ import importlib.util
 import re
 from pathlib import Path
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 
 CLONE = Path(__file__).parents[4]
 PAGE = (CLONE / "docs" / "reference" / "formats.md").read_text(encoding="utf-8")
@@ -38,14 +38,14 @@ def test_the_page_lists_every_cache() -> None:
     table = PAGE.split("\n## Caches\n")[1].split("\n## ")[0]
     folders = set(re.findall(r"^\| `([^/`]+)/", table, re.MULTILINE))
     parts = {
-        shared_cache.CHECKS_CACHE,
-        shared_cache.GOLDENS_CACHE,
-        shared_cache.EXECUTED_LINES_CACHE,
-        shared_cache.REPORTS_CACHE,
-        shared_cache.IMAGE_EFFECTS_CACHE,
-        shared_cache.VERIFIED_RUNS_CACHE,
+        cache_layout_and_pruning.CHECKS_CACHE,
+        cache_layout_and_pruning.GOLDENS_CACHE,
+        cache_layout_and_pruning.EXECUTED_LINES_CACHE,
+        cache_layout_and_pruning.REPORTS_CACHE,
+        cache_layout_and_pruning.IMAGE_EFFECTS_CACHE,
+        cache_layout_and_pruning.VERIFIED_RUNS_CACHE,
     }
-    assert folders == {*parts, shared_cache.TARGET_CACHES}
+    assert folders == {*parts, cache_layout_and_pruning.TARGET_CACHES}
 
 
 def test_the_page_lists_the_schema_of_every_library_file() -> None:

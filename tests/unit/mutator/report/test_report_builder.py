@@ -16,7 +16,7 @@ from mutator.figures.style import with_page_theme
 from mutator.report import report_builder
 from mutator.report.panels import failed_runs_panel
 from mutator.report.report_digests import inputs_digest
-from mutator.store import approvals
+from mutator.store import recorded_approvals
 from mutator.store.run_folder import STOP_AT_HAZARD_NOTE, RunFolder
 from mutator.workspace import Workspace
 from tests.made_up_results import write_results
@@ -102,11 +102,11 @@ def test_the_report_states_its_origin(run: Path) -> None:
 def test_the_report_names_the_reviewers(run: Path) -> None:
     assert "reviewed" not in report_builder.write_report(run, None).markdown.read_text()
     said = {
-        "schema": approvals.APPROVALS_SCHEMA,
+        "schema": recorded_approvals.APPROVALS_SCHEMA,
         "target": "toycar",
         "groups": [{"by": "Jane"}, {"by": "Joe"}],
     }
-    write_json(run / approvals.APPROVALS_FILE, said)
+    write_json(run / recorded_approvals.APPROVALS_FILE, said)
     written = report_builder.ensure_report(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         assert "2 groups approved by Jane (1), Joe (1)" in text

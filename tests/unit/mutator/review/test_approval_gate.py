@@ -12,8 +12,8 @@ from mutator.execution.campaign_running import run_campaign
 from mutator.review import approval_gate
 from mutator.review.decisions import ReviewAction, ReviewActionKind, load_review, record_actions
 from mutator.review.mutant_groups import groups_of_plan
-from mutator.store.approvals import approval_summary, write_approvals
 from mutator.store.plan_choices import Choices
+from mutator.store.recorded_approvals import approval_summary, write_approvals
 from mutator.workspace import Workspace
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
@@ -88,7 +88,7 @@ def test_images_are_cached_until_an_effect_changes(lit: Lit, runs: list[str]) ->
     runs.clear()
     assert drawn(workspace, group) == first
     assert not runs
-    [entry] = shared_cache.cached_image_effects_folder().iterdir()
+    [entry] = cache_layout_and_pruning.cached_image_effects_folder().iterdir()
     entry.write_bytes(entry.read_bytes().replace(b"least", b"lost!"))
     assert drawn(workspace, group) == first
     lens = workspace.library.parent / "tree/toycar/lens.py"

@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 import pytest
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator.errors import MutatorError
 from mutator.report import report_builder
 from mutator.report.report_digests import inputs_digest, write_report_files
@@ -217,14 +217,14 @@ def test_a_report_is_built_once(client: Client, linked: Path, monkeypatch: pytes
     monkeypatch.setattr(client.site.run_pages, "_reports", ReportCache())
     first = client.get("/runs/linked/report/index.html").data
     assert not (linked / "report").exists()
-    before = [path.name for path in shared_cache.cached_reports_folder().iterdir()]
+    before = [path.name for path in cache_layout_and_pruning.cached_reports_folder().iterdir()]
     with monkeypatch.context() as patch:
         patch.setattr(report_builder, "build_report", None)
         assert client.get("/runs/linked/report/index.html").data == first
         monkeypatch.setattr(client.site.run_pages, "_reports", ReportCache())
         assert client.get("/runs/linked/report/index.html").data == first
     for name in before:
-        page = shared_cache.cached_reports_folder() / name / "index.html"
+        page = cache_layout_and_pruning.cached_reports_folder() / name / "index.html"
         page.write_bytes(page.read_bytes().replace(b"</main>", b"</main><b>forged</b>"))
     monkeypatch.setattr(client.site.run_pages, "_reports", ReportCache())
     assert client.get("/runs/linked/report/index.html").data == first

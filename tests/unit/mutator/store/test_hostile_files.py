@@ -18,7 +18,7 @@ from mutator.store import series_format
 from mutator.store.checksummed_blocks import block_bytes, read_blocks
 from mutator.store.checksummed_lines import read_segment, verified_lines
 from mutator.store.file_digests import FileDigest
-from mutator.store.patch_files import COMPLETE_BLOCK, PatchFolder
+from mutator.store.packed_patches import COMPLETE_BLOCK, PatchFolder
 from mutator.store.plan_file import read_plan_lines
 from mutator.store.series_folder import load_index
 from mutator.store.series_script import write_script

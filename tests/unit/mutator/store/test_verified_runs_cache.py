@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.finished_outcome_cache import find_finished_run
 from mutator.store import file_digests, integrity, verified_runs_cache
-from mutator.store.patch_files import PatchFolder
-from mutator.store.patch_files import rewrite_patch_file as rewrite_patches
+from mutator.store.packed_patches import PatchFolder
+from mutator.store.packed_patches import rewrite_patch_file as rewrite_patches
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -114,7 +114,7 @@ def test_space_is_freed_for_the_images_of_the_next_seed(
     made: tuple[Workspace, Path], cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = []
-    monkeypatch.setattr(shared_cache, "prune_target_cache", asked.append)
+    monkeypatch.setattr(cache_layout_and_pruning, "prune_target_cache", asked.append)
     run_campaign(made[0], "small", tmp_path / "run", choices=Choices(limit=4), engine="reference")
     goldens = len(RunFolder.open(tmp_path / "run").golden_runs)
     assert asked == ["toycar"] * (goldens + 2)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator.errors import MutatorError, UnsafePath
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import AnchorKind
@@ -88,7 +88,7 @@ def test_every_run_has_the_same_cache_folder(toy: Workspace) -> None:
     manifest = toy.manifest("toy")
     for independent in (False, True):
         given = manifest.run_arguments(scenario=Path("s"), seed=0, out=Path("o"), independent=independent)
-        assert given[given.index("--cache") + 1] == str(shared_cache.target_cache_folder("toy"))
+        assert given[given.index("--cache") + 1] == str(cache_layout_and_pruning.target_cache_folder("toy"))
 
 
 def test_a_film_adds_arguments(toy: Workspace) -> None:

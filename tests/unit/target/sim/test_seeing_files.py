@@ -16,7 +16,7 @@ from selfdrive.sim.image_library import RENDERED_SPACING
 from selfdrive.sim.remembering_detector import DETECTION_FILES
 from selfdrive.sim.road_renderer import RoadRenderer
 
-from mutator._common import shared_cache
+from mutator._common import cache_layout_and_pruning
 from mutator.engines.engine_jobs import Job
 from mutator.engines.job_tree_pool import JobTreePool
 from mutator.engines.reference_engine import ReferenceEngine
@@ -75,7 +75,7 @@ def drive(tmp_path: Path) -> Drive:
 
 def memory() -> Path:
     """The folder where the harness lets the target store detections."""
-    return shared_cache.target_cache_folder("openpilot") / FILE_NAME
+    return cache_layout_and_pruning.target_cache_folder("openpilot") / FILE_NAME
 
 
 def test_the_manifest_lists_every_file_that_affects_detection() -> None:

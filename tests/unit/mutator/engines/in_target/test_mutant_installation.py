@@ -7,7 +7,7 @@ from functools import lru_cache, wraps  # noqa: F401 - used in LOADED
 
 import pytest
 
-from mutator.engines.code_swap import changed_functions
+from mutator.engines.code_swap_planning import changed_functions
 from mutator.engines.in_target.mutant_installation import SwapRefused, swap_code
 
 LOADED = """

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.store.patch_files import PatchFolder, PatchWriter
+from mutator.store.packed_patches import PatchFolder, PatchWriter
 
 
 @pytest.fixture

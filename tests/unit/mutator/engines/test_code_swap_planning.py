@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from mutator.engines.code_swap import CodeSwap, plan_swap
+from mutator.engines.code_swap_planning import CodeSwap, plan_swap
 from mutator.errors import MutantNotSwappable
 from mutator.mutants.probe import ProbeSource
 from mutator.targets.source_tree import SourceTree

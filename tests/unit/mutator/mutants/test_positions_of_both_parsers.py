@@ -10,7 +10,7 @@ from libcst.metadata import MetadataWrapper, PositionProvider
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.anchors import ParsedFile, parse_file
-from mutator.mutants.node_positions import NodePosition, ast_node_positions, line_after_statements
+from mutator.mutants.positions_of_both_parsers import NodePosition, ast_node_positions, line_after_statements
 
 SOURCE = '''\
 @deco
