@@ -26,8 +26,8 @@ from mutator.model import Record, Status  # noqa: E402
 from mutator.outcomes.trace_loading import trace_digest  # noqa: E402
 from mutator.store import plan_file  # noqa: E402
 from mutator.store.run_folder import RunFolder  # noqa: E402
-from mutator.store.series_folder import SeriesFolder  # noqa: E402
 from mutator.store.series_format import Series  # noqa: E402
+from mutator.store.time_series_folder import TimeSeriesFolder  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 WORTH_IT = 0.02  # of the CPU
@@ -58,7 +58,7 @@ def last_difference(golden: Series, faulty: Series) -> float:
 
 def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
     """Return an upper bound on the saving, and the CPU time (s) of all runs."""
-    manifest, series = workspace.manifest(folder.head.target), SeriesFolder(folder.path)
+    manifest, series = workspace.manifest(folder.head.target), TimeSeriesFolder(folder.path)
     timings, records = folder.timings(), folder.records()
     digests: dict[Path, str] = {}
     saved, total = Saved(), 0.0
@@ -75,7 +75,7 @@ def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
     return saved, total
 
 
-def _saved(record: Record, golden: str, series: SeriesFolder) -> tuple[str, float]:
+def _saved(record: Record, golden: str, series: TimeSeriesFolder) -> tuple[str, float]:
     found, active = series.load_series(record.experiment_id, record), record.activation
     if found is None or active is None:
         return "without a series", 0.0

@@ -42,10 +42,10 @@ from mutator.store.preflight_results import CHECKS_FILE as CHECKS
 from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.records import PROOF_FOLDER, RECORDS_SCHEMA, record_as_json
 from mutator.store.run_folder import GoldenRun, RunFolder
-from mutator.store.series_folder import INDEX_NAME, SeriesIndex, save_index
 from mutator.store.series_format import encode_series
 from mutator.store.series_script import script_name_of, write_script
 from mutator.store.session_environments import SessionEnvironment
+from mutator.store.time_series_folder import INDEX_NAME, SeriesIndex, save_index
 from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.workspace import Workspace
 

@@ -24,8 +24,8 @@ from mutator.execution.campaign_running import run_campaign  # noqa: E402
 from mutator.store.packed_patches import PatchWriter  # noqa: E402
 from mutator.store.plan_choices import Choices  # noqa: E402
 from mutator.store.run_folder import RunFolder  # noqa: E402
-from mutator.store.series_folder import SeriesFolder  # noqa: E402
 from mutator.store.series_packing import SeriesWriter  # noqa: E402
+from mutator.store.time_series_folder import TimeSeriesFolder  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 PAPER, GOAL_BYTES, GOAL_SHARE, GOAL_MB = 11_280, 6_000, 0.01, 150
@@ -58,7 +58,7 @@ def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
     summary = run_campaign(workspace, campaign, out, choices=Choices(limit=count))
     folder = RunFolder.open(out)
     cpu = [float(line["cpu_s"]) for line in folder.timings().values()]
-    index = SeriesFolder(out).index
+    index = TimeSeriesFolder(out).index
     assert index is not None
     sizes = {name: size_of(out / name) for name in GROWING}
     results = sum(size_of(path) for path in out.glob("*.parquet")) + size_of(out / "results.csv")

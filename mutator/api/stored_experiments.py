@@ -21,8 +21,8 @@ from mutator.results.plan_columns import PlanColumn
 from mutator.results.table_columns import ResultColumn, result_columns_of
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, rerun_command
 from mutator.store.session_environments import SessionEnvironment
+from mutator.store.time_series_folder import TimeSeriesFolder, rerun_command
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import ChannelFacts
@@ -141,7 +141,7 @@ class StoredExperiment(ExperimentResult):
     @property
     def has_series(self) -> bool:
         """Whether the run folder has an undamaged series of the experiment."""
-        return self.record is not None and SeriesFolder(self.run.path).is_readable(self.id, self.record)
+        return self.record is not None and TimeSeriesFolder(self.run.path).is_readable(self.id, self.record)
 
     @property
     def is_drawn(self) -> bool:
@@ -183,7 +183,7 @@ class StoredExperiment(ExperimentResult):
     def _load_traces(self) -> tuple[Trace, Trace]:
         if self.record is None:
             raise self.not_run_error()
-        series = SeriesFolder(self.run.path).load_series(self.id, self.record)
+        series = TimeSeriesFolder(self.run.path).load_series(self.id, self.record)
         if series is None:
             remedy = f"rerun the experiment: {rerun_command(self.run.path, self.id)}"
             raise MutatorError(f"no series of {self.id}", where=self.run.path, remedy=remedy)

@@ -11,18 +11,18 @@ from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.store import plan_file
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import (
+from mutator.store.series_format import Series, decode_series
+from mutator.store.series_packing import list_unpacked_worker_files
+from mutator.store.series_record_check import check_deviations
+from mutator.store.time_series_folder import (
     INDEX_NAME,
-    SeriesFolder,
     SeriesIndex,
+    TimeSeriesFolder,
     check_same_run,
     load_rerun_series,
     repair_remedy,
     rerun_command,
 )
-from mutator.store.series_format import Series, decode_series
-from mutator.store.series_packing import list_unpacked_worker_files
-from mutator.store.series_record_check import check_deviations
 from mutator.targets.manifest import TargetManifest
 
 _RELATIVE_ROUNDING = 1e-5  # relative; values have six digits
@@ -34,14 +34,14 @@ def audit_series(
     """Return the number of series files, and their problems: damaged files, missing files that others need,
     series of other runs than the records, and, with a `manifest`, series that differ from the golden runs.
     """
-    series_folder = SeriesFolder(folder.path)
+    series_folder = TimeSeriesFolder(folder.path)
     return sum(path.is_file() for path in series_folder.path.rglob("*")), _series_problems(
         folder, series_folder, manifest
     )
 
 
 def _series_problems(
-    folder: RunFolder, series_folder: SeriesFolder, manifest: TargetManifest | None
+    folder: RunFolder, series_folder: TimeSeriesFolder, manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
     run = folder.path
     yield from _packed_series_problems(folder, series_folder, manifest)
@@ -57,7 +57,7 @@ def _series_problems(
 
 
 def _kept_series_problems(
-    folder: RunFolder, series_folder: SeriesFolder, manifest: TargetManifest | None
+    folder: RunFolder, series_folder: TimeSeriesFolder, manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
     names, records = series_folder.rerun_ids(), folder.records()
     planned = (
@@ -85,7 +85,7 @@ def _kept_series_problems(
 
 
 def _packed_series_problems(
-    folder: RunFolder, series_folder: SeriesFolder, manifest: TargetManifest | None
+    folder: RunFolder, series_folder: TimeSeriesFolder, manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
     run, path = folder.path, series_folder.path / f"{INDEX_NAME}.js"
     try:
@@ -123,7 +123,7 @@ def _packed_series_problems(
 
 
 def _other_run_problems(
-    folder: RunFolder, series_folder: SeriesFolder, index: SeriesIndex, damaged: Set[str]
+    folder: RunFolder, series_folder: TimeSeriesFolder, index: SeriesIndex, damaged: Set[str]
 ) -> Iterator[MutatorError]:
     """Series that do not belong to the records. Those in `damaged` chunks are reported with their chunk."""
     records = folder.records()
@@ -147,7 +147,7 @@ def _other_run_problems(
 
 
 def _other_golden_problems(
-    folder: RunFolder, series_folder: SeriesFolder, index: SeriesIndex, manifest: TargetManifest | None
+    folder: RunFolder, series_folder: TimeSeriesFolder, index: SeriesIndex, manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
     for key, number in index.entry_number_by_golden.items() if manifest else ():
         assert manifest is not None

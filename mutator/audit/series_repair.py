@@ -13,9 +13,9 @@ from mutator.errors import MutatorError
 from mutator.outcomes.hazards_and_metrics import load_manifest_channels
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import INDEX_NAME, SeriesFolder, SeriesIndex, rerun_command
 from mutator.store.series_packing import WORKER_FILE_SUFFIX, repack_series
 from mutator.store.series_script import script_bytes, script_name_of
+from mutator.store.time_series_folder import INDEX_NAME, SeriesIndex, TimeSeriesFolder, rerun_command
 from mutator.workspace import Workspace
 
 
@@ -26,7 +26,7 @@ def repair_series(
 
     `set_aside` copies a file of the run folder. Golden runs can be read only with a `workspace`.
     """
-    run, series_folder = folder.path, SeriesFolder(folder.path)
+    run, series_folder = folder.path, TimeSeriesFolder(folder.path)
     paths = {Path(problem.where) for problem in audit_series(folder)[1] if problem.where}
     index = None
     if series_folder.path / f"{INDEX_NAME}.js" in paths:  # the content of the chunks is unknown

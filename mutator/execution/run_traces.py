@@ -12,7 +12,7 @@ from mutator.outcomes.series_sampling import traces_of_series, write_sampled_ser
 from mutator.outcomes.trace_loading import Trace, load_trace, trace_digest
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, rerun_command
+from mutator.store.time_series_folder import TimeSeriesFolder, rerun_command
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -65,7 +65,7 @@ class RunTraces:
         Without a series, the experiment is rerun if `rerun_if_missing` is set. Raises MutatorError if there
         is no series, if it is damaged, or if the rerun fails.
         """
-        series = SeriesFolder(self.folder.path)
+        series = TimeSeriesFolder(self.folder.path)
         record = self.record(experiment_id)
         series_pair = series.load_series(experiment_id, record)
         if series_pair is None and rerun_if_missing:

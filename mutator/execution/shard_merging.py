@@ -30,9 +30,9 @@ from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.store.run_writer import copy_line_files
-from mutator.store.series_folder import SERIES_FOLDER as SERIES
 from mutator.store.series_packing import pack_series
 from mutator.store.session_environments import SessionEnvironment, version_differences
+from mutator.store.time_series_folder import SERIES_FOLDER as SERIES
 
 _UNFINISHED_MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
 _SHARDS_REMEDY = "give the folder of each shard of one plan exactly once"

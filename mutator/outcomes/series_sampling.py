@@ -15,8 +15,8 @@ import numpy as np
 from mutator.model import Record
 from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.trace_loading import Trace, values_on_steps
-from mutator.store.series_folder import SeriesFolder, run_facts_for_series, write_rerun_series
 from mutator.store.series_format import ExtraPoints, Series, encode_series
+from mutator.store.time_series_folder import TimeSeriesFolder, run_facts_for_series, write_rerun_series
 from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
 
@@ -263,5 +263,5 @@ def write_sampled_series(
     sampler = SeriesSampler(manifest, golden)
     data = encode_series(sampler.faulty_series(faulty, record), sampler.golden)
     write_rerun_series(
-        SeriesFolder(run).rerun_series_path(record.experiment_id), sampler.encoded_golden, data
+        TimeSeriesFolder(run).rerun_series_path(record.experiment_id), sampler.encoded_golden, data
     )

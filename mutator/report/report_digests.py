@@ -19,7 +19,7 @@ from mutator.errors import MutatorError
 from mutator.report.page_series import series_facts_for_page
 from mutator.report.panel import REPORT_FOLDER
 from mutator.store import file_digests
-from mutator.store import series_folder as series_store
+from mutator.store import time_series_folder as series_store
 from mutator.store.allowed_contents import (
     DAMAGED_FOLDER,
     SCRATCH_FOLDER,

@@ -12,8 +12,14 @@ from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
 from mutator.store.checksummed_blocks import BlockWriter, read_blocks
-from mutator.store.series_folder import INDEX_NAME, SERIES_FOLDER, SeriesFolder, SeriesIndex, save_index
 from mutator.store.series_script import script_name_of, size_in_script, write_script
+from mutator.store.time_series_folder import (
+    INDEX_NAME,
+    SERIES_FOLDER,
+    SeriesIndex,
+    TimeSeriesFolder,
+    save_index,
+)
 
 WORKER_FILE_SUFFIX = ".blocks"  # suffix of the workers' files in series/
 GOLDEN_BLOCK, EXPERIMENT_BLOCK = 0, 1  # kinds of blocks
@@ -112,7 +118,7 @@ def pack_series(
         return
     to_pack = _SeriesToPack({}, {})
     for folder in (run, *other_runs):
-        to_pack.add(_packed_series(SeriesFolder(folder)))
+        to_pack.add(_packed_series(TimeSeriesFolder(folder)))
         for path in list_unpacked_worker_files(folder):
             to_pack.add(_worker_series(path))
     with raising_disk_full(run):
@@ -126,7 +132,7 @@ def pack_series(
 def repack_series(run: Path, index: SeriesIndex) -> None:
     """Repack the content of `index`, without damaged and missing parts. The workers' files are kept."""
     ranks = {name: place for place, name in enumerate(index.entry_number_by_experiment)}
-    to_pack = _packed_series(SeriesFolder(run))
+    to_pack = _packed_series(TimeSeriesFolder(run))
     ended = len(ranks) + index.left_out_count
     _remove_unindexed_files(
         run, _write_packed_files(run / SERIES_FOLDER, index.plan, to_pack, ranks, index.budget_mb, ended)
@@ -140,7 +146,7 @@ def _remove_unindexed_files(run: Path, index: SeriesIndex) -> None:
             path.unlink()
 
 
-def _packed_series(folder: SeriesFolder) -> _SeriesToPack:
+def _packed_series(folder: TimeSeriesFolder) -> _SeriesToPack:
     to_pack = _SeriesToPack({}, {})
     try:
         index = folder.index

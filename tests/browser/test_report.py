@@ -13,7 +13,7 @@ from mutator.report.panels import figures_panel
 from mutator.store import plan_file
 from mutator.store.packed_patches import PatchFolder
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder
+from mutator.store.time_series_folder import TimeSeriesFolder
 
 from .conftest import record
 
@@ -178,7 +178,7 @@ def test_the_first_tab_stop_skips_to_the_list(page: "Page") -> None:
 
 
 def test_series_are_loaded_from_their_files(page: "Page", run: Path, rows: list[dict[str, str]]) -> None:
-    series = SeriesFolder(run)
+    series = TimeSeriesFolder(run)
     assert series.index is not None
     names = {*series.index.entry_number_by_experiment, *series.rerun_ids()}
     planned = {experiment.id: experiment for experiment in plan_file.load_experiments(run)}
@@ -211,7 +211,7 @@ def test_series_are_loaded_from_their_files(page: "Page", run: Path, rows: list[
 
 
 def test_a_damaged_series_is_shown_with_the_command_that_restores_it(page: "Page", run: Path) -> None:
-    name = SeriesFolder(run).rerun_ids()[0]
+    name = TimeSeriesFolder(run).rerun_ids()[0]
     page.page.evaluate(
         "() => { SeriesFile.load = () => Promise.reject(new Error('series/x.js is damaged')); }"
     )

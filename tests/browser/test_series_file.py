@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, write_rerun_series
 from mutator.store.series_format import ExtraPoints, Series, encode_series
+from mutator.store.time_series_folder import TimeSeriesFolder, write_rerun_series
 from mutator.web import asset_text
 
 TRACE = "0123456789abcdef"
@@ -32,7 +32,7 @@ LOADED = """async ([id, known]) => {
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
     shutil.copytree(FIXTURE / "small" / "series", tmp_path / "series")
-    facts = {"series": {"packed": True, "kept": SeriesFolder(tmp_path).rerun_ids()}}
+    facts = {"series": {"packed": True, "kept": TimeSeriesFolder(tmp_path).rerun_ids()}}
     (tmp_path / "report").mkdir()
     told = f'<script type="application/json" id="facts">{json.dumps(facts)}</script>'
     page = (
@@ -55,7 +55,9 @@ def load(
 
 def as_read(run: Path, name: str) -> list[dict[str, Any]]:
     """Return the channels that Python reads, as bits, including the points between the values."""
-    read = SeriesFolder(run).load_series(name, RunFolder.open_unverified(FIXTURE / "small").records()[name])
+    read = TimeSeriesFolder(run).load_series(
+        name, RunFolder.open_unverified(FIXTURE / "small").records()[name]
+    )
     assert read is not None
     golden, faulty = read
     found = []
@@ -107,9 +109,9 @@ def test_the_page_reads_the_points_between_the_values(browser: Any, run: Path) -
         "end": 0.4,
     }
     faulty = Series(t=t, channel_values=longer, sample_every=[1, 2], facts=happened, extra_points=points)
-    name = SeriesFolder(run).rerun_ids()[0]
+    name = TimeSeriesFolder(run).rerun_ids()[0]
     write_rerun_series(
-        SeriesFolder(run).rerun_series_path(name), encode_series(golden), encode_series(faulty, golden)
+        TimeSeriesFolder(run).rerun_series_path(name), encode_series(golden), encode_series(faulty, golden)
     )
     (run / "series" / "index.js").unlink()
     page = run / "report" / "index.html"
@@ -134,11 +136,11 @@ def test_the_series_of_another_run_is_not_shown(browser: Any, run: Path) -> None
 def test_curves_that_deviate_otherwise_than_the_record_says_are_not_shown(browser: Any, run: Path) -> None:
     """Such as those of the golden run, with everything else as in the record."""
     for name, record in RunFolder.open_unverified(FIXTURE / "small").records().items():
-        found = SeriesFolder(run).load_series(name, record)
+        found = TimeSeriesFolder(run).load_series(name, record)
         if found and any(by for _, by in record.max_dev):
             golden, faulty = found
             write_rerun_series(
-                SeriesFolder(run).rerun_series_path(name),
+                TimeSeriesFolder(run).rerun_series_path(name),
                 encode_series(golden),
                 encode_series(replace(golden, facts=faulty.facts), golden),
             )

@@ -19,7 +19,7 @@ from mutator.cli import campaigns
 from mutator.errors import MutatorError
 from mutator.store import recorded_approvals
 from mutator.store.allowed_contents import ALLOWED_FILE_GLOBS
-from mutator.store.series_folder import SeriesFolder, load_rerun_series
+from mutator.store.time_series_folder import TimeSeriesFolder, load_rerun_series
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 Reseal = Callable[..., None]  # recomputes every checksum and digest of a run folder
@@ -223,7 +223,7 @@ def test_show_prints_diff_times_verdict_and_plot(cli: Cli, run: Path) -> None:
         assert wanted in answer.out
     [plot] = [line.removeprefix("plot: ") for line in answer.out.splitlines() if line.startswith("plot: ")]
     assert ET.parse(plot).getroot().tag.endswith("svg")
-    assert load_rerun_series(SeriesFolder(run).rerun_series_path(name))[1].facts["hazards"]
+    assert load_rerun_series(TimeSeriesFolder(run).rerun_series_path(name))[1].facts["hazards"]
     page = Path(cli("report", run, "--json").json["page"]).read_text()
     assert f'"series": {{"packed": true, "kept": ["{name}"]' in page
 

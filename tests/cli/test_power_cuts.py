@@ -17,8 +17,8 @@ from mutator.store import checksummed_blocks, checksummed_lines
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.checksummed_lines import read_segment
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder
 from mutator.store.series_packing import list_unpacked_worker_files, pack_series
+from mutator.store.time_series_folder import TimeSeriesFolder
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 WORDS = ("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "reference")
@@ -131,7 +131,7 @@ def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
         run = Path(shutil.copytree(cut / "series", Path("cut") / "series")).parent
         (run / "series" / path.name).write_bytes(data[:length])
         pack_series(run, "p", places, 500)
-        there = SeriesFolder(run)
+        there = TimeSeriesFolder(run)
         assert [name for name in names if there.is_readable(name, records[name])] == names[:-1]
         assert there.load_series(names[-1], records[names[-1]]) is None
         shutil.rmtree(run)
@@ -141,8 +141,8 @@ def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
     assert [
         one
         for one in worst_first_rank_by_ok_experiment(Results(cut).frame())
-        if not SeriesFolder(cut).has_series(one)
+        if not TimeSeriesFolder(cut).has_series(one)
     ] == names[-1:]
     assert cli("verify", "run").code == 0
     assert cli("rerun", names[-1], "--trace", "--run", "run").code == 0
-    assert SeriesFolder(cut).is_readable(names[-1], records[names[-1]])
+    assert TimeSeriesFolder(cut).is_readable(names[-1], records[names[-1]])

@@ -13,9 +13,9 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, SeriesIndex, write_rerun_series
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series
+from mutator.store.time_series_folder import SeriesIndex, TimeSeriesFolder, write_rerun_series
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
@@ -45,7 +45,7 @@ def sealed(cli: Cli, root: Path, shared: list[Any]) -> str:
 
 def series_of(name: str) -> object:
     run = Path("run")
-    return SeriesFolder(run).load_series(name, RunFolder.open_unverified(run).records()[name])
+    return TimeSeriesFolder(run).load_series(name, RunFolder.open_unverified(run).records()[name])
 
 
 def test_an_audit_is_printed_on_one_page(cli: Cli, sealed: str) -> None:
@@ -109,7 +109,7 @@ def flip(path: Path) -> None:
 
 
 def packed() -> SeriesIndex:
-    index = SeriesFolder(Path("run")).index
+    index = TimeSeriesFolder(Path("run")).index
     assert index is not None
     return index
 
@@ -164,7 +164,7 @@ def test_rerun_restores_damaged_series(
 def test_the_audit_names_the_command_that_restores_a_series(cli: Cli, sealed: str) -> None:
     name = next(iter(packed().entry_number_by_experiment))
     assert cli("show", name, "--run", "run", "--plot").code == 0
-    kept = SeriesFolder(Path("run")).rerun_series_path(name)
+    kept = TimeSeriesFolder(Path("run")).rerun_series_path(name)
     assert cli("rerun", name, "--trace", "--run", "run").code == 0
     data = kept.read_bytes()
     flip(kept)
@@ -180,7 +180,7 @@ def test_the_series_of_another_run_is_not_used(cli: Cli, sealed: str) -> None:
     """The audit names it, and commands refuse it."""
     one, other, *_ = RunFolder.open(Path("run")).records()
     assert cli("rerun", one, "--trace", "--run", "run").code == 0
-    kept = SeriesFolder(Path("run")).rerun_series_path(one)
+    kept = TimeSeriesFolder(Path("run")).rerun_series_path(one)
     script = kept.read_bytes().replace(one.encode(), other.encode(), 1)
     kept.with_name(f"{other}.js").write_bytes(script)
     with pytest.raises(MutatorError, match="the series of another run"):
@@ -193,7 +193,7 @@ def test_the_series_of_another_run_is_not_used(cli: Cli, sealed: str) -> None:
 
 def curves_of_golden(name: str) -> tuple[bytes, bytes]:
     """A forged series: everything as in the record, but the values of the golden run."""
-    found = SeriesFolder(Path("run")).load_series(
+    found = TimeSeriesFolder(Path("run")).load_series(
         name, RunFolder.open_unverified(Path("run")).records()[name]
     )
     assert found is not None
@@ -208,7 +208,7 @@ def deviating() -> str:
 
 def pack_with(name: str, forged: bytes) -> None:
     """Pack the series again, under new names and with an index, with another series of one experiment."""
-    there, index = SeriesFolder(Path("run")), packed()
+    there, index = TimeSeriesFolder(Path("run")), packed()
     writer = SeriesWriter(Path("run"), "forged")
     for one in index.entry_number_by_experiment:
         key = index.golden_by_experiment[one]
@@ -235,7 +235,7 @@ def pack_with(name: str, forged: bytes) -> None:
 
 def test_curves_of_the_golden_run_are_not_shown_as_those_of_a_fault(cli: Cli, sealed: str) -> None:
     """Whether they are in a rerun's file or in a chunk with a new name and index."""
-    name, there = deviating(), SeriesFolder(Path("run"))
+    name, there = deviating(), TimeSeriesFolder(Path("run"))
     golden, forged = curves_of_golden(name)
     write_rerun_series(there.rerun_series_path(name), golden, forged)
     found = cli("verify", "run")
@@ -261,7 +261,7 @@ def test_a_packed_series_that_is_none_is_reported(cli: Cli, sealed: str) -> None
 
 
 def test_a_rerun_s_golden_curves_must_be_those_of_the_golden_run(cli: Cli, sealed: str) -> None:
-    name, there = deviating(), SeriesFolder(Path("run"))
+    name, there = deviating(), TimeSeriesFolder(Path("run"))
     found = there.load_series(name, RunFolder.open_unverified(Path("run")).records()[name])
     assert found is not None
     golden, faulty = (

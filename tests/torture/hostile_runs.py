@@ -14,7 +14,7 @@ from mutator._common.files import json_bytes
 from mutator._common.hashing import digest
 from mutator.store import file_digests
 from mutator.store.file_digests import FileDigest
-from mutator.store.series_folder import SeriesIndex, save_index
+from mutator.store.time_series_folder import SeriesIndex, save_index
 from tests.made_up_results import edit_results
 
 UP = "../../home/mine"  # from a run folder to the user's files

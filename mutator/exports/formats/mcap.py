@@ -29,7 +29,7 @@ from mutator.outcomes.trace_loading import Trace
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, rerun_command
+from mutator.store.time_series_folder import TimeSeriesFolder, rerun_command
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -85,7 +85,7 @@ class ExperimentFileBuilder:
 
     def __init__(self, folder: RunFolder, workspace: Workspace | None) -> None:
         self._folder = folder
-        self._series = SeriesFolder(folder.path)
+        self._series = TimeSeriesFolder(folder.path)
         self._traces = None if workspace is None else RunTraces(workspace, folder)
         self._records = folder.records()
 

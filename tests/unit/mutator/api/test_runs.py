@@ -26,7 +26,7 @@ from mutator.store.checksummed_lines import LineWriter
 from mutator.store.packed_patches import PatchWriter
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder
+from mutator.store.time_series_folder import TimeSeriesFolder
 from mutator.workspace import Workspace
 
 LANE = 'fault_type == "lane" and method == "random"'
@@ -174,7 +174,7 @@ def test_only_a_rerun_that_equals_the_record_is_kept(driven: Run) -> None:
     assert len(trial.traces().faulty) == 120
     assert not (driven.path / "traces").exists()
     assert not experiment.is_drawn
-    kept = SeriesFolder(driven.path).rerun_series_path(experiment.id)
+    kept = TimeSeriesFolder(driven.path).rerun_series_path(experiment.id)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             run_experiments,

@@ -16,7 +16,7 @@ from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.packed_patches import PatchFolder
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesIndex, save_index
+from mutator.store.time_series_folder import SeriesIndex, save_index
 from mutator.workspace import Workspace
 
 

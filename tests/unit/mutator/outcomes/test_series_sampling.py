@@ -14,8 +14,8 @@ from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.golden_comparison import compare_traces
 from mutator.outcomes.series_sampling import SeriesSampler, write_sampled_series
 from mutator.outcomes.trace_loading import Trace
-from mutator.store.series_folder import SeriesFolder, write_rerun_series
 from mutator.store.series_format import Series, decode_series, encode_series
+from mutator.store.time_series_folder import TimeSeriesFolder, write_rerun_series
 from mutator.targets.channels import Role
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -179,7 +179,7 @@ def test_the_curves_of_every_run_match_its_record(
 ) -> None:
     one = recorded(manifest, *PAIRS[name], record())
     write_sampled_series(tmp_path, manifest, *PAIRS[name], one)
-    assert SeriesFolder(tmp_path).load_series(one.experiment_id, one) is not None
+    assert TimeSeriesFolder(tmp_path).load_series(one.experiment_id, one) is not None
 
 
 @pytest.mark.parametrize("forged", ["golden", "larger", "later", "renamed", "nothing"])
@@ -202,14 +202,14 @@ def test_curves_that_deviate_otherwise_than_the_record_says_are_refused(
     }
     forgery = curves.get(forged, faulty)
     reference = replace(golden, facts=about.get(forged, golden.facts))
-    path = SeriesFolder(tmp_path).rerun_series_path(one.experiment_id)
+    path = TimeSeriesFolder(tmp_path).rerun_series_path(one.experiment_id)
     write_rerun_series(
         path,
         encode_series(reference),
         encode_series(forgery, golden if forged != "later" else replace(golden, t=golden.t[:0])),
     )
     with pytest.raises(MutatorError):
-        SeriesFolder(tmp_path).load_series(one.experiment_id, one)
+        TimeSeriesFolder(tmp_path).load_series(one.experiment_id, one)
 
 
 def test_a_series_is_read_back_from_its_file(
@@ -217,11 +217,11 @@ def test_a_series_is_read_back_from_its_file(
 ) -> None:
     one = recorded(manifest, trace(), trace(speed=T), record(alerts=(("brake_hard", 2.5),)))
     write_sampled_series(tmp_path, manifest, trace(), trace(speed=T), one)
-    path = SeriesFolder(tmp_path).rerun_series_path(one.experiment_id)
+    path = TimeSeriesFolder(tmp_path).rerun_series_path(one.experiment_id)
     before = path.read_bytes()
     write_sampled_series(tmp_path, manifest, trace(), trace(speed=T), one)
     assert path.read_bytes() == before
-    found = SeriesFolder(tmp_path).load_series(one.experiment_id, one)
+    found = TimeSeriesFolder(tmp_path).load_series(one.experiment_id, one)
     assert found is not None
     assert (found[0].channel_values[SPEED] == 0).all()
     assert found[1].facts["alerts"] == [["brake_hard", 2.5]]

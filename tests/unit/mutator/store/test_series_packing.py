@@ -9,9 +9,9 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import ObservedActivation, Outcome, Record, Status
-from mutator.store.series_folder import SeriesFolder, run_facts_for_series, write_rerun_series
 from mutator.store.series_format import Series, encode_series
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, list_unpacked_worker_files, pack_series
+from mutator.store.time_series_folder import TimeSeriesFolder, run_facts_for_series, write_rerun_series
 
 RECORD = Record(
     experiment_id="e" * 16,
@@ -72,7 +72,7 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
-    folder = SeriesFolder(packed)
+    folder = TimeSeriesFolder(packed)
     index = folder.index
     assert index is not None
     assert [*index.entry_number_by_experiment] == IDS[::-1]
@@ -107,7 +107,7 @@ def test_the_budget_keeps_the_best_series_however_often_they_are_packed(tmp_path
         append(runs[1], f"{session}-main", part)
         pack_series(runs[1], "p", WORTH, 1)
     assert sum(map(len, files(runs[0]).values())) < 1_010_000
-    index = SeriesFolder(runs[0]).index
+    index = TimeSeriesFolder(runs[0]).index
     assert index is not None
     assert [*index.entry_number_by_experiment] == IDS[::-1][: len(index.entry_number_by_experiment)]
     assert index.left_out_count == len(IDS) - len(index.entry_number_by_experiment) > 0
@@ -130,7 +130,7 @@ def test_equal_golden_runs_stay_separate(tmp_path: Path) -> None:
         pack_series(tmp_path, "p", WORTH, 500)
         append(tmp_path, worker, names)
     pack_series(tmp_path, "p", WORTH, 500)
-    index = SeriesFolder(tmp_path).index
+    index = TimeSeriesFolder(tmp_path).index
     assert index is not None
     assert [*index.entry_number_by_experiment] == IDS[3::-1]
     assert {*index.golden_by_experiment.values()} == {"A", "B+alone"}
@@ -141,7 +141,7 @@ def test_a_truncated_segment_loses_only_its_last_series(tmp_path: Path) -> None:
     [segment] = list_unpacked_worker_files(tmp_path)
     segment.write_bytes(segment.read_bytes()[:-100])
     pack_series(tmp_path, "p", WORTH, 500)
-    index = SeriesFolder(tmp_path).index
+    index = TimeSeriesFolder(tmp_path).index
     assert index is not None
     assert [*index.entry_number_by_experiment] == IDS[1::-1]
 
@@ -149,20 +149,22 @@ def test_a_truncated_segment_loses_only_its_last_series(tmp_path: Path) -> None:
 def test_experiments_of_a_damaged_chunk_can_be_rerun(tmp_path: Path) -> None:
     append(tmp_path, "0001-main", IDS[:3])
     pack_series(tmp_path, "p", WORTH, 500)
-    index = SeriesFolder(tmp_path).index
+    index = TimeSeriesFolder(tmp_path).index
     assert index is not None
     chunk = tmp_path / "series" / f"{index.chunk_entry_counts[-1][0]}.js"
     data = chunk.read_bytes()
     chunk.write_bytes(data[:300] + bytes([data[300] ^ 1]) + data[301:])
     with pytest.raises(MutatorError, match="damaged"):
-        SeriesFolder(tmp_path).load_series(IDS[0], RECORD)
+        TimeSeriesFolder(tmp_path).load_series(IDS[0], RECORD)
     (tmp_path / "series" / "index.js").write_bytes(data)
     with pytest.raises(MutatorError, match="damaged"):
-        SeriesFolder(tmp_path).load_series(IDS[0], RECORD)
+        TimeSeriesFolder(tmp_path).load_series(IDS[0], RECORD)
     write_rerun_series(
-        SeriesFolder(tmp_path).rerun_series_path(IDS[0]), MADE[IDS[0]].golden_bytes, MADE[IDS[0]].faulty_bytes
+        TimeSeriesFolder(tmp_path).rerun_series_path(IDS[0]),
+        MADE[IDS[0]].golden_bytes,
+        MADE[IDS[0]].faulty_bytes,
     )
-    found = SeriesFolder(tmp_path).load_series(IDS[0], RECORD)
+    found = TimeSeriesFolder(tmp_path).load_series(IDS[0], RECORD)
     assert found is not None
     assert found[1].facts == {"n": 0, **run_facts_for_series(RECORD)}
 
@@ -171,4 +173,4 @@ def test_the_series_of_another_run_is_refused(packed: Path) -> None:
     """A series names the trace and the events of its run."""
     for other in (replace(RECORD, trace_digest="0" * 64), replace(RECORD, hazards=(("H1", 2.5),))):
         with pytest.raises(MutatorError, match="the series of another run"):
-            SeriesFolder(packed).load_series(IDS[0], other)
+            TimeSeriesFolder(packed).load_series(IDS[0], other)

@@ -20,8 +20,8 @@ from mutator.exports.run_export import export
 from mutator.model import Experiment, ObservedActivation, Outcome
 from mutator.store.run_deletion import list_deletable_files
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, run_facts_for_series, write_rerun_series
 from mutator.store.series_format import ExtraPoints, Series, encode_series
+from mutator.store.time_series_folder import TimeSeriesFolder, run_facts_for_series, write_rerun_series
 from mutator.workspace import Workspace
 
 CHANNELS = [
@@ -84,7 +84,7 @@ def run(
         if record.hazards:
             faulty = replace(FAULTY, facts=FAULTY.facts | run_facts_for_series(record))
             write_rerun_series(
-                SeriesFolder(run).rerun_series_path(record.experiment_id),
+                TimeSeriesFolder(run).rerun_series_path(record.experiment_id),
                 golden,
                 encode_series(faulty, GOLDEN),
             )
@@ -141,7 +141,7 @@ def test_negative_times_are_shifted(run: Path, tmp_path: Path) -> None:
     about = FAULTY.facts | run_facts_for_series(RunFolder.open(copy).records()[name])
     faulty = replace(FAULTY, t=FAULTY.t - 0.5, facts=about)
     write_rerun_series(
-        SeriesFolder(copy).rerun_series_path(name), encode_series(early), encode_series(faulty, early)
+        TimeSeriesFolder(copy).rerun_series_path(name), encode_series(early), encode_series(faulty, early)
     )
     only = f'experiment_id == "{name}"'
     [file] = export(copy, Format.MCAP, tmp_path / "out", selection=ExportSelection(only=only)).iterdir()

@@ -1,4 +1,4 @@
-"""Find and read the series of a run folder, `series/1`."""
+"""Find and read the time series (channels over time) of a run folder, `series/1`."""
 
 import gzip
 import json
@@ -95,7 +95,12 @@ class SeriesIndex:
         return places
 
 
-class SeriesFolder:
+class TimeSeriesFolder:
+    """The folder `series/` of a run: recorded channels over time, of golden runs and of faulty ones.
+
+    It holds the packed series, by an index, and those that reruns have written.
+    """
+
     def __init__(self, run: Path) -> None:
         self.path = run / SERIES_FOLDER
         self._chunk: tuple[str, bytes] = ("", b"")
