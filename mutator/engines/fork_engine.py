@@ -13,6 +13,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from secrets import token_bytes
+from typing import NamedTuple
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import (
@@ -50,7 +51,13 @@ from mutator.mutants.probe import ProbeSource, untriggered_report
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 
-_GoldenRunKey = tuple[str, int, tuple[str, ...]]
+
+class _GoldenRunKey(NamedTuple):
+    """What tells golden runs apart; `scenario_path` is absolute, without links."""
+
+    scenario_path: str
+    seed: int
+    scenario_changes: tuple[str, ...]
 
 
 class ForkEngine:
@@ -351,7 +358,7 @@ def _modules_to_load(swap: CodeSwap) -> list[str]:
 
 
 def _golden_run_key(job: Job) -> _GoldenRunKey:
-    return (_resolved_path(job.scenario), job.seed, job.scenario_changes)
+    return _GoldenRunKey(_resolved_path(job.scenario), job.seed, job.scenario_changes)
 
 
 @cache

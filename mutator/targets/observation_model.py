@@ -18,8 +18,7 @@ from mutator.triggers.conditions import RESERVED_NAMES, TIME, canonical_formula
 _MOST_LENGTH = 1000  # characters in an expression, at most
 # an expression runs in the target at every step, and must not change anything there
 _UNCONDITIONALLY_ALLOWED_NODES = (
-    *(ast.BinOp, ast.UnaryOp, ast.Compare, ast.Load, ast.Subscript, ast.Call),
-    *(ast.operator, ast.unaryop, ast.cmpop),
+    *(ast.BinOp, ast.UnaryOp, ast.Compare, ast.Load, ast.operator, ast.unaryop, ast.cmpop),
 )
 _ALLOWED_CALLS = ("abs", "min", "max", "hypot", "float", "len")
 _RESERVED_NAMES = (*RESERVED_NAMES, "math")
