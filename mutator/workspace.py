@@ -39,7 +39,7 @@ from mutator.stpa.hazard_list import HazardList, load_hazard_list
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
-from mutator.targets.severity_model import load_severity_scale
+from mutator.targets.severity_model import load_severity_scale, scale_for_target
 
 _SANDBOX_MODULE = "mutator.engines.sandbox"
 
@@ -117,22 +117,23 @@ class Workspace:
         return manifest
 
     def scale_of(self, manifest: TargetManifest) -> SeverityScale | None:
-        """Return the severity scale for a target's contacts; None without contacts.
+        """Return the severity scale of a target, with the rules for its hazards; None without `severity`.
 
-        MutatorError, at the manifest's line, for an unknown scale.
+        MutatorError, at the manifest's line, for an unknown scale or rule.
         """
-        if manifest.contact is None:
+        if manifest.severity is None:
             return None
         shipped = (shipped_folder() / "fault_library" / "severity").glob("*.yaml")
         path_by_name = {path.stem: path for path in sorted(shipped)} | self._path_by_name("severity")
-        if manifest.contact.scale not in path_by_name:
+        if manifest.severity.scale not in path_by_name:
             raise manifest.source.error(
                 ("severity", "scale"),
-                f"'{manifest.contact.scale}'",
+                f"'{manifest.severity.scale}'",
                 expected=f"one of {', '.join(path_by_name)}, or a file in {self.library / 'severity'}",
                 remedy="correct the name, or write the scale",
             )
-        return load_severity_scale(path_by_name[manifest.contact.scale])
+        scale = load_severity_scale(path_by_name[manifest.severity.scale])
+        return scale_for_target(scale, manifest.severity, manifest.all_metrics, manifest.source)
 
     @property
     def targets(self) -> Mapping[str, Path]:

@@ -13,7 +13,9 @@ from mutator.outcomes.fault_paths import FaultPathFinder
 from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.trace_loading import Trace, values_on_steps
 from mutator.outcomes.verdict_rules import (
+    classified_hazard_of,
     manifestation_to_hazard_time,
+    missing_severity_reason,
     reaction_time,
     severity_class_of,
     time_to_hazard,
@@ -122,9 +124,17 @@ class ExperimentResult(ABC):
 
     @property
     def severity_label(self) -> str:
-        """The severity class of the contact, in words: `S2 severe`; empty without contact."""
+        """The highest severity class of a hazard, in words: `S2 severe`; empty without a class."""
         name = severity_class_of(self.record, self.scale) if self.record else None
         return self.scale.labels[name] if self.scale and name else ""
+
+    @property
+    def severity_basis(self) -> str:
+        """The values from which the severity class follows: `delta-v 9.77 m/s`; empty without a class."""
+        worst = classified_hazard_of(self.record, self.scale) if self.record else None
+        if not self.record or not self.scale or not worst:
+            return ""
+        return self.scale.describe_basis(worst.hazard, dict(self.record.metrics))
 
     @property
     def sentence(self) -> str:
@@ -234,7 +244,7 @@ def verdict_facts(record: Record, scale: SeverityScale | None) -> dict[str, Any]
 
     `largest_difference` covers the whole run, `difference_in_drive` only the time up to the end of the drive.
     """
-    activation = record.activation
+    activation, classified = record.activation, classified_hazard_of(record, scale)
     return {
         "status": record.status.value,
         "outcome": record.outcome.value if record.outcome else None,
@@ -247,7 +257,9 @@ def verdict_facts(record: Record, scale: SeverityScale | None) -> dict[str, Any]
         "hazards_s": dict(record.hazards),
         "alerts_s": dict(record.alerts),
         "reaction_time_s": reaction_time(record.hazards, record.alerts),
-        "severity": severity_class_of(record, scale),
+        "severity": classified.severity if classified else None,
+        "severity_hazard": classified.hazard if classified else None,
+        "no_severity": missing_severity_reason(record, scale),
         "time_to_hazard_s": time_to_hazard(record),
         "manifest_to_hazard_s": manifestation_to_hazard_time(record),
         "largest_difference": dict(record.max_dev),

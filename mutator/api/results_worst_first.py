@@ -6,7 +6,7 @@ from mutator.campaigns.row_filters import compile_filter
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.result_rows import ResultRow, cells_by_row, rows_of
 from mutator.results.table_reader import Results
-from mutator.results.worst_first_ranking import worst_first_ranks
+from mutator.results.worst_first_ranking import worst_first_ranks, worst_of_each_cause
 from mutator.store import plan_file
 from mutator.store.run_head import load_head
 
@@ -37,3 +37,13 @@ def worst_results(
     sentences = ExperimentSentences.of_run(load_head(run))
     worst = rows_of(frame.iloc[row_indices[:limit]], plan_file.load_faults(run), sentences)
     return worst, len(row_indices)
+
+
+def worst_causes(run: Path, limit: int | None = None) -> tuple[list[tuple[ResultRow, int]], int]:
+    """Return the worst result of each cause (fault type and hazard) and how many more it has, worst first, at
+    most `limit`; and the number of all results.
+    """
+    frame = Results.up_to_date(run).frame()
+    worst, more = worst_of_each_cause(frame.iloc[worst_first_ranks(frame).argsort()])
+    rows = rows_of(worst.iloc[:limit], plan_file.load_faults(run), ExperimentSentences.of_run(load_head(run)))
+    return list(zip(rows, more, strict=False)), len(frame)

@@ -19,7 +19,7 @@ MOST_LISTED_FINDINGS = 20  # experiments listed in the terminal; the written com
 GATES_HELP = (
     "new-hazard, new-silent-hazard (no alert comes before it; new, or its alert is lost), other-hazard, "
     "higher-severity, earlier-hazard, lost-alert, worse, new-crash, harness-error, unmatched, severity:CLASS "
-    "(S0 to S3: RUN_B has a contact of that class or worse, RUN_A a milder one or none)"
+    "(S0 to S3: RUN_B has a hazard of that class or worse, RUN_A a milder one or none)"
 )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import mutator
 from mutator._common.message_text import NO_BREAK_SPACE, counted
 from mutator.api.experiment_results import experiment_facts
-from mutator.api.results_worst_first import worst_results
+from mutator.api.results_worst_first import worst_causes, worst_results
 from mutator.api.stored_experiments import StoredExperiment, find_newest_run, open_stored_run
 from mutator.cli.console import STYLE_BY_ENDING, Terminal, short_path
 from mutator.errors import MutatorError
@@ -46,9 +46,13 @@ def print_worst_experiments(
 ) -> None:
     folder = run or find_newest_run(workspace.library.parent)
     stored_run = open_stored_run(folder)
-    worst_rows, count = worst_results(stored_run.path, only, limit)
     length = terminal.id_length(stored_run.folder.experiment_ids())
-    rows = [_row_facts(row, length) for row in worst_rows]
+    if only is None:
+        causes, count = worst_causes(stored_run.path, limit)
+        rows = [_row_facts(row, length) | {"more": more} for row, more in causes]
+    else:
+        worst_rows, count = worst_results(stored_run.path, only, limit)
+        rows = [_row_facts(row, length) for row in worst_rows]
     if terminal.as_json:
         terminal.print_json({"run": str(folder), "count": count, "worst": rows})
         return
@@ -60,7 +64,7 @@ def print_worst_experiments(
     terminal.print_table(
         heads,
         [tuple(row.values()) for row in rows],
-        right_aligned=(3, 5),
+        right_aligned=(3, 5, 9),
         priorities=[i for i, head in enumerate(heads) if head not in ("margin", "first alert")],
     )
     for name, sentence in sentences:
@@ -68,6 +72,11 @@ def print_worst_experiments(
     terminal.print_text(
         f"{len(rows)} of {counted(count, 'experiment')} in {short_path(folder)}, the worst first"
     )
+    if only is None:
+        terminal.print_text(
+            "more: experiments with the same fault type and hazard; to list them: "
+            "mutator show --only 'fault_type == \"...\"'"
+        )
 
 
 def _row_facts(row: "ResultRow", id_length: int | None) -> dict[str, object]:
@@ -156,9 +165,9 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     if manifest and (note := _missing_alert_note(record, manifest, verdict["reaction_time_s"])):
         terminal.print_text(note)
     if verdict["severity"]:
-        terminal.print_text(
-            f"severity: {result.severity_label}, delta-v {verdict['metrics']['delta_v']:.2f} m/s"
-        )
+        terminal.print_text(f"severity: {result.severity_label}, {result.severity_basis}")
+    elif verdict["no_severity"]:
+        terminal.print_text(f"no severity class: {verdict['no_severity']}")
     for name, what in _TIME_LABELS.items():
         if verdict[name] is not None:
             terminal.print_text(f"{what}: {verdict[name]:.2f} s")

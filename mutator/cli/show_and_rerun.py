@@ -36,7 +36,7 @@ SHOW_EXAMPLES = """\b
 Examples:
   mutator show 3f9a                          an experiment of the newest run in runs/
   mutator show 3f9a --run runs/first --plot  plot it, too
-  mutator show                               the ten worst experiments
+  mutator show                               the worst experiments of the ten worst causes
   mutator show --only 'severity >= "S2"' --limit 30
   mutator show 3f9a --patch | (cd target && patch -p1)
   mutator show 3f9a --drive                  rerun it, and keep trace, series and plot
@@ -96,8 +96,9 @@ def show(
     """Show an experiment: diff, times, verdict, path of the fault.
 
     Reads what the run folder stores. With --drive, --plot, --video or --still, also reruns the experiment
-    and writes into the run folder. Without an experiment, lists the worst ones of a run, by severity class,
-    delta-v and margin.
+    and writes into the run folder. Without an experiment, lists the worst of each cause (fault type and
+    hazard): by severity class, silent hazards first, then by margin and time. With --only, lists each
+    experiment.
     """
     from mutator.cli import experiment_view
 

@@ -45,13 +45,12 @@ class ComparedRun:
         return self.folder.path.name
 
     def classified_by(self, scale: SeverityScale | None) -> "ComparedRun":
-        """Return this side with contacts classified by `scale`, or unclassified if it is None."""
+        """Return this side with hazards classified by `scale`, or unclassified if it is None."""
         rows = {}
         for name, row in self.row_by_id.items():
-            severity, label = "", ""
-            if scale and row.severity and row.delta_v is not None:
-                severity = scale.class_of(row.delta_v)
-                label = scale.labels[severity]
+            metrics = self.metrics_by_id.get(name, {})
+            worst = scale.worst_hazard(row.hazards, metrics, row.t_end) if scale else None
+            severity, label = (worst.severity, scale.labels[worst.severity]) if scale and worst else ("", "")
             rows[name] = replace(row, severity=severity, severity_label=label)
         return replace(self, row_by_id=rows)
 

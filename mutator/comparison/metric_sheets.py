@@ -14,7 +14,7 @@ from mutator.statistics.paired_statistics import wilcoxon_p
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
 from mutator.targets.contact_severity import SEVERITY_CLASSES, SeverityScale
 
-NO_CONTACT = "no contact"
+NO_CLASS = "no class"
 
 
 def metrics_sheets(
@@ -74,9 +74,9 @@ def severity_cross_table(
         title="Severity",
         note=f"Rows: severity class in {names.a}. Columns: severity class in {names.b}."
         + describe_classes(scale, classes),
-        heads=(f"{names.a} / {names.b}", *(name or NO_CONTACT for name in classes)),
+        heads=(f"{names.a} / {names.b}", *(name or NO_CLASS for name in classes)),
         lines=tuple(
-            (severity_class or NO_CONTACT, *(counts[severity_class, other] for other in classes))
+            (severity_class or NO_CLASS, *(counts[severity_class, other] for other in classes))
             for severity_class in classes
         )
         if any(classes)

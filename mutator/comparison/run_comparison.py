@@ -49,7 +49,7 @@ class Gate(StrEnum):
     OTHER_HAZARD = ResultChangeKind.OTHER_HAZARD.value
     HIGHER_SEVERITY = (
         ResultChangeKind.HIGHER_SEVERITY.value
-    )  #: a contact of a higher class, or a contact although the first run has none
+    )  #: a hazard of a higher class, or one with a class although the first run has none
     EARLIER_HAZARD = ResultChangeKind.EARLIER_HAZARD.value  #: less time from activation to the first hazard
     #: no alert, although the first run has one; a hazard of the first run, if any, is not gone
     LOST_ALERT = ResultChangeKind.LOST_ALERT.value
@@ -61,10 +61,10 @@ class Gate(StrEnum):
         ResultChangeKind.HARNESS_ERROR.value
     )  #: the second run has no result, although the first has one
     UNMATCHED = "unmatched"  #: an experiment that only one of the runs has
-    SEVERITY_S0 = "severity:S0"  #: a contact of class S0 or worse; in the first run a milder one or none
-    SEVERITY_S1 = "severity:S1"  #: a contact of class S1 or worse; in the first run a milder one or none
-    SEVERITY_S2 = "severity:S2"  #: a contact of class S2 or worse; in the first run a milder one or none
-    SEVERITY_S3 = "severity:S3"  #: a contact of class S3; in the first run a milder one or none
+    SEVERITY_S0 = "severity:S0"  #: a hazard of class S0 or worse; in the first run a milder one or none
+    SEVERITY_S1 = "severity:S1"  #: a hazard of class S1 or worse; in the first run a milder one or none
+    SEVERITY_S2 = "severity:S2"  #: a hazard of class S2 or worse; in the first run a milder one or none
+    SEVERITY_S3 = "severity:S3"  #: a hazard of class S3; in the first run a milder one or none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,9 +179,10 @@ def compare_runs(
     Raise MutatorError if no experiment has a partner, and CheckFailed if a run's equivalence check failed.
     """
     a, b = load_compared_run(run_a, only), load_compared_run(run_b, only)
-    scale = (
-        b.folder.severity_scale if a.folder.severity_scale else None
-    )  # classify both runs by the same scale, or neither
+    # classify both runs by the same scale, or neither, and by metrics that both have
+    scale = b.folder.severity_scale if a.folder.severity_scale else None
+    if scale:
+        scale = scale.with_rules_over([metric.name for metric in a.folder.head.metrics])
     a, b = a.classified_by(scale), b.classified_by(scale)
     matching = match_experiments(a, b)
     if not matching.pairs:
@@ -251,7 +252,9 @@ def _describe_ending(row: ResultRow) -> str:
         names = ", ".join(name for name, _ in row.hazards)
         details.append(names if time is None else f"{names} {time:.2f} s after activation")
     if row.severity:
-        details.append(f"{row.severity_label}, delta-v {row.delta_v:.1f} m/s")
+        details.append(row.severity_label)
+        if row.delta_v is not None:
+            details[-1] += f", delta-v {row.delta_v:.1f} m/s"
     if row.alerts:
         is_late = bool(row.hazards) and row.reaction_time is None
         details.append(f"alert {', '.join(row.alerts)}" + (" only after the hazard" if is_late else ""))

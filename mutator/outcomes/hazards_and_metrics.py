@@ -87,8 +87,12 @@ def judge_run(
     measured = [metric for metric in manifest.metrics if golden is not None or not metric.uses_golden]
     metrics += [(metric, _metric_values(metric, values)) for metric in measured]
     t_end = min(ends.values(), default=None)
+    first_by_hazard = dict(hazards)
     value_by_metric = {
-        metric.name: _aggregate_metric(metric, numbers, values, t_end) for metric, numbers in metrics
+        metric.name: _value_at(numbers, values[TIME], first_by_hazard.get(metric.hazard), metric.end_s(t_end))
+        if metric.aggregate == "at_hazard"
+        else _aggregate_metric(metric, numbers, values, t_end)
+        for metric, numbers in metrics
     }
     contact = manifest.contact
     if contact and t_end is not None and ends.get(contact.hazard) == t_end:
@@ -180,6 +184,14 @@ def _metric_values(metric: Metric, values: ValuesByName) -> np.ndarray:
     return (
         np.where(np.isnan(values[GOLDEN_PREFIX + TIME]), np.nan, numbers) if metric.uses_golden else numbers
     )
+
+
+def _value_at(numbers: np.ndarray, time: np.ndarray, at_s: float | None, end_s: float) -> float | None:
+    """Return the value in the newest step at a time; None if the time is missing or after the end."""
+    if at_s is None or at_s > end_s + _TIME_SLACK_S:
+        return None
+    steps = np.flatnonzero(time <= at_s + _TIME_SLACK_S)
+    return float(numbers[steps[-1]]) if steps.size and math.isfinite(numbers[steps[-1]]) else None
 
 
 def _aggregate_metric(

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from mutator.model import ObservedActivation, Outcome, Record
-from mutator.targets.contact_severity import DELTA_V_NAME, SeverityScale
+from mutator.targets.contact_severity import DELTA_V_NAME, ClassifiedHazard, SeverityScale
 
 EventTimes = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
 
@@ -78,9 +78,36 @@ def manifestation_to_hazard_time(record: Record) -> float | None:
     return record.hazards[0][1] - record.t_manifest
 
 
-def severity_class_of(record: Record, scale: SeverityScale | None) -> str | None:
-    """Return the class of the contact that ended the drive. None without a contact after activation."""
-    delta_v = dict(record.metrics).get(DELTA_V_NAME)
-    if scale is None or delta_v is None or record.activation is None or record.t_end is None:
+def classified_hazard_of(record: Record, scale: SeverityScale | None) -> ClassifiedHazard | None:
+    """Return the hazard of the highest severity class, of those that came after the activation and up to the
+    end of the drive. None without a class.
+    """
+    if scale is None or record.activation is None:
         return None
-    return scale.class_of(delta_v) if record.t_end >= record.activation.first else None
+    return scale.worst_hazard(record.hazards, dict(record.metrics), record.t_end)
+
+
+def severity_class_of(record: Record, scale: SeverityScale | None) -> str | None:
+    """Return the highest severity class of a hazard, as in `classified_hazard_of`."""
+    worst = classified_hazard_of(record, scale)
+    return worst.severity if worst else None
+
+
+def missing_severity_reason(record: Record, scale: SeverityScale | None) -> str | None:
+    """Return why no hazard of a run has a severity class. None if one has, or if there was no hazard."""
+    if not record.hazards or record.activation is None or classified_hazard_of(record, scale):
+        return None
+    if scale is None:
+        return "the target has no `severity`"
+    return "; ".join(_unclassified_reason(name, record, scale) for name, _ in record.hazards)
+
+
+def _unclassified_reason(hazard: str, record: Record, scale: SeverityScale) -> str:
+    if dict(record.hazards)[hazard] > (float("inf") if record.t_end is None else record.t_end):
+        return f"{hazard} came after the end of the drive"
+    rules = [rule for rule in scale.rules if rule.hazard == hazard]
+    if not rules and hazard != scale.contact:
+        return f"the scale `{scale.name}` has no rule for {hazard}"
+    metrics = dict(record.metrics)
+    missing = [name for rule in rules for name in rule.metrics if name not in metrics]
+    return f"{hazard} has no value of {', '.join(missing) or DELTA_V_NAME}"

@@ -52,7 +52,7 @@ def render_results_page(workspace: Workspace) -> str:
 def _result_columns_section(manifest: TargetManifest) -> Iterator[str]:
     yield f"## Target {manifest.name}\n"
     compared = [channel.name for channel in manifest.compared_channels]
-    severity = severity_and_time_columns(has_classes=manifest.contact is not None)
+    severity = severity_and_time_columns(has_classes=manifest.severity is not None)
     columns = (manifest.hazard_names, compared, metric_facts(manifest), severity)
     yield from _columns_table(result_columns(*columns, paths=True, speed=True))
 
@@ -134,6 +134,8 @@ def _hazard_row(hazard: Hazard) -> tuple[str, ...]:
 def _metric_row(metric: Metric) -> tuple[str, ...]:
     if metric.name == DELTA_V_NAME:
         definition = "as in `severity`"
+    elif metric.hazard:
+        definition = f"`{metric.step_formula}` when {metric.hazard} first occurs"
     elif metric.step_formula:
         definition = f"{metric.aggregate} of `{metric.step_formula}`"
     else:

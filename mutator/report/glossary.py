@@ -21,7 +21,7 @@ _COUNTING_TERMS = {
     "margin": "the distance that a run kept from a hazard, negative once the hazard has occurred",
     "end of the drive": "the first terminal hazard, such as a contact: the simulation continues, but metrics "
     "and fault paths leave out later steps",
-    "rank": "1 is the worst; contacts rank by severity and delta-v, the others by outcome and margin",
+    "rank": "1 is the worst; the order is by severity, silent hazards first, then by margin and time",
 }
 _ENDING_TERMS = {
     "hazard": "a hazard occurred at or after activation",
@@ -87,9 +87,7 @@ def _severity_meanings(scale: SeverityScale | None, before: str = "") -> dict[st
         (f"{before}{scale.labels[name]}" if before else name): f"delta-v of {low:.2f} m/s or more: {about}"
         for name, low, about in scale.classes
     }
-    return meanings | {
-        "no contact": "no severity class; these runs rank by margin, alternating between hazards"
-    }
+    return meanings | {"no class": "no severity class; the column `no_severity` says why"}
 
 
 def _scenario_meanings(run: ReportedRun) -> dict[str, str]:

@@ -18,15 +18,15 @@ from mutator.report.answer_parts import (
     filtered_list_fragment,
     share_bar,
 )
+from mutator.results.worst_first_ranking import causes_of, worst_of_each_cause
 from mutator.targets.stored_target_facts import MetricFacts
 
-MOST_LISTED = 10  # maximum number of experiments listed as most dangerous
-MOST_LISTED_CONTACTS = 6  # maximum number with contact among them, if there are also hazards without contact
+MOST_LISTED = 10  # maximum number of causes listed as most dangerous
 MOST_FAULT_TYPES = 6  # maximum number of fault types listed
 MARGIN_PREFIX = "margin_"  # prefix of the columns of hazard margins
-SEVERITY_COLUMN = "severity"  # column with S0 to S3, or '' without contact
+SEVERITY_COLUMN = "severity"  # column with S0 to S3, or '' without a class
 HAZARD_FILTER = {"outcome": ["hazard"]}  # filter for the list of experiments
-NO_CONTACT_VALUE = "no contact"  # the page filter's name for an empty severity
+NO_CLASS_VALUE = "no class"  # the page filter's name for an empty severity
 
 
 def most_dangerous_answer(
@@ -64,7 +64,7 @@ def most_dangerous_answer(
         has_wide_tables=True,
         paragraph="No fault was activated." if active.empty else paragraph,
         tables=(
-            *_worst_tables(ranked, units, severity_labels, has_alerts=has_alerts),
+            _worst_table(ranked, units, severity_labels, has_alerts=has_alerts),
             AnswerTable(heads=heads, rows=rows),
         ),
         links=_list_links(ranked),
@@ -73,11 +73,8 @@ def most_dangerous_answer(
 
 def worst_hazard_ids(frame: pd.DataFrame) -> list[str]:
     """Ids of the experiments that `dangerous` can list, sorted by `place`."""
-    hazards = frame[frame["outcome"] == "hazard"]
-    groups = [hazards]
-    if SEVERITY_COLUMN in frame:
-        groups = [hazards[hazards[SEVERITY_COLUMN] != ""], hazards[hazards[SEVERITY_COLUMN] == ""]]
-    return [str(name) for group in groups for name in group.nsmallest(MOST_LISTED, "place")["experiment_id"]]
+    ranked = frame[frame["outcome"] == "hazard"].sort_values("place")
+    return [str(name) for name in worst_of_each_cause(ranked)[0]["experiment_id"].head(MOST_LISTED)]
 
 
 def _list_links(ranked: pd.DataFrame) -> tuple[PageLink, ...]:
@@ -88,13 +85,13 @@ def _list_links(ranked: pd.DataFrame) -> tuple[PageLink, ...]:
     if classes and (ranked[SEVERITY_COLUMN] == "").any():
         links.append(
             PageLink(
-                "With contact", filtered_list_fragment({**HAZARD_FILTER, SEVERITY_COLUMN: classes}, "rank")
+                "With a class", filtered_list_fragment({**HAZARD_FILTER, SEVERITY_COLUMN: classes}, "rank")
             )
         )
         links.append(
             PageLink(
-                "Without contact",
-                filtered_list_fragment({**HAZARD_FILTER, SEVERITY_COLUMN: [NO_CONTACT_VALUE]}, "rank"),
+                "Without a class",
+                filtered_list_fragment({**HAZARD_FILTER, SEVERITY_COLUMN: [NO_CLASS_VALUE]}, "rank"),
             )
         )
     return tuple(links)
@@ -106,65 +103,23 @@ def find_contact_column(frame: pd.DataFrame) -> str:
 
 
 def _describe_severities(hazards: pd.DataFrame, labels: Mapping[str, str]) -> str:
-    """`2 of severity S3 possibly fatal, 4 of severity S1 light, 14 without contact`."""
+    """`2 of severity S3 possibly fatal, 4 of severity S1 light, 14 without a class`."""
     counts = hazards[SEVERITY_COLUMN].value_counts()
     parts = [
         f"{counts[name]} of severity {labels.get(name, name)}"
         for name in sorted(filter(None, counts.index), reverse=True)
     ]
-    return ", ".join((*parts, f"{counts.get('', 0)} without contact"))
-
-
-def _worst_tables(
-    ranked: pd.DataFrame, units: Mapping[str, str], severity_labels: Mapping[str, str], *, has_alerts: bool
-) -> tuple[AnswerTable, ...]:
-    """Return the worst hazards in one list, or in two if only some have a severity class: the others, which
-    rank by margin, would rarely appear in a common list.
-    """
-    with_contact = ranked[ranked[SEVERITY_COLUMN] != ""] if SEVERITY_COLUMN in ranked else ranked
-    without_contact = ranked.drop(with_contact.index)
-    if with_contact.empty or without_contact.empty:
-        return (
-            _worst_table(
-                ranked.head(MOST_LISTED),
-                "worst",
-                HAZARD_FILTER,
-                units,
-                severity_labels,
-                has_alerts=has_alerts,
-            ),
-        )
-    contacts = with_contact.head(max(MOST_LISTED_CONTACTS, MOST_LISTED - len(without_contact)))
-    others = without_contact.head(MOST_LISTED - len(contacts))
-    classes = sorted(with_contact[SEVERITY_COLUMN].unique())
-    contact_filter, no_contact_filter = (
-        {**HAZARD_FILTER, SEVERITY_COLUMN: classes},
-        {**HAZARD_FILTER, SEVERITY_COLUMN: [NO_CONTACT_VALUE]},
-    )
-    return (
-        _worst_table(
-            contacts, "worst with contact", contact_filter, units, severity_labels, has_alerts=has_alerts
-        ),
-        _worst_table(
-            others, "worst without contact", no_contact_filter, units, severity_labels, has_alerts=has_alerts
-        ),
-    )
+    return ", ".join((*parts, f"{counts.get('', 0)} without a class"))
 
 
 def _worst_table(
-    ranked: pd.DataFrame,
-    first_head: str,
-    list_filter: Mapping[str, Sequence[str]],
-    units: Mapping[str, str],
-    severity_labels: Mapping[str, str],
-    *,
-    has_alerts: bool,
+    ranked: pd.DataFrame, units: Mapping[str, str], severity_labels: Mapping[str, str], *, has_alerts: bool
 ) -> AnswerTable:
-    """Return the experiments with their measures of danger. Each link opens one of them in the list filtered
-    by `list_filter`.
-    """
+    """Return the worst experiment of each cause, with its measures of danger and the number of others."""
+    ranked, more = worst_of_each_cause(ranked)
+    ranked = ranked.head(MOST_LISTED)
     contact_column = find_contact_column(ranked)
-    heads = [first_head, "scenario", "hazards"]
+    heads = ["worst of each cause", "scenario", "hazards"]
     columns: list[Iterable[AnswerCell]] = [ranked["scenario"], map(ExplainedCodes, ranked["hazard_names"])]
     if SEVERITY_COLUMN in ranked and (ranked[SEVERITY_COLUMN] != "").any():
         heads.append("severity")
@@ -180,12 +135,22 @@ def _worst_table(
     if has_alerts:
         heads.append("alert before hazard")
         columns.append(ranked["warned"])
-    filtered_list = filtered_list_fragment(list_filter, "rank")
+    heads.append("more of this cause")
+    causes = causes_of(ranked).itertuples(index=False)
+    columns.append(
+        PageLink(f"{count:,}", filtered_list_fragment(_filter_of_cause(*cause), "rank")) if count else "-"
+        for cause, count in zip(causes, more, strict=False)
+    )
+    filtered_list = filtered_list_fragment(HAZARD_FILTER, "rank")
     links = [
         PageLink(fault, f"e={name}&{filtered_list}")
         for fault, name in zip(ranked["fault"], ranked["experiment_id"], strict=True)
     ]
     return AnswerTable(heads=tuple(heads), rows=list(zip(links, *columns, strict=True)))
+
+
+def _filter_of_cause(kind: str, hazard: str) -> dict[str, Sequence[str]]:
+    return {"kind": [kind], **HAZARD_FILTER, "hazards": [hazard]}
 
 
 def _describe_danger(row: Mapping[Any, Any], contact_column: str, units: Mapping[str, str]) -> str:

@@ -126,12 +126,12 @@ def _group_by_plan(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
 
 def _table_cells(run: PastRun) -> list[str]:
     hazards = run.hazards
-    classes = Counter(row.severity or "no contact" for row in hazards)
-    order = sorted((name for name in classes if name != "no contact"), reverse=True)
+    classes = Counter(row.severity or "no class" for row in hazards)
+    order = sorted((name for name in classes if name != "no class"), reverse=True)
     scale = run.folder.severity_scale
     labels = scale.labels if scale else {}
     severity_text = ", ".join(
-        f"{labels.get(name, name)}: {classes[name]}" for name in (*order, "no contact") if classes[name]
+        f"{labels.get(name, name)}: {classes[name]}" for name in (*order, "no class") if classes[name]
     )
     silent = sum(row.reaction_time is None for row in hazards)
     return [

@@ -19,7 +19,7 @@ from mutator.report.answer_parts import (
     filtered_list_fragment,
 )
 from mutator.report.fault_path_data import RunFaultPaths, link_name
-from mutator.report.most_dangerous_experiments import NO_CONTACT_VALUE, SEVERITY_COLUMN
+from mutator.report.most_dangerous_experiments import NO_CLASS_VALUE, SEVERITY_COLUMN
 
 MOST_FAULT_TYPES = 5  # maximum number of fault types listed
 
@@ -32,7 +32,7 @@ def fix_first_answer(
     has_alerts: bool,
 ) -> ReportAnswer:
     """Say which fault types to fix first: those with the most silent hazards in the highest severity
-    class; ties are broken by the next lower classes, then by hazards without contact, then by the shortest
+    class; ties are broken by the next lower classes, then by hazards without a class, then by the shortest
     time from activation to hazard. If the target has no alerts, all hazards are counted. `frame` must have at
     least one hazard.
     """
@@ -74,7 +74,7 @@ def fix_first_answer(
 
 
 def _severity_classes(hazards: pd.DataFrame) -> list[str]:
-    """Return the severity classes that occur, highest first; no contact ('') is last."""
+    """Return the severity classes that occur, highest first; no class ('') is last."""
     return sorted(hazards[SEVERITY_COLUMN].unique(), reverse=True) if SEVERITY_COLUMN in hazards else [""]
 
 
@@ -139,7 +139,7 @@ def _fault_type_row(
     counts_by_class = [(name, len(_hazards_of_class(counted_hazards, name))) for name in classes]
     if SEVERITY_COLUMN in counted_hazards:
         named = [
-            f"{n} severity {severity_labels.get(name, name)}" if name else f"{n} without contact"
+            f"{n} severity {severity_labels.get(name, name)}" if name else f"{n} without a class"
             for name, n in counts_by_class
             if n
         ]
@@ -150,7 +150,7 @@ def _fault_type_row(
     fastest = str(counted_hazards["experiment_id"].iloc[int(times_to_hazard.fillna(inf).argmin())])
     worst = next((name for name, n in counts_by_class if n), "")
     filters = {"kind": [kind], **list_filter}
-    severe = {SEVERITY_COLUMN: [worst or NO_CONTACT_VALUE]} if SEVERITY_COLUMN in counted_hazards else {}
+    severe = {SEVERITY_COLUMN: [worst or NO_CLASS_VALUE]} if SEVERITY_COLUMN in counted_hazards else {}
     row: list[AnswerCell] = [
         fault_type_link(kind, **list_filter),
         PageLink(numbers, filtered_list_fragment({**filters, **severe}, "rank")),

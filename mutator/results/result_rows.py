@@ -44,7 +44,7 @@ class ResultRow:
     t_alert: float | None
     reaction_time: float | None
     detail: str
-    severity: str = ""  # class of the contact that ended the drive
+    severity: str = ""  # highest class of a hazard in the drive
     severity_label: str = ""  # the class in words, if a scale is known
     delta_v: float | None = None  # delta-v of that contact in m/s
     t_end: float | None = None  # when a terminal hazard ended the drive

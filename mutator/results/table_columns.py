@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
 from mutator.outcomes.verdict_rules import (
+    classified_hazard_of,
     manifestation_to_hazard_time,
+    missing_severity_reason,
     reaction_time,
-    severity_class_of,
     time_to_hazard,
 )
 from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, HOLD_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
@@ -55,6 +56,7 @@ class FinishedExperiment:
         self.hazards, self.metrics = dict(record.hazards), dict(record.metrics)
         self.max_dev = dict(record.max_dev)
         self.dev = self.max_dev | dict(record.dev)  # up to the end of the drive, where a hazard ended it
+        self.classified = classified_hazard_of(record, scale)
         self.untimed_path = fault_paths.untimed_path(experiment.fault, record) if fault_paths else None
 
 
@@ -147,8 +149,24 @@ SEVERITY_COLUMN = ResultColumn(
     "severity",
     "text",
     "",
-    "class of the contact that ended the drive; empty without a contact",
-    lambda f: severity_class_of(f.record, f.severity_scale),
+    "highest severity class of a hazard in the drive; empty without a class",
+    lambda f: f.classified.severity if f.classified else None,
+)
+CLASSIFIED_HAZARD_COLUMNS = (
+    ResultColumn(
+        "severity_hazard",
+        "text",
+        "",
+        "the hazard that has this class; of several, the first",
+        lambda f: f.classified.hazard if f.classified else None,
+    ),
+    ResultColumn(
+        "no_severity",
+        "text",
+        "",
+        "why no hazard has a class; empty with a class, and without a hazard",
+        lambda f: missing_severity_reason(f.record, f.severity_scale),
+    ),
 )
 TIME_TO_HAZARD_COLUMNS = (
     ResultColumn(
@@ -304,8 +322,9 @@ def row_of(columns: Iterable[PlanColumn | ResultColumn], finished: FinishedExper
 
 
 def severity_and_time_columns(*, has_classes: bool) -> tuple[ResultColumn, ...]:
-    """Return the columns of a target whose contacts have classes of severity, or have none."""
-    return (SEVERITY_COLUMN, *TIME_TO_HAZARD_COLUMNS) if has_classes else TIME_TO_HAZARD_COLUMNS
+    """Return the columns of a target whose hazards can have classes of severity, or have none."""
+    severity = (SEVERITY_COLUMN, *CLASSIFIED_HAZARD_COLUMNS) if has_classes else ()
+    return (*severity, *TIME_TO_HAZARD_COLUMNS)
 
 
 def _deviation_column(channel: str, column: str) -> ResultColumn:
@@ -399,7 +418,7 @@ def check_column_names(manifest: TargetManifest) -> None:
     used_names = {
         column.name for column in result_columns((), compared, paths=True, speed=bool(manifest.speed))
     }
-    used_names |= {SEVERITY_COLUMN.name, *(column.name for column in TIME_TO_HAZARD_COLUMNS)}
+    used_names |= {column.name for column in severity_and_time_columns(has_classes=True)}
     used_names |= {
         *DERIVED_COLUMN_NAMES,
         DRIVE_END_COLUMN,

@@ -3,8 +3,14 @@
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
-from mutator.results.outcome_counting import hazard_margins, outcome_or_status_of_rows
+from mutator.results.outcome_counting import (
+    fault_types_of,
+    first_hazard_times,
+    hazard_margins,
+    outcome_or_status_of_rows,
+)
 from mutator.targets.contact_severity import DELTA_V_NAME, SEVERITY_CLASSES
+from mutator.targets.stored_target_facts import DRIVE_END_COLUMN
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,9 +31,10 @@ _ENDINGS_WORST_FIRST = (  # worst first
 def worst_first_ranks(frame: "pd.DataFrame") -> "np.ndarray":
     """Return the rank (from 0: the worst) of each row of a frame of results, whatever the order of the rows.
 
-    Rows with a severity class come first, by class and then by delta-v. The others follow by outcome and then
-    by margin, alternating between hazards, because margins with different units cannot be compared. Ties are
-    broken by id.
+    Rows with a severity class come first, by class; the others follow by outcome. In each of these groups,
+    silent hazards precede hazards after an alert. Then the margin decides, alternating between hazards,
+    because margins with different units cannot be compared; a contact has its delta-v instead. Then the time
+    from the activation to the hazard decides, and last the id.
     """
     import numpy as np
     import pandas as pd
@@ -35,37 +42,82 @@ def worst_first_ranks(frame: "pd.DataFrame") -> "np.ndarray":
     ending_rank = pd.Index(_ENDINGS_WORST_FIRST).get_indexer(pd.Index(outcome_or_status_of_rows(frame)))
     severity = frame["severity"] if "severity" in frame else pd.Series("", frame.index)
     severity_rank = pd.Index(SEVERITY_CLASSES).get_indexer(pd.Index(severity))
-    has_class = severity_rank >= 0
+    was_warned = frame["reaction_time"].notna().to_numpy()
+    group = np.column_stack([-severity_rank, ending_rank, was_warned])
+    time = frame["time_to_hazard"].fillna(np.inf).to_numpy() if "time_to_hazard" in frame else np.inf
+    time = np.broadcast_to(time, len(frame))
     id_rank = np.empty(len(frame), dtype=np.int64)
     id_rank[np.argsort(frame["experiment_id"].to_numpy(dtype=object), kind="stable")] = np.arange(len(frame))
-    margin_rank = np.where(has_class, 0.0, _margin_ranks(frame, ending_rank, has_class, id_rank))
-    speed = (
-        frame[DELTA_V_NAME].fillna(-1.0).to_numpy() if DELTA_V_NAME in frame else np.full(len(frame), -1.0)
-    )
-    delta_v = np.where(has_class, -speed, 0.0)  # without a class, the rank does not depend on it
-    order = np.lexsort((id_rank, margin_rank, ending_rank, delta_v, -severity_rank, ~has_class))
+    group_number = np.unique(group, axis=0, return_inverse=True)[1].ravel()
+    margin_rank = _margin_ranks(frame, group_number, time, id_rank)
+    order = np.lexsort((id_rank, time, margin_rank, *group.T[::-1]))
     ranks = np.empty(len(frame), dtype=np.int64)
     ranks[order] = np.arange(len(frame))
     return ranks
 
 
 def _margin_ranks(
-    frame: "pd.DataFrame", ending_rank: "np.ndarray", has_class: "np.ndarray", id_rank: "np.ndarray"
+    frame: "pd.DataFrame", group_number: "np.ndarray", time: "np.ndarray", id_rank: "np.ndarray"
 ) -> "np.ndarray":
-    """Rank rows without a severity class among those with the same outcome, by `hazard_margins`.
+    """Rank rows among those of their group, for each hazard by margin, time and id.
 
     A row with margins to several hazards gets its lowest rank number. Rows without a margin: infinite.
     """
     import numpy as np
 
     margin_rank = np.full(len(frame), np.inf)
-    for _, margins in hazard_margins(frame).items():
+    for _, margins in _margins_with_delta_v(frame).items():
         margin = margins.to_numpy()
-        rows = np.flatnonzero(~has_class & ~np.isnan(margin))
-        rows = rows[np.lexsort((id_rank[rows], margin[rows], ending_rank[rows]))]
-        _, first, sizes = np.unique(ending_rank[rows], return_index=True, return_counts=True)
+        rows = np.flatnonzero(~np.isnan(margin))
+        rows = rows[np.lexsort((id_rank[rows], time[rows], margin[rows], group_number[rows]))]
+        _, first, sizes = np.unique(group_number[rows], return_index=True, return_counts=True)
         margin_rank[rows] = np.minimum(margin_rank[rows], np.arange(len(rows)) - np.repeat(first, sizes))
     return margin_rank
+
+
+def _margins_with_delta_v(frame: "pd.DataFrame") -> "pd.DataFrame":
+    """Return `hazard_margins`, with minus delta-v for the contact that ended a drive: its margin is how far
+    the car came in the last step.
+    """
+    margins = hazard_margins(frame)
+    if not {DELTA_V_NAME, DRIVE_END_COLUMN} <= {*frame.columns}:
+        return margins
+    for name, times in first_hazard_times(frame).items():
+        is_contact = frame[DELTA_V_NAME].notna() & (times == frame[DRIVE_END_COLUMN])
+        margin = margins[name] if name in margins else float("nan")
+        margins[name] = (-frame[DELTA_V_NAME]).where(is_contact, margin)
+    return margins
+
+
+def causes_of(frame: "pd.DataFrame") -> "pd.DataFrame":
+    """Return the cause of each row: the fault type (`kind`) and the `hazard` that has the severity class, or
+    else the first one; '' without a hazard.
+    """
+    import pandas as pd
+
+    times = first_hazard_times(frame)
+    names = [*times.columns, ""]
+    order = times.fillna(float("inf")).to_numpy().argmin(axis=1) if len(times.columns) else []
+    first = [
+        names[i] if happened else "" for i, happened in zip(order, times.notna().any(axis=1), strict=False)
+    ]
+    hazard = pd.Series(first or "", frame.index, dtype=object)
+    if "severity_hazard" in frame:
+        hazard = frame["severity_hazard"].where(frame["severity_hazard"] != "", hazard)
+    return pd.DataFrame(
+        {"kind": frame["kind"] if "kind" in frame else fault_types_of(frame), "hazard": hazard},
+        index=frame.index,
+    )
+
+
+def worst_of_each_cause(ranked: "pd.DataFrame") -> tuple["pd.DataFrame", list[int]]:
+    """Return the first row of each cause and outcome, and how many more rows have them. `ranked` is sorted,
+    worst first.
+    """
+    keys = causes_of(ranked).assign(ending=outcome_or_status_of_rows(ranked))
+    group = keys.groupby(list(keys), sort=False).ngroup()
+    more = (group.groupby(group).size() - 1).tolist()
+    return ranked[~group.duplicated()], more
 
 
 def worst_first_rank_by_ok_experiment(frame: "pd.DataFrame") -> dict[str, int]:

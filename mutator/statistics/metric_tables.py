@@ -65,10 +65,9 @@ def severity_sheet(frame: pd.DataFrame, scale: SeverityScale | None = None) -> S
     return Sheet(
         name="severity",
         title="Severity by fault type",
-        note="Activated faults whose drive ended in a contact, in total and by class. 95 % "
-        "Wilson intervals; in brackets, the count and the total. Hazards without a contact have no class."
-        + describe_classes(scale, SEVERITY_CLASSES),
-        heads=("fault type", "contact", *SEVERITY_CLASSES),
+        note="Activated faults with a hazard that has a severity class, in total and by class. 95 % "
+        "Wilson intervals; in brackets, the count and the total." + describe_classes(scale, SEVERITY_CLASSES),
+        heads=("fault type", "any class", *SEVERITY_CLASSES),
         lines=tuple(lines),
     )
 

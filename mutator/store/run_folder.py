@@ -174,7 +174,7 @@ class RunFolder:
 
     @property
     def severity_scale(self) -> SeverityScale | None:
-        """The scale of delta-v classes; None for a target without contacts."""
+        """The severity scale of the target; None without one."""
         return self.head.severity
 
     @property

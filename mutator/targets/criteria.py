@@ -7,7 +7,7 @@ from typing import Literal
 from mutator.targets.stored_phrases import PhraseByCase
 from mutator.triggers.conditions import GOLDEN_PREFIX
 
-Aggregate = Literal["min", "max", "mean", "last", "integral", "duration", "at_end"]
+Aggregate = Literal["min", "max", "mean", "last", "integral", "duration", "at_end", "at_hazard"]
 WorseDirection = Literal["higher", "lower"]
 
 
@@ -16,6 +16,7 @@ class Metric:
     """A number for each run: an aggregate of `formula` over the steps in which `where` holds, up to the first
     terminal hazard. Both may name values of the golden run (`golden.gap`).
 
+    `at_hazard` is the value when `hazard` first occurs, if that is not after the end.
     With `ends_before_s`, the metric ends that long before this hazard; 0 leaves out the hazard's step.
     """
 
@@ -28,6 +29,7 @@ class Metric:
     worse: WorseDirection
     about: str
     source: str = ""
+    hazard: str = ""
 
     @property
     def uses_golden(self) -> bool:

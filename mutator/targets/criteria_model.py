@@ -76,6 +76,12 @@ class MetricModel(StrictModel, title="A metric"):
     at_end: str | None = Field(
         None, description="The value in the step of the first terminal hazard; empty if there is none."
     )
+    at_hazard: str | None = Field(
+        None,
+        description="The value in the step in which `hazard` first occurs; empty without it, or if the drive "
+        "had ended by then.",
+    )
+    hazard: str | None = Field(None, description="The hazard of `at_hazard`.")
     where: str | None = Field(None, description="Use only the steps in which this condition holds.")
     ends_before_s: float | None = Field(
         None,
@@ -179,11 +185,26 @@ def _margin_of(when: str) -> str:
 
 
 def build_metrics(
-    models: dict[str, MetricModel], names: Collection[str], source: YamlSource
+    models: dict[str, MetricModel], names: Collection[str], source: YamlSource, *, hazards: Collection[str]
 ) -> tuple[Metric, ...]:
-    """Read a manifest's metrics; the arguments and errors are those of `build_hazards`."""
+    """Read a manifest's metrics; `hazards` are the names of its hazards, and the other arguments and the
+    errors are those of `build_hazards`.
+    """
     names = (*names, *(GOLDEN_PREFIX + name for name in names if name != TIME))
-    return tuple(_build_metric(name, model, names, source) for name, model in models.items())
+    metrics = tuple(_build_metric(name, model, names, source) for name, model in models.items())
+    for metric in metrics:
+        if (metric.aggregate == "at_hazard" or metric.hazard) and (
+            metric.aggregate != "at_hazard" or metric.where or metric.hazard not in hazards
+        ):
+            raise source.error(
+                ("metrics", metric.name),
+                f"`{metric.aggregate}` with the hazard '{metric.hazard}'"
+                if metric.hazard
+                else "`at_hazard` without `hazard`",
+                expected=f"`at_hazard` without `where`, and a hazard: {', '.join(hazards)}",
+                remedy="correct them, or choose another aggregate",
+            )
+    return metrics
 
 
 def _build_metric(name: str, model: MetricModel, names: Collection[str], source: YamlSource) -> Metric:
@@ -217,4 +238,5 @@ def _build_metric(name: str, model: MetricModel, names: Collection[str], source:
         worse=model.worse,
         about=model.about,
         source=model.source,
+        hazard=model.hazard or "",
     )

@@ -14,7 +14,7 @@ from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metad
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
-from mutator.targets.contact_severity import DELTA_V_NAME, ContactSettings
+from mutator.targets.contact_severity import DELTA_V_NAME, ContactSettings, SeveritySettings
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.observed_values import Observation
 from mutator.targets.overhead_view import OverheadView
@@ -96,7 +96,7 @@ class TargetManifest:
     observation: Observation
     hazard_rules: tuple[Hazard, ...]
     metrics: tuple[Metric, ...]
-    contact: ContactSettings | None
+    severity: SeveritySettings | None
     scene: OverheadView | None
     alerts: tuple[str, ...]  # other alerts are ignored
     source: YamlSource = field(repr=False, compare=False)  # the file's lines, for errors
@@ -164,6 +164,11 @@ class TargetManifest:
         """The margins of the hazards, the metrics and delta-v."""
         margins = [hazard.margin_metric for hazard in self.hazard_rules if hazard.margin_metric]
         return (*margins, *self.metrics, *([_DELTA_V_METRIC] if self.contact else []))
+
+    @property
+    def contact(self) -> ContactSettings | None:
+        """The contact that has a delta-v."""
+        return self.severity.contact if self.severity else None
 
     @property
     def output_files(self) -> tuple[str, ...]:

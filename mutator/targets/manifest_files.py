@@ -10,7 +10,6 @@ from mutator._common.shipped_files import SHIPPED_TARGET_ROOT
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
 from mutator.targets.channel_model import ChannelModel, TraceModel, build_channels
-from mutator.targets.contact_severity import ContactSettings
 from mutator.targets.criteria_model import HazardModel, MetricModel, build_hazards, build_metrics
 from mutator.targets.entry_model import EntryModel, ScenarioChangeModel, check_commands
 from mutator.targets.manifest import FilmCommands, TargetManifest
@@ -20,7 +19,7 @@ from mutator.targets.overhead_view_model import OverheadViewModel, build_overhea
 from mutator.targets.process_environment import check_environment
 from mutator.targets.relative_paths import clean_relative_path
 from mutator.targets.required_packages import parse_requirements
-from mutator.targets.severity_model import check_contact
+from mutator.targets.severity_model import SeverityModel, build_severity
 from mutator.targets.target_roots import (
     INSTALLED_PREFIX,
     check_only_installed_package,
@@ -112,8 +111,8 @@ class ManifestModel(StrictModel, title="The file"):
         default_factory=dict,
         description="The numbers computed for each run. They are columns of the results.",
     )
-    severity: YamlRecord[ContactSettings] | None = Field(
-        None, description="How severe a contact is. Without it, results have no severity class."
+    severity: SeverityModel | None = Field(
+        None, description="How severe hazards are. Without it, results have no severity class."
     )
     scene: OverheadViewModel | None = Field(None, description="How to draw a drive from above.")
     speed: str | None = Field(
@@ -156,7 +155,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
     observation = build_observation(model.observation, source)
     judgeable_names = observation.names_for_trace_formulas(channel.name for channel in channels)
     _check_criteria_recorded(source, set(observation.variables) - set(judgeable_names))
-    metrics = build_metrics(model.metrics, judgeable_names, source)
+    metrics = build_metrics(model.metrics, judgeable_names, source, hazards=[*model.hazards])
     rules = build_hazards(
         model.hazards,
         judgeable_names,
@@ -165,8 +164,6 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         step_s=model.step_s,
         metrics=[metric.name for metric in metrics],
     )
-    if model.severity:
-        check_contact(model.severity, rules, metrics, source)
     return TargetManifest(
         name=model.name,
         path=path,
@@ -196,7 +193,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         observation=observation,
         hazard_rules=rules,
         metrics=metrics,
-        contact=model.severity,
+        severity=build_severity(model.severity, rules, metrics, source) if model.severity else None,
         scene=None if model.scene is None else build_overhead_view(model.scene, judgeable_names, source),
         alerts=tuple(model.alerts),
         source=source,

@@ -69,14 +69,26 @@ class Happened {
     return `hazard ${name}${about ? `: ${about}` : ""}`;
   }
 
-  /** The severity class of the contact and its meaning. */
+  /** The severity class of the worst hazard, the values that it follows from, and its meaning. */
   #severity() {
     const { el } = Dom;
     const name = this.text("severity"), scale = this.facts.severity;
+    const reason = this.text("no_severity");
+    if (reason) return el("p", {}, `No severity class: ${reason}.`);
     if (!name || !scale) return "";
-    const about = scale.classes.find(([of]) => of === name)?.[2];
-    return el("div", {}, el("b", {}, `Severity ${this.table.called("severity", name)}`), `: delta-v ${this.table.number(this.row, "delta_v").toFixed(2)} m/s`,
-      about ? `, ${about}` : "", el("details.quiet", {}, el("summary", {}, "Source of the classes"), `${scale.name}: ${scale.source}`));
+    const hazard = this.text("severity_hazard"), rule = (scale.rules || []).find((of) => of.hazard === hazard);
+    const metric = (of, unit) => `${of.replaceAll("_", " ")} ${this.table.number(this.row, of).toFixed(2)} ${unit}`;
+    const values = rule ? rule.metrics.map((of, i) => metric(of, rule.units[i][1])).join(", ") : metric("delta_v", "m/s").replace("delta v", "delta-v");
+    const about = (rule || scale).classes.find(([of]) => of === name)?.[2];
+    return el("div", {}, el("b", {}, `Severity ${this.table.called("severity", name)}`), `${rule ? `, of ${hazard}` : ""}: ${values}`,
+      about ? `, ${about}` : "", el("details.quiet", {}, el("summary", {}, "Source of the classes"), Happened.#source(rule, scale)));
+  }
+
+  /** The source of a rule's bounds, or of those of delta-v; a judgement is called one. */
+  static #source(rule, scale) {
+    if (!rule) return `${scale.name}: ${scale.source}`;
+    const judgement = rule.judgement ? `judgement: ${rule.judgement}` : "";
+    return `${scale.name}, ${rule.name}: ${[rule.about, rule.source, judgement].filter(Boolean).join(" ")}`;
   }
 
   /** The metrics of this run and their meanings. */

@@ -24,7 +24,7 @@ class HeatMap {
     this.picker = picker;
   }
 
-  /** For each severity class, the share of activated faults with a contact of at least that class. */
+  /** For each severity class, the share of activated faults with a hazard of at least that class. */
   static severities(table) {
     const facet = table.facets.find((f) => f.name === "severity");
     const classes = facet ? facet.values.filter((value) => value !== facet.none).sort() : [];

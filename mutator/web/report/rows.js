@@ -12,7 +12,7 @@ const Rows = (() => {
     { name: "trigger", title: "Trigger" },
     { name: "outcome", title: "Outcome", none: "no outcome" },
     { name: "status", title: "Status" },
-    { name: "severity", title: "Severity", none: "no contact", show: (value) => (value === "no contact" ? `${value}, any outcome` : value) },
+    { name: "severity", title: "Severity", none: "no class", show: (value) => (value === "no class" ? `${value}, any outcome` : value) },
     { name: "hazards", title: "Hazard", between: ";", none: "no hazard" },
     { name: "alerts", title: "Alert", between: ";", none: "no alert" },
     { name: "warning", title: "Alert in time", none: "no hazard" },

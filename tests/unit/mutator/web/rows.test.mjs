@@ -116,7 +116,7 @@ test("a search finds the words that the page shows", () => {
   assert.deepEqual(drives("silent hazard"), [0]);
   assert.deepEqual(drives("no alert"), [0, 2]);
   assert.deepEqual(drives("no alert at all"), [0]);
-  assert.deepEqual(drives("no contact"), [2, 3]);
+  assert.deepEqual(drives("no class"), [2, 3]);
   assert.deepEqual(drives("not activated"), [2]);
   assert.deepEqual(drives("no outcome"), [3]);
   assert.deepEqual(drives("radar/chaff/distance s1"), [0]);
