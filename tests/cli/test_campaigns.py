@@ -232,9 +232,10 @@ def test_show_without_an_experiment_lists_the_worst_ones(cli: Cli, run: Path) ->
     listed = cli("show", "--json").json
     endings = [line["ending"] for line in listed["worst"]]
     assert endings == sorted(endings, key=lambda ending: ending != "hazard")
-    assert (endings[0], len(endings)) == ("hazard", min(10, listed["count"]))
+    assert endings[0] == "hazard"
+    assert sum(1 + line["more"] for line in listed["worst"]) <= listed["count"]
     only = cli("show", "--only", 'outcome == "hazard" and t_activation > 0', "--limit", "1", "--json").json
-    assert (len(only["worst"]), only["worst"][0]) == (1, listed["worst"][0])
+    assert only["worst"][0].items() <= listed["worst"][0].items()
     assert only["count"] < listed["count"]
     answer = cli("show", "--run", run)
     assert answer.code == 0

@@ -120,7 +120,7 @@ def test_the_medians_of_metrics_are_compared(found: Comparison) -> None:
 
 def test_the_table_of_severity_classes_contains_each_pair_once(found: Comparison) -> None:
     sheet = next(sheet for sheet in found.sheets if sheet.name == "severity")
-    assert sheet.heads == ("before / after", "S3", "S2", "S1", "no contact")
+    assert sheet.heads == ("before / after", "S3", "S2", "S1", "no class")
     assert sum(sum(line[1:]) for line in sheet.lines) == len(found.pairs)  # type: ignore[arg-type]
 
 

@@ -68,6 +68,9 @@ def test_a_hazard_occurs_when_its_condition_has_held_long_enough(
         ("integral: speed", 2.0),  # 1 + 2 - 1: each value lasts until the next step, and the last is left out
         ('duration: "speed > 0"', 2.0),
         ("at_end: speed", 2.0),
+        ("at_hazard: rate(speed), hazard: HIT", 3.0),
+        ("at_hazard: speed, hazard: LATE", None),  # the drive had ended
+        ("at_hazard: speed, hazard: NEVER", None),
         ("min: left", 0.0),
         ('{min: gap, where: "speed < 0"}', 2.0),
         ('{min: gap, where: "speed > 9"}', None),
@@ -86,7 +89,8 @@ def test_metrics_end_with_the_step_of_the_first_terminal_hazard(
     what = metric.strip("{}")
     found = judged(
         write(
-            'hazards: {HIT: {when: "gap <= 0", terminal: true}}\n'
+            'hazards: {HIT: {when: "gap <= 0", terminal: true}, '
+            'LATE: {when: "gap < 0"}, NEVER: {when: "gap > 9"}}\n'
             f'metrics: {{it: {{{what}, unit: m, worse: lower, about: "x"}}}}\n'
         )
     )

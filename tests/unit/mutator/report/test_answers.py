@@ -82,6 +82,7 @@ def answer_by_name(run: ReportedRun) -> dict[str, ReportAnswer]:
 
 
 def test_the_worst_experiment_is_first(answer_by_name: dict[str, ReportAnswer]) -> None:
+    """Silent hazards precede hazards after an alert, also if those have the lower margin."""
     answer = answer_by_name["dangerous"]
     assert (
         answer.paragraph
@@ -89,18 +90,15 @@ def test_the_worst_experiment_is_first(answer_by_name: dict[str, ReportAnswer]) 
     )
     worst, kinds = answer.tables
     assert [line[0] for line in worst.rows] == [
-        PageLink("radar/chaff/x", f"e={'1' * 16}&outcome=hazard&sort=rank"),
         PageLink("radar/chaff/x", f"e={'0' * 16}&outcome=hazard&sort=rank"),
         PageLink("car/speed/x", f"e={'4' * 16}&outcome=hazard&sort=rank"),
-        PageLink("car/speed/x", f"e={'3' * 16}&outcome=hazard&sort=rank"),
     ]
-    assert worst.heads[3:] == ("measure", "time to hazard", "alert before hazard")
-    assert [line[3:] for line in worst.rows] == [
-        ("contact at 9.00 m/s", "4.00 s", "fcw, 1.0 s"),
+    assert worst.heads[3:] == ("measure", "time to hazard", "alert before hazard", "more of this cause")
+    assert [line[3:-1] for line in worst.rows] == [
         ("contact at 4.00 m/s", "3.00 s", "none"),
         ("margin -0.50 m", "7.00 s", "none"),
-        ("margin -0.25 m", "5.00 s", "only after"),
     ]
+    assert worst.rows[0][-1] == PageLink("1", "kind=radar%2Fchaff&outcome=hazard&hazards=H1&sort=rank")
     assert [line[1] for line in kinds.rows] == [ShareBar(2, 3, "2 of 3"), ShareBar(2, 3, "2 of 3")]
     assert answer.links == (PageLink("All 4 hazards", "outcome=hazard&sort=rank"),)
 
@@ -161,7 +159,7 @@ def test_severity_and_then_time_decide_what_to_fix_first() -> None:
     kinds = [line[0].text for line in lines if isinstance(line[0], PageLink)]
     assert kinds == ["d/both", "c/fast", "b/slow", "a/many"]
     assert lines[0][1] == PageLink(
-        "1 severity S3 fatal, 1 without contact",
+        "1 severity S3 fatal, 1 without a class",
         "kind=d%2Fboth&warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard&severity=S3&sort=rank",
     )
     assert "and 1 of 3 of severity S3 fatal, the highest among the silent hazards." in answer.paragraph
@@ -198,23 +196,25 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
     )
 
 
-def test_six_contacts_and_four_other_hazards_are_listed() -> None:
+def test_a_cause_shows_its_worst_experiment_and_how_many_more() -> None:
+    """A fault type with many experiments of one hazard is one line, so that other causes are seen, too."""
     frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
+    frame = frame.assign(status="ok", t_h1=3.0, t_h2=4.0, h1=1.0, h2=1.0)
+    frame.attrs["hazards"] = ("H1", "H2")
     metrics = [MetricFacts("margin_h1", "m", "", "lower"), MetricFacts("margin_h2", "s", "", "lower")]
     answer = most_dangerous_answer(frame, metrics, {"S1": "S1 light"}, has_alerts=True)
-    assert "12 of severity S1 light, 12 without contact" in answer.paragraph
-    hit, missed, _ = answer.tables
-    assert (len(hit.rows), len(missed.rows)) == (6, 4)
-    assert "severity" in hit.heads and "severity" not in missed.heads
-    assert hit.rows[0][0] == PageLink("a/hit", "e=e0&outcome=hazard&severity=S1&sort=rank")
-    assert missed.rows[0][0] == PageLink("b/miss", "e=e12&outcome=hazard&severity=no%20contact&sort=rank")
-    assert hit.rows[0][2:5] == (
+    assert "12 of severity S1 light, 12 without a class" in answer.paragraph
+    hit, missed = answer.tables[0].rows
+    assert hit[0] == PageLink("a/hit", "e=e0&outcome=hazard&sort=rank")
+    assert hit[2:5] == (
         ExplainedCodes(("H1", "H2")),
         ExplainedCodes(("S1",), "severity", "S1 light"),
         "margin -2.00 s",
     )
-    assert missed.rows[0][2:4] == (ExplainedCodes(("H1", "H2")), "margin -2.00 s")
-    assert len(most_dangerous_answer(frame[:12], metrics, {}, has_alerts=True).tables[0].rows) == 10
+    assert missed[0] == PageLink("b/miss", "e=e12&outcome=hazard&sort=rank")
+    assert hit[-1] == PageLink("11", "kind=a%2Fhit&outcome=hazard&hazards=H1&sort=rank")
+    frame = frame.assign(kind=[f"k/{i}" for i in frame.index])
+    assert len(most_dangerous_answer(frame, metrics, {}, has_alerts=True).tables[0].rows) == 10
 
 
 def test_tolerated_faults_are_a_share_of_the_activated_ones(answer_by_name: dict[str, ReportAnswer]) -> None:

@@ -9,8 +9,6 @@ from mutator._common.hashing import as_json_types
 from mutator._common.typed_json import from_json_types
 from mutator.model import Experiment, Method, Outcome, Record, Status
 from mutator.results.table_columns import (
-    SEVERITY_COLUMN,
-    TIME_TO_HAZARD_COLUMNS,
     FinishedExperiment,
     cells_by_column,
     result_columns,
@@ -20,7 +18,7 @@ from mutator.targets.contact_severity import SeverityScale
 
 HAZARDS = ("H1", "H2", "H3")
 COLUMNS = result_columns(
-    HAZARDS, ("gas", "brake", "steer_torque"), (), (SEVERITY_COLUMN, *TIME_TO_HAZARD_COLUMNS)
+    HAZARDS, ("gas", "brake", "steer_torque"), (), severity_and_time_columns(has_classes=True)
 )
 MakeRecord = Callable[..., Record]
 
@@ -113,9 +111,27 @@ def test_a_row_has_the_severity_and_the_times_to_the_hazard(
     assert row_of(experiment(), kept)["severity"] is None  # without a scale
 
 
+def test_a_hazard_without_a_class_says_why(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
+    """The reason names the hazard; there is none with a class, and none without a hazard."""
+    scale = replace(SCALE, contact="H1")
+    reasons = {
+        (("H1", 5.5), ("H2", 7.0)): None,
+        (("H2", 5.0),): "the scale `x` has no rule for H2",
+        (("H2", 7.0),): "H2 came after the end of the drive",
+        (): None,
+    }
+    for hazards, reason in reasons.items():
+        metrics = (("delta_v", 5.5),) if reason is None else ()
+        cells = row_of(experiment(), record(hazards=hazards, t_end=5.5, metrics=metrics), scale)
+        assert cells["no_severity"] == reason
+
+
 def test_a_scale_determines_the_columns_of_severity() -> None:
     times = ["time_to_hazard", "manifest_to_hazard"]
-    for has_classes, names in ((True, ["severity", *times]), (False, times)):
+    for has_classes, names in (
+        (True, ["severity", "severity_hazard", "no_severity", *times]),
+        (False, times),
+    ):
         severity = severity_and_time_columns(has_classes=has_classes)
         columns = [c.name for c in result_columns(("H1",), ("gas",), (), severity)]
         assert columns[columns.index("max_dev_gas") + 1 : columns.index("variant")] == names
