@@ -60,6 +60,9 @@ def print_worst_experiments(
     if scale:
         rows = [row | {"severity": scale.labels.get(str(row["severity"]), "")} for row in rows]
     sentences = [(row["experiment"], row.pop("sentence")) for row in rows]
+    has_more = any(row.get("more") for row in rows)
+    if not has_more:
+        rows = [{head: cell for head, cell in row.items() if head != "more"} for row in rows]
     heads = tuple(rows[0]) if rows else ()
     terminal.print_table(
         heads,
@@ -72,7 +75,7 @@ def print_worst_experiments(
     terminal.print_text(
         f"{len(rows)} of {counted(count, 'experiment')} in {short_path(folder)}, the worst first"
     )
-    if only is None:
+    if has_more:
         terminal.print_text(
             "more: experiments with the same fault type and hazard; to list them: "
             "mutator show --only 'fault_type == \"...\"'"
