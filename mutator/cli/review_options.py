@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 import mutator
+from mutator._common.garbage_collection import without_garbage_collection
 from mutator.cli import completion
 from mutator.cli.console import Terminal
 from mutator.cli.options import Manifest, Reading, Seed, WorkspaceOptions
@@ -61,7 +62,8 @@ class MutantOptions:
         if self.campaign and self.specs:
             raise MutatorError("--campaign together with --spec", expected="one or the other")
         workspace = workspace_options.workspace()
-        with terminal.show_spinner("making the mutants"):
+        # collections take a tenth of the time, also while libraries are imported
+        with terminal.show_spinner("making the mutants"), without_garbage_collection():
             return mutator.load_review(
                 campaign=self.campaign,
                 specs=tuple(self.specs or ()),

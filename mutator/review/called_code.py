@@ -6,7 +6,7 @@ included whole, with their bases; for a call on `self`, only the called method i
 """
 
 import ast
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -42,9 +42,7 @@ class CalledCode:
         are included whole.
         """
         module = source_names.parse_module(path, mutated_file, Path())
-        return self._sources_with_callees(
-            path, uses_in(module.tree, is_selected=_injected_node_predicate(mutated_file))
-        )
+        return self._sources_with_callees(path, uses_in(module.tree, selection=_InjectedNodes(mutated_file)))
 
     def called_by_expressions(self, path: str, function: str, texts: Iterable[str]) -> dict[str, str]:
         """Return the code that expressions would call in a function. Invalid expressions are ignored."""
@@ -181,18 +179,27 @@ class CalledCode:
         )
 
 
-def _injected_node_predicate(mutated_file: bytes) -> Callable[[ast.expr], bool]:
-    """Return a predicate for the injected nodes of a mutated file: those in inserted lines, and those in the
-    new parts of changed lines.
+class _InjectedNodes:
+    """The injected nodes of a mutated file: those in inserted lines, and those in the new parts of changed
+    lines.
     """
-    tags = {number: tag for number, line in enumerate(mutated_file.splitlines(), 1) if (tag := tag_of(line))}
-    changed = [(line, first, end) for _, line, first, end in changed_value_positions(mutated_file)]
 
-    def is_injected(node: ast.expr) -> bool:
-        tag = tags.get(node.lineno)
+    def __init__(self, mutated_file: bytes) -> None:
+        self._tag_by_line = {
+            number: tag for number, line in enumerate(mutated_file.splitlines(), 1) if (tag := tag_of(line))
+        }
+        self._changed_parts = [
+            (line, first, end) for _, line, first, end in changed_value_positions(mutated_file)
+        ]
+
+    def may_contain(self, first_line: int, last_line: int) -> bool:
+        return any(first_line <= line <= last_line for line in self._tag_by_line)
+
+    def __contains__(self, node: ast.expr) -> bool:
+        tag = self._tag_by_line.get(node.lineno)
         if tag is None or not tag.is_of_fault:
             return False
-        within = (line == node.lineno and first <= node.col_offset < end for line, first, end in changed)
+        within = (
+            line == node.lineno and first <= node.col_offset < end for line, first, end in self._changed_parts
+        )
         return tag.replaced_line is None or any(within)
-
-    return is_injected

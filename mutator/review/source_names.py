@@ -1,15 +1,33 @@
 """The names in Python source: what a module defines and imports, and which names code uses."""
 
 import ast
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 _FunctionNode = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 _FUNCTION_NODES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
-_NodePredicate = Callable[[ast.expr], bool]
 SUPER = "super"
 _COMPREHENSION_NODES = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+
+
+class NodeSelection(Protocol):
+    """Some nodes of a module."""
+
+    def __contains__(self, node: ast.expr) -> bool: ...
+
+    def may_contain(self, first_line: int, last_line: int) -> bool:
+        """Return False if no node in these lines is selected, so that they need no search."""
+        ...
+
+
+class _AllNodes:
+    def __contains__(self, node: ast.expr) -> bool:
+        return True
+
+    def may_contain(self, first_line: int, last_line: int) -> bool:
+        return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +95,7 @@ class SourceModule:
         lines = data.splitlines(keepends=True)
         parts = []
         for node in self.definitions_of(name):
-            decorators = getattr(node, "decorator_list", [])
-            first = min(part.lineno for part in (node, *decorators))
-            parts += lines[first - 1 : node.end_lineno]
+            parts += lines[_first_line(node) - 1 : node.end_lineno]
         return b"".join(parts)
 
 
@@ -98,11 +114,9 @@ def parse_module(path: str, data: bytes, root: Path) -> SourceModule:
     return SourceModule(tree=tree, definitions=defined, imports=imports)
 
 
-def uses_in(node: ast.AST, owner: str = "", is_selected: _NodePredicate | None = None) -> Iterator[NameUse]:
-    """Yield the external names used in `node`, within the parts that `is_selected` accepts. `owner` is the
-    class of a method.
-    """
-    yield from _uses(node, _NameScope(owner=owner), is_selected or (lambda _: True))
+def uses_in(node: ast.AST, owner: str = "", selection: NodeSelection | None = None) -> Iterator[NameUse]:
+    """Yield the external names used in the selected parts of `node`. `owner` is the class of a method."""
+    yield from _uses(node, _NameScope(owner=owner), selection or _AllNodes())
 
 
 def uses_inside_function(function: ast.stmt | None, owner: str, node: ast.AST) -> Iterator[NameUse]:
@@ -111,7 +125,7 @@ def uses_inside_function(function: ast.stmt | None, owner: str, node: ast.AST) -
     yield from _uses(
         node,
         scope.within_function(function) if isinstance(function, _FUNCTION_NODES) else scope,
-        lambda _: True,
+        _AllNodes(),
     )
 
 
@@ -145,15 +159,17 @@ class _NameScope:
         return None if words[0] in self.local_names else NameUse(words)
 
 
-def _uses(node: ast.AST, scope: _NameScope, is_selected: _NodePredicate) -> Iterator[NameUse]:
+def _uses(node: ast.AST, scope: _NameScope, selection: NodeSelection) -> Iterator[NameUse]:
+    if isinstance(node, ast.stmt) and not selection.may_contain(_first_line(node), node.end_lineno or 0):
+        return
     if isinstance(node, ast.Name | ast.Attribute) and (words := _dotted_name(node)):
-        if isinstance(node.ctx, ast.Load) and is_selected(node) and (use := scope.find_use(words)):
+        if isinstance(node.ctx, ast.Load) and node in selection and (use := scope.find_use(words)):
             yield use
         return
-    if isinstance(node, ast.Attribute) and _is_super_call(node.value) and scope.owner and is_selected(node):
+    if isinstance(node, ast.Attribute) and _is_super_call(node.value) and scope.owner and node in selection:
         yield NameUse((SUPER, node.attr), owner=scope.owner)
     for part, inner in _children_with_scopes(node, scope):
-        yield from _uses(part, inner, is_selected)
+        yield from _uses(part, inner, selection)
 
 
 def _children_with_scopes(node: ast.AST, scope: _NameScope) -> Iterator[tuple[ast.AST, _NameScope]]:
@@ -186,6 +202,12 @@ def _children_without_annotations(node: ast.AST) -> Iterator[ast.AST]:
         for child in value if isinstance(value, list) else [value]:
             if isinstance(child, ast.AST):
                 yield child
+
+
+def _first_line(node: ast.stmt) -> int:
+    """Return the statement's first line, decorators included."""
+    decorators: list[ast.expr] = getattr(node, "decorator_list", [])
+    return min([node.lineno, *(decorator.lineno for decorator in decorators)])
 
 
 def _dotted_name(node: ast.AST) -> tuple[str, ...]:
