@@ -169,16 +169,18 @@ class Run(RunContents):
             )
         return trace_frame(load_trace(self.selected_target.manifest, folder), self.selected_target.manifest)
 
-    def report(self, *, anew: bool = False) -> report_builder.WrittenReport:
+    def report(self, *, anew: bool = False, single_file: bool = False) -> report_builder.WrittenReport:
         """Write the report, Markdown and one HTML page, unless it is up to date; with `anew`, always.
 
-        No experiment is rerun. Without a library, the report shows only the results.
+        With `single_file`, write it always, and also a page into exports/ that contains the replays of the
+        worst experiments and works without any other file, so that it can be sent. No experiment is rerun.
+        Without a library, the report shows only the results.
         """
         workspace = self._workspace_if_any()
-        if not anew:
+        if not (anew or single_file):
             return report_builder.ensure_report(self.path, workspace)
         results_table.build_tables(self.path)
-        return report_builder.write_report(self.path, workspace)
+        return report_builder.write_report(self.path, workspace, single_file=single_file)
 
     def take_stills(self, progress: ProgressCallback | None = None, *, workers: int = 1) -> str:
         """Rerun the worst camera experiments, and keep the frames at the activation, the first alert and the

@@ -91,6 +91,7 @@ def merge(
 REPORT_EXAMPLES = """\b
 Examples:
   mutator report runs/first
+  mutator report runs/first --single-file        one file to send, with replays
   mutator report /data/night --root ~/openpilot-faults
   mutator report runs                            history of all runs in a folder
 """
@@ -105,6 +106,14 @@ def report(
         ),
     ],
     wide: Wide = False,
+    single_file: Annotated[
+        bool,
+        typer.Option(
+            "--single-file",
+            help="Also write DIR/exports/<run>-report.html: the page with replays of the worst experiments "
+            "inside (at most 4 MB of them), which works without any other file.",
+        ),
+    ] = False,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,
@@ -116,23 +125,34 @@ def report(
     """
     terminal = Terminal(as_json, wide)
     if not (run / "run.json").exists() and any(run.glob("*/run.json")):
+        if single_file:
+            raise MutatorError(
+                "--single-file for a folder of runs",
+                where=run,
+                expected="a run folder",
+                remedy="name one of its runs; a history is one file anyway",
+            )
         _write_history(terminal, run)
         return
     loaded_run = mutator.load_run(run, workspace=workspace_if_any(workspace_options))
     with terminal.show_spinner("writing the report"):  # this can rerun a few experiments
-        report_files = loaded_run.report(anew=True)
+        report_files = loaded_run.report(anew=True, single_file=single_file)
     if as_json:
-        terminal.print_json(
-            {
-                "markdown": str(report_files.markdown),
-                "page": str(report_files.page),
-                "rows": report_files.rows,
-            }
-        )
+        facts = {
+            "markdown": str(report_files.markdown),
+            "page": str(report_files.page),
+            "rows": report_files.rows,
+        }
+        if report_files.single_file:
+            facts["single_file"] = str(report_files.single_file)
+        terminal.print_json(facts)
     print_outcome_counts(terminal, loaded_run)
     for summary in report_files.summaries:
         terminal.print_table(summary.heads, summary.rows, right_aligned=tuple(summary.right_aligned))
     terminal.print_text(f"report: {short_path(report_files.markdown)} and {short_path(report_files.page)}")
+    if report_files.single_file:
+        size_mb = report_files.single_file.stat().st_size / 1e6
+        terminal.print_text(f"single file: {short_path(report_files.single_file)} ({size_mb:.1f} MB)")
     loaded_run.check_equivalence()  # last, because the report is wanted even if this fails
 
 

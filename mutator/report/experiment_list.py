@@ -42,7 +42,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.formula_json import JsonTree, formula_as_json
 from mutator.triggers.trigger_kinds import ALWAYS_NAME
-from mutator.web import packed_script_element
+from mutator.web import json_script_element, packed_script_element
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -62,13 +62,17 @@ MOST_LISTED_EXPERIMENTS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExperimentListData:
-    """Data for the page's scripts: facts as JSON, the rest as script elements. `truncation_note` says which
-    experiments the page lists; '' if all.
+    """Data for the page's scripts: `facts`, and the script elements with the rest, by id. `truncation_note`
+    says which experiments the page lists; '' if all.
     """
 
-    facts_json: Markup
-    scripts: tuple[Markup, ...]
+    facts: Mapping[str, Any]
+    script_by_id: Mapping[str, Markup]
     truncation_note: str = ""
+
+    @property
+    def facts_element(self) -> Markup:
+        return Markup(json_script_element(self.facts, "facts"))
 
 
 def build_list_data(run: ReportedRun) -> ExperimentListData:
@@ -89,8 +93,8 @@ def build_list_data(run: ReportedRun) -> ExperimentListData:
         "meanings": code_meanings_by_column(run),
     }
     return ExperimentListData(
-        facts_json=Markup(json.dumps(facts).replace("<", "\\u003c")),
-        scripts=tuple(Markup(packed_script_element(value, name)) for name, value in data.items()),
+        facts=facts,
+        script_by_id={name: Markup(packed_script_element(value, name)) for name, value in data.items()},
         truncation_note=_describe_truncation(run),
     )
 

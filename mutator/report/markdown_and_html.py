@@ -1,6 +1,6 @@
 """The two forms of a report: Markdown, and one self-contained HTML page."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from mutator._common.message_text import counted
@@ -9,13 +9,14 @@ from mutator.mutants.injected_lines import tags_for_page_scripts
 from mutator.report.experiment_list import ExperimentListData
 from mutator.report.glossary import Glossary
 from mutator.report.panel import Panel, rendered
-from mutator.web import asset_text, json_script_element, load_order
+from mutator.web import asset_text, csp_hash, json_script_element, load_order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportContent:
     """The content of both forms of a report. `alarm` is shown first. `study_citation` cites the
     study that has its own page. `answers` come before the list of experiments, `panels` after it.
+    `replays_note` says which replays a page contains that lies alone.
     """
 
     title: str
@@ -27,6 +28,7 @@ class ReportContent:
     answers: Panel
     panels: Sequence[Panel]
     experiment_list: ExperimentListData  # the list of experiments, which only the page has
+    replays_note: str = ""
 
 
 def report_markdown(content: ReportContent) -> str:
@@ -47,10 +49,13 @@ def report_markdown(content: ReportContent) -> str:
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
-def report_html(content: ReportContent) -> str:
-    """Return the report as one self-contained HTML page. All text is escaped."""
+def report_html(content: ReportContent, *, is_alone: bool = False) -> str:
+    """Return the report as one self-contained HTML page. All text is escaped. A page that lies alone is not
+    allowed to request anything.
+    """
     from markupsafe import Markup
 
+    scripts = [asset_text(name) for name in load_order("report", ".js")]
     html = rendered(
         asset_text("report/report.html"),
         content=content,
@@ -63,9 +68,15 @@ def report_html(content: ReportContent) -> str:
                 *dict.fromkeys(p.style for p in content.panels if p.style),
             )
         ],
-        scripts=[Markup(asset_text(name)) for name in load_order("report", ".js")],
+        scripts=list(map(Markup, scripts)),
+        policy=_policy_without_requests(scripts) if is_alone else "",
     )
     return str(html)
+
+
+def _policy_without_requests(scripts: Iterable[str]) -> str:
+    hashes = " ".join(csp_hash(f"\n{script}") for script in scripts)
+    return f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data:"
 
 
 def study_markdown(content: ReportContent, panels: Sequence[Panel]) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from mutator._common.confined_files import write_below
 from mutator._common.helper_processes import computing_in_background, process_count_for
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
@@ -25,6 +26,7 @@ from mutator.report.panels import PANELS, build_study_panels
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.report_digests import inputs_digest, is_current, write_report_files
 from mutator.report.reported_run import ReportedRun
+from mutator.report.single_file import single_file_html, single_file_name
 from mutator.results.outcome_counting import count_by_outcome_or_status
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
@@ -36,22 +38,24 @@ MARKDOWN_FILE, PAGE_FILE = "REPORT.md", "index.html"
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WrittenReport:
     """The files of a report, and its number of experiments. Only a new report has `summaries`, tables for
-    the terminal.
+    the terminal; `single_file` is the page that works alone, if it was wanted.
     """
 
     markdown: Path
     page: Path
     rows: int
+    single_file: Path | None = None
     summaries: tuple[TextTable, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BuiltReport:
     """A report in memory: its `files` by name in the report's folder, of which REPORT.md and index.html
-    always exist.
+    always exist. `single_file` is the page that works alone, if it was wanted.
     """
 
     files: Mapping[str, bytes]
+    single_file: bytes | None
     experiment_count: int
     summaries: tuple[TextTable, ...]
 
@@ -63,21 +67,27 @@ def ensure_report(run: Path, workspace: Workspace | None) -> WrittenReport:
     return _written_report(run, Results(run).row_count())
 
 
-def write_report(run: Path, workspace: Workspace | None) -> WrittenReport:
+def write_report(run: Path, workspace: Workspace | None, *, single_file: bool = False) -> WrittenReport:
     """Write the report of a run folder whose tables are up to date, and missing series of kept traces.
 
-    Without a workspace, no experiments are rerun and no published numbers are shown.
+    With `single_file`, also write a page that works alone, into exports/. Without a workspace, no experiments
+    are rerun and no published numbers are shown.
     """
     folder = RunFolder.open(run)
     if workspace:
         write_missing_series_of_traces(folder, workspace)
     sources = inputs_digest(folder, workspace)
-    built = build_report(folder, workspace)
+    built = build_report(folder, workspace, single_file=single_file)
     write_report_files(run, sources, built.files)
-    return _written_report(run, built.experiment_count, built.summaries)
+    written = _written_report(run, built.experiment_count, built.summaries)
+    if built.single_file is None:
+        return written
+    name = single_file_name(folder.path.resolve().name)
+    write_below(run, name, built.single_file)
+    return replace(written, single_file=run / name)
 
 
-def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
+def build_report(folder: RunFolder, workspace: Workspace | None, *, single_file: bool = False) -> BuiltReport:
     """Build the report of a run folder whose tables are up to date, without writing anything."""
     reported = ReportedRun.open(folder, workspace)
     with computing_in_background(
@@ -92,7 +102,12 @@ def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
         files |= {"STUDY.md": study_markdown(content, study_panels).encode()}
         files |= {"study.html": study_html(content, study_panels).encode()}
     summaries = tuple(panel.summary for panel in panels if panel.summary)
-    return BuiltReport(files=files, experiment_count=len(reported.results), summaries=summaries)
+    return BuiltReport(
+        files=files,
+        single_file=single_file_html(content, reported).encode() if single_file else None,
+        experiment_count=len(reported.results),
+        summaries=summaries,
+    )
 
 
 def _written_report(run: Path, rows: int, summaries: tuple[TextTable, ...] = ()) -> WrittenReport:

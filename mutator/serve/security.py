@@ -5,8 +5,6 @@ the token, in a cookie that other sites cannot send. The request must not come f
 name this server, because a page whose host name resolves to this machine could otherwise read responses.
 """
 
-import base64
-import hashlib
 import hmac
 from collections.abc import Iterable
 from functools import cache
@@ -17,7 +15,7 @@ from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mutator.comparison import comparison_files
-from mutator.web import asset_names, asset_text
+from mutator.web import asset_names, asset_text, csp_hash
 
 HOST = "127.0.0.1"
 MOST_BODY_BYTES = 1_000_000  # the longest body of a request
@@ -161,9 +159,9 @@ def _with_security_headers(send: Send) -> Send:
 @cache
 def content_security_policy() -> str:
     """Return the policy for pages: they can run only code from `mutator.web`, as files or inline by hash."""
-    scripts = [_csp_hash(f"\n{asset_text(name)}") for name in asset_names(".js")]
-    styles = [_csp_hash(f"\n{asset_text(name)}") for name in asset_names(".css")] + [
-        _csp_hash(f"\n{comparison_files.page_style()}")
+    scripts = [csp_hash(f"\n{asset_text(name)}") for name in asset_names(".js")]
+    styles = [csp_hash(f"\n{asset_text(name)}") for name in asset_names(".css")] + [
+        csp_hash(f"\n{comparison_files.page_style()}")
     ]
     return "; ".join(
         (
@@ -179,7 +177,3 @@ def content_security_policy() -> str:
             "form-action 'none'",
         )
     )
-
-
-def _csp_hash(text: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

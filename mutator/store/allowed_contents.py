@@ -28,6 +28,7 @@ ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any
     *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
     *(
         "exports/mcap/*.mcap",
+        "exports/*-report.html",
         *(f"exports/{name}.{kind}" for name in _EXPORTED_TABLES for kind in ("csv", "parquet")),
     ),
     *(f"{DAMAGED_FOLDER}/*", "owner.lock", "workers/*", f"{SCRATCH_FOLDER}/*"),

@@ -155,6 +155,16 @@ class TimeSeriesFolder:
             return None
         return self.load_packed_series(index, experiment_id)
 
+    def read_encoded(self, experiment_id: str) -> tuple[bytes, bytes] | None:
+        """Return the encoded golden and faulty series that `load_series` decodes; MutatorError for damage."""
+        if (path := self.rerun_series_path(experiment_id)).exists():
+            return read_rerun_series(path)
+        index = self.index
+        if index is None or experiment_id not in index.entry_number_by_experiment:
+            return None
+        golden = index.entry_number_by_golden[index.golden_by_experiment[experiment_id]]
+        return self.read_entry(golden), self.read_entry(index.entry_number_by_experiment[experiment_id])
+
     def load_packed_series(self, index: SeriesIndex, experiment_id: str) -> tuple[Series, Series]:
         """Return the golden and the faulty series in the chunks; MutatorError for damage."""
         key = index.golden_by_experiment[experiment_id]
@@ -250,13 +260,25 @@ def write_rerun_series(path: Path, golden: bytes, faulty: bytes) -> None:
     write_script(path, b"".join((_LENGTH_STRUCT.pack(len(golden)), golden, faulty)))
 
 
-def load_rerun_series(path: Path) -> tuple[Series, Series]:
-    """Read the golden and the faulty series of a rerun; MutatorError if the file is damaged."""
-    data = read_script(path)
+def read_rerun_series(path: Path) -> tuple[bytes, bytes]:
+    """Read the encoded golden and faulty series of a rerun; MutatorError if the file is damaged."""
+    data, at = read_script(path), _LENGTH_STRUCT.size
     try:
         (length,) = _LENGTH_STRUCT.unpack_from(data)
-        at = _LENGTH_STRUCT.size
-        golden = decode_series(data[at : at + length])
-        return golden, decode_series(data[at + length :], golden)
-    except (struct.error, MutatorError):
-        raise MutatorError("damaged", where=path, expected="the series of two runs") from None
+    except struct.error:
+        raise _damaged_rerun_error(path) from None
+    return data[at : at + length], data[at + length :]
+
+
+def load_rerun_series(path: Path) -> tuple[Series, Series]:
+    """Read the golden and the faulty series of a rerun; MutatorError if the file is damaged."""
+    encoded_golden, encoded_faulty = read_rerun_series(path)
+    try:
+        golden = decode_series(encoded_golden)
+        return golden, decode_series(encoded_faulty, golden)
+    except MutatorError:
+        raise _damaged_rerun_error(path) from None
+
+
+def _damaged_rerun_error(path: Path) -> MutatorError:
+    return MutatorError("damaged", where=path, expected="the series of two runs")

@@ -7,6 +7,7 @@ its files in load order.
 
 import base64
 import gzip
+import hashlib
 import json
 from functools import cache
 from importlib.resources import files
@@ -34,6 +35,11 @@ def asset_names(suffix: str) -> tuple[str, ...]:
     folders = [folder for folder in files(__package__).iterdir() if folder.is_dir()]
     names = [f"{folder.name}/{file.name}" for folder in folders for file in folder.iterdir()]
     return tuple(sorted(name for name in names if name.endswith(suffix)))
+
+
+def csp_hash(text: str) -> str:
+    """Return the source expression with which a content security policy allows an inline script or style."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def pack_json(value: Any) -> str:

@@ -180,6 +180,18 @@ def test_report_of_a_folder_of_runs_is_their_history(cli: Cli, run: Path, tmp_pa
     assert "| first |" in Path(answer.json["markdown"]).read_text()
 
 
+def test_report_writes_one_file_to_send(cli: Cli, run: Path, tmp_path: Path) -> None:
+    """It is named after its run and lies next to other exports. A folder of runs has no such file."""
+    folder = Path(shutil.copytree(run, tmp_path / "runs" / "first"))
+    answer = cli("report", folder, "--single-file", "--json")
+    assert answer.code == 0
+    assert Path(answer.json["single_file"]) == folder / "exports" / "first-report.html"
+    assert 'id="embedded-series"' in (folder / "exports" / "first-report.html").read_text()
+    refused = cli("report", tmp_path / "runs", "--single-file")
+    assert refused.code == 2
+    assert "name one of its runs" in refused.err
+
+
 def test_a_failed_proof_is_at_the_top_of_the_report(
     cli: Cli, run: Path, tmp_path: Path, reseal: Reseal
 ) -> None:

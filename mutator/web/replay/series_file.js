@@ -1,7 +1,7 @@
 // @ts-check
 "use strict";
 // Reads the series of experiments (format series/1): channels over time, golden and faulty. Chunks are scripts in the
-// run's folder series/, because a page opened from disk can load only scripts.
+// run's folder series/, because a page opened from disk can load only scripts. A page can also contain them.
 
 const SeriesFile = (() => {
   const FOLDER = "../series/", CHUNKS = 6; // CHUNKS: chunks kept in memory
@@ -182,6 +182,24 @@ const SeriesFile = (() => {
     };
   }
 
+  /** The series that the page contains: { runs, of }, texts in base64 and the numbers of each experiment's golden and faulty
+   *  one; null if the page loads files. A page alone contains them, and requests no file. */
+  const embedded = (() => {
+    let data; // parsed on first use
+    return () => (data === undefined ? (data = JSON.parse(document.getElementById("embedded-series")?.textContent ?? "null")) : data);
+  })();
+
+  const decodedText = (text, golden) => decoded(Uint8Array.from(atob(text), (character) => character.charCodeAt(0)), golden);
+
+  async function readEmbedded(id, expected) {
+    const { runs, of } = embedded();
+    if (!Object.hasOwn(of, id)) return null;
+    const [reference, entry] = of[id];
+    if (!goldens.has(reference)) goldens.set(reference, decodedText(runs[reference], null));
+    const golden = await goldens.get(reference);
+    return buildSeries(id, expected, golden, await decodedText(runs[entry], golden));
+  }
+
   /** The two runs in the file of one rerun experiment. */
   async function readKept(id, expected) {
     const bytes = await read(`kept/${id}`, id);
@@ -191,6 +209,7 @@ const SeriesFile = (() => {
   }
 
   async function findSeries(id, expected, isNew) {
+    if (embedded()) return readEmbedded(id, expected);
     const there = JSON.parse(document.getElementById("facts").textContent).series; // so that no missing files are requested
     if (isNew || there.kept.includes(id)) { // from a rerun, perhaps because the packed series is damaged
       const series = await readKept(id, expected);

@@ -222,14 +222,20 @@ class Experiment {
     }
     const hazard = this.table.number(this.row, "t_hazard"), begin = this.table.number(this.row, "t_activation");
     const t = Number.isNaN(hazard) ? (Number.isNaN(begin) ? 10 : begin + 2) : hazard;
-    const run = this.facts.run(), separator = run.includes("\\") ? "\\" : "/";
     place.replaceChildren(
       ...(pictures ? pictures.stills : []).map(([time, link]) => el("figure", {}, el("img", { src: link, alt: `Golden and faulty runs at ${time} s`, loading: "lazy" }), el("figcaption", {}, this.#moment(time)))),
       ...(pictures ? pictures.films : []).map((link) => link.endsWith(".gif") ? el("img", { src: link, alt: "Golden and faulty runs", loading: "lazy" })
         : el("video", { src: link, controls: true, preload: "none", "aria-label": "Golden and faulty runs" })),
+      ...(this.facts.series.alone ? [] : this.#filming(id, pictures, t)));
+  }
+
+  /** Commands that make pictures in the run folder. */
+  #filming(id, pictures, t) {
+    const { el } = Dom, run = this.facts.run(), separator = run.includes("\\") ? "\\" : "/";
+    return [
       el("p", {}, pictures ? "More stills, or a film:" : "There are no pictures of this experiment yet. This command makes a still and a film:"),
       this.command(`mutator show ${id} --run ${run} --still ${t.toFixed(2)} --video ${run}${separator}plots${separator}${id}.mp4`),
-      el("p", {}, "Then rebuild the report to see them here:"), this.command(`mutator report ${run}`));
+      el("p", {}, "Then rebuild the report to see them here:"), this.command(`mutator report ${run}`)];
   }
 
   /** The time of a still, as in its file name, and the event at that time. */
@@ -247,6 +253,13 @@ class Experiment {
       place.replaceChildren(el("p", {}, `${Experiment.ENDINGS[this.text("status")] ?? "The run did not finish normally"}, so there are no channels.`));
       return;
     }
+    const { alone, reason_if_missing: reason } = this.facts.series; // alone: the page cannot load files
+    if (alone) {
+      const isBeyond = this.table.number(this.row, "rank") > alone.last_rank, isUnreadable = error || alone.unreadable.includes(id);
+      place.replaceChildren(isUnreadable ? el("p", { role: "alert" }, error?.message ?? "The run folder has a series of this experiment, but it is damaged or belongs to another run than the record.")
+        : el("p", {}, isBeyond ? alone.reason_beyond : reason));
+      return;
+    }
     const status = el("p", { role: "status" });
     const load = async () => {
       const series = await SeriesFile.load(id, expected, { isNew: true }).catch((error) => error);
@@ -256,7 +269,7 @@ class Experiment {
     };
     const isApart = error?.cause?.isMissingFile;
     const why = isApart ? "The channels are not next to this page: it lies outside its run folder, or the folder's `series` was removed. Open report/index.html in the whole run folder."
-      : this.facts.series.reason_if_missing;
+      : reason;
     place.replaceChildren(error && !isApart ? el("p", { role: "alert" }, error.message) : el("p", {}, why), el("p", {}, "This command reruns it:"),
       this.command(`mutator rerun ${id} --trace --run ${this.facts.run()}`),
       el("p", {}, el("button", { type: "button", onclick: load }, "Show them"), " after the rerun."), status);

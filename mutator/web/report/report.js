@@ -24,7 +24,7 @@ const Report = (() => {
     const grid = new Grid(find("grid"), table, state, facts.metrics);
     const columns = new Columns(search.parentElement, grid, state);
     const actions = { move: (by) => grid.move(by), close: () => view.close(), place: () => grid.placeOf(state.experiment) };
-    const experiment = new Experiment(find("experiment"), table, state, { ...facts, run: runFolder }, actions);
+    const experiment = new Experiment(find("experiment"), table, state, { ...facts, run: facts.series.alone ? () => "DIR" : runFolder }, actions);
     const view = viewOf({ table, state, search, heat, filters, grid, columns, experiment });
     searching(search, state);
     keyboard({ grid, experiment, search, close: view.close });
