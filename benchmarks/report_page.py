@@ -163,8 +163,13 @@ def write(size: int, out: Path) -> dict[str, float]:
     # no column of deviations: the synthetic records do not state those of the series
     series_facts = {"packed": True, "kept": [], "deviations": {}}
     browse = ExperimentListData(
-        facts_json=Markup(json.dumps({"filmed": True, "series": series_facts})),
-        scripts=tuple(map(Markup, (table, detail, paths, packed_script_element({}, "media")))),
+        facts={"filmed": True, "series": series_facts},
+        script_by_id={
+            "table": Markup(table),
+            "details": Markup(detail),
+            "paths": Markup(paths),
+            "media": Markup(packed_script_element({}, "media")),
+        },
     )
     content = ReportContent(
         title=f"{size} experiments",
