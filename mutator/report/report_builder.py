@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mutator._common.confined_files import write_below
+from mutator._common.confined_files import path_below, write_below
 from mutator._common.helper_processes import computing_in_background, process_count_for
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
@@ -84,7 +84,7 @@ def write_report(run: Path, workspace: Workspace | None, *, single_file: bool = 
         return written
     name = single_file_name(folder.path.resolve().name)
     write_below(run, name, built.single_file)
-    return replace(written, single_file=run / name)
+    return replace(written, single_file=path_below(run, name))
 
 
 def build_report(folder: RunFolder, workspace: Workspace | None, *, single_file: bool = False) -> BuiltReport:
