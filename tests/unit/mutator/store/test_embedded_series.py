@@ -4,9 +4,10 @@ import base64
 from dataclasses import replace
 from pathlib import Path
 
+from mutator.store.series_folder import SeriesFolder
+
 from mutator.model import Record
 from mutator.store.embedded_series import EmbeddedSeries, embed_worst
-from mutator.store.series_folder import SeriesFolder
 from mutator.store.series_packing import SeriesWriter, pack_series
 
 from .test_series_packing import IDS, MADE, RECORD
