@@ -26,7 +26,7 @@ from mutator.store.embedded_series import (
     EmbeddedSeries,
     embed_worst,
 )
-from mutator.store.series_folder import SeriesFolder
+from mutator.store.time_series_folder import TimeSeriesFolder
 from mutator.web import json_script_element, packed_script_element
 
 SINGLE_FILE_FOLDER, SINGLE_FILE_SUFFIX = "exports", "-report.html"
@@ -39,7 +39,7 @@ def single_file_name(run_name: str) -> str:
 
 def single_file_html(content: ReportContent, run: ReportedRun) -> str:
     """Return the page of a report that works without any other file."""
-    ids, series = _ids_worst_first(run), SeriesFolder(run.folder.path)
+    ids, series = _ids_worst_first(run), TimeSeriesFolder(run.folder.path)
     embedded, last_rank = embed_worst(series, map(run.records.get, ids), MOST_EMBEDDED_SERIES_BYTES)
     is_cut = last_rank < min(len(run.results), MOST_LISTED_EXPERIMENTS)
     alone = {
@@ -63,7 +63,7 @@ def _ids_worst_first(run: ReportedRun) -> list[str]:
     return [str(name) for name in run.results["experiment_id"].to_numpy()[order]]
 
 
-def _has_series(series: SeriesFolder, experiment_id: str) -> bool:
+def _has_series(series: TimeSeriesFolder, experiment_id: str) -> bool:
     try:
         return series.has_series(experiment_id)
     except MutatorError:  # the index is damaged

@@ -10,7 +10,7 @@ from typing import Any
 
 from mutator.errors import MutatorError
 from mutator.model import Record
-from mutator.store.series_folder import SeriesFolder
+from mutator.store.time_series_folder import TimeSeriesFolder
 
 MOST_EMBEDDED_SERIES_BYTES = 4_000_000  # of about 400 experiments; a page with it can be mailed
 EMBEDDED_SERIES_ELEMENT = "embedded-series"  # id of the script element
@@ -54,7 +54,7 @@ def _base64_text(data: bytes) -> str:
     return base64.b64encode(data).decode("ascii")
 
 
-def readable_encoded_series(series: SeriesFolder, record: Record | None) -> tuple[bytes, bytes] | None:
+def readable_encoded_series(series: TimeSeriesFolder, record: Record | None) -> tuple[bytes, bytes] | None:
     """Return the encoded golden and faulty series of an experiment with this record; None if they do not
     exist, are damaged, or belong to another run than the record.
     """
@@ -69,7 +69,7 @@ def readable_encoded_series(series: SeriesFolder, record: Record | None) -> tupl
 
 
 def embed_worst(
-    series: SeriesFolder, records: Iterable[Record | None], most_bytes: int
+    series: TimeSeriesFolder, records: Iterable[Record | None], most_bytes: int
 ) -> tuple[EmbeddedSeries, int]:
     """Embed the series of `records`, worst first, until one does not fit. Return them, and how many records
     were considered: those after these are left out because of the limit.

@@ -4,22 +4,21 @@ import base64
 from dataclasses import replace
 from pathlib import Path
 
-from mutator.store.series_folder import SeriesFolder
-
 from mutator.model import Record
 from mutator.store.embedded_series import EmbeddedSeries, embed_worst
 from mutator.store.series_packing import SeriesWriter, pack_series
+from mutator.store.time_series_folder import TimeSeriesFolder
 
 from .test_series_packing import IDS, MADE, RECORD
 
 
-def packed_run(run: Path, names: list[str]) -> SeriesFolder:
+def packed_run(run: Path, names: list[str]) -> TimeSeriesFolder:
     writer = SeriesWriter(run, "0001-main")
     for name in names:
         writer.append(name, MADE[name])
     writer.close()
     pack_series(run, "p", {name: place for place, name in enumerate(names)}, 500)
-    return SeriesFolder(run)
+    return TimeSeriesFolder(run)
 
 
 def record_of(name: str) -> Record:
