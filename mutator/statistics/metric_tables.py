@@ -53,8 +53,11 @@ def describe_classes(scale: SeverityScale | None, names: Sequence[str]) -> str:
     return f" Severity classes: {', '.join(labels)}." if labels else ""
 
 
-def severity_sheet(frame: pd.DataFrame, scale: SeverityScale | None = None) -> Sheet:
-    """Return the table of activated faults by severity class. Without classes, it has no lines."""
+def severity_by_fault_type_sheet(frame: pd.DataFrame, scale_for_note: SeverityScale | None = None) -> Sheet:
+    """Return the shares of activated faults in each severity class, by fault type; no lines without classes.
+
+    With a scale, the note gives the classes in words.
+    """
     lines: list[tuple[SheetCell, ...]] = []
     columns = [name for name in ("kind", "severity") if name in frame]
     activated = frame.loc[frame["is_activated"], columns]
@@ -66,7 +69,8 @@ def severity_sheet(frame: pd.DataFrame, scale: SeverityScale | None = None) -> S
         name="severity",
         title="Severity by fault type",
         note="Activated faults with a hazard that has a severity class, in total and by class. 95 % "
-        "Wilson intervals; in brackets, the count and the total." + describe_classes(scale, SEVERITY_CLASSES),
+        "Wilson intervals; in brackets, the count and the total."
+        + describe_classes(scale_for_note, SEVERITY_CLASSES),
         heads=("fault type", "any class", *SEVERITY_CLASSES),
         lines=tuple(lines),
     )

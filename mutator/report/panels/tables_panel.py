@@ -14,7 +14,11 @@ from mutator.results.outcome_counting import (
     count_table,
     fault_types_of,
 )
-from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, times_to_hazard_sheet
+from mutator.statistics.metric_tables import (
+    metrics_sheet,
+    severity_by_fault_type_sheet,
+    times_to_hazard_sheet,
+)
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.sheet_selection import run_sheets
 from mutator.statistics.statistics_sheet import Sheet
@@ -143,7 +147,7 @@ def _statistic_sheets(run: ReportedRun, published: PublishedCounts | None) -> tu
 
 def _distribution_sheets(run: ReportedRun) -> tuple[Sheet, ...]:
     sheets = (
-        severity_sheet(run.frame, run.folder.severity_scale),
+        severity_by_fault_type_sheet(run.frame, run.folder.severity_scale),
         times_to_hazard_sheet(
             run.frame,
             run.frame["experiment_id"].isin(run.experiment_facts.ids_active_at_hazard),

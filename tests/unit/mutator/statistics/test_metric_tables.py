@@ -8,7 +8,11 @@ import pytest
 
 from mutator.statistics import median_intervals
 from mutator.statistics.median_intervals import median_difference, median_interval
-from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, times_to_hazard_sheet
+from mutator.statistics.metric_tables import (
+    metrics_sheet,
+    severity_by_fault_type_sheet,
+    times_to_hazard_sheet,
+)
 from mutator.targets.stored_target_facts import MetricFacts
 
 METRICS = [
@@ -52,11 +56,11 @@ def test_without_values_there_is_no_table() -> None:
     frame = FRAME[FRAME["kind"] == "a/y"]
     assert metrics_sheet(frame, []).lines == ()
     assert times_to_hazard_sheet(frame, frame["is_hazard"]).lines == ()
-    assert severity_sheet(frame.drop(columns="severity")).lines == ()
+    assert severity_by_fault_type_sheet(frame.drop(columns="severity")).lines == ()
 
 
 def test_severity_classes_are_counted_by_fault_type() -> None:
-    rows = severity_sheet(FRAME).table().rows
+    rows = severity_by_fault_type_sheet(FRAME).table().rows
     counts = [[row[0], *(cell.partition("(")[2].partition(";")[0] for cell in row[1:])] for row in rows]
     assert counts == [
         ["a/x", "3/5", "1/5", "0/5", "1/5", "1/5"],
