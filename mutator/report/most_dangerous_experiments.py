@@ -109,7 +109,9 @@ def _describe_severities(hazards: pd.DataFrame, labels: Mapping[str, str]) -> st
         f"{counts[name]} of severity {labels.get(name, name)}"
         for name in sorted(filter(None, counts.index), reverse=True)
     ]
-    return ", ".join((*parts, f"{counts.get('', 0)} without a class"))
+    if unclassified := counts.get("", 0):
+        parts.append(f"{unclassified} without a class")
+    return ", ".join(parts)
 
 
 def _worst_table(
