@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mutator._common.confined_files import path_below
 from mutator._common.table_rendering import TextTable
 from mutator.api.notebook_html import text_html
-from mutator.api.runs import Run, alerts_note_if_any, load_run
+from mutator.api.runs import Run, alerts_note_if_any, load_run, scene_if_any
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
 from mutator.comparison.pairs import ExperimentPair, ResultChangeKind
@@ -114,7 +114,8 @@ def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None
     """
     runs = [run if isinstance(run, Run) else load_run(run) for run in (a, b)]
     first, second = map(alerts_note_if_any, runs)
-    return RunComparison(comparing.compare_runs(runs[0].path, runs[1].path, only, (first, second)))
+    scenes = (scene_if_any(runs[0]), scene_if_any(runs[1]))
+    return RunComparison(comparing.compare_runs(runs[0].path, runs[1].path, only, (first, second), scenes))
 
 
 def _pair_cells_frame(pairs: Sequence[ExperimentPair]) -> "pd.DataFrame":

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mutator._common.message_text import describe_choices, describe_seeds
 from mutator._common.table_rendering import TextTable
@@ -39,6 +39,7 @@ from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import run_deletion
 from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.targets.scene_json import scene_as_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -233,6 +234,14 @@ class Run(RunContents):
     def finish_deletion(self) -> bool:
         """Finish a deletion that another command has started; return whether the folder is gone."""
         return run_deletion.finish_deletion(self.path)
+
+
+def scene_if_any(run: Run) -> "dict[str, Any] | None":
+    """Return what a replay of the run draws; None without a library that has it."""
+    try:
+        return scene_as_json(run.workspace.manifest(run.folder.head.target))
+    except (MutatorError, KeyError):
+        return None
 
 
 def alerts_note_if_any(run: Run) -> str:

@@ -11,6 +11,7 @@ from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable, markdown_line
+from mutator.comparison.comparison_replays import ReportAddresses, addresses_from, replay_elements
 from mutator.comparison.input_differences import InputFact
 from mutator.comparison.pairs import ExperimentPair, ResultChangeKind, time_to_hazard
 from mutator.comparison.run_comparison import Comparison, Gate, describe_ending_change
@@ -23,6 +24,18 @@ MOST_LISTED_EXPERIMENTS = (
 )
 MOST_SHOWN_ROWS = 500  # table rows that the page shows at once; browsers need seconds to lay out thousands
 _WORSE_CHANGES = frozenset(gate.value for gate in Gate)
+_BETTER_CHANGES = frozenset(
+    kind.value
+    for kind in (
+        ResultChangeKind.HAZARD_GONE,
+        ResultChangeKind.LOWER_SEVERITY,
+        ResultChangeKind.LATER_HAZARD,
+        ResultChangeKind.NEW_ALERT,
+        ResultChangeKind.BETTER,
+        ResultChangeKind.CRASH_GONE,
+        ResultChangeKind.HARNESS_ERROR_GONE,
+    )
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +56,8 @@ def write_comparison(comparison: Comparison, out: Path) -> ComparisonFiles:
     write_atomic(pairs, pairs_csv(comparison))
     write_atomic(out / "unmatched.csv", unmatched_csv(comparison))
     write_atomic(text, render_markdown(comparison).encode())
-    write_atomic(hypertext, render_html_page(comparison).encode())
+    page = render_html_page(comparison, addresses_from(out, comparison))
+    write_atomic(hypertext, page.encode())
     return ComparisonFiles(markdown=text, page=hypertext, pairs=pairs)
 
 
@@ -141,8 +155,26 @@ def _unmatched_reasons_table(comparison: Comparison) -> TextTable:
     return TextTable(heads=("why", "experiments"), rows=rows, right_aligned=(1,))
 
 
-def render_html_page(comparison: Comparison) -> str:
-    """Return the comparison as one HTML page. All text from runs is escaped."""
+def verdict(comparison: Comparison) -> tuple[str, str]:
+    """Return a word for the change from the first run to the second (worse, better, otherwise, same), and a
+    sentence with the numbers of experiments. An experiment that is worse in any respect is not better.
+    """
+    all_kinds = [{kind.value for kind in pair.change_kinds} for pair in comparison.changed_pairs]
+    worse = sum(bool(kinds & _WORSE_CHANGES) for kinds in all_kinds)
+    better = sum(bool(kinds & _BETTER_CHANGES) and not kinds & _WORSE_CHANGES for kinds in all_kinds)
+    otherwise = len(all_kinds) - worse - better
+    experiments = counted(len(comparison.pairs), "experiment")
+    if not all_kinds:
+        return "same", f"No change: {experiments} in both runs, with equal results."
+    counts = {"for the worse": worse, "only for the better": better, "otherwise": otherwise}
+    changed = ", ".join(f"{count} {how}" for how, count in counts.items() if count)
+    word = "worse" if worse else "better" if better else "otherwise"
+    head = {"worse": "Worse", "better": "Better", "otherwise": "Changed"}[word]
+    return word, f"{head}: of {experiments} in both runs, {changed}."
+
+
+def render_html_page(comparison: Comparison, addresses: ReportAddresses) -> str:
+    """Return the comparison as one HTML page, which links to the reports. All text from runs is escaped."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -152,44 +184,65 @@ def render_html_page(comparison: Comparison) -> str:
     counts = Counter(change for pair in comparison.pairs for change in pair.change_kinds)
     return environment.from_string(asset_text("comparison/comparison.html")).render(
         c=comparison,
+        verdict=verdict(comparison),
         summary=summary_text(comparison),
         differing=_facts_table(comparison, [fact for fact in comparison.facts if fact.is_different]),
         origin=_facts_table(comparison, [f for f in comparison.facts if not f.name.startswith("package ")]),
         files=differing_files_text(comparison),
         counts=[(change.value, counts[change]) for change in ResultChangeKind if counts[change]],
         reasons=_unmatched_reasons_table(comparison),
-        changed=_changed_table(comparison),
+        changed=_changed_table(comparison, addresses),
         limit=MOST_SHOWN_ROWS,
-        style=Markup(page_style()),
-        script=Markup(asset_text("comparison/comparison.js")),
+        styles=[Markup(text) for text in page_styles()],
+        data=[Markup(element) for element in replay_elements(comparison, addresses)],
+        scripts=[Markup(asset_text(name)) for name in load_order("comparison", ".js")],
     )
 
 
-def page_style() -> str:
-    styles = "".join(map(asset_text, load_order("comparison", ".css")))
-    return styles.replace("LIMIT", str(MOST_SHOWN_ROWS + 1))
+def page_styles() -> tuple[str, ...]:
+    """Return the style sheets of the page."""
+    return tuple(
+        asset_text(name).replace("LIMIT", str(MOST_SHOWN_ROWS + 1))
+        for name in load_order("comparison", ".css")
+    )
 
 
-def _changed_table(comparison: Comparison) -> TextTable:
+def _changed_table(comparison: Comparison, addresses: ReportAddresses) -> TextTable:
     a, b = comparison.names.a, comparison.names.b
-    heads = ("experiment", "what changed", a, b, f"hazard, {a} [s]", f"hazard, {b} [s]", "ids")
-    return TextTable(
-        heads=heads, rows=list(map(_changed_row, comparison.changed_pairs)), right_aligned=(4, 5)
-    )
+    heads = ("experiment", "what changed", a, b, f"hazard, {a} [s]", f"hazard, {b} [s]", "in the reports")
+    rows = [_changed_row(pair, comparison, addresses) for pair in comparison.changed_pairs]
+    return TextTable(heads=heads, rows=rows, right_aligned=(4, 5))
 
 
-def _changed_row(pair: ExperimentPair) -> tuple[str, ...]:
+def _changed_row(pair: ExperimentPair, comparison: Comparison, addresses: ReportAddresses) -> tuple[str, ...]:
     from markupsafe import Markup
 
     badge = Markup('<span class="change{}">{}</span> ').format
     changes = [change.value for change in ResultChangeKind if change in pair.change_kinds]
     sides = (pair.row_a, pair.row_b)
+    button = Markup('<button type="button" class="open" data-a="{}" data-b="{}">{}</button>').format
     return (
-        pair.b.label,
+        button(pair.a.id, pair.b.id, pair.b.label),
         Markup("").join(badge(" bad" if change in _WORSE_CHANGES else "", change) for change in changes),
         *map(_ending_html, sides),
         *map(_hazard_time_text, sides),
-        Markup("<br>").join(map(Markup("<code>{}</code>").format, dict.fromkeys((pair.a.id, pair.b.id)))),
+        Markup("<br>").join(
+            (
+                _experiment_link(addresses.a, pair.a.id, comparison.names.a),
+                _experiment_link(addresses.b, pair.b.id, comparison.names.b),
+            )
+        ),
+    )
+
+
+def _experiment_link(address: str, experiment_id: str, name: str) -> str:
+    from markupsafe import Markup
+
+    code = Markup("<code>{}</code>").format(experiment_id)
+    if not address:
+        return code
+    return Markup('<a href="{}#e={}" title="{}">{}</a>').format(
+        address, experiment_id, f"in the report of {name}", code
     )
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from mutator.comparison.compared_runs import ComparedRun, load_compared_run
 from mutator.comparison.input_differences import (
@@ -37,6 +38,8 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.results.result_rows import ResultRow
 from mutator.statistics.statistics_sheet import Sheet
+
+Scenes = tuple[dict[str, Any] | None, dict[str, Any] | None]
 
 
 class Gate(StrEnum):
@@ -79,12 +82,15 @@ class GateFinding:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Two matched runs. `golden_alerts_notes` has a note on the alerts of each run's golden runs, or ''."""
+    """Two matched runs. `golden_alerts_notes` has a note on the alerts of each run's golden runs, or '';
+    `scenes` has what the page's replays of each run draw, as JSON, or None.
+    """
 
     a: ComparedRun
     b: ComparedRun
     matching: ExperimentMatching
     golden_alerts_notes: tuple[str, str] = ("", "")
+    scenes: Scenes = (None, None)
 
     @cached_property
     def names(self) -> RunDisplayNames:
@@ -172,7 +178,11 @@ class Comparison:
 
 
 def compare_runs(
-    run_a: Path, run_b: Path, only: str | None = None, golden_alerts_notes: tuple[str, str] = ("", "")
+    run_a: Path,
+    run_b: Path,
+    only: str | None = None,
+    golden_alerts_notes: tuple[str, str] = ("", ""),
+    scenes: Scenes = (None, None),
 ) -> Comparison:
     """Compare two run folders; `only` filters experiments by plan columns.
 
@@ -195,7 +205,7 @@ def compare_runs(
             expected="runs of the same faults, scenarios and triggers",
             remedy="compare runs of one campaign, or widen `only`",
         )
-    return Comparison(a=a, b=b, matching=matching, golden_alerts_notes=golden_alerts_notes)
+    return Comparison(a=a, b=b, matching=matching, golden_alerts_notes=golden_alerts_notes, scenes=scenes)
 
 
 def findings_of_gates(comparison: Comparison, gates: Sequence[Gate]) -> tuple[GateFinding, ...]:

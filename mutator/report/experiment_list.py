@@ -39,8 +39,7 @@ from mutator.results.result_rows import ResultRow, rows_of
 from mutator.review.patch_shapes import PatchShape, shapes_of_patches
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
-from mutator.targets.manifest import TargetManifest
-from mutator.triggers.formula_json import JsonTree, formula_as_json
+from mutator.targets.scene_json import scene_as_json
 from mutator.triggers.trigger_kinds import ALWAYS_NAME
 from mutator.web import json_script_element, packed_script_element
 
@@ -342,23 +341,3 @@ def media_by_experiment(
                 link = f"data:image/{kind};base64,{base64.b64encode(read_bounded(path)).decode()}"
             media_of_experiment["stills"].append([time.removesuffix("s"), link])
     return {name: files for name, files in files_by_experiment.items() if any(files.values())}
-
-
-def scene_as_json(manifest: TargetManifest) -> dict[str, Any] | None:
-    """Return the data that web/replay/scene.js draws; None if the target's manifest has no scene."""
-    scene = manifest.scene
-    if scene is None:
-        return None
-    channels = {channel.name for channel in manifest.channels}
-    derived = {v.name: v.text for v in manifest.observation.derived if v.name not in channels}
-
-    def expression_tree(text: str) -> JsonTree:
-        return formula_as_json(text, derived)
-
-    actors = [
-        asdict(actor)
-        | {key: expression_tree(getattr(actor, key)) for key in ("x", "y", "heading", "visible")}
-        for actor in scene.actors
-    ]
-    lines = [asdict(line) | {"y": expression_tree(line.y) if line.y else None} for line in scene.lines]
-    return {"actors": actors, "lines": lines, "follow": scene.follow, "speed": expression_tree(scene.speed)}

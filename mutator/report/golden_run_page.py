@@ -12,10 +12,10 @@ from mutator._common.files import make_folder, write_atomic
 from mutator.errors import CheckFailed, MutatorError
 from mutator.outcomes.hazards_and_metrics import RunJudgement, load_judged_run
 from mutator.outcomes.trace_loading import Trace, values_on_steps
-from mutator.report.experiment_list import scene_as_json
 from mutator.store.preflight_results import check_results
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.scene_json import scene_as_json
 from mutator.targets.stored_target_facts import channel_facts, hazard_facts
 from mutator.web import asset_text, load_order, packed_script_element
 from mutator.workspace import Workspace

@@ -7,6 +7,7 @@ from mutator.errors import MutatorError
 from mutator.execution.run_traces import RunTraces
 from mutator.outcomes.series_sampling import write_sampled_series
 from mutator.results.table_columns import deviation_column_by_channel
+from mutator.store.missing_series import reason_for_missing_series
 from mutator.store.run_folder import RunFolder
 from mutator.store.time_series_folder import TimeSeriesFolder
 
@@ -27,21 +28,6 @@ def series_facts_for_page(folder: RunFolder) -> dict[str, Any]:
         "reason_if_missing": reason_for_missing_series(folder, is_packed=series.is_packed),
         "deviations": columns,
     }
-
-
-def reason_for_missing_series(folder: RunFolder, *, is_packed: bool) -> str:
-    """Return why an experiment that finished normally has no series in this run folder."""
-    budget_mb = folder.series_budget_mb
-    if not budget_mb:
-        return "This run kept no channels, because it was made with --series-mb 0."
-    if is_packed:
-        return f"The channels of other experiments fill the run's {budget_mb:,} MB for them (--series-mb)."
-    if not folder.is_finished:
-        return (
-            "The run was not finished when this page was written, and channels can be read when it is. "
-            "Finish the run, then rebuild its report."
-        )
-    return "This run folder has no channels: its folder `series` was removed, or an older mutator wrote it."
 
 
 def write_missing_series_of_traces(folder: RunFolder, workspace: "Workspace") -> None:

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from starlette.responses import HTMLResponse, Response
 
@@ -12,6 +13,7 @@ from mutator._common.hashing import digest
 from mutator.audit.table_audit import audit_tables
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
+from mutator.comparison.comparison_replays import ReportAddresses
 from mutator.errors import MutatorError, NotServed
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note, load_fault_free_runs
 from mutator.report import report_builder
@@ -21,9 +23,11 @@ from mutator.results.table_reader import Results
 from mutator.serve.page_tokens import PageTokens, run_page_name
 from mutator.serve.report_cache import ReportCache
 from mutator.serve.responses import UNTRUSTED_FILE_HEADERS, OpenFileResponse, media_type_of
-from mutator.serve.served_runs import ServedRuns, open_served_file
+from mutator.serve.served_runs import ServedRuns, open_served_file, report_address
 from mutator.store.run_folder import RunFolder
+from mutator.store.series_folder import SeriesFolder
 from mutator.store.series_script import read_script, script_bytes
+from mutator.targets.scene_json import scene_as_json
 from mutator.web import load_order
 from mutator.workspace import Workspace
 
@@ -61,9 +65,10 @@ class RunPages:
         for folder in folders:
             check_only_plain_files(folder)  # because outdated tables are written
         with self._page_lock:
-            first, second = (digest(Results.up_to_date(folder).parquet()) for folder in folders)
+            first, second = map(_comparison_inputs, (a, b), folders)
+            addresses = ReportAddresses(a=report_address(a), b=report_address(b))
             files = self._comparison_cache.pop((first, second), None) or self._build_comparison_files(
-                *folders
+                *folders, addresses
             )
             self._comparison_cache[first, second] = files
             for old in list(self._comparison_cache)[:-_MOST_CACHED_COMPARISONS]:
@@ -97,14 +102,20 @@ class RunPages:
                 raise problem
         return report_builder.build_report(folder, self._workspace).files
 
-    def _build_comparison_files(self, a: Path, b: Path) -> dict[str, bytes]:
+    def _build_comparison_files(self, a: Path, b: Path, addresses: ReportAddresses) -> dict[str, bytes]:
         notes = (self._golden_alerts_note(a), self._golden_alerts_note(b))
-        comparison = comparing.compare_runs(a, b, None, notes)
+        comparison = comparing.compare_runs(a, b, None, notes, (self._scene(a), self._scene(b)))
         return {
-            "index.html": comparison_files.render_html_page(comparison).encode(),
+            "index.html": comparison_files.render_html_page(comparison, addresses).encode(),
             "pairs.csv": comparison_files.pairs_csv(comparison),
             "unmatched.csv": comparison_files.unmatched_csv(comparison),
         }
+
+    def _scene(self, run: Path) -> dict[str, Any] | None:
+        try:
+            return scene_as_json(self._workspace.manifest(RunFolder.open(run).head.target))
+        except (MutatorError, KeyError):
+            return None
 
     def _golden_alerts_note(self, run: Path) -> str:
         folder = RunFolder.open(run)
@@ -114,6 +125,11 @@ class RunPages:
             )
         except (MutatorError, KeyError):
             return ""
+
+
+def _comparison_inputs(key: str, run: Path) -> str:
+    """Return the digest of what a comparison's page shows of a run: its address, results and series."""
+    return digest([key, digest(Results.up_to_date(run).parquet()), SeriesFolder(run).rerun_ids()])
 
 
 def _read_series_script(run: Path, name: str) -> bytes:

@@ -160,9 +160,9 @@ def _with_security_headers(send: Send) -> Send:
 def content_security_policy() -> str:
     """Return the policy for pages: they can run only code from `mutator.web`, as files or inline by hash."""
     scripts = [csp_hash(f"\n{asset_text(name)}") for name in asset_names(".js")]
-    styles = [csp_hash(f"\n{asset_text(name)}") for name in asset_names(".css")] + [
-        csp_hash(f"\n{comparison_files.page_style()}")
-    ]
+    # a page of a comparison changes a style sheet
+    sheets = dict.fromkeys((*map(asset_text, asset_names(".css")), *comparison_files.page_styles()))
+    styles = [csp_hash(f"\n{sheet}") for sheet in sheets]
     return "; ".join(
         (
             "default-src 'none'",

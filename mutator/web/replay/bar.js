@@ -65,7 +65,8 @@ class ReplayBar {
 
   /** Show the time. Describe it only while the replay is paused; otherwise a screen reader would never stop talking. */
   show() {
-    const { t, isPlaying } = this.clock, { start, end } = this.series, share = (t - start) / (end - start || 1);
+    const { isPlaying } = this.clock, { start, end } = this.series;
+    const t = Math.min(end, Math.max(start, this.clock.t)), share = (t - start) / (end - start || 1); // a shared clock can be beyond this run
     this.handle.style.left = `${100 * share}%`;
     this.progress.style.transform = `scaleX(${share})`;
     if (isPlaying) return;

@@ -69,6 +69,10 @@ const ReplayData = (() => {
     return { low: low - margin, high: high + margin, cut, isWhole };
   }
 
+  /** The axis that covers two axes. */
+  const joined = (a, b) => ({ low: Math.min(a.low, b.low), high: Math.max(a.high, b.high), isWhole: a.isWhole && b.isWhole,
+    cut: a.cut && b.cut ? [Math.min(a.cut[0], b.cut[0]), Math.max(a.cut[1], b.cut[1])] : a.cut ?? b.cut });
+
   /** About `count` round numbers that label an axis from `low` to `high`. */
   function ticks(low, high, count) {
     const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
@@ -94,5 +98,5 @@ const ReplayData = (() => {
 
   const unit = (channel) => (channel.unit && channel.unit !== "-" ? channel.unit.replace("^2", "²").replace("^3", "³") : "");
 
-  return { TINY, index, valueAt, same, steps, until, largest, apart, range, ticks, digits, text, unit };
+  return { TINY, index, valueAt, same, steps, until, largest, apart, range, joined, ticks, digits, text, unit };
 })();

@@ -65,6 +65,17 @@ class ReplayPlots {
     this.clock.redraw();
   }
 
+  /** Plot those of the channels that this run has. */
+  choose(names) {
+    this.chosen = new Set(this.plots.map(({ channel }) => channel.name).filter((name) => names.has(name)));
+    this.#fill();
+  }
+
+  /** Show a range of times, as far as this run has them. */
+  cover(from, to) {
+    this.#set(from, to);
+  }
+
   /** Draw all plots over the available width. */
   draw(colours) {
     const width = Math.floor(this.list.clientWidth);

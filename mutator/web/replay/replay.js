@@ -16,15 +16,15 @@ const Replay = (() => {
   const symbol = (name) => Dom.svg("svg", { viewBox: "0 0 16 16", width: 14, height: 14, fill: "currentColor", "aria-hidden": "true" }, Dom.svg("path", { d: SYMBOLS[name] }));
 
   class Player {
-    constructor(place, series, facts) {
+    /** `clock`, `axes` by channel and `toggle(name)` of a channel's plot are those of all players that are shown together. */
+    constructor({ place, series, facts }, { clock, axes, toggle }) {
       this.place = place;
       this.series = series;
       this.facts = facts;
       this.channels = [...series.channels].sort((a, b) => Number(b.role === "actuator") - Number(a.role === "actuator"));
-      this.axes = this.channels.map((channel) => ReplayData.range(channel, ReplayData.until(series)));
-      const at = Math.max(series.start, (series.active?.[0] ?? series.marks[0]?.[1] ?? series.start) - BEFORE);
-      this.clock = new ReplayClock({ start: series.start, end: series.end, stops: series.tEnd === null ? [] : [series.tEnd], steps: ReplayData.steps(series), at },
-        () => this.draw());
+      this.axes = this.channels.map(({ name }) => axes.get(name));
+      this.clock = clock;
+      this.toggle = toggle;
       this.scene = this.#scene();
       this.#build();
       this.plots.begin();
@@ -45,17 +45,14 @@ const Replay = (() => {
     #build() {
       const { el } = Dom, { clock, series } = this;
       this.bar = new ReplayBar(series, clock, (t) => this.describe(t));
-      const plotting = { isPlotted: (name) => this.plots.isPlotted(name), toggle: (name) => {
-        this.plots.toggle(name);
-        this.gauges.pressed();
-      } };
+      const plotting = { isPlotted: (name) => this.plots.isPlotted(name), toggle: this.toggle };
       this.gauges = new ReplayGauges(this.channels, this.axes, plotting);
       this.plots = new ReplayPlots(this.channels, this.axes, series, clock, (from, to) => this.bar.zoomed(from, to));
       this.gauges.pressed();
       this.time = el("span.now");
       this.states = el("span.states");
       this.live = el("p.visually-hidden", { "aria-live": "polite" });
-      this.root = el("div.replay-player", { role: "group", "aria-label": "Replay. Space plays and pauses, arrows step, Shift and an arrow moves a second.",
+      this.root = el("div.replay-player", { role: "group", "aria-label": `${this.facts.title ?? "Replay"}. Space plays and pauses, arrows step, Shift and an arrow moves a second.`,
         onkeydown: (event) => this.#key(event), onpointerdown: (event) => {
           if (!event.target.matches("canvas")) return;
           if (event.pointerType === "mouse") event.preventDefault(); // keep the focus off the page
@@ -189,17 +186,61 @@ const Replay = (() => {
     }
   }
 
-  let current = null;
-  for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", () => current?.draw());
+  const firstEvent = (series) => series.active?.[0] ?? series.marks[0]?.[1] ?? series.start;
+
+  /** The clock of several series: it begins before the first event, and pauses at the end of each drive. */
+  function clockOf(all, draw) {
+    const start = Math.min(...all.map((series) => series.start)), steps = all.map(ReplayData.steps).reduce((most, t) => (t.length > most.length ? t : most));
+    const stops = all.map(({ tEnd }) => tEnd).filter((t) => t !== null).sort((a, b) => a - b);
+    return new ReplayClock({ start, end: Math.max(...all.map(({ end }) => end)), stops, steps, at: Math.max(start, Math.min(...all.map(firstEvent)) - BEFORE) }, draw);
+  }
+
+  /** The axis of each channel, which covers its values in all series. */
+  function axesOf(all) {
+    const axes = new Map();
+    for (const series of all) {
+      for (const channel of series.channels) {
+        const axis = ReplayData.range(channel, ReplayData.until(series)), other = axes.get(channel.name);
+        axes.set(channel.name, other ? ReplayData.joined(other, axis) : axis);
+      }
+    }
+    return axes;
+  }
+
+  let current = []; // the players that are shown
+  for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", () => current.forEach((player) => player.draw()));
+
+  /** Fill the places of `sides`, each {place, series, facts}, with replays that share clock, axes and choice of plots. Returns
+   *  their players, without those of series that have no channels. */
+  function showTogether(sides) {
+    current[0]?.clock.pause();
+    const drawable = sides.filter(({ series }) => series.channels.length), all = drawable.map(({ series }) => series);
+    for (const { place } of sides.filter((side) => !drawable.includes(side))) place.replaceChildren(Dom.el("p.quiet", {}, "The series of this experiment has no channel."));
+    if (!all.length) return (current = []);
+    const players = [], toggle = (name) => players.forEach((player) => {
+      player.plots.toggle(name);
+      player.gauges.pressed();
+    });
+    const shared = { clock: clockOf(all, () => players.forEach((player) => player.draw())), axes: axesOf(all), toggle };
+    for (const side of drawable) players.push(new Player(side, shared));
+    if (players.length > 1) align(players);
+    return (current = players);
+  }
+
+  /** Let all players begin with the same plots, those of the last one, over the same time. */
+  function align(players) {
+    const { chosen } = players[players.length - 1].plots, views = players.map(({ plots }) => plots.view);
+    const from = Math.min(...views.map((view) => view.from)), to = Math.max(...views.map((view) => view.to));
+    for (const { plots, gauges } of players) {
+      plots.choose(chosen);
+      plots.cover(from, to);
+      gauges.pressed();
+    }
+  }
 
   /** Fill `place` with the replay of a series (SeriesFile.load); `facts` has scene and hazards. Returns the player, or null
    *  if the series has no channels. */
-  function show(place, series, facts) {
-    current?.clock.pause();
-    current = series.channels.length ? new Player(place, series, facts) : null;
-    if (!current) place.replaceChildren(Dom.el("p.quiet", {}, "The series of this experiment has no channel."));
-    return current;
-  }
+  const show = (place, series, facts) => showTogether([{ place, series, facts }])[0] ?? null;
 
-  return { show, rate: 0 };
+  return { show, showTogether, rate: 0 };
 })();

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from mutator._common.hashing import as_json_types
-from mutator.report.page_series import reason_for_missing_series
 from mutator.store import file_digests
 from mutator.store.file_digests import DigestLedger
+from mutator.store.missing_series import reason_for_missing_series
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 
