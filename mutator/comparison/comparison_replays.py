@@ -20,7 +20,7 @@ from mutator.store.embedded_series import (
     readable_encoded_series,
 )
 from mutator.store.missing_series import reason_for_missing_series
-from mutator.store.series_folder import SeriesFolder
+from mutator.store.time_series_folder import TimeSeriesFolder
 from mutator.web import json_script_element, packed_script_element
 
 _TRACE_DIGEST_DIGITS = 16  # of the digest that a series must name
@@ -83,7 +83,7 @@ def _side_facts(comparison: Comparison, number: int, title: str, address: str) -
         "report": address,
         "scene": comparison.scenes[number],
         "hazards": as_json_types(folder.head.about_hazards),
-        "reason": reason_for_missing_series(folder, is_packed=SeriesFolder(folder.path).is_packed),
+        "reason": reason_for_missing_series(folder, is_packed=TimeSeriesFolder(folder.path).is_packed),
     }
 
 
@@ -93,7 +93,7 @@ def _embed_pairs(comparison: Comparison) -> tuple[EmbeddedSeries, dict[str, str]
     """
     embedded, digests = EmbeddedSeries(MOST_EMBEDDED_SERIES_BYTES), {}
     sides = [
-        (letter, SeriesFolder(run.folder.path), run.folder.records())
+        (letter, TimeSeriesFolder(run.folder.path), run.folder.records())
         for letter, run in (("a", comparison.a), ("b", comparison.b))
     ]
     for number, pair in enumerate(comparison.changed_pairs):

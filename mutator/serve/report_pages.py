@@ -25,8 +25,8 @@ from mutator.serve.report_cache import ReportCache
 from mutator.serve.responses import UNTRUSTED_FILE_HEADERS, OpenFileResponse, media_type_of
 from mutator.serve.served_runs import ServedRuns, open_served_file, report_address
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder
 from mutator.store.series_script import read_script, script_bytes
+from mutator.store.time_series_folder import TimeSeriesFolder
 from mutator.targets.scene_json import scene_as_json
 from mutator.web import load_order
 from mutator.workspace import Workspace
@@ -68,7 +68,7 @@ class RunPages:
             first, second = map(_comparison_inputs, (a, b), folders)
             addresses = ReportAddresses(a=report_address(a), b=report_address(b))
             files = self._comparison_cache.pop((first, second), None) or self._build_comparison_files(
-                *folders, addresses
+                folders[0], folders[1], addresses
             )
             self._comparison_cache[first, second] = files
             for old in list(self._comparison_cache)[:-_MOST_CACHED_COMPARISONS]:
@@ -129,7 +129,7 @@ class RunPages:
 
 def _comparison_inputs(key: str, run: Path) -> str:
     """Return the digest of what a comparison's page shows of a run: its address, results and series."""
-    return digest([key, digest(Results.up_to_date(run).parquet()), SeriesFolder(run).rerun_ids()])
+    return digest([key, digest(Results.up_to_date(run).parquet()), TimeSeriesFolder(run).rerun_ids()])
 
 
 def _read_series_script(run: Path, name: str) -> bytes:

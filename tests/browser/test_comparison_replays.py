@@ -121,3 +121,20 @@ def test_the_page_says_which_changes_have_no_replay(
     page.wait_for_selector(f"#pair[data-ready='{len(found.changed_pairs) - 1}']")
     assert page.locator("#pair .replay-player").count() == 0
     assert "replays fill at most 0.0001 MB" in page.inner_text("#pair")
+
+
+def test_the_server_shows_both_replays_and_links_to_both_reports(
+    toycar: Workspace, found: Comparison, serve: Any, visit: Callable[..., Any]
+) -> None:
+    """Its rules for scripts and styles allow the page's."""
+    runs = (found.a.folder.path, found.b.folder.path)
+    with serve(toycar, runs) as address:
+        page = visit(address)
+        links = page.eval_on_selector_all("a[href^='/compare/']", "all => all.map((a) => a.href)")
+        page.goto(next(link for link in links if link.rstrip("/").endswith("/after")))
+        page.wait_for_selector("#pair[data-ready]")
+        assert page.locator(".replay-player canvas").first.is_visible()
+        assert page.locator(".replay-player").count() == 2
+        page.locator("#pair .sides a").last.click()
+        page.wait_for_selector("#experiment .replay-player")
+        assert found.changed_pairs[0].b.id in page.inner_text("#experiment .id")
