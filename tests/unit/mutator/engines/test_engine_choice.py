@@ -20,7 +20,7 @@ def test_the_default_engine_depends_on_the_size_of_the_campaign(toycar: Workspac
     manifest = toycar.manifest("toycar")
     assert choose_engine(None, manifest, 3) == REFERENCE
     assert choose_engine(None, manifest, 1000) == FORK
-    with pytest.raises(MutatorError, match="engine 'quick'; expected one of reference, fork"):
+    with pytest.raises(MutatorError, match="no engine 'quick'; expected one of reference, fork"):
         choose_engine("quick", manifest, 3)
 
 
@@ -28,5 +28,5 @@ def test_the_default_engine_depends_on_the_size_of_the_campaign(toycar: Workspac
 def test_users_choose_among_the_offered_engines(name: str) -> None:
     check_engine_is_offered(None)
     check_engine_is_offered(FORK)
-    with pytest.raises(MutatorError, match=f"engine: engine '{name}'; expected one of reference, fork"):
+    with pytest.raises(MutatorError, match=f"engine: no engine '{name}'; expected one of reference, fork"):
         check_engine_is_offered(name)

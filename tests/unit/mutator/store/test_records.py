@@ -10,6 +10,7 @@ import pytest
 from mutator._common.hashing import canonical_json
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import ObservedActivation, Outcome, Record, RunError, Status
+from mutator.store import run_progress
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import RECORDS_SCHEMA, load_records, record_as_json
 from mutator.store.run_progress import RecordTail
@@ -107,7 +108,12 @@ def test_a_second_record_is_refused(tmp_path: Path, record: MakeRecord) -> None:
         load_records(tmp_path)
 
 
-def test_progress_counts_complete_lines_as_they_arrive(tmp_path: Path, record: MakeRecord) -> None:
+def test_progress_counts_complete_lines_as_they_arrive(
+    tmp_path: Path, record: MakeRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A line counts once it is complete; the rate counts from the first finished experiments."""
+    now_s = 100.0
+    monkeypatch.setattr(run_progress.time, "monotonic", lambda: now_s)
     write(tmp_path, "0001-gw0.jsonl", record("a" * 16))
     tail = RecordTail("experiments", tmp_path / "records", 4)
     assert (tail.poll().done, tail.poll().per_s, tail.poll().remaining_s) == (1, None, None)
@@ -120,5 +126,10 @@ def test_progress_counts_complete_lines_as_they_arrive(tmp_path: Path, record: M
     progress = tail.poll()
     assert (progress.done, progress.total) == (2, 4)
     assert progress.outcomes == {"masked": 1, "hazard": 1}
-    assert progress.per_s is not None
-    assert progress.remaining_s == 2 / progress.per_s > 0
+    assert (progress.per_s, progress.remaining_s) == (None, None)
+    now_s = 102.0
+    with writer.path.open("ab") as file:
+        file.truncate(file.tell() - 50)
+    writer.append(asdict(record("c" * 16)))
+    progress = tail.poll()
+    assert (progress.done, progress.per_s, progress.remaining_s) == (3, 0.5, 2.0)

@@ -100,7 +100,7 @@ def test_the_signal_handler_of_dask_jobqueue_is_not_installed() -> None:
 def test_kubernetes_requires_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "dask_kubernetes", None)
     monkeypatch.setitem(sys.modules, "dask_kubernetes.operator", None)
-    with pytest.raises(MutatorError, match=r"dask_kubernetes.* is not installed.*'.\[kubernetes\]'"):
+    with pytest.raises(MutatorError, match=r"dask_kubernetes.* is not installed.*'mutator-fi\[kubernetes\]'"):
         run(opened(tmp_path, SLURM.replace("kind: slurm", "kind: kubernetes"), insecure=True))
 
 
