@@ -21,7 +21,7 @@ from mutator.store.embedded_series import (
 )
 from mutator.store.missing_series import reason_for_missing_series
 from mutator.store.time_series_folder import TimeSeriesFolder
-from mutator.web import json_script_element, packed_script_element
+from mutator.web import json_script_element
 
 _TRACE_DIGEST_DIGITS = 16  # of the digest that a series must name
 
@@ -47,7 +47,7 @@ def _relative_address(page: Path, out: Path) -> str:
 
 
 def replay_elements(comparison: Comparison, addresses: ReportAddresses) -> tuple[str, ...]:
-    """Return the script elements with the data of the changed pairs, their replays and what these draw."""
+    """Return the script elements with the replays of the changed pairs, and what these draw."""
     embedded, digests, complete_count = _embed_pairs(comparison)
     facts = {
         "sides": [
@@ -58,10 +58,8 @@ def replay_elements(comparison: Comparison, addresses: ReportAddresses) -> tuple
         "complete": complete_count,
         "beyond": _describe_limit(complete_count),
     }
-    sentences = [[pair.row_a.sentence, pair.row_b.sentence] for pair in comparison.changed_pairs]
     return (
         json_script_element(facts, "facts"),
-        packed_script_element(sentences, "sentences"),
         json_script_element(embedded.as_json(), EMBEDDED_SERIES_ELEMENT),
     )
 

@@ -20,9 +20,9 @@
   }
 
   /** The place of the replay of one side, `a` or `b`, with what its row says about it. */
-  function sideOf(row, number, sentence) {
+  function sideOf(row, number) {
     const { title, report } = facts.sides[number], button = row.querySelector("button.open"), id = number ? button.dataset.b : button.dataset.a;
-    const place = el("div.content", {}, el("p.quiet", {}, "…")), ending = row.cells[2 + number];
+    const place = el("div.content", {}, el("p.quiet", {}, "…")), ending = row.cells[2 + number], sentence = ending.querySelector(".sentence")?.textContent;
     const section = el("section", { "aria-label": title }, el("h4", {}, title),
       el("p", {}, sentence || [...ending.cloneNode(true).childNodes]),
       el("p", {}, report ? el("a", { href: `${report}#e=${id}` }, "Open ", el("code", {}, id), " in its report")
@@ -48,16 +48,14 @@
     panel.dataset.ready = String(now);
   }
 
-  async function show(number, { isFocused = true } = {}) {
+  function show(number, { isFocused = true } = {}) {
     rows[open]?.classList.remove("is-open");
     buttons[open]?.removeAttribute("aria-current");
     open = number;
     const row = rows[number];
     row.classList.add("is-open");
     buttons[number].setAttribute("aria-current", "true");
-    const [before, after] = (await Packed.read("sentences"))[number];
-    if (open !== number) return;
-    const sides = [sideOf(row, 0, before), sideOf(row, 1, after)];
+    const sides = [sideOf(row, 0), sideOf(row, 1)];
     const step = (text, name, by) => el("button", { type: "button", "aria-label": name, title: name, onclick: () => move(by) }, text);
     panel.hidden = false;
     panel.replaceChildren(
@@ -68,7 +66,7 @@
       panel.querySelector("h3").focus({ preventScroll: true });
       panel.scrollIntoView({ block: "start" });
     }
-    await fill(sides);
+    fill(sides);
   }
 
   buttons.forEach((button, number) => button.addEventListener("click", () => show(number)));
