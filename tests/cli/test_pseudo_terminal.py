@@ -107,7 +107,7 @@ def screens(
         for name in ("COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR"):
             patch.delenv(name, raising=False)
         # reports draw figures, and the machine differs
-        patch.setattr(mutator.Run, "report", lambda run, anew: WRITTEN)
+        patch.setattr(mutator.Run, "report", lambda run, **_options: WRITTEN)
         patch.setattr(mutator, "doctor", lambda workspace: FINDINGS)
         patch.setattr(mutator, "check_library", lambda workspace, target: [])
         patch.setattr(mutator, "check_target", lambda workspace, **options: FINDINGS)

@@ -32,8 +32,9 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
         monkeypatch.syspath_prepend(info.parent)
         monkeypatch.syspath_prepend(project)
 
+    forget_packages = run_environment._installed_packages.cache_clear  # a test may replace the function
     yield installed
-    run_environment._installed_packages.cache_clear()  # or later tests see the project
+    forget_packages()  # or later tests see the project
 
 
 @pytest.fixture

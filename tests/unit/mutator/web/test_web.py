@@ -8,7 +8,7 @@ import pytest
 
 from mutator import web
 
-PAGES = ("comparison", "report", "review", "serve")
+PAGES = ("comparison", "golden", "report", "review", "serve")
 
 
 def test_embedded_data_round_trip_and_are_reproducible() -> None:
