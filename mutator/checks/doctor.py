@@ -58,7 +58,7 @@ def _python_finding() -> Finding:
     python = f"{sys.version.split()[0]} at {sys.executable}"
     if sys.version_info >= OLDEST_PYTHON:
         return Finding(name="python", level=CheckState.OK, found=python)
-    return Finding(name="python", level=CheckState.FAIL, found=python, remedy="use Python 3.11 or newer")
+    return Finding(name="python", level=CheckState.FAIL, found=python, remedy="use Python 3.11 to 3.14")
 
 
 def _package_findings() -> Iterator[Finding]:

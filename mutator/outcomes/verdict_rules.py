@@ -40,9 +40,10 @@ def outcome_of(
 
 
 def reaction_time(hazards: EventTimes, alerts: EventTimes) -> float | None:
-    """Return the time (s) that a driver has to react: from the first alert to the first hazard.
+    """Return the time (s) from the first alert to the first hazard.
 
-    None unless both happened and the alert came first.
+    A driver has at most this long to react, less if the hazard becomes inevitable before it
+    comes. None unless both happened and the alert came first.
     """
     if not hazards or not alerts or alerts[0][1] >= hazards[0][1]:
         return None

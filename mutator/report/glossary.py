@@ -16,8 +16,8 @@ _COUNTING_TERMS = {
     "activated": "a changed statement ran while its trigger held",
     "manifested": "after activation, an actuator output differed from the golden run",
     "time to hazard": "the time from activation to the first hazard, also if the fault had ended by then",
-    "FTTI": "the fault tolerant time interval of ISO 26262, the shortest time from a fault to a hazard; runs "
-    "are a sample, so their shortest time with the fault still active is an upper bound",
+    "FTTI": "the fault tolerant time interval: the shortest time from a fault to a hazardous event, if no "
+    "safety mechanism acts (ISO 26262-1:2018); the shortest time of sampled runs is an upper bound",
     "margin": "the distance that a run kept from a hazard, negative once the hazard has occurred",
     "end of the drive": "the first terminal hazard, such as a contact: the simulation continues, but metrics "
     "and fault paths leave out later steps",
@@ -34,7 +34,8 @@ _ENDING_TERMS = {
 _ALERT_TERMS = {
     "silent hazard": "a hazard with no alert before it: either no alert at all, or only a later one",
     "hazard, no alert": "a silent hazard with no alert at all, not even a later one",
-    "reaction time": "the time from the first alert to the hazard that follows it",
+    "reaction time": "the time from the first alert to the hazard that follows it; the driver has at most "
+    "this long, less if the hazard becomes inevitable before it comes",
 }
 _METHOD_MEANINGS = {
     Method.GUIDED.value: "the trigger is a condition, such as a context of the hazard analysis",

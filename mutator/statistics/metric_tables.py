@@ -105,7 +105,10 @@ def times_to_hazard_sheet(
         note="Time in s to the first hazard from activation, from the first difference of an actuator, and "
         "from the first alert, in the N runs with this order of events. A fault can have ended before the "
         f"hazard. The shortest time under *{FTTI_BOUND_SPAN}* is an upper bound of the fault tolerant time "
-        "interval (FTTI): these runs are a sample, and others can reach a hazard sooner. "
+        "interval (FTTI) of the hazard that came first in that run: an FTTI belongs to one hazardous event, "
+        "but each line, also the total, covers all hazards. These runs are a sample, and others can reach "
+        "a hazard sooner; runs in which an alert came or a safety mechanism acted are included; and a "
+        "hazard, such as a contact, can be later than the hazardous event. "
         f"{_INTERVAL_NOTE}",
         heads=(
             *("fault type", "time", "N", "shortest, s", "lower quartile, s"),

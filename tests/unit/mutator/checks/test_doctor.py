@@ -18,6 +18,13 @@ def test_on_this_machine_only_the_library_fails() -> None:
     assert {"python", "numpy", "cores", "child process"} <= {f.name for f in findings}
 
 
+def test_an_old_python_fails_with_the_tested_versions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The remedy names the versions that README and the limits name."""
+    monkeypatch.setattr(doctor, "OLDEST_PYTHON", (99, 0))
+    [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "python"]
+    assert (finding.level, finding.remedy) == (CheckState.FAIL, "use Python 3.11 to 3.14")
+
+
 def test_a_missing_package_fails_with_its_pip_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ["no-such-package>=2,<3"])
     [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "no-such-package"]

@@ -83,6 +83,13 @@ def test_times_to_a_hazard_need_an_earlier_event() -> None:
     assert len(times_to_hazard_sheet(FRAME, still_active, has_alerts=False).lines) == 3
 
 
+def test_the_note_on_times_says_what_the_bound_of_the_ftti_covers() -> None:
+    """A reader can see that lines mix hazards, that warned runs count, and that a hazard can be late."""
+    note = times_to_hazard_sheet(FRAME, FRAME["is_hazard"]).note
+    for words in ("one hazardous event", "covers all hazards", "an alert came", "later than the hazardous"):
+        assert words in note
+
+
 @pytest.mark.parametrize("pairs", [False, True])
 def test_the_interval_of_a_median_resamples_whole_faults(
     pairs: bool, monkeypatch: pytest.MonkeyPatch
