@@ -58,6 +58,7 @@ def export(
         typer.Option(
             metavar="EXPR",
             help="MCAP: only experiments whose result columns match, e.g. 'outcome == \"hazard\"'.",
+            autocompletion=completion.result_columns,
         ),
     ] = None,
     table: Annotated[ExportTable, typer.Option(help="CSV and Parquet: which table.")] = ExportTable.RESULTS,

@@ -8,6 +8,7 @@ from typer.core import TyperCommand
 # of the value of an option that declares no name, by the parser's type
 _NAME_BY_TYPE = {"int": "N", "int range": "N", "float": "X", "float range": "X", "path": "PATH"}
 _LEAST_VALUE_PATTERN = re.compile(r"\bx>=(\S+?)(?=[];])")
+_RANGE_PATTERN = re.compile(r"(?<=[\[ ])(\S+)<=x<=(\S+?)(?=[];])")
 
 
 class NamedValuesCommand(TyperCommand):
@@ -46,7 +47,7 @@ def help_record(param: Any, ctx: Any) -> tuple[str, str] | None:
         name = param.display_name_raw
     elif param.metavar is None:
         name = re.sub(r"<(.*)>$", lambda match: _value_name(match[1]), name)
-    return name, _LEAST_VALUE_PATTERN.sub(r"at least \1", text)
+    return name, _LEAST_VALUE_PATTERN.sub(r"at least \1", _RANGE_PATTERN.sub(r"\1 to \2", text))
 
 
 def _value_name(type_text: str) -> str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 SomeGroups = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[GROUP...]", help="Ids of groups, or the start of each id; not with --only."),
+    typer.Argument(metavar="GROUP", help="Ids of groups, or the start of each id; not with --only."),
 ]
 Yes = Annotated[
     bool, typer.Option("--yes", "-y", help="Do not ask for confirmation of the groups that --only finds.")

@@ -70,6 +70,7 @@ def test_run_folders_and_their_experiments_are_completed(complete: Complete, cli
     assert complete("rerun", "--run", "runs/old", "") == old
     Path("runs/new/results.csv").write_text("experiment_id,delta_v,detail\n")
     assert complete("show", "--only", "de") == ["delta_v", "detail"]
+    assert complete("export", "runs/new", "--format", "mcap", "--only", "de") == ["delta_v", "detail"]
     Path("runs/old/plan.csv").write_bytes(b"\xff")
     assert complete("rerun", "--run", "runs/old", "") == []
 

@@ -3,11 +3,12 @@
 import errno
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.main import get_command
 
 from mutator import __version__
 from mutator.cli import list_check_doctor
@@ -30,11 +31,27 @@ def test_every_verb_is_in_the_help_under_a_heading(cli: Cli) -> None:
         assert all(f"\n  {verb} " in answer.out for verb in verbs)
 
 
-@pytest.mark.parametrize("verb", VERBS)
-def test_each_verb_has_a_help_text(cli: Cli, verb: str) -> None:
-    answer = cli(verb, "--help")
+def subcommands(group: Any = None, words: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """Yield the words of every subcommand, also of those in a group such as `review`."""
+    for name, command in (group or get_command(app)).commands.items():
+        yield (*words, name)
+        if hasattr(command, "commands"):
+            yield from subcommands(command, (*words, name))
+
+
+@pytest.mark.parametrize("words", list(subcommands()), ids=" ".join)
+def test_each_subcommand_has_a_help_text(cli: Cli, words: tuple[str, ...]) -> None:
+    """It shows neither brackets in brackets nor the parser's notation for a range."""
+    answer = cli(*words, "--help")
     assert answer.code == 0
-    assert answer.out.startswith(f"Usage: mutator {verb} ")
+    assert answer.out.startswith(f"Usage: mutator {' '.join(words)} ")
+    assert not [line for line in answer.out.splitlines() if "[[" in line or "<=x" in line or "x>=" in line]
+
+
+def test_the_help_names_the_least_and_the_greatest_value(cli: Cli) -> None:
+    text = " ".join(cli("serve", "--help").out.split())
+    assert "[default: 0; 0 to 65535]" in text
+    assert "[default: 1; 1 to 16]" in text
 
 
 def test_without_arguments_the_help_is_printed(cli: Cli) -> None:
