@@ -17,7 +17,8 @@ _COUNTING_TERMS = {
     "manifested": "after activation, an actuator output differed from the golden run",
     "time to hazard": "the time from activation to the first hazard, also if the fault had ended by then",
     "FTTI": "the fault tolerant time interval: the shortest time from a fault to a hazardous event, if no "
-    "safety mechanism acts (ISO 26262-1:2018); the shortest time of sampled runs is an upper bound",
+    "safety mechanism acts (ISO 26262-1:2018); the shortest time of the sampled runs "
+    "whose fault was still active is an upper bound",
     "margin": "the distance that a run kept from a hazard, negative once the hazard has occurred",
     "end of the drive": "the first terminal hazard, such as a contact: the simulation continues, but metrics "
     "and fault paths leave out later steps",
