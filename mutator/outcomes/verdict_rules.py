@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from mutator.model import ObservedActivation, Outcome, Record
+from mutator.model import AfterHazard, Experiment, Fault, Hold, ObservedActivation, Outcome, Record
 from mutator.targets.contact_severity import DELTA_V_NAME, ClassifiedHazard, SeverityScale
 
 EventTimes = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
@@ -59,17 +59,33 @@ def time_to_hazard(record: Record) -> float | None:
     return record.hazards[0][1] - record.activation.first
 
 
-def was_active_at_hazard(record: Record) -> bool:
-    """Return whether the fault still acted when the first hazard came.
+def was_active_at_hazard(record: Record, experiment: Experiment) -> bool:
+    """Return whether the record shows that the fault still acted when the first hazard came.
 
-    It did if it was active then or later. A run can end with the hazard, so that the next activation is
-    missing: the fault acted, too, if that was due, at the mean interval of its activations.
+    A fault without pauses acted if an activation came at the hazard or later. If it lasts to the end and the
+    run stopped at the hazard, it acted, too, if its next activation was due by then, at the mean interval of
+    its activations. A fault that can pause acted only if its first or last activation came at the very time
+    of the hazard, because a record does not have the times of the others.
     """
     activation = record.activation
     if not record.hazards or activation is None:
         return False
-    mean_interval_s = (activation.last - activation.first) / max(activation.count - 1, 1)
-    return activation.last + mean_interval_s >= record.hazards[0][1]
+    hazard = record.hazards[0][1]
+    hold = experiment.fault.hold or experiment.trigger.hold
+    if _can_pause(experiment.fault, hold):
+        return hazard in (activation.first, activation.last)
+    stopped_at_hazard = experiment.after_hazard is AfterHazard.STOP and record.t_end == hazard
+    if hold is Hold.TO_END and stopped_at_hazard:
+        mean_interval_s = (activation.last - activation.first) / max(activation.count - 1, 1)
+        return activation.last + mean_interval_s >= hazard
+    return activation.last >= hazard
+
+
+def _can_pause(fault: Fault, hold: Hold) -> bool:
+    """Return whether a fault can stop to act and act again: with `while`, and with injections that affect
+    only some executions.
+    """
+    return hold is Hold.WHILE or any(i.where or i.call or i.every for i in fault.injections)
 
 
 def manifestation_to_hazard_time(record: Record) -> float | None:

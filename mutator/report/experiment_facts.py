@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mutator._common.helper_processes import map_in_processes, process_count_for
-from mutator.model import Fault, Record
+from mutator.model import Experiment, Fault, Record
 from mutator.outcomes.fault_paths import FaultPathFinder, UntimedPath, UntimedPathInputs
 from mutator.outcomes.verdict_rules import was_active_at_hazard
 from mutator.results.worst_first_ranking import worst_first_ranks
@@ -30,7 +30,7 @@ _BatchFacts = tuple[list[UntimedPathInputs | None], dict[str, _TimedAlerts], set
 class ExperimentFacts:
     """`worst_first_ranks` (from 0) and `untimed_path_indices` (into `distinct_untimed_paths`, -1: none) have
     a number for each row of the results. `alerts_by_hazardous_id` has only experiments with a hazard, and
-    `ids_active_at_hazard` those whose fault still acted when the hazard came.
+    `ids_active_at_hazard` those whose record shows that the fault still acted when the hazard came.
     `timings` has a row for each timed experiment; its engine is '' if not recorded.
     """
 
@@ -46,6 +46,7 @@ class ExperimentFacts:
         cls,
         folder: RunFolder,
         results: "DataFrame",
+        experiments: Mapping[str, Experiment],
         records: Mapping[str, Record],
         faults: Mapping[str, Fault],
         fault_paths: FaultPathFinder | None,
@@ -56,7 +57,7 @@ class ExperimentFacts:
         alerts: dict[str, _TimedAlerts] = {}
         ids_active_at_hazard: set[str] = set()
         for number, (all_inputs, batch_alerts, batch_active_ids) in enumerate(
-            _path_inputs_and_hazards_by_batch(results, records, faults, fault_paths)
+            _path_inputs_and_hazards_by_batch(results, experiments, records, faults, fault_paths)
         ):
             alerts |= batch_alerts
             ids_active_at_hazard |= batch_active_ids
@@ -78,12 +79,13 @@ class ExperimentFacts:
 
 def _path_inputs_and_hazards_by_batch(
     results: "DataFrame",
+    experiments: Mapping[str, Experiment],
     records: Mapping[str, Record],
     faults: Mapping[str, Fault],
     fault_paths: FaultPathFinder | None,
 ) -> Iterator[_BatchFacts]:
     """Yield, for each batch of experiments, their `UntimedPathInputs`, the alerts of those with a hazard, and
-    the ids of those whose fault still acted then.
+    the ids of those whose fault provably still acted then.
     """
     pairs = results[["experiment_id", "fault_id"]]
 
@@ -95,8 +97,9 @@ def _path_inputs_and_hazards_by_batch(
             if record is not None:
                 if record.hazards:
                     alerts[name] = record.alerts
-                if was_active_at_hazard(record):
-                    active_ids.add(name)
+                    experiment = experiments.get(name)
+                    if experiment and was_active_at_hazard(record, experiment):
+                        active_ids.add(name)
                 if fault_paths and fault in faults:
                     inputs = fault_paths.untimed_path_inputs(faults[fault], record)
             all_inputs.append(inputs)

@@ -57,7 +57,7 @@ class ReportedRun:
         experiments, records = PlannedExperiments(folder.path), folder.records()
         faults, fault_paths = plan_file.load_faults(folder.path), fault_paths_of(folder)
         results = Results(folder.path).frame()
-        facts = ExperimentFacts.of(folder, results, records, faults, fault_paths)
+        facts = ExperimentFacts.of(folder, results, experiments, records, faults, fault_paths)
         return cls(
             folder=folder,
             workspace=workspace,

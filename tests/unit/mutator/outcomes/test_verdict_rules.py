@@ -1,11 +1,13 @@
 """The verdict's truth table, and the events that the verdict uses."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import pytest
 
-from mutator.model import ObservedActivation, Outcome, Record
+from mutator.model import AfterHazard, Experiment, Hold, ObservedActivation, Outcome, Record
 from mutator.outcomes.verdict_rules import (
     first_events_after,
     outcome_of,
@@ -77,32 +79,89 @@ def test_the_reaction_time_is_first_hazard_minus_first_alert(
     assert reaction_time(hazards, alerts) == expected
 
 
+LONG, TO_HAZARD = (2.0, 30.0, 2801), (2.0, 4.0, 201)  # first, last and count of the activations
+SHORT_OF_IT, ONCE = (2.0, 3.98, 100), (2.0, 2.0, 1)  # the next of SHORT_OF_IT is due at 4.0
+TWO_BURSTS = (1.0, 20.0, 12)  # from 1.0 to 1.1, and at 20
+FAR_APART = (1.0, 9.0, 2)
+
+
 @pytest.mark.parametrize(
-    ("activation", "hazard", "is_active"),
+    ("activation", "hazard", "hold", "is_active"),
     [
-        (ObservedActivation(first=2.0, last=30.0, count=2801), 4.0, True),
-        (ObservedActivation(first=2.0, last=4.0, count=201), 4.0, True),
-        (
-            ObservedActivation(first=2.0, last=3.98, count=100),
-            4.0,
-            True,
-        ),  # the run ended; the next one was due at 4.0
-        (ObservedActivation(first=2.0, last=3.97, count=198), 4.0, False),
-        (ObservedActivation(first=2.0, last=2.0, count=1), 4.0, False),
-        (ObservedActivation(first=2.0, last=2.0, count=1), 2.0, True),
-        (None, 4.0, False),
-        (ObservedActivation(first=2.0, last=30.0, count=2801), None, False),
+        (LONG, 4.0, Hold.TO_END, True),
+        (TO_HAZARD, 4.0, Hold.TO_END, True),
+        (TO_HAZARD, 4.0, Hold.FOR, True),
+        (TO_HAZARD, 4.0, Hold.WHILE, True),
+        (SHORT_OF_IT, 4.0, Hold.TO_END, False),
+        (ONCE, 4.0, Hold.TO_END, False),
+        (ONCE, 2.0, Hold.WHILE, True),
+        (LONG, 4.0, Hold.WHILE, False),
+        (TWO_BURSTS, 5.0, Hold.WHILE, False),
+        (FAR_APART, 15.0, Hold.WHILE, False),
+        (FAR_APART, 15.0, Hold.TO_END, False),
+        (FAR_APART, 15.0, Hold.FOR, False),
+        (None, 4.0, Hold.TO_END, False),
+        (LONG, None, Hold.TO_END, False),
     ],
 )
-def test_a_fault_can_end_before_its_hazard(
+def test_only_a_fault_that_provably_acted_at_the_hazard_was_active_then(
     record: Callable[..., Record],
-    activation: ObservedActivation | None,
+    experiment: Callable[..., Experiment],
+    activation: tuple[float, float, int] | None,
     hazard: float | None,
+    hold: Hold,
     is_active: bool,
 ) -> None:
-    """The time to the hazard counts from the activation all the same."""
-    hazards = () if hazard is None else (("H1", hazard), ("H2", 9.0))
-    finished = record(activation=activation, hazards=hazards)
-    assert was_active_at_hazard(finished) == is_active
-    expected = hazard - activation.first if activation and hazard is not None else None
+    """A fault with `while` can pause. The time to the hazard counts from the activation all the same."""
+    hazards = () if hazard is None else (("H1", hazard), ("H2", 29.0))
+    finished = record(activation=_activation(activation), hazards=hazards, t_end=hazard)
+    assert was_active_at_hazard(finished, _holding(experiment(), hold)) == is_active
+    expected = hazard - activation[0] if activation and hazard is not None else None
     assert time_to_hazard(finished) == expected
+
+
+@pytest.mark.parametrize(
+    ("activation", "t_end", "hold", "is_active"),
+    [
+        (SHORT_OF_IT, 4.0, Hold.TO_END, True),
+        (SHORT_OF_IT, 4.0, Hold.FOR, False),
+        (SHORT_OF_IT, 4.0, Hold.WHILE, False),
+        (SHORT_OF_IT, 6.0, Hold.TO_END, False),  # another hazard stopped the run
+        ((2.0, 3.97, 198), 4.0, Hold.TO_END, False),
+    ],
+)
+def test_a_run_that_stopped_at_the_hazard_can_lack_the_activation_that_was_due(
+    record: Callable[..., Record],
+    experiment: Callable[..., Experiment],
+    activation: tuple[float, float, int],
+    t_end: float,
+    hold: Hold,
+    is_active: bool,
+) -> None:
+    """Only a fault that lasts to the end would have acted again."""
+    finished = record(activation=_activation(activation), hazards=(("H1", 4.0),), t_end=t_end)
+    stopped = replace(_holding(experiment(), hold), after_hazard=AfterHazard.STOP)
+    assert was_active_at_hazard(finished, stopped) == is_active
+
+
+@pytest.mark.parametrize("limit", [{"where": "x > 1"}, {"call": 2}, {"every": 2}], ids=str)
+def test_an_injection_that_affects_only_some_executions_can_pause(
+    record: Callable[..., Record], experiment: Callable[..., Experiment], limit: dict[str, Any]
+) -> None:
+    """Activations before and after the hazard do not show that such a fault acted at the hazard."""
+    permanent = _holding(experiment(), Hold.TO_END)
+    injections = tuple(replace(injection, **limit) for injection in permanent.fault.injections)
+    limited = replace(permanent, fault=replace(permanent.fault, injections=injections))
+    finished = record(activation=_activation(LONG), hazards=(("H1", 4.0),))
+    assert was_active_at_hazard(finished, permanent)
+    assert not was_active_at_hazard(finished, limited)
+
+
+def _activation(values: tuple[float, float, int] | None) -> ObservedActivation | None:
+    if values is None:
+        return None
+    return ObservedActivation(first=values[0], last=values[1], count=values[2])
+
+
+def _holding(experiment: Experiment, hold: Hold) -> Experiment:
+    return replace(experiment, trigger=replace(experiment.trigger, hold=hold))
