@@ -32,7 +32,7 @@ Examples:
   mutator compare runs/before runs/after
   mutator compare runs/before runs/after --only 'module == "vision_input"'
   mutator compare runs/main runs/change \\
-    --fail-on new-hazard,new-silent-hazard,new-crash,harness-error,unmatched
+    --fail-on new-hazard,new-silent-hazard,other-hazard,new-crash,harness-error,unmatched
   mutator compare runs/main runs/change --fail-on severity:S2
 
 With --fail-on, the exit code is 1 if such a change is found; each is printed. Otherwise it is 3 if

@@ -1,6 +1,7 @@
 """`compare` and `export` on the command line."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -92,6 +93,26 @@ def test_a_gate_fails_for_a_new_hazard(cli: Cli, runs: tuple[Path, Path]) -> Non
     assert both.err.count("sensor/silence/no_data, A, guided far") == 1
     assert "new-hazard, new-silent-hazard: sensor/silence/no_data, A, guided" in both.err
     assert cli("compare", *reversed(runs), "--fail-on", "lost-alert", "--fail-on", "new-hazard").code == 0
+
+
+def test_the_recommended_gate_fails_for_a_hazard_beside_another(
+    cli: Cli, root: Path, write_run: Write
+) -> None:
+    """A fault that led to H3 and now also to H1 has a new hazard, although an alert comes before it."""
+    docs = Path(__file__).parents[2] / "docs"
+    pages = ("how-to/gate-a-change-in-ci.md", "tutorial/tour-controller-developer.md", "reference/cli.md")
+    pattern = re.compile(r"--fail-on (new-hazard,\S+)")
+    [gate] = {kinds for page in pages for kinds in pattern.findall((docs / page).read_text())}
+
+    def run(name: str, *hazards: tuple[str, float]) -> Path:
+        fields = {"outcome": Outcome.HAZARD, "hazards": hazards, "alerts": (("fcw", 2.5),)}
+        return write_run(Workspace.find(root), Path(name), lambda e: fields, campaign="small")
+
+    one, two = run("one", ("H3", 3.0)), run("two", ("H3", 3.0), ("H1", 4.0))
+    refused = cli("compare", one, two, "--fail-on", gate)
+    assert refused.code == 1
+    assert "error: other-hazard: " in refused.err
+    assert cli("compare", two, one, "--fail-on", gate).code == 0
 
 
 def test_a_run_equals_itself(cli: Cli, runs: tuple[Path, Path]) -> None:
