@@ -7,7 +7,7 @@
     python docs/images/make.py runs/quickstart runs/distant
 
 Each picture is made wide and narrow, light and dark, such as `report-wide-dark.png`. The film shows the worst
-experiment of the first run. The same runs give the same pictures, up to the shade of a few pixels.
+contact of the first run. The same runs give the same pictures, up to the shade of a few pixels.
 The script needs the extra `test` and Chromium; it takes about a minute.
 """
 
@@ -31,7 +31,7 @@ HERE = Path(__file__).parent
 WIDTHS = {"wide": {"width": 1280, "height": 800}, "narrow": {"width": 390, "height": 780}}
 SCHEMES = ("light", "dark")
 NOON = "2026-01-01T12:00"
-WORST = "[aria-labelledby=answer-dangerous] a[href^='#e=']"
+WORST_CONTACT = "[aria-labelledby=answer-dangerous] tr:has-text('delta-v') a[href^='#e=']"
 STEPS = 2  # of 1/20 s, from one frame of a film to the next
 FRAME_MS, LAST_MS, COLOURS, MARGIN = 100, 3000, 64, 4
 INSTRUMENTS = ("v_ego", "d_rel", "gas", "brake")  # below the road in a film
@@ -100,7 +100,7 @@ def report(page: Any, path: Path, name: str) -> None:
     page.goto(path.as_uri())
     page.wait_for_selector("html[data-ready]")
     save(page.screenshot(), "report" + name)
-    page.locator(WORST).first.click()
+    page.locator(WORST_CONTACT).first.click()
     page.wait_for_selector(".replay-player")
     page.locator(".jumps button").last.click()
     page.mouse.move(0, 0)  # so that the pointer highlights nothing
