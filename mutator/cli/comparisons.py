@@ -129,6 +129,8 @@ def _print_comparison(terminal: Terminal, run_comparison: "mutator.RunComparison
         terminal.print_table(
             heads, lines, right_aligned=range(1, len(heads)), last_is_total=sheet.name == "changes"
         )
+        if sheet.name == "severity":  # its heads are names of classes
+            terminal.print_text(sheet.note)
         terminal.print_text()
     terminal.print_text(run_comparison.summary)
     for remark in comparison.remarks:
