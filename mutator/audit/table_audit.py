@@ -8,7 +8,6 @@ from typing import BinaryIO
 
 from mutator._common.bounded_reading import read_bounded_lines
 from mutator._common.confined_files import path_below
-from mutator.campaigns.row_filters import RENAMED_COLUMNS
 from mutator.errors import MutatorError, TooLarge
 from mutator.results import table_building
 from mutator.results.table_reader import is_same_parquet
@@ -32,9 +31,9 @@ def _table_problems(folder: RunFolder, existing: list[str]) -> Iterator[MutatorE
     with TemporaryDirectory() as scratch:
         rebuilt = {name: path_below(Path(scratch), name) for name in table_building.TABLE_FILES}
         table_building.write_tables(folder, rebuilt)
-        if replaced := _replaced_columns(folder.path, rebuilt[table_building.CSV_FILE]):
+        if renamed := table_building.renamed_columns_of(folder):
             yield MutatorError(
-                f"tables with the columns of another version of mutator ({replaced})",
+                f"tables with the columns of another version of mutator ({renamed})",
                 where=folder.path,
                 remedy="`mutator report` rebuilds them",
             )
@@ -48,18 +47,6 @@ def _table_problems(folder: RunFolder, existing: list[str]) -> Iterator[MutatorE
                     yield err
             elif name not in rebuilt or not is_same_parquet(path, rebuilt[name]):
                 yield MutatorError("does not follow from the records", where=path, remedy=_REMEDY)
-
-
-def _replaced_columns(run: Path, rebuilt_path: Path) -> str:
-    """Return the columns of the run's results.csv that this version does not write; '' if there are none."""
-    try:
-        with (run / table_building.CSV_FILE).open("rb") as current, rebuilt_path.open("rb") as rebuilt:
-            header, rebuilt_header = (
-                next(_decoded_lines(file, run), "").strip().split(",") for file in (current, rebuilt)
-            )
-    except FileNotFoundError:
-        return ""
-    return ", ".join(name for name in header if name not in rebuilt_header and name in RENAMED_COLUMNS)
 
 
 def _differing_lines(path: Path, rebuilt_path: Path) -> Iterator[MutatorError]:

@@ -11,6 +11,7 @@ from fnmatch import fnmatchcase
 
 from mutator._common.message_text import operator_hint, spelling_suggestion
 from mutator.errors import MutatorError
+from mutator.results.renamed_columns import RENAMED_COLUMNS
 
 FilterRow = Mapping[str, object]
 RowPredicate = Callable[[FilterRow], bool]
@@ -22,7 +23,6 @@ _ORDER_OPERATORS: dict[type[ast.cmpop], Callable[[object, object], bool]] = {
     ast.Gt: operator.gt,  # type: ignore[dict-item]
     ast.GtE: operator.ge,  # type: ignore[dict-item]
 }
-RENAMED_COLUMNS = {"fault_tolerant_time": "time_to_hazard"}  # columns of earlier versions
 _MOST_CHARACTERS = 2000  # more than anybody writes; limits how deep an expression can nest
 _ALLOWED_SYNTAX = (
     'columns, numbers, "strings", ==, !=, <, <=, >, >=, in, not in, and, or, not, match(column, "glob*")'

@@ -89,21 +89,25 @@ class ExperimentSentences:
     def sentence(self, row: Row, fault: Fault) -> str:
         """Return the sentence about the experiment of a row."""
         status = Status(row["status"])
-        clause = self.fault_clause(fault)
+        injected = self._fault_sentence(fault, row)
         if status is not Status.OK:
-            parts = [self._fault_sentence(clause, row), _failure(status, row)]
+            parts = [injected, _failure(status, row)]
         elif row["outcome"] == Outcome.NOT_ACTIVATED:
-            parts = [self._fault_sentence(clause, row), _why_not_active(row)]
+            parts = [injected, _why_not_active(row)]
         else:
-            parts = [self._fault_sentence(clause, row), self._effect(row), *self._consequences(row)]
+            parts = [injected, self._effect(row), *self._consequences(row)]
         return " ".join(filter(None, parts))
 
-    def _fault_sentence(self, clause: str, row: Row) -> str:
+    def _fault_sentence(self, fault: Fault, row: Row) -> str:
         """Say what was injected and when it was active; if it never was, what was planned."""
+        clause = self.fault_clause(fault)
+        is_name = clause == fault.label  # a name keeps its letters
         begin, situation = _number(row, "t_activation"), self._situation(row)
         if begin is not None:
-            return _as_sentence(f"{clause} from {measured_number(begin, 's')}{situation}")
-        return f"Planned: {_decapitalized(clause)}{_planned_begin(row)}{situation}."
+            text = f"{clause} from {measured_number(begin, 's')}{situation}"
+            return f"{text}." if is_name else _as_sentence(text)
+        planned = clause if is_name else _decapitalized(clause)
+        return f"Planned: {planned}{_planned_begin(row)}{situation}."
 
     def _situation(self, row: Row) -> str:
         """` for 2 s`, ` while the car is close behind a slower vehicle`; '' for a fault that stays."""
@@ -130,10 +134,12 @@ class ExperimentSentences:
         if not hazards:
             return f"{text} No hazard follows.".strip()
         severity_class = row.get("severity") or ""
-        severity = self.words_by_severity.get(severity_class) or severity_class
-        if not severity:
+        if not severity_class:
             return text
-        return f"{text[:-1]} ({severity})." if len(hazards) == 1 else f"{text} Severity: {severity}."
+        words = self.words_by_severity.get(severity_class)
+        if len(hazards) > 1:
+            return f"{text} Severity: {words or severity_class}."
+        return f"{text[:-1]} ({words or f'severity {severity_class}'})."
 
     def _hazard_times(self, row: Row) -> list[tuple[HazardFacts, float]]:
         times = [(hazard, _number(row, f"t_{hazard.name.lower()}")) for hazard in self.hazards]

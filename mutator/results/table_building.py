@@ -15,6 +15,7 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.results import propagation_columns
+from mutator.results.renamed_columns import renamed_columns_in
 from mutator.results.table_columns import (
     TIMING_COLUMNS,
     FinishedExperiment,
@@ -46,7 +47,7 @@ def ensure_tables(run: Path) -> Path:
 def build_tables(run: Path) -> Path:
     """Write the tables of a run folder from plan and records, and return the path of results.csv.
 
-    MutatorWarning if a table that was edited by hand is overwritten.
+    MutatorWarning if a table that was edited by hand is overwritten, or has renamed columns.
     """
     folder = RunFolder.open(run)
     inputs_digest = _inputs_digest(folder)
@@ -65,9 +66,16 @@ def build_tables(run: Path) -> Path:
         # Record old and new digests before the tables are replaced at the end of the block. Otherwise a kill
         # could leave tables that look edited.
         before = _unedited_digests(folder, new_digests)
+        _warn_of_renamed_columns(folder)
         stamp = {"schema": STAMP_SCHEMA, "made_from": inputs_digest, "tables": new_digests, "before": before}
         write_json(folder.path / STAMP_FILE, stamp)
     return folder.path / CSV_FILE
+
+
+def renamed_columns_of(folder: RunFolder) -> str:
+    """Return the columns of results.csv with a name of another version of mutator; '' if there are none."""
+    names = [column.name for column in result_columns_of(folder.head)]
+    return renamed_columns_in(path_below(folder.path, CSV_FILE), names)
 
 
 def write_tables(folder: RunFolder, paths: Mapping[str, Path]) -> None:
@@ -180,6 +188,12 @@ def _unedited_digests(folder: RunFolder, new_digests: Mapping[str, str]) -> dict
             text = "the table did not match the plan and records, so it was rebuilt"
             warnings.warn(f"{path_below(folder.path, name)}: {text}", MutatorWarning, stacklevel=2)
     return {name: current_digest for name, current_digest in current.items() if current_digest in built[name]}
+
+
+def _warn_of_renamed_columns(folder: RunFolder) -> None:
+    if renamed := renamed_columns_of(folder):
+        text = f"the tables had the columns of another version of mutator ({renamed}), so they were rebuilt"
+        warnings.warn(f"{folder.path}: {text}", MutatorWarning, stacklevel=2)
 
 
 def _write_timings(folder: RunFolder, path: Path) -> None:

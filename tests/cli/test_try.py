@@ -6,11 +6,13 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from mutator.cli import experiment_view
+from mutator.cli.console import Terminal
 from mutator.model import Record
 from mutator.outcomes.verdict_rules import reaction_time
 from mutator.workspace import Workspace
@@ -82,6 +84,22 @@ def test_the_note_on_alerts_agrees_with_the_reaction_time(
     )
     reaction = reaction_time(made.hazards, made.alerts)
     assert experiment_view._missing_alert_note(made, toycar.manifest("toycar"), reaction) == note
+
+
+@pytest.mark.parametrize("width", range(20, 60))
+def test_a_sentence_is_not_folded_between_a_number_and_its_unit(
+    record: Callable[..., Record], width: int, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    """In a pipe of any width, `9.5 s` stays on one line."""
+    monkeypatch.setenv("COLUMNS", str(width))
+    sentence = "The car slows to 11.7 m/s and touches the lead 9.5 s later at 20 mph."
+    result = SimpleNamespace(
+        record=record(), sentence=sentence, verdict={"reaction_time_s": None}, _manifest=lambda: None
+    )
+    experiment_view.print_answer(Terminal(), cast(Any, result))
+    out = capsys.readouterr().out
+    assert sentence in " ".join(out.split())
+    assert all(value in out for value in ("11.7 m/s", "9.5 s", "20 mph"))
 
 
 def test_try_reports_hazards_of_the_fault_free_run(cli: Cli, root: Path) -> None:

@@ -150,7 +150,7 @@ def assert_results_as_stored(table: Path, run: Path) -> None:
 
 
 def test_a_renamed_column_is_no_damage(cli: Cli, place: Path) -> None:
-    """`report` rebuilds the tables; until then, `verify` says why they differ, in one sentence."""
+    """Until the tables are rebuilt, `verify` says why they differ, in one sentence."""
     shutil.copytree(FIXTURE / "small", copy := place / "renamed")
     code, out, _ = cli("verify", copy)
     said = "tables with the columns of another version of mutator (fault_tolerant_time)"
@@ -162,6 +162,24 @@ def test_a_renamed_column_is_no_damage(cli: Cli, place: Path) -> None:
     assert cli("verify", copy)[0] == 0
     code, out, err = cli("show", "--run", copy, "--only", "time_to_hazard < 2")
     assert code == 0 and "3 of 3 experiments" in out, err
+
+
+@pytest.mark.parametrize("words", [("show",), ("export", "--format", "csv")], ids=["show", "export"])
+def test_who_rebuilds_tables_of_another_version_says_so_once(
+    cli: Cli, place: Path, words: tuple[str, ...]
+) -> None:
+    """A command that only reads also rebuilds the tables, and says so; the next one has nothing to say."""
+    shutil.copytree(FIXTURE / "small", copy := place / f"older-{words[0]}")
+    where = ("--run", copy) if words[0] == "show" else (copy, "--out", copy / "written.csv")
+    said = (
+        f"{copy}: the tables had the columns of another version of mutator (fault_tolerant_time), "
+        "so they were rebuilt"
+    )
+    code, _, err = cli(*words, *where)
+    assert code == 0 and " ".join(err.split()).count(said) == 1, err
+    assert_results_as_stored(copy / "results.csv", FIXTURE / "small")
+    code, _, err = cli(*words, *where)
+    assert code == 0 and "another version" not in err
 
 
 def test_show_runs_no_experiment(cli: Cli, place: Path) -> None:

@@ -79,7 +79,7 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
         f"{START} {DRIVE} at 19.6 m/s (severe). Alert fcw only in the moment of the hazard.",
     ),
     "a class without words": (
-        HAZARD | {"severity": "S1"}, f"{START} {DRIVE} at 19.6 m/s (S1). No alert.",
+        HAZARD | {"severity": "S1"}, f"{START} {DRIVE} at 19.6 m/s (severity S1). No alert.",
     ),
     "no class of severity": (HAZARD | {"severity": ""}, f"{START} {DRIVE} at 19.6 m/s. No alert."),
     "a metric of another end of the drive": (
@@ -226,6 +226,15 @@ def test_empty_cells_and_nan_are_missing_values() -> None:
 def test_a_fault_has_the_words_of_its_spec_its_model_or_its_label(injected: Fault, text: str) -> None:
     """The first of these that exists is used; numbers have the unit of the spec or of the source."""
     assert SENTENCES.fault_clause(injected) == text
+
+
+def test_a_name_keeps_its_letters() -> None:
+    """A fault without words has its name in the sentence, with the letters that find it."""
+    for spec in ("sensors/other/x", "Sensors/other/x"):
+        named = fault(spec, model="unknown")
+        assert SENTENCES.sentence(HAZARD, named).startswith(f"{spec} 50 mph from 24.6 s. The car ")
+        planned = SENTENCES.sentence(NEVER | {"condition": "t >= 24.6"}, named)
+        assert planned.startswith(f"Planned: {spec} 50 mph from 24.6 s. It was never active")
 
 
 def test_a_target_without_alerts_has_no_word_about_them() -> None:
