@@ -14,7 +14,7 @@ UsedNamesByFunction = Mapping[tuple[int, str], frozenset[str]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RescopedName:
-    """A name whose meaning has changed in a function or class."""
+    """A name whose meaning has changed in a function, a class or, since Python 3.14, an annotation."""
 
     name: str
     function_or_class: str
@@ -84,7 +84,7 @@ def _rescoped_between(
         if homes.get(name, "unknown") != home:
             yield RescopedName(
                 name=name,
-                function_or_class=before.get_name(),
+                function_or_class=_scope_name(before),
                 scope_before=home,
                 scope_after=homes.get(name, "unknown"),
             )
@@ -94,11 +94,22 @@ def _rescoped_between(
 
 
 def _scopes_in(table: SymbolTable) -> list[SymbolTable]:
-    """Return the functions and classes in a scope.
+    """Return the functions, classes and annotations in a scope.
 
-    Since Python 3.14, annotations have scopes, too. They bind no names and run only when somebody asks.
+    Since Python 3.14, annotations have scopes, too. Those without names are left out: they cannot change,
+    and an inserted line can add one.
     """
-    return [child for child in table.get_children() if child.get_type() != "annotation"]
+    return [child for child in table.get_children() if child.get_type() != "annotation" or _has_names(child)]
+
+
+def _has_names(annotations: SymbolTable) -> bool:
+    return any(not symbol.is_parameter() for symbol in annotations.get_symbols())
+
+
+def _scope_name(table: SymbolTable) -> str:
+    if table.get_type() == "annotation":
+        return f"the annotations of line {table.get_lineno()}"
+    return table.get_name()
 
 
 def _scope_kind(symbol: Symbol) -> str:

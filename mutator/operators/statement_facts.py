@@ -87,6 +87,8 @@ def _collect_statement(statement: ast.stmt, def_line: int, facts: StatementFacts
     if isinstance(statement, ast.Global | ast.Nonlocal):
         for name in statement.names:
             facts.first_binding_line_by_name[def_line, name] = 0
+    if isinstance(statement, ast.AnnAssign) and statement.value is None:
+        return  # `x: int` declares a name, but binds none
     for node in _nodes_in_scope(statement):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             facts.first_binding_line_by_name.setdefault((def_line, node.id), statement.lineno)

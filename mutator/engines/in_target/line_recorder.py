@@ -60,7 +60,9 @@ class LineRecorder:
         return first
 
     def _on_monitored_line(self, code: CodeType, line: int) -> Any:
-        if code.co_filename.startswith(self._tree) and self._note_line(code.co_filename, line):
+        # since Python 3.14, a function of its own evaluates annotations, but only when somebody asks for them
+        in_tree = code.co_filename.startswith(self._tree) and code.co_name != "__annotate__"
+        if in_tree and self._note_line(code.co_filename, line):
             _monitoring.restart_events()
         return _monitoring.DISABLE
 

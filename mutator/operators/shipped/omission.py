@@ -19,6 +19,7 @@ OPERATOR = Operator(
         "a += b": ["a += b -> left out"],
         "a(b)": ["a(b) -> left out"],
         "c = b": [],  # the first value of `c`, without which the name would not exist
+        "c: int\n    c = b": [],  # an annotation alone is no value
         "if a: b = c": [],
         "a([c for c in b])\n    c = b": ["a([c for c in b]) -> left out"],  # the `c` inside is another one
     },

@@ -1,5 +1,7 @@
 """Scopes: the names that a function knows, and the names whose meaning inserted lines would change."""
 
+import sys
+
 import pytest
 
 from mutator.mutants.name_scopes import RescopedName, rescoped_names, used_names_by_function
@@ -35,6 +37,7 @@ def test_the_files_encoding_is_used() -> None:
 READS = "def f(x):\n    #\n    return limit + x\n"
 NESTED = "def f(x):\n    #\n    def g(): return limit\n    return g\n"
 ENCLOSED = "def f(x):\n    def g():\n        #\n        return x\n    return g\n"
+ANNOTATED = "def f(x):\n    #\n    def g(y: limit): return y\n    return g\n"
 CLASS = "class C:\n    def f(self):\n        #\n        return __x\n"
 
 
@@ -66,6 +69,8 @@ CLASS = "class C:\n    def f(self):\n        #\n        return __x\n"
         ("def f(x):\n    def g():\n        nonlocal x\n        #\n        x\n    return g\n", "x = 1", None),
         ("def f(x):\n    #\n    return x.limit(limit=1)\n", "limit = 1", None),
         (CLASS, "__y = 1", None),
+        (ANNOTATED, "_: int = 1", None),
+        (ANNOTATED, "y = 1", None),
         ("def f(x):\n    #\n    y: int = limit\n    g = lambda: limit\n", "_: int = 1", None),
     ],
 )  # fmt: skip
@@ -79,3 +84,14 @@ def test_an_inserted_binding_can_change_the_scope_of_a_name(
         name=moved[0], function_or_class=moved[1], scope_before=moved[2], scope_after=moved[3]
     )
     assert found == expected
+
+
+def test_an_inserted_binding_can_change_the_scope_of_a_name_in_an_annotation() -> None:
+    """Since Python 3.14, annotations have a scope of their own."""
+    made = ANNOTATED.replace("#", "limit = 1")
+    (found,) = rescoped_names(ANNOTATED.replace("#", "pass").encode(), made.encode(), {2})
+    deferred = ("the annotations of line 3", "nonlocal")
+    assert (found.function_or_class, found.scope_after) == (
+        deferred if sys.version_info >= (3, 14) else ("f", "local")
+    )
+    assert (found.name, found.scope_before) == ("limit", "global or built-in")

@@ -140,3 +140,23 @@ def test_models_that_repeat_or_move_a_yield_are_not_listed(shipped: Workspace) -
     models = {one.line: one.models for one in places}
     assert not {"repetition", "reordering"} & set(models[2])
     assert "repetition" in models[3]
+
+
+@pytest.mark.parametrize(
+    "kind", ["later", "1 / 0", "round(2) > LIMIT", "[x for x in len(2)]", "lambda q=1: q + 1"]
+)
+def test_annotations_are_no_places(shipped: Workspace, kind: str) -> None:
+    """Since Python 3.14, they need not even run. A call in one does not count as a call of that name."""
+    plain = SOURCE.decode()
+    annotated = plain.replace("world, factor", f"world: {kind}, factor: {kind}").replace(
+        "):", f") -> {kind}:"
+    )
+    for name in ("LIMIT", "    gain", "        gap"):
+        annotated = annotated.replace(f"{name} =", f"{name}: {kind} =")
+    assert annotated.count(kind) == 8
+    files = [parse_file("m.py", text.encode(), Path("x")) for text in (plain, annotated)]
+    first, second = (
+        [(file.line_span(one.location), one) for one in places_of(file, shipped.fault_models())]
+        for file in files
+    )
+    assert first == second

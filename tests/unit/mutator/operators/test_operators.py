@@ -1,5 +1,6 @@
 """Mutation operators: the mutations of small sources, the exclusions, and samples."""
 
+import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -84,6 +85,38 @@ def test_first_assignments_are_never_omitted_in_functions_with_the_same_name(mak
         head="if 1:",
     )
     assert [one.description for one in made] == ["self.a = c -> left out"]
+
+
+ANNOTATED = """{before}
+    def g(k{kind} = b + 1){result}:
+        if k > b: return k
+        return -k
+    c{kind} = a + 1
+    self.c{kind} = g(c)
+    return c - 1"""
+
+
+@pytest.mark.parametrize(
+    "kind", ["later", "1 / 0", "a(1) + b > 3", "[x + 1 for x in a]", "lambda q=1: q + 1"]
+)
+def test_annotations_have_no_mutations(make: Make, kind: str) -> None:
+    """Since Python 3.14, they need not even run."""
+    plain = make(ANNOTATED.format(before="pass", kind="", result=""))
+    annotated = make(
+        ANNOTATED.format(before=f"c: {kind}", kind=f": {kind}", result=f" -> {kind}"),
+        head=f"def f(self, a: {kind}, b: {kind}) -> {kind}:",
+    )
+    assert len(plain) > 10
+    assert [(one.line, one.description.replace(f": {kind} =", " =")) for one in annotated] == [
+        (one.line, one.description) for one in plain
+    ]
+
+
+@pytest.mark.skipif(sys.version_info < (3, 14), reason="t-strings need Python 3.14")
+def test_a_t_string_has_the_mutations_of_an_f_string(make: Make) -> None:
+    body = "c = a({0}'{{a + 1}}', b) + {0}'{{b > 1}}'\n    self.c = {0}'{{a}}'\n    return {0}'{{a - 1}}'"
+    of_f, of_t = make(body.format("f")), make(body.format("t"))
+    assert of_f and [one.description.replace("t'", "f'") for one in of_t] == [one.description for one in of_f]
 
 
 def test_mutants_of_a_file_with_a_byte_order_mark_compile(tmp_path: Path, clone: Workspace) -> None:
