@@ -47,14 +47,17 @@ def operator_hint(text: str) -> str:
 
 
 NO_BREAK_SPACE = "\u00a0"  # printed as a space at which text is not folded
-_UNIT_PATTERN = re.compile(r"(?<=\d) (?=[A-Za-z%°][\w/^²]{0,4}(?![\w/]))")
+_UNIT_PATTERN = re.compile(r"(?<=\d) (?!and |or )(?=[A-Za-z%°][\w/^²]{0,4}(?![\w/]))")
+
+_COMPARISON_PATTERN = re.compile(r" ([<>]=?|[=!]=) ")  # `hwt <= 2.0`
 
 
 def bind_units(text: str) -> str:
     """Return the text with spaces that no line may be folded at: between a number and a short word, which can
-    be its unit, and in commands in backticks.
+    be its unit, around the sign of a comparison, and in commands in backticks.
     """
     text = _UNIT_PATTERN.sub(NO_BREAK_SPACE, text)
+    text = _COMPARISON_PATTERN.sub(NO_BREAK_SPACE + r"\1" + NO_BREAK_SPACE, text)
     return _COMMAND_PATTERN.sub(lambda command: command[0].replace(" ", NO_BREAK_SPACE), text)
 
 
@@ -65,6 +68,7 @@ def unbreakable_parts(text: str) -> list[str]:
 
 _NAME_BEFORE_VALUE_PATTERN = re.compile(r"[^\s:]+(?: [^\s:]+)*  +")  # `name   ` before a value
 _COMMAND_PATTERN = re.compile(r"`[^`]*`")
+_DIGEST_LINE_PATTERN = re.compile(r"[\w .-]{1,40}:? +[0-9a-f]{64}")  # `seal: 3f9a...`, to copy
 _UNBREAKABLE_SPACE = "\0"  # no message contains it, and textwrap does not break lines there
 
 
@@ -72,13 +76,14 @@ def wrap_text(text: str, width: int) -> str:
     """Break lines between words to at most `width` characters. Longer words and commands in backticks stay
     whole.
 
-    Continuation lines are indented; in a line `name  value`, they align with the value.
+    A line with only a name and a digest is left as it is. Continuation lines are indented; in a line
+    `name  value`, they align with the value.
     """
     return "\n".join(_wrap_line(line, width) if len(line) > width else line for line in text.split("\n"))
 
 
 def _wrap_line(line: str, width: int) -> str:
-    if line.startswith("|"):  # a row of a Markdown table
+    if line.startswith("|") or _DIGEST_LINE_PATTERN.fullmatch(line):  # a row of a Markdown table; a digest
         return line
     start = _NAME_BEFORE_VALUE_PATTERN.match(line)
     # values far to the right would leave too little room for their lines

@@ -106,7 +106,7 @@ def plan(
     # enough to compare by eye; run.json has all digits
     terminal.print_text(f"plan: {short_path(folder / 'plan.csv')} (digest {new_plan.digest[:16]})")
     command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
-    terminal.print_command("run it:", command)
+    terminal.print_command("run it:", shlex.join(command))
 
 
 def _print_plan_as_json(
@@ -317,7 +317,7 @@ def _print_summary(
     if summary.problem:
         terminal.print_error(summary.problem)
     if summary.interrupted or summary.done < summary.planned:
-        terminal.print_command("resume:", ["mutator", *sys.argv[1:]])
+        terminal.print_command("resume:", resume_command())
 
 
 def resume_command() -> str:

@@ -8,9 +8,7 @@ import json
 import math
 import os
 import re
-import shlex
 import sys
-import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -113,8 +111,10 @@ class Terminal:
         right_aligned: Sequence[int] = (),
         priorities: Sequence[int] = (),
         last_is_total: bool = False,
+        last_is_whole: bool = False,
     ) -> None:
-        """Print a table. Numbers of columns begin with 0; `last_is_total` sets the last row apart.
+        """Print a table. Numbers of columns begin with 0; `last_is_total` sets the last row apart. With
+        `last_is_whole`, cells of the last column are never folded, so that they can be copied.
 
         A terminal that is too narrow shows the columns in `priorities` first, then those from left to right.
         """
@@ -134,6 +134,7 @@ class Terminal:
                 right_aligned=right_aligned,
                 priorities=priorities,
                 last_is_total=last_is_total,
+                last_is_whole=last_is_whole,
             )
         )
 
@@ -158,17 +159,20 @@ class Terminal:
         lengths = range(SHORT_ID_LENGTH, max(map(len, names), default=0))
         return next((n for n in lengths if len({name[:n] for name in names}) == len(names)), None)
 
-    def print_command(self, introduction: str, words: Sequence[str]) -> None:
-        """Print a command to copy, if it fits in the same line as its introduction."""
-        line = f"{introduction} {shlex.join(words)}"
-        if not self.out.is_terminal or len(line) <= self.out.width:
-            self.print_text(line, without_folding=True)
+    def print_command(self, introduction: str, command: str) -> None:
+        """Print a command to copy, which is never folded: behind its introduction, or on a line of its
+        own if both do not fit.
+        """
+        if len(introduction) + 1 + len(command) <= _line_width(self.out):
+            self.print_text(f"{introduction} {command}", without_folding=True)
             return
         self.print_text(introduction)
-        self.print_text(_folded_command(words, self.out.width), without_folding=True)
+        self.print_text(f"  {command}", without_folding=True)
 
     def print_diff(self, patch: str) -> None:
-        """Print a unified diff: coloured in a terminal, elsewhere unchanged, as `patch` needs it."""
+        """Print a unified diff: coloured in a terminal, elsewhere unchanged. Its lines are never folded,
+        because `patch` needs them whole.
+        """
         if self.as_json:
             return
         if not self.out.is_terminal:
@@ -180,7 +184,7 @@ class Terminal:
 
         text = Text()
         for line in patch.splitlines():
-            text.append(_fold_code(line, self.out.width) + "\n", style=_diff_style(line))
+            text.append(line + "\n", style=_diff_style(line))
         self.out.print(text, soft_wrap=True, end="")
 
     @contextmanager
@@ -324,43 +328,17 @@ def _build_console(*, stderr: bool) -> "Console":
 def _print_text(console: "Console", text: str, style: str | None, *, without_folding: bool = False) -> None:
     text = _escape_controls(text)
     if not without_folding:
-        width = console.width if console.is_terminal else _pipe_line_width()
-        text = wrap_text(bind_units(text) if console.is_terminal else text, width).replace(
-            NO_BREAK_SPACE, " "
-        )
+        text = wrap_text(bind_units(text), _line_width(console))
     # Rich must not fold again
-    console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
-
-
-def _fold_code(line: str, width: int) -> str:
-    """Fold a line of a diff between words; what follows is indented deeper than the line."""
-    if len(line) <= width:
-        return line
-    indent = len(line) - len(line[1:].lstrip()) + 4
-    return textwrap.fill(
-        line,
-        max(width, indent + 1),
-        subsequent_indent=" " * indent,
-        break_long_words=False,
-        break_on_hyphens=False,
-        expand_tabs=False,
-        replace_whitespace=False,
+    console.print(
+        text.replace(NO_BREAK_SPACE, " "), style=style, markup=False, highlight=False, soft_wrap=True
     )
 
 
-def _folded_command(words: Sequence[str], width: int) -> str:
-    """Return the command in lines that a shell reads as one."""
-    lines = ["  " + shlex.quote(words[0])]
-    for word in map(shlex.quote, words[1:]):
-        if len(lines[-1]) + len(word) + len("  \\") > width:
-            lines[-1] += " \\"
-            lines.append("    " + word)
-        else:
-            lines[-1] += " " + word
-    return "\n".join(lines)
-
-
-def _pipe_line_width() -> int:
+def _line_width(console: "Console") -> int:
+    """Return the width of the terminal; in a pipe, that of COLUMNS, or else `PIPE_LINE_WIDTH`."""
+    if console.is_terminal:
+        return console.width
     columns = os.environ.get("COLUMNS", "")
     return int(columns) if columns.isdecimal() and int(columns) else PIPE_LINE_WIDTH
 

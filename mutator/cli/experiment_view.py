@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import mutator
-from mutator._common.message_text import NO_BREAK_SPACE, bind_units, counted
+from mutator._common.message_text import NO_BREAK_SPACE, counted
 from mutator.api.experiment_results import experiment_facts
 from mutator.api.results_worst_first import worst_causes, worst_results
 from mutator.api.stored_experiments import StoredExperiment, find_newest_run, open_stored_run
@@ -71,14 +71,14 @@ def print_worst_experiments(
         priorities=[i for i, head in enumerate(heads) if head not in ("margin", "first alert")],
     )
     for name, sentence in sentences:
-        terminal.print_text(bind_units(f"{name}: {sentence}"))
+        terminal.print_text(f"{name}: {sentence}")
     terminal.print_text(
         f"{len(rows)} of {counted(count, 'experiment')} in {short_path(folder)}, the worst first"
     )
     if has_more:
-        terminal.print_text(
-            "more: experiments with the same fault type and hazard; to list them: "
-            "mutator show --only 'fault_type == \"...\"'"
+        terminal.print_command(
+            "more: experiments with the same fault type and hazard; to list them:",
+            "mutator show --only 'fault_type == \"...\"'",
         )
 
 
@@ -121,7 +121,7 @@ def print_answer(terminal: Terminal, result: "ExperimentResult") -> None:
     record = result.record
     if record is None:
         return
-    terminal.print_text(bind_units(result.sentence), style="bold")
+    terminal.print_text(result.sentence, style="bold")
     ending = _ending_of(record)
     parts = [ending]
     if record.hazards:
@@ -263,7 +263,7 @@ def print_trial(terminal: Terminal, trial: "Trial", *, with_plot: bool) -> None:
         )
         return
     print_experiment(terminal, trial.experiment, trial.patch, is_trial=True)
-    terminal.print_text(bind_units(trial.sentence), style="bold")
+    terminal.print_text(trial.sentence, style="bold")
     print_verdict(terminal, trial)
     if trial.golden_hazards:
         reached = ", ".join(f"{name} at {t:.2f} s" for name, t in trial.golden_hazards)

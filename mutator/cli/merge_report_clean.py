@@ -1,5 +1,6 @@
 """`merge`, `report` and `clean`: work with run folders."""
 
+import shlex
 import sys
 from contextlib import suppress
 from dataclasses import asdict
@@ -85,7 +86,7 @@ def merge(
     terminal.print_text(f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {results}")
     for name, value in seals.digest_by_name().items():
         terminal.print_text(f"{name}: {value}")
-    terminal.print_command("report:", ["mutator", "report", str(out)])
+    terminal.print_command("report:", shlex.join(["mutator", "report", str(out)]))
 
 
 REPORT_EXAMPLES = """\b

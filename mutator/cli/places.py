@@ -57,8 +57,8 @@ def _print_places(terminal: Terminal, places: Sequence["ListedPlace"]) -> None:
     rows = []
     for place in places:
         letter = letters.setdefault(place.models, _letters_of(len(letters)))
-        rows.append([place.line, _anchor_as_yaml(place.at), letter])
-    terminal.print_table(["line", "at", "models"], rows, right_aligned=[0])
+        rows.append([place.line, letter, _anchor_as_yaml(place.at)])
+    terminal.print_table(["line", "models", "at"], rows, right_aligned=[0], last_is_whole=True)
     terminal.print_text()
     for models, letter in letters.items():
         terminal.print_text(f"{letter}: {', '.join(models)}")

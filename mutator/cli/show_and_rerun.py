@@ -1,6 +1,7 @@
 """`show` and `rerun`: one experiment of a run."""
 
 import math
+import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -126,10 +127,8 @@ def show(
     for path in film_paths:
         terminal.print_link("film", path)
     if stored.record and not plot_path and not film_paths:
-        run_words = ["--run", short_path(stored.run.path), "--plot"]
-        terminal.print_command(
-            "no plot is stored; to rerun and plot it:", ["mutator", "show", stored.id, *run_words]
-        )
+        words = ["mutator", "show", stored.id, "--run", short_path(stored.run.path), "--plot"]
+        terminal.print_command("no plot is stored; to rerun and plot it:", shlex.join(words))
 
 
 def _experiment_facts(

@@ -39,6 +39,7 @@ class TerminalTable:
     """A table of texts, with one cell per head in each row.
 
     `priorities` numbers the most important columns, the first one most; the others follow from left to right.
+    With `last_is_whole`, cells of the last column are never folded; one can be longer than the line.
     """
 
     heads: Sequence[str]
@@ -46,11 +47,15 @@ class TerminalTable:
     right_aligned: Collection[int] = ()
     priorities: Sequence[int] = ()
     last_is_total: bool = False
+    last_is_whole: bool = False
 
     def layout(self, width: int | None) -> TableLayout:
         """Return the layout for a terminal of so many columns; None: as wide as the table."""
-        columns = list(zip(self.heads, *self.rows, strict=True))
-        return _LayoutSearch(list(map(_column_widths, columns)), self._by_importance()).search(width)
+        widths = list(map(_column_widths, zip(self.heads, *self.rows, strict=True)))
+        if self.last_is_whole:
+            head = len(self.heads[-1])
+            widths[-1] = _Widths(natural=widths[-1].natural, with_folded_head=head, least=head)
+        return _LayoutSearch(widths, self._by_importance()).search(width)
 
     def _by_importance(self) -> list[int]:
         return list(dict.fromkeys([*self.priorities, *range(len(self.heads))]))
@@ -74,7 +79,7 @@ class TerminalTable:
     def _entry(self, cells: Sequence[str], layout: TableLayout, styles: Sequence[str]) -> list[StyledLine]:
         lines: list[StyledLine] = []
         for i, columns in enumerate(layout.lines):
-            folded = [_fold(cells[column.index], column.width) for column in columns]
+            folded = [self._fold(cells[column.index], column) for column in columns]
             for parts in zip(*_filled(folded), strict=True):
                 line: StyledLine = [(INDENT, "")] if i else []
                 for column, text in zip(columns, parts, strict=True):
@@ -83,6 +88,10 @@ class TerminalTable:
                 lines.append(_without_trailing_spaces(line))
         # a second line without any text says nothing
         return [line for i, line in enumerate(lines) if line or i == 0]
+
+    def _fold(self, cell: str, column: PlacedColumn) -> list[str]:
+        is_whole = self.last_is_whole and column.index == len(self.heads) - 1
+        return [cell] if is_whole else _fold(cell, column.width)
 
 
 @dataclass(frozen=True, slots=True)

@@ -313,9 +313,7 @@ def generate(
     first_patch = out / index[0]["patch"]
     root = mutants.selected_target.manifest.root
     if mutants.selected_target.manifest.overlay is None:  # otherwise a patch spans two folders
-        terminal.print_text(
-            f"apply one: patch -p1 -d {short_path(root)} < {first_patch}", without_folding=True
-        )
+        terminal.print_command("apply one:", f"patch -p1 -d {short_path(root)} < {first_patch}")
 
 
 def _parse_operator_choice(

@@ -17,11 +17,16 @@ _LINES = 50
 _ESCAPE_PATTERN = re.compile(r"\x1b\[(\??[0-9;]*)([A-Za-z])")
 
 
-def run_in_terminal(width: int, *words: str) -> tuple[int, list[str]]:
-    """Run `mutator WORDS...` in a terminal of so many columns; return its exit code and the lines shown."""
+def run_in_terminal(width: int, *words: str) -> tuple[int, str]:
+    """Run `mutator WORDS...` in a terminal of so many columns; return its exit code and what was sent."""
     with pseudo_terminal(width) as received:
         code = main(list(words))
-    return code, lines_on_screen(b"".join(received).decode(), width)
+    return code, b"".join(received).decode()
+
+
+def lines_to_copy(text: str) -> list[str]:
+    """Return the lines as they are copied: a terminal joins the lines that it has broken itself."""
+    return lines_on_screen(text, sys.maxsize)
 
 
 @contextmanager

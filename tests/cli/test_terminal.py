@@ -18,6 +18,7 @@ from mutator.store.run_progress import Progress
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
+DIGEST = "0123456789abcdef" * 4
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 PATCH = """\
 diff --git a/p/_fi.py b/p/_fi.py
@@ -132,6 +133,9 @@ COMMAND = "`mutator review approve 3b5103806ae0 a9281388d042 --campaign paper_sm
         ("no-break at-hyphens", 10, ["no-break", "  at-hyphens"]),
         ("do it: `mutator run x` now", 14, ["do it:", "  `mutator run x`", "  now"]),
         ("one two\n| a cell | of a table |", 8, ["one two", "| a cell | of a table |"]),
+        (f"results digest: {DIGEST}", 60, [f"results digest: {DIGEST}"]),
+        (f"plan         {DIGEST}", 60, [f"plan         {DIGEST}"]),
+        (f"it is the seal: {DIGEST}, it says", 60, ["it is the seal:", f"  {DIGEST},", "  it says"]),
         ("", 8, [""]),
     ],
 )
@@ -160,6 +164,28 @@ def test_output_to_a_pipe_is_folded_at_100_columns_by_default(
     whole = capsys.readouterr().out.splitlines()
     assert whole[0] == LONG
     assert whole[2].split("  ") == [LONG, COMMAND]
+
+
+def test_a_command_to_copy_is_never_folded(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It stands behind its introduction, or on a line of its own."""
+    command = "mutator show --only 'fault_type == \"...\"'"
+    for columns, lines in (
+        ("60", [f"list them: {command}"]),
+        ("40", ["list them:", f"  {command}"]),
+    ):
+        monkeypatch.setenv("COLUMNS", columns)
+        Terminal().print_command("list them:", command)
+        assert capsys.readouterr().out.splitlines() == lines
+
+
+def test_a_number_keeps_its_unit_in_a_pipe(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "30")
+    Terminal().print_text("it touches the vehicle at 6.4 m/s, it says")
+    assert capsys.readouterr().out.splitlines() == ["it touches the vehicle at", "  6.4 m/s, it says"]
 
 
 def test_output_to_a_terminal_is_folded_at_its_width(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mutator._common.message_text import operator_hint
+from mutator._common.message_text import operator_hint, unbreakable_parts
 from mutator.campaigns.row_filters import compile_filter
 from mutator.errors import MutatorError
 from mutator.triggers.conditions import canonical_condition
@@ -29,3 +29,17 @@ def test_errors_in_conditions_and_filters_contain_the_hint(text: str) -> None:
             refused(text)
         assert operator_hint(text) in str(caught.value)
         assert caught.value.remedy == operator_hint(text)
+
+
+def test_units_comparisons_and_commands_are_not_folded() -> None:
+    text = "at 6.4 m/s while hwt <= 2.0 and rs > 0.0: run `pip install x`"
+    assert unbreakable_parts(text) == [
+        "at",
+        "6.4\u00a0m/s",
+        "while",
+        "hwt\u00a0<=\u00a02.0",
+        "and",
+        "rs\u00a0>\u00a00.0:",
+        "run",
+        "`pip\u00a0install\u00a0x`",
+    ]

@@ -95,6 +95,13 @@ def test_a_number_stays_with_its_unit_and_a_command_whole() -> None:
     ]
 
 
+def test_a_last_column_to_copy_is_never_folded() -> None:
+    """The columns before it stay, and the rule is as wide as the terminal."""
+    anchor = "{function: Sensor.sense, argument: measure, which: 1}"
+    table = TerminalTable(heads=["line", "at"], rows=[["12", anchor]], last_is_whole=True)
+    assert lines(table, 30) == ["line  at", "─" * 30, f"12    {anchor}"]
+
+
 def test_the_last_row_of_totals_is_set_apart() -> None:
     table = TerminalTable(heads=["kind", "n"], rows=[["a", "1"], ["total", "1"]], last_is_total=True)
     assert lines(table, 80)[3].strip("─") == "" and lines(table, 80)[4].startswith("total")
