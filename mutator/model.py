@@ -276,7 +276,8 @@ class ObservedActivation:
 class RunError:
     """An exception that ended a run.
 
-    `place` is the innermost line of the target in the traceback, as `file:line`; empty if there is none.
+    `place` is the innermost line of the target in the traceback, as `file:line` of the target's own file;
+    empty if there is none.
     """
 
     kind: str

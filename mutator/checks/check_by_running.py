@@ -5,6 +5,7 @@ each statement that a fault spec names executes, and calls that can make runs di
 differ, further runs show the cause.
 """
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -28,7 +29,7 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import NotForkable
 from mutator.model import Experiment, Limits
-from mutator.mutants.injected_lines import tag_of
+from mutator.mutants.injected_lines import target_line_of
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import is_probe_path
 from mutator.preflight import canary
@@ -90,6 +91,7 @@ class _RunningCheck:
         limits = self.campaigns[0].limits if self.campaigns else Limits()
         self.seed = self.campaigns[0].seed if self.campaigns else 0
         self._scratch = scratch
+        self._run_numbers = itertools.count()
         work = scratch / "work"
         work.mkdir()
         self.engine = ReferenceEngine(self.manifest, work, limits)
@@ -148,13 +150,16 @@ class _RunningCheck:
             changed_files=mutant.files,
             mutant_id=mutant.id,
             injection_ids=mutant.injection_ids,
+            ids_before_anchor=mutant.ids_before_anchor,
             hash_seed=_OTHER_HASH_SEED,
             watch_nondeterminism=True,
         )
 
     def _execute(self, job: Job) -> JobResult:
-        folder = path_below(self.engine.work_folder, f"{job.name}-{'-'.join(job.scenario_changes)}")
-        return self.engine.execute(job, folder)
+        # numbered, because the same job can run again, and two campaigns can have the same canary
+        return self.engine.execute(
+            job, path_below(self.engine.work_folder, f"{next(self._run_numbers)}-{job.name}")
+        )
 
     def _check_run(self, execution: JobResult) -> CheckRun:
         return read_check_run(self.manifest, execution)
@@ -202,7 +207,7 @@ class _RunningCheck:
         noted = [
             note
             | {
-                "line": _target_line_of_mutant_line(files[note["file"]], note["line"])
+                "line": target_line_of(files[note["file"]], note["line"])
                 if note["file"] in files
                 else note["line"]
             }
@@ -364,9 +369,3 @@ def _reading_of(workspace: Workspace, campaign: Campaign) -> str:
 
 def _campaign_changes(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:
     return campaign.changes_in(_reading_of(workspace, campaign))
-
-
-def _target_line_of_mutant_line(data: bytes, line: int) -> int:
-    """Convert a line number in a mutant's file to the one in the target's own file."""
-    tags = map(tag_of, data.splitlines()[: line - 1])
-    return line - sum(tag is not None and tag.replaced_line is None for tag in tags)

@@ -1,6 +1,6 @@
 """Jobs and engines: what to run, the results, and the interface of engines."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import partial
@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Limits, Status
+from mutator.mutants.injected_lines import place_in_target
 from mutator.mutants.probe import ProbeSource, is_probe_path, report_problem
 from mutator.targets.manifest import TargetManifest
 
@@ -39,6 +40,7 @@ class Job:
     mutant_id: str | None = None  # the id that the probe must report; None for a tree without a probe
     probe_source: ProbeSource | None = None  # the probe in `changed_files`; engines that fork need it
     injection_ids: tuple[str, ...] = ()  # all ids that the probe must report on
+    ids_before_anchor: Collection[str] = ()  # those whose lines stand above the statement of their anchor
     hash_seed: int = 0
     golden_folder: Path | None = None  # output folder of the fault-free run, if known
     keep_observations: bool = False  # keep what the probe observes
@@ -52,6 +54,10 @@ class Job:
         """Return the problem with the probe's report; empty if there is none, or no probe."""
         return "" if self.mutant_id is None else report_problem(report, self.mutant_id, self.injection_ids)
 
+    def place_in_target(self, path: str, line: int) -> str:
+        """Return `file:line` in the target's own tree of a line of the tree that runs."""
+        return place_in_target(path, line, self.changed_files, self.ids_before_anchor)
+
 
 # frames in the tree, innermost first: file, line, start byte in the line (-1 if unknown)
 TargetStack = tuple[tuple[str, int, int], ...]
@@ -62,24 +68,30 @@ class RaisedException:
     """The exception that ended a run.
 
     `stacks[0]` is its own stack. The others are those of its causes and of the exceptions that it groups.
+    `place` is `file:line`, in the target's own tree, of the innermost line outside the probe; empty if there
+    is none.
     """
 
     kind: str
     message: str
     stacks: tuple[TargetStack, ...]
+    place: str = ""
 
     @property
-    def file_and_line(self) -> str:
-        """`file:line` of the innermost target line outside the probe; empty if there is none."""
-        return next((f"{path}:{line}" for path, line, _ in self.stacks[0] if not is_probe_path(path)), "")
+    def description_without_place(self) -> str:
+        if self.kind == SystemExit.__name__:
+            return f"exit status {self.message}"
+        return f"{self.kind}: {self.message}" if self.message else self.kind
 
     @property
     def description(self) -> str:
-        if self.kind == SystemExit.__name__:
-            what = f"exit status {self.message}"
-        else:
-            what = f"{self.kind}: {self.message}" if self.message else self.kind
-        return f"{what} ({self.file_and_line})" if self.file_and_line else what
+        what = self.description_without_place
+        return f"{what} ({self.place})" if self.place else what
+
+
+def innermost_position(stack: TargetStack) -> tuple[str, int] | None:
+    """Return file and line of the innermost position outside the probe; None if there is none."""
+    return next(((path, line) for path, line, _ in stack if not is_probe_path(path)), None)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,6 +38,7 @@ from mutator.engines.observation_store import ObservationStore
 from mutator.engines.process_endings import (
     GUARD_PATIENCE_S,
     ProcessEnding,
+    exception_in_report,
     status_of_ending,
     was_disk_full,
     without_run_specifics,
@@ -279,12 +280,13 @@ class ForkEngine:
         report = home.read_report(threads=list)
         if report is not None:
             check_fork_report(job, report)
-        status, detail = status_of_ending(self._limits, ended, report)
+        status, detail = status_of_ending(self._limits, ended, report, job)
         if status is not Status.OK and was_disk_full(self._work_folder, report):
             raise disk_full_error(self._work_folder)
         if status is Status.CRASHED:
-            # a crash's record has its exception, which only the reference engine reports
-            raise NotForkable(f"ended as crashed: {detail}")
+            # a crash's record has its exception, with the place, which only the reference engine reports
+            raised = exception_in_report(report) if report else None
+            raise NotForkable(f"ended as crashed: {raised.description_without_place if raised else detail}")
         return JobResult(
             status=status,
             detail=detail,

@@ -14,7 +14,7 @@ from typing import Any
 
 from mutator._common.confined_files import open_below
 from mutator._common.files import is_disk_full_error
-from mutator.engines.engine_jobs import RaisedException
+from mutator.engines.engine_jobs import Job, RaisedException, innermost_position
 from mutator.engines.in_target import process_guard
 from mutator.errors import MutatorError, UnsafePath
 from mutator.model import Limits, Status
@@ -69,12 +69,12 @@ def check_own_limits_suffice(limits: Limits) -> None:
 
 
 def status_of_ending(
-    limits: Limits, ending: ProcessEnding, report: dict[str, Any] | None
+    limits: Limits, ending: ProcessEnding, report: dict[str, Any] | None, job: Job
 ) -> tuple[Status, str]:
     if stopped := _find_status_if_stopped(limits, ending):
         return stopped
     if report is not None:
-        return _status_of_report(limits, report)
+        return _status_of_report(limits, report, job)
     if ending.code < 0:
         return Status.CRASHED, f"killed by {signal.Signals(-ending.code).name}"
     return Status.CRASHED, f"left with status {ending.code} without a report"
@@ -97,15 +97,16 @@ def _find_status_if_stopped(limits: Limits, ending: ProcessEnding) -> tuple[Stat
     return None
 
 
-def _status_of_report(limits: Limits, report: dict[str, Any]) -> tuple[Status, str]:
+def _status_of_report(limits: Limits, report: dict[str, Any], job: Job) -> tuple[Status, str]:
     if report["ended"] == "steps":
         return Status.TIMEOUT, f"limit of {limits.steps} simulation steps"
-    if raised := exception_in_report(report):
+    if raised := exception_in_report(report, job):
         return Status.CRASHED, raised.description
     return Status.OK, ""
 
 
-def exception_in_report(report: dict[str, Any]) -> RaisedException | None:
+def exception_in_report(report: dict[str, Any], job: Job | None = None) -> RaisedException | None:
+    """Return the exception that ended a run; without a `job`, the run of a pristine tree."""
     error = report["error"]
     if error is None:
         return None
@@ -114,7 +115,10 @@ def exception_in_report(report: dict[str, Any]) -> RaisedException | None:
         for stack in error["stacks"]
     )
     stacks = (first_stack, *other_stacks)
-    return RaisedException(kind=str(error["kind"]), message=str(error["message"]), stacks=stacks)
+    place = ""
+    if position := innermost_position(first_stack):
+        place = job.place_in_target(*position) if job else f"{position[0]}:{position[1]}"
+    return RaisedException(kind=str(error["kind"]), message=str(error["message"]), stacks=stacks, place=place)
 
 
 def environment_variables_of_run(

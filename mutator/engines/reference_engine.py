@@ -147,7 +147,7 @@ class ReferenceEngine:
         status, detail = self._status_of_run(job, ended, report, changed_input)
         if status is not Status.OK and was_disk_full(self.work_folder, report):
             raise disk_full_error(self.work_folder)
-        raised = exception_in_report(report) if report and status is Status.CRASHED else None
+        raised = exception_in_report(report, job) if report and status is Status.CRASHED else None
         return JobResult(
             status=status,
             detail=without_run_specifics(detail, home.path),
@@ -265,7 +265,7 @@ class ReferenceEngine:
     ) -> tuple[Status, str]:
         if report is not None and (problem := self._problem_with_tree(job, report, changed_input)):
             return Status.HARNESS_ERROR, problem
-        status, detail = status_of_ending(self.limits, ended, report)
+        status, detail = status_of_ending(self.limits, ended, report, job)
         if (
             report is None and changed_input and status is Status.CRASHED
         ):  # whoever changed it can have caused this
@@ -301,6 +301,7 @@ def _exception_without_run_specifics(raised: RaisedException, folder: Path) -> R
         kind=without_run_specifics(raised.kind, folder),
         message=without_run_specifics(raised.message, folder),
         stacks=stacks,
+        place=without_run_specifics(raised.place, folder),
     )
 
 

@@ -22,6 +22,7 @@ from mutator.outcomes import golden_comparison, trace_loading
 from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.failure_cause import judge_failure, run_error
 from mutator.outcomes.hazards_and_metrics import RunJudgement, load_judged_run, load_manifest_channels
+from mutator.outcomes.lost_values import find_lost_value
 from mutator.outcomes.reaction_and_speeds import first_actuator_change, speeds_after_activation
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.outcomes.trace_loading import Trace
@@ -182,6 +183,7 @@ class ExperimentRunner:
             mutant_id=mutant.id,
             probe_source=mutant.probe_source,
             injection_ids=mutant.injection_ids,
+            ids_before_anchor=mutant.ids_before_anchor,
             golden_folder=self.goldens.folder_of(experiment),
             stop_at_hazard=stop,
             golden_has_terminal_hazard=stop and self.goldens.has_terminal_hazard(experiment),
@@ -276,6 +278,12 @@ class ExperimentRunner:
                 return _record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, why, mutant)
             reference = trace_loading.trace_until(reference, faulty[time][-1], time)
         faulty = trace_loading.with_golden_times(reference, faulty, time)
+        if lost := find_lost_value(self.manifest, reference, faulty, judged.t_end):
+            problem = _reason_not_by_fault(lost.time_s, activation)
+            status, detail = (
+                (Status.HARNESS_ERROR, f"{lost}: {problem}") if problem else (Status.CRASHED, str(lost))
+            )
+            return _record_of_mutant_without_outcome(experiment, status, detail, mutant, activation)
         difference = golden_comparison.compare_traces(
             reference, faulty, self.manifest.compared_channels, time, judged.t_end
         )
@@ -309,7 +317,10 @@ class ExperimentRunner:
 
     def _record_of_failed_run(self, experiment: Experiment, mutant: Mutant, execution: JobResult) -> Record:
         status, detail = judge_failure(
-            execution, mutant.files, self._injections_that_raise(experiment, mutant)
+            execution,
+            mutant.files,
+            self._injections_that_raise(experiment, mutant),
+            mutant.ids_before_anchor,
         )
         # the number of activations before a crash is reproducible; before a timeout it is not
         activation = activation_of(execution.probe_report or {}) if status is Status.CRASHED else None

@@ -18,6 +18,7 @@ from mutator.errors import CheckFailed
 from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
 from mutator.model import Experiment, Limits, Record, Status
 from mutator.mutants.mutant_building import Mutant
+from mutator.preflight.check_run_problems import read_check_run
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -147,6 +148,12 @@ def _run_golden_on_engine(
     if execution.status is not Status.OK:
         raise CheckFailed(
             f"the run without any fault ended as {execution.status.value}: {execution.detail}",
+            where=job.scenario,
+            remedy="correct the target or the scenario first",
+        )
+    if problem := read_check_run(engine.manifest, execution).problem:
+        raise CheckFailed(
+            f"the run without any fault cannot be used: {problem}",
             where=job.scenario,
             remedy="correct the target or the scenario first",
         )

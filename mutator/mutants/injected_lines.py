@@ -5,7 +5,7 @@ Code inside a target's process cannot import this module, so engines pass the ne
 
 import ast
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -127,6 +127,28 @@ def tag_of(line: bytes) -> Tag | None:
         line_without_tag=code,
         replaced_line=match[3],
     )
+
+
+def target_line_of(mutated: bytes, line: int, ids_before_anchor: Collection[str] = ()) -> int:
+    """Return the line in the target's own file, from 1, of a line of the mutated file.
+
+    An injected line has the line of the statement at which it was injected: the one below it if its id is one
+    of `ids_before_anchor`, else the one above it.
+    """
+    tags = [tag_of(text) for text in mutated.splitlines()[:line]]
+    target_lines = sum(tag is None or tag.replaced_line is not None for tag in tags)
+    last = tags[-1] if tags else None
+    is_above_anchor = last and last.replaced_line is None and last.id in ids_before_anchor
+    return max(1, target_lines + bool(is_above_anchor))
+
+
+def place_in_target(
+    path: str, line: int, changed_files: Mapping[str, bytes], ids_before_anchor: Collection[str]
+) -> str:
+    """Return `file:line` in the target's own tree of a line of a tree with these changed files."""
+    if path in changed_files:
+        line = target_line_of(changed_files[path], line, ids_before_anchor)
+    return f"{path}:{line}"
 
 
 def tagged_line(code: str, tag: str, guarded_line_count: int = 0) -> str:

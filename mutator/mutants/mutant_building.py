@@ -27,6 +27,7 @@ from mutator.mutants.normalized_source import compiles, normalize_numbers_and_id
 from mutator.mutants.patch_rendering import render_changed_file, render_new_file
 from mutator.mutants.probe import ProbeSource, build_probe_settings, probe_path, render_probe
 from mutator.mutants.splicing import (
+    EditRank,
     ExpressionEdit,
     LineEdit,
     apply_edits,
@@ -53,6 +54,7 @@ class Mutant:
     tree_digest: str  # of the whole mutated tree
     probe_source: ProbeSource
     injection_ids: tuple[str, ...]  # ids used in tags and in the probe's report, in the fault's order
+    ids_before_anchor: frozenset[str]  # those whose lines stand above the statement of their anchor
 
     @cached_property
     def patch_bytes(self) -> bytes:
@@ -108,6 +110,7 @@ def _build_with(
         tree_digest=manifest.tree.digest_with(files),
         probe_source=probe,
         injection_ids=ids,
+        ids_before_anchor=_ids_before_anchor(injection_edits),
     )
 
 
@@ -123,6 +126,14 @@ def _edits_by_path(
         path: as_line_edits(parsed_file(manifest.tree, path), file_edits)
         for path, file_edits in edits.items()
     }
+
+
+def _ids_before_anchor(injection_edits: Sequence[InjectionEdit]) -> frozenset[str]:
+    return frozenset(
+        change.id
+        for change in injection_edits
+        if isinstance(change.edit, LineEdit) and change.edit.rank in (EditRank.BEFORE, EditRank.GUARD)
+    )
 
 
 def _observation_edit(manifest: TargetManifest) -> LineEdit:

@@ -11,7 +11,7 @@ from itertools import dropwhile
 
 from mutator.engines.engine_jobs import JobResult, RaisedException, TargetStack
 from mutator.model import RunError, Status
-from mutator.mutants.injected_lines import Tag, changed_value_positions, tag_of
+from mutator.mutants.injected_lines import Tag, changed_value_positions, place_in_target, tag_of
 from mutator.mutants.probe import is_probe_path
 
 _Position = tuple[str, int, int]  # file, line, column
@@ -21,21 +21,25 @@ _Position = tuple[str, int, int]  # file, line, column
 class _ExceptionCause:
     """The cause of an exception: an injected line or, if `tag` is None, the probe."""
 
-    place: str
+    place: str = ""
     tag: Tag | None = None
     injection_ids: Sequence[str] = ()
 
 
 class _ChangedFiles:
-    """The changed files of a mutant, with the injection at each position."""
+    """The changed files of a mutant, with the injection and the target's own line at each position."""
 
-    def __init__(self, files: Mapping[str, bytes]) -> None:
+    def __init__(self, files: Mapping[str, bytes], ids_before_anchor: Collection[str]) -> None:
         self._files = files
+        self._ids_before_anchor = ids_before_anchor
         self._lines = {path: data.splitlines() for path, data in files.items()}
 
     def tag_at(self, position: _Position) -> Tag | None:
         file, line = self._lines.get(position[0], ()), position[1]
         return tag_of(file[line - 1]) if 0 < line <= len(file) else None
+
+    def place_in_target(self, position: _Position) -> str:
+        return place_in_target(*position[:2], self._files, self._ids_before_anchor)
 
     def injection_ids_at(self, position: _Position, tag: Tag, in_probe: bool) -> Sequence[str]:
         """Return the ids of the injections whose code is at this position. There can be none, because a
@@ -49,16 +53,21 @@ class _ChangedFiles:
 
 
 def judge_failure(
-    job_result: JobResult, changed_files: Mapping[str, bytes], raising_injection_ids: Collection[str]
+    job_result: JobResult,
+    changed_files: Mapping[str, bytes],
+    raising_injection_ids: Collection[str],
+    ids_before_anchor: Collection[str] = (),
 ) -> tuple[Status, str]:
-    """Return the status and detail of a mutant's run. `changed_files` are those of the mutant.
+    """Return the status and detail of a mutant's run. `changed_files` and `ids_before_anchor` are those of
+    the mutant.
 
-    `raising_ids` has the ids of injections whose fault models raise exceptions on purpose.
+    `raising_injection_ids` has the ids of injections whose fault models raise exceptions on purpose.
     """
     status, detail, raised = job_result.status, job_result.detail, job_result.exception
     if status not in (Status.CRASHED, Status.TIMEOUT):
         return status, detail
-    cause = _exception_cause(raised, _ChangedFiles(changed_files)) if raised else None
+    files = _ChangedFiles(changed_files, ids_before_anchor)
+    cause = _exception_cause(raised, files) if raised else None
     if (cause and not cause.tag) or (raised and job_result.probe_report is None):
         return Status.HARNESS_ERROR, f"the probe failed: {detail}"
     if not job_result.was_fault_active:
@@ -70,7 +79,7 @@ def judge_failure(
 
 
 def run_error(raised: RaisedException | None) -> RunError | None:
-    return RunError(kind=raised.kind, message=raised.message, place=raised.file_and_line) if raised else None
+    return RunError(kind=raised.kind, message=raised.message, place=raised.place) if raised else None
 
 
 def _exception_cause(raised: RaisedException, files: _ChangedFiles) -> _ExceptionCause | None:
@@ -92,14 +101,14 @@ def _cause_on_stack(stack: TargetStack, files: _ChangedFiles) -> _ExceptionCause
     """
     in_probe = in_target = False
     for position in stack:
-        place, tag = f"{position[0]}:{position[1]}", files.tag_at(position)
+        tag = files.tag_at(position)
         if is_probe_path(position[0]):
             in_probe = True
         elif tag and tag.replaced_line is not None and in_target:
             continue
         elif tag and (ids := files.injection_ids_at(position, tag, in_probe)):
-            return _ExceptionCause(place=place, tag=tag, injection_ids=ids)
+            return _ExceptionCause(place=files.place_in_target(position), tag=tag, injection_ids=ids)
         elif in_probe or (tag and tag.replaced_line is None):
-            return _ExceptionCause(place=place)
+            return _ExceptionCause()
         in_target = in_target or (tag is None and not is_probe_path(position[0]))
-    return _ExceptionCause(place="") if in_probe else None
+    return _ExceptionCause() if in_probe else None

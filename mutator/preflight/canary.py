@@ -40,6 +40,7 @@ def build_canary_job(workspace: Workspace, manifest: TargetManifest, experiment:
         changed_files=mutant.files,
         mutant_id=mutant.id,
         injection_ids=mutant.injection_ids,
+        ids_before_anchor=mutant.ids_before_anchor,
     )
 
 

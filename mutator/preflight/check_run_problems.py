@@ -13,6 +13,7 @@ from mutator.model import Status
 from mutator.mutants.probe import was_triggered
 from mutator.outcomes import trace_loading
 from mutator.outcomes.hazards_and_metrics import load_judged_run
+from mutator.outcomes.lost_values import find_value_lost_for_good
 from mutator.targets.manifest import TargetManifest
 
 
@@ -40,9 +41,11 @@ def read_check_run(manifest: TargetManifest, execution: JobResult) -> CheckRun:
         last = f" ({log.splitlines()[-1]})" if log and execution.exception is None else ""
         return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
     try:
-        _, judged = load_judged_run(manifest, execution.out)
+        trace, judged = load_judged_run(manifest, execution.out)
     except BadOutput as err:
         return CheckRun(problem=f"{Path(err.where or '').name}: {err.got}")
+    if lost := find_value_lost_for_good(manifest, trace, judged.t_end):
+        return CheckRun(problem=f"{lost}, and stays so to the end of the drive")
     return CheckRun(
         problem="",
         output_digest=output_digest_of(manifest, execution.out),

@@ -13,6 +13,7 @@ from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
 SCENARIO = ["A"]
+HERE = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -235,6 +236,53 @@ def test_a_harmless_canary_is_reported_with_all_values(toy: Workspace) -> None:
     assert found.level is CheckState.FAIL
     assert "sensor/lane/shifted in A did not reach H3 with any of its values: 2." in found.found
     assert found.found.count(" m") == 4
+
+
+HOSTILE = """\
+if _fi.active("{{{{ fi }}}}"):
+    {body}
+"""
+
+
+@pytest.mark.parametrize(
+    ("body", "cpu_s", "wall_s", "problem"),
+    [
+        ("raise ValueError('no')", 20, 60, "crashed: ValueError: no (toycar/sensing.py:LINE)"),
+        ("raise SystemExit(4)", 20, 60, "crashed: exit status 4 (toycar/sensing.py:LINE)"),
+        pytest.param("while True: pass", 1, 60, "timeout: CPU time limit of 1 s", marks=pytest.mark.slow),
+        pytest.param(
+            "import time; time.sleep(99)", 20, 9, "timeout: wall time limit of 9 s", marks=pytest.mark.slow
+        ),
+    ],
+    ids=["raises", "exits", "loops", "sleeps"],
+)
+def test_a_canary_that_ends_its_run_is_reported_with_the_place(
+    toy: Workspace, body: str, cpu_s: int, wall_s: int, problem: str
+) -> None:
+    """As `run` reports it: the exception at the line of the user's file, though the canary ran twice, in two
+    campaigns."""
+    library = toy.library
+    (toy.templates / "crash.py.j2").write_text(HOSTILE.format(body=body))
+    hostile = (HERE / "toy/fault_library/faults/hostile/crash.yaml").read_text()
+    (library / "faults" / "hostile").mkdir(exist_ok=True)
+    (library / "faults" / "hostile" / "crash.yaml").write_text(hostile)
+    toy.campaign("toy").unlink()
+    text = (
+        toy.campaign("small")
+        .read_text()
+        .replace("sensor/lane/shifted, scenario", "hostile/crash/it, scenario")
+    )
+    text = text.replace("cpu_s: 20, wall_s: 60", f"cpu_s: {cpu_s}, wall_s: {wall_s}")
+    toy.campaign("small").write_text(text)
+    other = toy.campaign("small").with_name("other.yaml")
+    other.write_text(text.replace("name: small", "name: other").replace("hazard: H3", "hazard: H1"))
+    found = findings(Workspace(library=library, templates=toy.templates))
+    expected = problem.replace("LINE", str(line_of(toy, "gap = world.gap", "sensing.py")))
+    for name, hazard in (("small", "H3"), ("other", "H1")):
+        finding = found[f"canary {name}"]
+        assert finding.level is CheckState.FAIL
+        assert finding.found.startswith(f"hostile/crash/it in A did not reach {hazard} ")
+        assert finding.found.endswith(f"({expected})")
 
 
 def test_a_crashing_or_hazardous_target_is_reported(toy: Workspace) -> None:

@@ -220,7 +220,7 @@ def test_unprintable_names_are_stored_as_printable_text(run: Run) -> None:
     )
     raised = run(entry(body)).exception
     assert raised is not None
-    assert (raised.kind, raised.file_and_line) == (r"a\n", r"toycar/\udcff\n:1")
+    assert (raised.kind, raised.place) == (r"a\n", r"toycar/\udcff\n:1")
 
 
 def test_a_run_receives_signals_that_its_parent_ignored(run: Run) -> None:

@@ -9,15 +9,35 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mutator._common.hashing import digest
 from mutator.campaigns.plan import build_plan
-from mutator.engines.engine_jobs import Job, JobResult
+from mutator.engines.engine_jobs import Job, JobResult, RunMode
+from mutator.engines.fork_engine import ForkEngine
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens
-from mutator.model import Experiment, ObservedActivation, Outcome, Record, Status
+from mutator.model import (
+    Anchor,
+    AnchorKind,
+    Experiment,
+    Fault,
+    FaultLocation,
+    Injection,
+    Limits,
+    Method,
+    ObservedActivation,
+    Outcome,
+    Record,
+    Status,
+)
+from mutator.mutants.mutant_building import build
 from mutator.outcomes import trace_files
 from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store.plan_choices import Choices
+from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
+
+from ..fork_on_toy import Edit
 
 T = np.arange(20) * 0.05
 TRACE = "log.npz"
@@ -287,3 +307,62 @@ def test_nothing_is_kept_of_a_run_with_a_changed_scenario(
         file.write("# another\n")
     with pytest.raises(MutatorError, match=r"A\.yaml: changed while it was in use"):
         judged(ran=RAN)
+
+
+SUM = "self.speed + (3.0 * gas - 8.0 * brake) * STEP"
+OBSERVED_CHANNEL = "  d_rel: {unit: m, role: truth, from: gap}\n"
+
+
+@pytest.fixture
+def with_observed_channel(toycar: Workspace) -> None:
+    path = toycar.manifest("toycar").path
+    path.write_text(path.read_text().replace("observation:\n", f"{OBSERVED_CHANNEL}observation:\n", 1))
+
+
+@pytest.mark.usefixtures("with_observed_channel")
+def test_an_observed_value_that_becomes_nan_ends_the_drive(
+    toycar: Workspace, tmp_path: Path, judged: Callable[..., Record]
+) -> None:
+    """It is the target's crash, unless it came before the fault or the golden run has NaN there, too."""
+    write(tmp_path / "golden", gap=np.zeros(20))
+    record = judged(ran=RAN, trace={"gap": np.where(np.arange(20) < 7, 0.0, np.nan)})
+    assert (record.status, record.outcome, record.metrics) == (Status.CRASHED, None, ())
+    assert record.detail == "truth: d_rel is NaN at 0.35 s"
+    assert record.activation == ObservedActivation(first=0.2, last=0.5, count=5)
+    early = judged(ran=RAN, trace={"gap": np.where(np.arange(20) < 3, 0.0, np.nan)})
+    assert early.status is Status.HARNESS_ERROR
+    assert early.detail.startswith("truth: d_rel is NaN at 0.15 s: ")
+
+
+@pytest.mark.usefixtures("with_observed_channel")
+def test_both_engines_end_the_drive_at_the_same_nan(toycar: Workspace, tmp_path: Path, edit: Edit) -> None:
+    edit("tree/toycar/world.py", "max(0.0, self.speed + (3.0 * gas - 8.0 * brake) * STEP)", SUM)
+    manifest, models = toycar.manifest("toycar"), toycar.fault_models()
+    place = FaultLocation(
+        path="toycar/driver.py",
+        function="Driver.drive",
+        anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gas"),
+    )
+    injection = Injection(location=place, model="nan", params=(("target", "gas"),))
+    fault = Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
+    scenario = toycar.scenario("A")
+    experiment = Experiment(fault, "A", digest(scenario.read_bytes()), Method.GUIDED, trigger_at_time(1.0), 7)
+    limits = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
+    null = build(manifest, models, None, always_trigger())
+    records = []
+    for engine in (
+        ReferenceEngine(manifest, tmp_path, limits),
+        ForkEngine(manifest, tmp_path, limits, null_mutant=null),
+    ):
+        golden_job = Job(name="golden", scenario=scenario, seed=7)
+        golden = ReferenceEngine(manifest, tmp_path, limits).execute(golden_job, tmp_path / f"{len(records)}")
+        goldens = LoadedGoldens(manifest, lambda experiment, out=golden.out: out)  # type: ignore[misc]
+        (finished,) = ExperimentRunner(manifest, models, engine, goldens, toycar.scenario).run([experiment])
+        engine.close()
+        records.append((finished.record, finished.mode))
+    assert records[0][0] == records[1][0]
+    assert [mode for _, mode in records] == [RunMode.REFERENCE, RunMode.FORK]
+    assert (records[0][0].status, records[0][0].detail) == (
+        Status.CRASHED,
+        "truth: d_rel is NaN at 1.05 s",
+    )

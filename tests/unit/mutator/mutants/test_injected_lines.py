@@ -54,3 +54,24 @@ def test_pages_use_the_tags_defined_in_python() -> None:
     assert words["probe"] == [injected_lines.PROBE_IMPORT_TAG, injected_lines.OBSERVATION_TAG]
     assert "fi:" not in asset_text("shared/diff.js")
     assert not re.search("|".join(rf"{tag}\W*\|" for tag in words["probe"]), asset_text("shared/diff.js"))
+
+
+MUTATED = b"""\
+from car import _fi  # fi:probe
+def read(frame):
+    _fi.observe(t=now)  # fi:observe
+    angle = (0.0 if _fi.active("0a1b2c3d") else decode(frame))  # fi:0a1b2c3d was:    angle = decode(frame)
+    if _fi.active("aaaaaaaa"):  # fi:aaaaaaaa
+        angle = 1.0  # fi:aaaaaaaa
+    if not _fi.active("bbbbbbbb"):  # fi:bbbbbbbb guard:1
+        send(angle)
+    return angle
+"""
+
+
+def test_each_line_of_a_mutant_has_a_line_in_the_targets_file() -> None:
+    """An injected line has that of the statement at its anchor, which stands above or below it."""
+    lines = range(1, 10)
+    assert [injected_lines.target_line_of(MUTATED, line) for line in lines] == [1, 1, 1, 2, 2, 2, 2, 3, 4]
+    below = [injected_lines.target_line_of(MUTATED, line, ("aaaaaaaa", "bbbbbbbb")) for line in lines]
+    assert below == [1, 1, 1, 2, 3, 3, 3, 3, 4]

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines.engine_jobs import JobResult, RaisedException, TargetStack
+from mutator.engines.engine_jobs import Job, JobResult, TargetStack
+from mutator.engines.process_endings import exception_in_report
 from mutator.model import RunError, Status
 from mutator.outcomes.failure_cause import judge_failure, run_error
 
@@ -29,7 +30,10 @@ def execution(
     kind: str = "ValueError",
     probe: bool = True,
 ) -> JobResult:
-    raised = RaisedException(kind=kind, message="no", stacks=stacks) if stacks else None
+    error = {"kind": kind, "message": "no", "stacks": stacks} if stacks else None
+    raised = exception_in_report(
+        {"error": error}, Job(name="j", scenario=Path(), seed=0, changed_files=FILES)
+    )
     return JobResult(
         status=status,
         detail=raised.description if raised else "why",
@@ -132,16 +136,22 @@ def test_an_intended_exception_excuses_no_other_injection() -> None:
     assert told == [Status.CRASHED, Status.INVALID_MUTANT]
 
 
-def test_the_message_names_the_line_or_the_reason() -> None:
+def test_the_message_names_the_users_line_or_the_reason() -> None:
+    """Lines are those of the target's own file, which has no injected lines."""
     told = [
         judge_failure(execution(stack), FILES, ()) for stack in ((TARGET,), (ELSEWHERE, INJECTED), (PROBE,))
     ]
     assert [detail for _, detail in told] == [
-        "ValueError: no (car/radar.py:6)",
-        "car/radar.py:5: the injected `d_rel = _fi.flip_bit(d_rel, 3)` ended the run: "
+        "ValueError: no (car/radar.py:3)",
+        "car/radar.py:2: the injected `d_rel = _fi.flip_bit(d_rel, 3)` ended the run: "
         "ValueError: no (car/can.py:5)",
         "the probe failed: ValueError: no",
     ]
+
+
+def test_lines_above_the_anchor_have_the_line_of_the_statement_below() -> None:
+    above = judge_failure(execution((INJECTED, ELSEWHERE)), FILES, (), ("0a1b2c3d",))
+    assert above[1].startswith("car/radar.py:3: the injected ")
 
 
 def test_an_intended_exception_is_a_crash() -> None:
@@ -186,5 +196,5 @@ def test_a_missing_report_is_a_harness_error() -> None:
 
 def test_the_reported_position_is_the_targets_innermost_line() -> None:
     error = run_error(execution((PROBE, INJECTED, ELSEWHERE)).exception)
-    assert error == RunError(kind="ValueError", message="no", place="car/radar.py:5")
+    assert error == RunError(kind="ValueError", message="no", place="car/radar.py:2")
     assert run_error(None) is None
