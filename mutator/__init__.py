@@ -24,6 +24,7 @@ NAMES_BY_MODULE = {
         "check_target",
         "doctor",
         "draw_control_structure",
+        "find_place_notes",
         "find_places",
         "init_library",
     ),

@@ -16,6 +16,7 @@ from mutator.api.libraries import check_library as check_library
 from mutator.api.libraries import check_target as check_target
 from mutator.api.libraries import doctor as doctor
 from mutator.api.libraries import draw_control_structure as draw_control_structure
+from mutator.api.libraries import find_place_notes as find_place_notes
 from mutator.api.libraries import find_places as find_places
 from mutator.api.libraries import init_library as init_library
 from mutator.api.mutant_files import MutantSet as MutantSet
@@ -97,6 +98,7 @@ __all__ = [
     "compare",
     "doctor",
     "draw_control_structure",
+    "find_place_notes",
     "find_places",
     "init_library",
     "load_review",

@@ -15,6 +15,7 @@ from mutator.checks.unused_draws_and_parameters import unused_draws_and_paramete
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import parsed_file
 from mutator.mutants.possible_places import ListedPlace, places_of
+from mutator.mutants.refused_places import PlaceNote, split_by_refusal
 from mutator.onboarding.first_library import write_first_library
 from mutator.onboarding.source_survey import survey_source
 from mutator.onboarding.todo_marks import unfilled_mark_errors
@@ -62,13 +63,34 @@ def find_places(
     """Return the places where faults can be injected in a file of the target, or in a function
     (`FILE::FUNCTION`): line, anchor and fault models of each, from top to bottom.
 
-    MutatorError for a file in which faults are not allowed, and for an unknown function.
+    `find_place_notes` says what is left out. MutatorError for a file in which faults are not allowed, and for
+    an unknown function.
     """
+    return _places_and_notes(where, workspace, target)[0]
+
+
+def find_place_notes(
+    where: str, workspace: WorkspaceLike = None, *, target: str | None = None
+) -> list[PlaceNote]:
+    """Return the functions and constants of a file or function that `find_places` leaves out, or in which a
+    fault acts only once, each with line and reason: compiled functions, fields of classes that copy their
+    defaults, files that another file shadows.
+
+    MutatorError as `find_places`.
+    """
+    return _places_and_notes(where, workspace, target)[1]
+
+
+def _places_and_notes(
+    where: str, workspace: WorkspaceLike, target: str | None
+) -> tuple[list[ListedPlace], list[PlaceNote]]:
     opened_workspace = open_workspace(workspace)
     manifest = opened_workspace.manifest(opened_workspace.target_name(target))
     path, _, function = where.partition("::")
     check_file_allowed(manifest, path)  # a forbidden file must not even be read
-    return places_of(parsed_file(manifest.tree, path), opened_workspace.fault_models(), function or None)
+    file = parsed_file(manifest.tree, path)
+    places = places_of(file, opened_workspace.fault_models(), function or None)
+    return split_by_refusal(manifest, file, places)
 
 
 def check_target(

@@ -50,6 +50,9 @@ def list_places(
         )
         return
     _print_places(terminal, places)
+    notes = mutator.find_place_notes(where, workspace_options.workspace(), target=manifest)
+    for note in notes:
+        terminal.print_text(f"line {note.line}, {note.what}: {note.reason}")
 
 
 def _print_places(terminal: Terminal, places: Sequence["ListedPlace"]) -> None:

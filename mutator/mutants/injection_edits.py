@@ -22,6 +22,7 @@ from mutator.mutants.injected_lines import (
 )
 from mutator.mutants.name_scopes import normalize_identifier, rescoped_names
 from mutator.mutants.probe import injection_id
+from mutator.mutants.refused_places import check_place_can_be_hit
 from mutator.mutants.splicing import (
     ExpressionEdit,
     LineEdit,
@@ -53,11 +54,12 @@ def edits_of(
 ) -> list[InjectionEdit]:
     """Return the edits of a fault's injections, in order. Only here does a fault's value enter a mutant.
 
-    MutatorError as `injection_edit`, and for a location outside the target.
+    MutatorError as `injection_edit`, and for a location outside the target or where no fault can act.
     """
     edits = []
     for index, injection in enumerate(injections):
         check_location_allowed(manifest, injection.location)
+        check_place_can_be_hit(manifest, injection.location)
         name, file = injection_id(index, injection), parsed_file(manifest.tree, injection.location.path)
         edit = injection_edit(file, models, injection, name, manifest.tree)
         edits.append(InjectionEdit(id=name, file=file, edit=edit))

@@ -10,6 +10,7 @@ from mutator._common.random_streams import random_generator
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.mutants.anchors import parsed_file
+from mutator.mutants.refused_places import refusal_reason_of_function
 from mutator.operators.equal_code_filter import drop_equal_code
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutations import Mutation
@@ -28,6 +29,7 @@ class SelectedMutations:
 
     mutations: tuple[Mutation, ...] = ()
     unexecuted_count: int = 0  # no golden run executes the line
+    compiled_count: int = 0  # Python never runs the function as it stands
     equal_to_original_count: int = 0  # same code as the original
     duplicate_count: int = 0  # same code as an earlier mutation
     invalid_count: int = 0  # does not compile
@@ -37,6 +39,7 @@ class SelectedMutations:
         """A summary of the numbers for the user."""
         left_out = {
             "in lines that no golden run executes": self.unexecuted_count,
+            "in functions that are compiled or shadowed": self.compiled_count,
             "with the code of the original": self.equal_to_original_count,
             "with the code of another": self.duplicate_count,
             "that do not compile": self.invalid_count,
@@ -79,9 +82,9 @@ def _select_in_file(
     executed: LinesByFile | None,
 ) -> SelectedMutations:
     file, facts = parsed_file(manifest.tree, path), statement_facts_of(manifest.tree, path)
-    mutations = [
-        mutation for name in functions for mutation in mutations_of(file, facts, name, models, operators)
-    ]
+    mutations_by_function = {name: mutations_of(file, facts, name, models, operators) for name in functions}
+    refused = {name for name in functions if refusal_reason_of_function(manifest, path, name)}
+    mutations = [m for name in functions if name not in refused for m in mutations_by_function[name]]
     lines = None if executed is None else facts.extend_to_statements(executed.get(path, ()))
     executed_mutations = (
         mutations if lines is None else [mutation for mutation in mutations if mutation.line + 1 in lines]
@@ -90,6 +93,7 @@ def _select_in_file(
     return SelectedMutations(
         mutations=distinct_mutations.mutations,
         unexecuted_count=len(mutations) - len(executed_mutations),
+        compiled_count=sum(len(mutations_by_function[name]) for name in refused),
         equal_to_original_count=distinct_mutations.equal_to_original_count,
         duplicate_count=distinct_mutations.duplicate_count,
         invalid_count=distinct_mutations.invalid_count,
@@ -100,6 +104,7 @@ def _merge(first: SelectedMutations, second: SelectedMutations) -> SelectedMutat
     return SelectedMutations(
         mutations=first.mutations + second.mutations,
         unexecuted_count=first.unexecuted_count + second.unexecuted_count,
+        compiled_count=first.compiled_count + second.compiled_count,
         equal_to_original_count=first.equal_to_original_count + second.equal_to_original_count,
         duplicate_count=first.duplicate_count + second.duplicate_count,
         invalid_count=first.invalid_count + second.invalid_count,

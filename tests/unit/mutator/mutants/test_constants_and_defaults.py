@@ -21,6 +21,8 @@ from mutator.workspace import Workspace
 
 SOURCE = '''"""How it is tuned."""
 from dataclasses import dataclass, field
+
+import attrs
 from enum import Enum
 
 LIMIT = 5
@@ -60,6 +62,51 @@ class Gear(Enum):
     DRIVE = 1
 
 
+@attrs.define
+class Defined:
+    e: float = 1.0
+    _f: int = attrs.field(default=2, kw_only=True)
+
+
+@attrs.define
+class Derived(Defined):
+    g: float = 5.0
+
+
+class Table(type):
+    def __new__(kind, name, bases, names):
+        names["_defaults"] = {key: names[key] for key in names.get("__annotations__", {})}
+        return super().__new__(kind, name, bases, names)
+
+
+class Tabled(metaclass=Table):
+    h: float = 1.0
+
+    def __init__(self, **values):
+        vars(self).update({**self._defaults, **values})
+
+
+def defaults(kind):
+    kind._fields = {key: getattr(kind, key) for key in kind.__annotations__}
+    kind.__init__ = lambda self: vars(self).update(self._fields)
+    return kind
+
+
+@defaults
+class Decorated:
+    k: float = 1.0
+
+
+class Hiding(type):
+    def __new__(kind, name, bases, names):
+        made = super().__new__(kind, name, bases, {"kept": (names.pop("w", None),), **names})
+        return made
+
+
+class Hidden(metaclass=Hiding):
+    w: float = 1.0
+
+
 COUNT = 0
 
 
@@ -91,6 +138,11 @@ PLACES = {
     "a field by keyword": (at("Field.c"), lambda m: m.Field().c),
     "a field's class attribute": (at("Field.c"), lambda m: m.Field.c),
     "a slot": (at("Slotted.d"), lambda m: m.Slotted().d),
+    "a field of attrs": (at("Defined.e"), lambda m: m.Defined().e),
+    "a private field of attrs": (at("Defined._f"), lambda m: m.Defined()._f),
+    "an inherited field of attrs": (at("Defined.e"), lambda m: m.Derived().e),
+    "a metaclass's copy": (at("Tabled.h"), lambda m: m.Tabled().h),
+    "a decorator's copy": (at("Decorated.k"), lambda m: m.Decorated().k),
 }
 
 
@@ -100,7 +152,7 @@ def mutant(clone: Workspace, *locations: FaultLocation) -> bytes:
         injection_edit(
             file, clone.fault_models(), Injection(location=one, model="offset", params=(("by", 10.0),)), name
         )
-        for one, name in zip(locations, "abcdefghijklmnop", strict=False)
+        for one, name in zip(locations, ("a", "b", *(f"{n:08x}" for n in range(30))), strict=False)
     ]
     data = mutated_bytes(apply_edits(file, as_line_edits(file, [probe_import_edit(file, None), *edits])))
     assert unsplice(data) == file.data
@@ -147,6 +199,15 @@ def test_a_fixed_value_changes_while_the_fault_is_active(
     assert fi.report()["injections"]["a"] == {"first": 1.0, "last": 1.0, "count": 1}
 
 
+def test_a_value_that_a_metaclass_hides_is_reported(load: Callable[..., tuple[Any, Any]]) -> None:
+    """The fault is never counted as active, and the report says why."""
+    _, fi = load(at("Hidden.w"))
+    fi.observe(t=1.0)
+    report = fi.report()
+    assert report["injections"]["a"]["count"] == 0
+    assert report["unset"] == {"a": "Hiding, the metaclass of Hidden, keeps the value where it cannot be set"}
+
+
 def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace) -> None:
     lines = mutant(clone, *dict.fromkeys(one for one, _ in PLACES.values())).decode().splitlines()
     tagged = [i for i, line in enumerate(lines) if "# fi:" in line][1:]
@@ -159,10 +220,14 @@ def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace)
         "a: float = 1.0",
         "c: int = field(default=3, kw_only=True)",
         "d: int = 4",
+        "e: float = 1.0",
+        "_f: int = attrs.field(default=2, kw_only=True)",
+        "h: float = 1.0",
+        "k: float = 1.0",
         "return q",
     ]
-    assert lines[4:6] == ["", "LIMIT = 5"]
-    assert lines[6] == '_fi.constant("a", globals(), "LIMIT", lambda original: original + 10)  # fi:a'
+    assert lines[6:8] == ["", "LIMIT = 5"]
+    assert lines[8] == '_fi.constant("a", globals(), "LIMIT", lambda original: original + 10)  # fi:a'
 
 
 @pytest.mark.parametrize(
@@ -172,7 +237,7 @@ def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace)
         (at("q", "Gains.f"), "no default 'q' in Gains.f; expected one of x, y"),
         (at("self", "Gains.h"), "there is none of this kind"),
         (at("x", "Gains.gone"), "no function 'Gains.gone'"),
-        (at("Field.b"), "m.py:29: the constant 'Field.b' cannot be set: the field has no default"),
+        (at("Field.b"), "m.py:31: the constant 'Field.b' cannot be set: the field has no default"),
         (at("Gear.DRIVE"), "its class derives from Enum"),
         (at("COUNT"), "a function also sets it"),
     ],

@@ -1,0 +1,114 @@
+"""Functions that numba, JAX and other compilers take over are recognised in the source."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.mutants.compiled_functions import (
+    compiler_of_constant,
+    compiler_of_function,
+    tracer_of_function,
+)
+from mutator.targets.source_tree import SourceTree, read_tree
+
+BODY = "    return GAIN * y\n"
+
+
+def tree_of(folder: Path, **texts: str) -> SourceTree:
+    for name, text in texts.items():
+        (folder / f"{name}.py").write_text(text)
+    return read_tree(folder, ["**"])
+
+
+@pytest.mark.parametrize(
+    ("text", "compiler"),
+    [
+        ("from numba import njit\n@njit\ndef law(y):\n", "numba.njit"),
+        ("import numba as nb\n@nb.njit(fastmath=True)\ndef law(y):\n", "numba.njit"),
+        ("from numba import njit as fast\n@fast(cache=True)\ndef law(y):\n", "numba.njit"),
+        ("import numba\nfast = numba.njit(cache=True)\n@fast\ndef law(y):\n", "numba.njit"),
+        (
+            "from functools import partial\nimport jax\n@partial(jax.jit, static_argnums=0)\ndef law(y):\n",
+            "jax.jit",
+        ),
+        ("import torch\n@torch.compile\ndef law(y):\n", "torch.compile"),
+        (
+            "try:\n    from numba import njit\nexcept ImportError:\n    njit = print\n@njit\ndef law(y):\n",
+            "numba.njit",
+        ),
+        ("import cython\n@cython.compile\ndef law(y):\n", "cython.compile"),
+        (
+            "import numba\n@numba.extending.register_jitable\ndef law(y):\n",
+            "numba.extending.register_jitable",
+        ),
+    ],
+)
+def test_a_decorator_is_recognised_under_any_name(tmp_path: Path, text: str, compiler: str) -> None:
+    """The decorator is found through aliases, options and `partial`."""
+    tree = tree_of(tmp_path, m=text + BODY)
+    assert compiler_of_function(tree, "m.py", "law", {}) == compiler
+
+
+@pytest.mark.parametrize(
+    "after",
+    [
+        "law = njit(law)\n",
+        "fast = njit(cache=True)(law)\n",
+        "class C:\n    def __init__(self):\n        self.law = njit(law)\n",
+    ],
+)
+def test_a_function_that_is_given_to_a_compiler_is_compiled(tmp_path: Path, after: str) -> None:
+    """A call of the compiler counts like its decorator, wherever it stands."""
+    tree = tree_of(tmp_path, m=f"from numba import njit\ndef law(y):\n{BODY}\ndef free(y):\n{BODY}\n{after}")
+    assert compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
+    assert compiler_of_function(tree, "m.py", "free", {}) is None
+
+
+def test_methods_and_inner_functions_belong_to_what_is_compiled(tmp_path: Path) -> None:
+    """`jitclass` compiles every method, `jit` the functions inside a function, `torch.compile` a module."""
+    text = "import jax, numba, torch\n"
+    text += "@numba.experimental.jitclass\nclass A:\n    def f(self, y):\n        return y\n"
+    text += "@jax.jit\ndef outer(y):\n    def inner(x):\n        return x\n    return inner(y)\n"
+    text += "class Net:\n    def forward(self, y):\n        return y\nnet = torch.compile(Net())\n"
+    tree = tree_of(tmp_path, m=text)
+    assert compiler_of_function(tree, "m.py", "A.f", {}) == "numba.experimental.jitclass"
+    assert compiler_of_function(tree, "m.py", "outer.inner", {}) == "jax.jit"
+    assert compiler_of_function(tree, "m.py", "Net.forward", {}) == "torch.compile"
+
+
+def test_another_file_can_compile_a_function(tmp_path: Path) -> None:
+    """`fast = njit(law)` after `from m import law` compiles m.py's function."""
+    tree = tree_of(
+        tmp_path, m=f"def law(y):\n{BODY}", use="from m import law\nimport numba\nf = numba.njit(law)\n"
+    )
+    assert compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
+
+
+def test_a_compiler_that_the_manifest_turns_off_compiles_nothing(tmp_path: Path) -> None:
+    """With NUMBA_DISABLE_JIT, numba leaves functions to Python."""
+    tree = tree_of(tmp_path, m="from numba import njit\n@njit\ndef law(y):\n" + BODY)
+    assert compiler_of_function(tree, "m.py", "law", {"NUMBA_DISABLE_JIT": "1"}) is None
+    assert compiler_of_function(tree, "m.py", "law", {"NUMBA_DISABLE_JIT": "0"}) == "numba.njit"
+
+
+def test_names_of_the_target_are_no_compilers(tmp_path: Path) -> None:
+    """A decorator of the target's own that is called njit compiles nothing."""
+    text = "# not numba\nfrom tools import njit\n@njit\ndef law(y):\n" + BODY
+    assert compiler_of_function(tree_of(tmp_path, m=text), "m.py", "law", {}) is None
+
+
+def test_a_constant_that_only_compiled_functions_read_is_frozen(tmp_path: Path) -> None:
+    """numba keeps the value that a global has when it compiles; one that Python reads, too, is free."""
+    text = "from numba import njit\nGAIN = 2\nFREE = 3\n@njit\ndef law(y):\n    return GAIN * FREE * y\n"
+    tree = tree_of(tmp_path, m=text + "def f():\n    return FREE\n")
+    assert compiler_of_constant(tree, "m.py", "GAIN", {}) == "numba.njit"
+    assert compiler_of_constant(tree, "m.py", "FREE", {}) is None
+
+
+def test_a_function_that_builds_a_graph_is_noted(tmp_path: Path) -> None:
+    """casadi runs the law once, inside the arguments of `casadi.Function` or as a function given to it."""
+    text = "import casadi as ca\ndef law(y):\n    return y\ndef free(y):\n    return y\n"
+    text += "class C:\n    def __init__(self, y):\n        self.f = ca.Function('law', [y], [law(y)])\n"
+    tree = tree_of(tmp_path, m=text)
+    assert tracer_of_function(tree, "m.py", "law") == "casadi.Function"
+    assert tracer_of_function(tree, "m.py", "free") is None
