@@ -35,6 +35,7 @@ from mutator.report.glossary import glossary_of
 from mutator.report.markdown_and_html import ReportContent
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.panels.fault_paths_panel import build_fault_paths_panel
+from mutator.report.panels.first_screen_panel import build_first_screen_panel
 from mutator.report.reported_run import ReportedRun
 from mutator.results import table_building
 from mutator.results.outcome_counting import count_by_outcome_or_status
@@ -161,25 +162,26 @@ def write(size: int, out: Path) -> dict[str, float]:
     detail = packed_script_element(details, "details")
     index_kb = write_series(workspace, records, out)
     # no column of deviations: the synthetic records do not state those of the series
-    series_facts = {"packed": True, "kept": [], "deviations": {}}
-    browse = ExperimentListData(
-        facts={"filmed": True, "series": series_facts},
-        script_by_id={
-            "table": Markup(table),
-            "details": Markup(detail),
-            "paths": Markup(paths),
-            "media": Markup(packed_script_element({}, "media")),
-        },
-    )
+    facts = {"filmed": True, "series": {"packed": True, "kept": [], "deviations": {}}}
+    scripts = {
+        "table": Markup(table),
+        "details": Markup(detail),
+        "paths": Markup(paths),
+        "media": Markup(packed_script_element({}, "media")),
+    }
+    worst_facts, worst_scripts = report_browse.first_replay_data(run)
+    browse = ExperimentListData(facts=facts | worst_facts, script_by_id=scripts | worst_scripts)
     content = ReportContent(
         title=f"{size} experiments",
         alarm="",
         outcome_counts=count_by_outcome_or_status(run.results),
         plan_text="",
         glossary=glossary_of(run),
-        study_citation="",
+        first_screen=build_first_screen_panel(run),
         answers=build_answers_panel(run),
         panels=[panel for panel in (build_fault_paths_panel(run),) if panel],
+        pages=(),
+        study=None,
         experiment_list=browse,
     )
     page = report_page.report_html(content)

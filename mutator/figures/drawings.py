@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from mutator.figures import hazard_heat_map, hazards_by_fault_type, propagation_times
+from mutator.figures import propagation_times
 from mutator.figures.golden_and_faulty_plot import render_images
 from mutator.statistics.results_frame import select_common_columns
 
@@ -33,16 +33,9 @@ class Drawing:
 
 
 def draw_figures(frame: pd.DataFrame) -> tuple[Drawing, ...]:
+    """Return the figures that show what no part of the report's page shows; empty without a comparison."""
     frame = select_common_columns(frame)
-    kinds, scenarios = frame["kind"].nunique(), frame["scenario"].nunique()
-    drawings = []
-    if kinds > 1:
-        drawings.append(_draw_hazards(frame))
-    if scenarios > 1:
-        drawings.append(_draw_propagation_times(frame))
-    if kinds > 1 and scenarios > 1:
-        drawings.append(_draw_hazard_heat_map(frame))
-    return tuple(drawings)
+    return (_draw_propagation_times(frame),) if frame["scenario"].nunique() > 1 else ()
 
 
 def drawing_files(drawings: Sequence[Drawing]) -> dict[str, bytes]:
@@ -55,16 +48,6 @@ def drawing_files(drawings: Sequence[Drawing]) -> dict[str, bytes]:
     return files
 
 
-def _draw_hazards(frame: pd.DataFrame) -> Drawing:
-    return Drawing(
-        name="hazards_by_fault_type",
-        title="Hazards by fault type",
-        note="Left: runs with a hazard among all injected. Right: hazards as a share of activated faults. "
-        "Fault types without a mark were never activated.",
-        figure=hazards_by_fault_type.draw(frame),
-    )
-
-
 def _draw_propagation_times(frame: pd.DataFrame) -> Drawing:
     return Drawing(
         name="propagation_by_scenario",
@@ -72,13 +55,4 @@ def _draw_propagation_times(frame: pd.DataFrame) -> Drawing:
         note="Times between two events, in runs with both (number above). Alert to hazard: "
         "only if the alert came first. Runs that ended before the second event are not shown.",
         figure=propagation_times.draw(frame),
-    )
-
-
-def _draw_hazard_heat_map(frame: pd.DataFrame) -> Drawing:
-    return Drawing(
-        name="fault_type_by_scenario",
-        title="Fault type and scenario",
-        note="Runs with a hazard / activated faults. 0/0 without colour: never activated. Empty: no run.",
-        figure=hazard_heat_map.draw(frame),
     )

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 FIGURE_WIDTH_INCHES = 11.0  # inches
 TEXT_POINTS, SMALL_TEXT_POINTS = 9, 8  # points
 INK_COLOUR = "#222222"
-HAZARD_COLOURS = ("#d55e00", "#f0e442", "#56b4e9", "#009e73", "#cc79a7", "#e69f00")
-SEVERAL_COLOUR = "#444444"
 _MATPLOTLIB, _RC_FILE = "matplotlib", "matplotlibrc"
 _MATPLOTLIB_SETTINGS = {  # what differs from matplotlib's defaults
     "svg.hashsalt": "mutator",  # a fixed salt keeps the SVG deterministic
@@ -86,9 +84,9 @@ def blank_figure(
 
 
 _THEME_CSS = """<style>
-svg { color: #1b2027; --several: #444444; --hazard: #b00020 } text { fill: currentColor }
+svg { color: #1b2027; --hazard: #b00020 } text { fill: currentColor }
 @media screen and (prefers-color-scheme: dark) {
-  svg { color: #e4e8ec; --several: #a5afba; --hazard: #ff9a90 }
+  svg { color: #e4e8ec; --hazard: #ff9a90 }
 }
 </style>"""
 _THEMED_COLOURS = {  # black parts follow the theme; the background is transparent
@@ -96,7 +94,6 @@ _THEMED_COLOURS = {  # black parts follow the theme; the background is transpare
     "#000000": "currentColor",
     INK_COLOUR: "currentColor",
     "#555555": "currentColor",
-    SEVERAL_COLOUR: "var(--several)",
     "#b00020": "var(--hazard)",
 }
 

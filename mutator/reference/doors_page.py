@@ -103,7 +103,7 @@ _INTERNAL_DOORS = (
         name="panel",
         purpose="a part of the report",
         protocol="a function from a `ReportedRun` to a `Panel` or None",
-        how_to_register="`PANELS` in `mutator/report/panels/`",
+        how_to_register="`PANELS` or `PLANNED_PAGES` in `mutator/report/panels/`",
         example="`mutator/report/panels/provenance_panel.py`",
     ),
 )

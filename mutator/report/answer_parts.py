@@ -18,10 +18,13 @@ SILENT_HAZARD_WARNINGS = (NO_ALERT, ALERT_AFTER_HAZARD)  # silent hazards: no al
 
 @dataclass(frozen=True, slots=True)
 class PageLink:
-    """A text that links to a place on the page. `fragment` is that of the URL, without #."""
+    """A text that links to a place on the page. `fragment` is that of the URL, without #. `note` stands below
+    the link.
+    """
 
     text: str
     fragment: str
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)

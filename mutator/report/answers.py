@@ -28,6 +28,7 @@ from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
 from mutator.report.most_dangerous_experiments import most_dangerous_answer, worst_hazard_ids
 from mutator.report.reported_run import ReportedRun
 from mutator.report.what_to_fix_first import fix_first_answer
+from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.result_rows import ResultRow, rows_of
 
 MOST_FAULT_TYPES = 6  # maximum number of fault types that an answer lists
@@ -61,9 +62,11 @@ def _frame_for_answers(run: ReportedRun) -> pd.DataFrame:
         warning=warning_filter_values(frame),
     )
     listed_ids = worst_hazard_ids(extended)
-    rows = rows_of(run.results[run.results["experiment_id"].isin(listed_ids)], run.faults)
+    sentences = ExperimentSentences.of_run(run.folder.head)
+    rows = rows_of(run.results[run.results["experiment_id"].isin(listed_ids)], run.faults, sentences)
     listed_columns: dict[str, dict[str, Any]] = {
         "fault": {row.experiment_id: row.fault for row in rows},
+        "sentence": {row.experiment_id: row.sentence for row in rows},
         "hazard_names": {row.experiment_id: tuple(name for name, _ in row.hazards) for row in rows},
         "margins": {row.experiment_id: row.margins for row in rows},
         "warned": {row.experiment_id: _describe_first_alert(row) for row in rows},

@@ -21,6 +21,7 @@ from mutator.mutants.file_patches import patch_without_new_files
 from mutator.report.answer_parts import warning_filter_values
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
 from mutator.report.fault_path_data import RunFaultPaths
+from mutator.report.first_screen import worst_record
 from mutator.report.glossary import code_meanings_by_column
 from mutator.report.heat_map_data import build_heat_map
 from mutator.report.page_series import series_facts_for_page
@@ -38,7 +39,9 @@ from mutator.results.outcome_counting import (
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.review.patch_shapes import PatchShape, shapes_of_patches
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
+from mutator.store.embedded_series import EMBEDDED_SERIES_ELEMENT, embed_worst
 from mutator.store.run_folder import RunFolder
+from mutator.store.time_series_folder import TimeSeriesFolder
 from mutator.targets.scene_json import scene_as_json
 from mutator.triggers.trigger_kinds import ALWAYS_NAME
 from mutator.web import json_script_element, packed_script_element
@@ -54,6 +57,7 @@ DETAILS_SCHEMA = "report-details/1"
 _ALERT_COLUMNS = ("alerts", "t_alert", "reaction_time")  # columns that need a target with alerts
 MOST_EMBEDDED_STILL_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
 _TRACE_DIGEST_DIGITS = 16  # enough to notice another trace; whole digests would be four times as long
+_MOST_BYTES_OF_FIRST_REPLAY = 500_000  # about 7 kB are usual; a larger series is read from its file
 MOST_LISTED_EXPERIMENTS = (
     50_000  # maximum number of experiments that the page lists, so that it opens quickly
 )
@@ -91,11 +95,26 @@ def build_list_data(run: ReportedRun) -> ExperimentListData:
         "hazards": as_json_types(folder.head.about_hazards),
         "meanings": code_meanings_by_column(run),
     }
+    worst_facts, worst_scripts = first_replay_data(run)
+    scripts = {name: Markup(packed_script_element(value, name)) for name, value in data.items()}
     return ExperimentListData(
-        facts=facts,
-        script_by_id={name: Markup(packed_script_element(value, name)) for name, value in data.items()},
+        facts={**facts, **worst_facts},
+        script_by_id=scripts | worst_scripts,
         truncation_note=_describe_truncation(run),
     )
+
+
+def first_replay_data(run: ReportedRun) -> tuple[dict[str, Any], dict[str, Markup]]:
+    """Return facts and script elements for the replay of the worst experiment, which the page contains; empty
+    without one.
+    """
+    worst = worst_record(run)
+    if worst is None:
+        return {}, {}
+    embedded, _ = embed_worst(TimeSeriesFolder(run.folder.path), [worst], _MOST_BYTES_OF_FIRST_REPLAY)
+    element = json_script_element(embedded.as_json(), EMBEDDED_SERIES_ELEMENT)
+    facts = {"worst": {"id": worst.experiment_id, "trace": worst.trace_digest[:_TRACE_DIGEST_DIGITS]}}
+    return facts, {EMBEDDED_SERIES_ELEMENT: Markup(element)} if embedded else {}
 
 
 def _describe_truncation(run: ReportedRun) -> str:

@@ -1,22 +1,22 @@
 """The two forms of a report: Markdown, and one self-contained HTML page."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mutator._common.message_text import counted
 from mutator.model import Outcome
 from mutator.mutants.injected_lines import tags_for_page_scripts
 from mutator.report.experiment_list import ExperimentListData
 from mutator.report.glossary import Glossary
-from mutator.report.panel import Panel, rendered
+from mutator.report.panel import Panel, ReportPage, rendered
 from mutator.web import asset_text, csp_hash, json_script_element, load_order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportContent:
-    """The content of both forms of a report. `alarm` is shown first. `study_citation` cites the
-    study that has its own page. `answers` come before the list of experiments, `panels` after it.
-    `replays_note` says which replays a page contains that lies alone.
+    """The content of both forms of a report. `alarm` is shown first, then `first_screen` and `answers`.
+    `panels` come after the list of experiments. `pages` lie beside the report, as does `study`, the
+    comparison with the campaign's study. `replays_note` says which replays a page contains that lies alone.
     """
 
     title: str
@@ -24,11 +24,22 @@ class ReportContent:
     outcome_counts: Mapping[str, int]
     plan_text: str
     glossary: Glossary
-    study_citation: str
+    first_screen: Panel
     answers: Panel
     panels: Sequence[Panel]
+    pages: Sequence[ReportPage]
+    study: ReportPage | None
     experiment_list: ExperimentListData  # the list of experiments, which only the page has
     replays_note: str = ""
+
+    @property
+    def all_pages(self) -> tuple[ReportPage, ...]:
+        return (*self.pages, *([self.study] if self.study else ()))
+
+    def on_one_page(self) -> "ReportContent":
+        """Return the content with the panels of its pages among its own, and without the study."""
+        panels = (*self.panels, *(panel for page in self.pages for panel in page.panels))
+        return replace(self, panels=panels, pages=(), study=None)
 
 
 def report_markdown(content: ReportContent) -> str:
@@ -39,10 +50,11 @@ def report_markdown(content: ReportContent) -> str:
         f"# {content.title}",
         f"**{content.alarm}**" if content.alarm else "",
         f"{counted(total, 'experiment')}: {endings}. {content.plan_text}",
+        content.first_screen.markdown,
         content.answers.markdown,
-        *(panel.markdown for panel in content.panels),
-        f"Compared with the published numbers: [STUDY.md](STUDY.md) ({content.study_citation})."
-        if content.study_citation
+        *(panel.markdown for panel in content.on_one_page().panels),
+        f"Compared with the published numbers: [STUDY.md](STUDY.md). {content.study.about}"
+        if content.study
         else "",
         f"The table of all experiments is `results.csv`; `index.html` lists {which} with their diffs.",
     ]
@@ -79,17 +91,15 @@ def _policy_without_requests(scripts: Iterable[str]) -> str:
     return f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data:"
 
 
-def study_markdown(content: ReportContent, panels: Sequence[Panel]) -> str:
-    parts = (
-        f"# {content.title}, compared with its study",
-        f"{content.study_citation}.",
-        *(panel.markdown for panel in panels),
-    )
+def page_markdown(content: ReportContent, page: ReportPage) -> str:
+    parts = (f"# {page.title}: {content.title}", page.about, *(panel.markdown for panel in page.panels))
     return "\n\n".join(parts) + "\n"
 
 
-def study_html(content: ReportContent, panels: Sequence[Panel]) -> str:
+def page_html(content: ReportContent, page: ReportPage) -> str:
+    """Return a page beside the report as HTML."""
     from markupsafe import Markup
 
-    styles = [Markup(asset_text(name)) for name in load_order("report", ".css")]
-    return str(rendered(asset_text("report/study.html"), content=content, panels=panels, styles=styles))
+    names = dict.fromkeys((*load_order("report", ".css"), *(p.style for p in page.panels if p.style)))
+    styles = [Markup(asset_text(name)) for name in names]
+    return str(rendered(asset_text("report/page.html"), content=content, page=page, styles=styles))

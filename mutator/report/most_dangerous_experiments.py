@@ -121,34 +121,43 @@ def _worst_table(
     ranked, more = worst_of_each_cause(ranked)
     ranked = ranked.head(MOST_LISTED)
     contact_column = find_contact_column(ranked)
-    heads = ["worst of each cause", "scenario", "hazards"]
-    columns: list[Iterable[AnswerCell]] = [ranked["scenario"], map(ExplainedCodes, ranked["hazard_names"])]
+    filtered_list = filtered_list_fragment(HAZARD_FILTER, "rank")
+    columns: dict[str, Iterable[AnswerCell]] = {}
     if SEVERITY_COLUMN in ranked and (ranked[SEVERITY_COLUMN] != "").any():
-        heads.append("severity")
-        columns.append(
-            ExplainedCodes((name,), "severity", severity_labels.get(name, "")) if name else "-"
+        columns["severity"] = (
+            ExplainedCodes((name,), "", severity_labels.get(name, "")) if name else NO_CLASS_VALUE
             for name in ranked[SEVERITY_COLUMN]
         )
+    columns["worst of each cause"] = (
+        _experiment_link(row, filtered_list) for row in ranked.to_dict("records")
+    )
+    columns["hazards"] = map(ExplainedCodes, ranked["hazard_names"])
     if contact_column or any(name.startswith(MARGIN_PREFIX) for name in units):
-        heads.append("measure")
-        columns.append(_describe_danger(row, contact_column, units) for row in ranked.to_dict("records"))
-    heads.append("time to hazard")
-    columns.append((ranked["t_hazard"] - ranked["t_activation"]).map("{:.2f} s".format))
+        columns["measure"] = (
+            _describe_danger(row, contact_column, units) for row in ranked.to_dict("records")
+        )
+    columns["time to hazard"] = (ranked["t_hazard"] - ranked["t_activation"]).map("{:.2f} s".format)
     if has_alerts:
-        heads.append("alert before hazard")
-        columns.append(ranked["warned"])
-    heads.append("more of this cause")
+        columns["alert before hazard"] = ranked["warned"]
     causes = causes_of(ranked).itertuples(index=False)
-    columns.append(
+    columns["more of this cause"] = (
         PageLink(f"{count:,}", filtered_list_fragment(_filter_of_cause(*cause), "rank")) if count else "-"
         for cause, count in zip(causes, more, strict=False)
     )
-    filtered_list = filtered_list_fragment(HAZARD_FILTER, "rank")
-    links = [
-        PageLink(fault, f"e={name}&{filtered_list}")
-        for fault, name in zip(ranked["fault"], ranked["experiment_id"], strict=True)
-    ]
-    return AnswerTable(heads=tuple(heads), rows=list(zip(links, *columns, strict=True)))
+    return AnswerTable(heads=tuple(columns), rows=list(zip(*columns.values(), strict=True)))
+
+
+def _experiment_link(row: Mapping[Any, Any], filtered_list: str) -> PageLink:
+    """Return the link to an experiment: what happened and, below, its fault with value, scenario and trigger.
+    Without a sentence, the fault is the link.
+    """
+    place = f"in {row['scenario']}, trigger {row['trigger']}"
+    sentence = row["sentence"]
+    return PageLink(
+        sentence or row["fault"],
+        f"e={row['experiment_id']}&{filtered_list}",
+        f"{row['fault']} {place}" if sentence else place,
+    )
 
 
 def _filter_of_cause(kind: str, hazard: str) -> dict[str, Sequence[str]]:

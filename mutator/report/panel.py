@@ -1,7 +1,7 @@
-"""Panels: the parts of a report, each in Markdown and in HTML."""
+"""Panels: the parts of a report, each in Markdown and in HTML, and the pages that they are on."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +26,17 @@ class Panel:
     summary: TextTable | None = None
     files: Mapping[str, bytes] = field(default_factory=dict)
     style: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportPage:
+    """A page beside the report. `link` is its name in the navigation bar; `about` says what it shows."""
+
+    file_name: str
+    link: str
+    title: str
+    about: str
+    panels: Sequence[Panel]
 
 
 def rendered(template: str, **values: Any) -> "Markup":

@@ -1,4 +1,4 @@
-"""Builds the report of a run: REPORT.md and one self-contained HTML page.
+"""Builds the report of a run: REPORT.md, and a self-contained HTML page with others beside it.
 
 The only inputs are the run folder and the fault library. Equal inputs give equal bytes.
 """
@@ -15,15 +15,16 @@ from mutator.report.experiment_list import ExperimentListData, build_list_data
 from mutator.report.glossary import glossary_of
 from mutator.report.markdown_and_html import (
     ReportContent,
+    page_html,
+    page_markdown,
     report_html,
     report_markdown,
-    study_html,
-    study_markdown,
 )
 from mutator.report.page_series import write_missing_series_of_traces
-from mutator.report.panel import REPORT_FOLDER
-from mutator.report.panels import PANELS, build_study_panels
+from mutator.report.panel import REPORT_FOLDER, ReportPage
+from mutator.report.panels import build_pages, build_panels, build_study_page
 from mutator.report.panels.answers_panel import build_answers_panel
+from mutator.report.panels.first_screen_panel import build_first_screen_panel
 from mutator.report.report_digests import inputs_digest, is_current, write_report_files
 from mutator.report.reported_run import ReportedRun
 from mutator.report.single_file import single_file_html, single_file_name
@@ -93,14 +94,14 @@ def build_report(folder: RunFolder, workspace: Workspace | None, *, single_file:
     with computing_in_background(
         lambda: build_list_data(reported), process_count_for(len(reported.results))
     ) as wait_for_list_data:
-        study_panels = build_study_panels(reported)
-        content = _build_content(replace(reported, has_study_page=bool(study_panels)), wait_for_list_data)
-    panels = (*content.panels, *study_panels)
+        study = build_study_page(reported)
+        content = _build_content(replace(reported, has_study_page=bool(study)), study, wait_for_list_data)
+    panels = (*content.on_one_page().panels, *(study.panels if study else ()))
     files = {name: data for panel in panels for name, data in panel.files.items()}
     files |= {MARKDOWN_FILE: report_markdown(content).encode(), PAGE_FILE: report_html(content).encode()}
-    if study_panels:
-        files |= {"STUDY.md": study_markdown(content, study_panels).encode()}
-        files |= {"study.html": study_html(content, study_panels).encode()}
+    files |= {page.file_name: page_html(content, page).encode() for page in content.all_pages}
+    if study:
+        files |= {"STUDY.md": page_markdown(content, study).encode()}
     summaries = tuple(panel.summary for panel in panels if panel.summary)
     return BuiltReport(
         files=files,
@@ -115,8 +116,9 @@ def _written_report(run: Path, rows: int, summaries: tuple[TextTable, ...] = ())
     return WrittenReport(markdown=out / MARKDOWN_FILE, page=out / PAGE_FILE, rows=rows, summaries=summaries)
 
 
-def _build_content(run: ReportedRun, wait_for_list_data: Callable[[], ExperimentListData]) -> ReportContent:
-    panels = [panel for build_panel in PANELS if (panel := build_panel(run)) is not None]
+def _build_content(
+    run: ReportedRun, study: ReportPage | None, wait_for_list_data: Callable[[], ExperimentListData]
+) -> ReportContent:
     return ReportContent(
         title=run.folder.head.campaign,
         alarm=run.engine_summary.equivalence_text
@@ -125,9 +127,11 @@ def _build_content(run: ReportedRun, wait_for_list_data: Callable[[], Experiment
         outcome_counts=count_by_outcome_or_status(run.results),
         plan_text=_describe_plan(run.folder),
         glossary=glossary_of(run),
-        study_citation=run.published_work.about if run.published_work and run.has_study_page else "",
+        first_screen=build_first_screen_panel(run),
         answers=build_answers_panel(run),
-        panels=panels,
+        panels=build_panels(run),
+        pages=build_pages(run),
+        study=study,
         experiment_list=wait_for_list_data(),
     )
 

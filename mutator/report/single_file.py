@@ -50,8 +50,7 @@ def single_file_html(content: ReportContent, run: ReportedRun) -> str:
         ],
     }
     alone_content = replace(
-        content,
-        study_citation="",  # its page is another file
+        content.on_one_page(),
         replays_note=_describe_replays(embedded, last_rank, is_cut=is_cut),
         experiment_list=_list_data_alone(content.experiment_list, run, embedded, alone),
     )

@@ -120,9 +120,9 @@ def test_the_list_stays_next_to_an_opened_experiment(page: "Page") -> None:
     assert page.page.title() == title
     assert page.page.evaluate("scrollY") == before > 100
     page.page.click("#grid tr[data-at] >> nth=1")
-    page.page.click(".bar a:has-text('Tables')")
+    page.page.click(".bar a:has-text('Summary')")
     assert not page.page.is_visible("#experiment")
-    assert page.page.locator("#tables").is_visible()
+    assert page.page.locator("#summary").is_visible()
 
 
 def test_answers_link_to_their_experiments(page: "Page", rows: list[dict[str, str]]) -> None:

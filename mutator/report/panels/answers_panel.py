@@ -1,4 +1,4 @@
-"""The first panel of a report, which answers a reader's first questions."""
+"""The panel that answers a reader's first questions, the list of the worst experiments first."""
 
 import re
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from mutator.report.reported_run import ReportedRun
 _HTML_TEMPLATE = """\
 <div class="answers">
 {% for column in columns %}
-<div class="column">
+<div class="column{{ " whole" if loop.first }}">
 {% for answer in column %}
 <section class="answer {{ answer.html_name }}" aria-labelledby="answer-{{ answer.html_name }}">
 <h2 id="answer-{{ answer.html_name }}">{{ answer.title }}</h2>
@@ -41,27 +41,44 @@ def build_answers_panel(run: ReportedRun) -> Panel:
     for answer in answers:
         tables = [_plain_table(table).as_markdown() for table in answer.tables if table.rows]
         parts += [f"## {answer.title}", answer.paragraph, *tables]
-    columns = [[a for a in answers if a.has_wide_tables], [a for a in answers if not a.has_wide_tables]]
+    first, *others = answers
+    columns = [
+        [first],
+        [answer for answer in others if answer.has_wide_tables],
+        [answer for answer in others if not answer.has_wide_tables],
+    ]
     meanings = code_meanings_by_column(run)
     html = rendered(_HTML_TEMPLATE, columns=columns, table=lambda listing: _table_html(listing, meanings))
     return Panel(anchor="answers", link="Answers", markdown="\n\n".join(parts), html=html)
 
 
 def _plain_table(answer_table: AnswerTable) -> TextTable:
-    rows = [[cell if isinstance(cell, str) else cell.text for cell in line] for line in answer_table.rows]
+    rows = [list(map(_plain_text, line)) for line in answer_table.rows]
     return TextTable(heads=answer_table.heads, rows=rows)
+
+
+def _plain_text(cell: AnswerCell) -> str:
+    if isinstance(cell, str):
+        return cell
+    return f"{cell.text} ({cell.note})" if isinstance(cell, PageLink) and cell.note else cell.text
 
 
 def _table_html(answer_table: AnswerTable, meanings: Glossary) -> Markup:
     """Return the table as HTML. On narrow screens, each cell shows the heading of its column."""
     rows = [
         [
-            _labelled_cell_html(head, cell, meanings.get(head, {})) if i else _cell_html(cell)
-            for i, (head, cell) in enumerate(zip(answer_table.heads, line, strict=True))
+            _cell_html(cell) if cell is subject else _labelled_cell_html(head, cell, meanings.get(head, {}))
+            for head, cell in zip(answer_table.heads, line, strict=True)
         ]
         for line in answer_table.rows
+        if (subject := next(filter(_is_subject, line), line[0]))
     ]
     return TextTable(heads=answer_table.heads, rows=rows).as_html("plain")
+
+
+def _is_subject(cell: AnswerCell) -> bool:
+    """Whether a cell says what its line is about, and needs no label."""
+    return isinstance(cell, PageLink) and bool(cell.note)
 
 
 def _labelled_cell_html(head: str, cell: AnswerCell, meanings: Mapping[str, str]) -> str:
@@ -83,7 +100,8 @@ def _explained_cell_html(cell: str | ExplainedCodes, meanings: Mapping[str, str]
 def _cell_html(cell: AnswerCell) -> str:
     if isinstance(cell, PageLink):
         text = Markup("<wbr>").join(re.split(r"(?<=[/_])", cell.text))  # long names can break here
-        return Markup('<a href="#{}">{}</a>').format(cell.fragment, text)
+        link = Markup('<a href="#{}">{}</a>').format(cell.fragment, text)
+        return link + Markup('<span class="note">{}</span>').format(cell.note) if cell.note else link
     if isinstance(cell, ShareBar):
         return Markup(_BAR_HTML).format(cell.part / cell.whole if cell.whole else 0.0, cell.text)
     return cell if isinstance(cell, str) else cell.text

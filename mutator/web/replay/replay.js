@@ -16,9 +16,11 @@ const Replay = (() => {
   const symbol = (name) => Dom.svg("svg", { viewBox: "0 0 16 16", width: 14, height: 14, fill: "currentColor", "aria-hidden": "true" }, Dom.svg("path", { d: SYMBOLS[name] }));
 
   class Player {
-    /** `clock`, `axes` by channel and `toggle(name)` of a channel's plot are those of all players that are shown together. */
-    constructor({ place, series, facts }, { clock, axes, toggle }) {
+    /** `clock`, `axes` by channel and `toggle(name)` of a channel's plot are those of all players that are shown together.
+     *  `isBrief`: the scene without instruments and plots; without a scene, two plots. */
+    constructor({ place, series, facts, isBrief = false }, { clock, axes, toggle }) {
       this.place = place;
+      this.isBrief = isBrief;
       this.series = series;
       this.facts = facts;
       this.channels = [...series.channels].sort((a, b) => Number(b.role === "actuator") - Number(a.role === "actuator"));
@@ -27,7 +29,7 @@ const Replay = (() => {
       this.toggle = toggle;
       this.scene = this.#scene();
       this.#build();
-      this.plots.begin();
+      if (this.#hasPlots) this.plots.begin();
       new ResizeObserver(() => this.clock.redraw()).observe(this.root);
     }
 
@@ -60,8 +62,17 @@ const Replay = (() => {
         } },
         el("div.stage", {}, this.#view(), el("div.state", {}, this.time, this.states)), this.#controls(), this.bar.element, this.bar.jumps,
         this.missing ? el("p.quiet", {}, `The scene cannot be drawn: ${this.missing}.`) : null,
-        this.gauges.element, this.plots.element, this.live);
+        this.#hasGauges ? this.gauges.element : null, this.#hasPlots ? this.plots.element : null, this.live);
+      if (this.isBrief) this.plots.choose(new Set([...this.plots.chosen].slice(0, 2)));
       this.place.replaceChildren(el("div.replay-box", {}, this.root));
+    }
+
+    get #hasGauges() {
+      return !this.isBrief;
+    }
+
+    get #hasPlots() {
+      return !this.isBrief || !this.scene;
     }
 
     #view() {
@@ -95,7 +106,7 @@ const Replay = (() => {
       const keys = {
         ArrowLeft: () => (by ? this.#go(clock.t - by) : clock.step(-1)), ArrowRight: () => (by ? this.#go(clock.t + by) : clock.step(1)),
         Home: () => this.#go(series.start), End: () => this.#go(ReplayData.until(series)),
-        "+": () => plots.zoom(1), "-": () => plots.zoom(-1), 0: () => plots.all(), e: () => plots.event(),
+        ...(this.#hasPlots ? { "+": () => plots.zoom(1), "-": () => plots.zoom(-1), 0: () => plots.all(), e: () => plots.event() } : {}),
         " ": event.target.matches("button") ? null : () => clock.toggle(),
       };
       if (!keys[event.key]) return;
@@ -136,9 +147,11 @@ const Replay = (() => {
       const isAfter = series.tEnd !== null && t > series.tEnd + ReplayData.TINY;
       this.root.classList.toggle("is-after", isAfter);
       if (this.scene) this.#drawScene(t, colours);
-      this.plots.draw(colours);
-      this.plots.show(now, isPlaying);
-      this.gauges.show(t, now, isPlaying);
+      if (this.#hasPlots) {
+        this.plots.draw(colours);
+        this.plots.show(now, isPlaying);
+      }
+      if (this.#hasGauges) this.gauges.show(t, now, isPlaying);
       this.bar.show();
       this.#write(t, isPlaying);
       this.place.dispatchEvent(new CustomEvent("replay-time", { bubbles: true, detail: { t } }));
@@ -207,16 +220,17 @@ const Replay = (() => {
     return axes;
   }
 
-  let current = []; // the players that are shown
+  let current = []; // the players on the page
   for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", () => current.forEach((player) => player.draw()));
 
-  /** Fill the places of `sides`, each {place, series, facts}, with replays that share clock, axes and choice of plots. Returns
+  /** Fill the places of `sides`, each {place, series, facts, isBrief}, with replays that share clock, axes and choice of plots. Returns
    *  their players, without those of series that have no channels. */
   function showTogether(sides) {
-    current[0]?.clock.pause();
+    current.forEach(({ clock }) => clock.pause());
+    current = current.filter(({ place, root }) => root.isConnected && !sides.some((side) => side.place === place));
     const drawable = sides.filter(({ series }) => series.channels.length), all = drawable.map(({ series }) => series);
     for (const { place } of sides.filter((side) => !drawable.includes(side))) place.replaceChildren(Dom.el("p.quiet", {}, "The series of this experiment has no channel."));
-    if (!all.length) return (current = []);
+    if (!all.length) return [];
     const players = [], toggle = (name) => players.forEach((player) => {
       player.plots.toggle(name);
       player.gauges.pressed();
@@ -224,7 +238,8 @@ const Replay = (() => {
     const shared = { clock: clockOf(all, () => players.forEach((player) => player.draw())), axes: axesOf(all), toggle };
     for (const side of drawable) players.push(new Player(side, shared));
     if (players.length > 1) align(players);
-    return (current = players);
+    current.push(...players);
+    return players;
   }
 
   /** Let all players begin with the same plots, those of the last one, over the same time. */
@@ -240,7 +255,7 @@ const Replay = (() => {
 
   /** Fill `place` with the replay of a series (SeriesFile.load); `facts` has scene and hazards. Returns the player, or null
    *  if the series has no channels. */
-  const show = (place, series, facts) => showTogether([{ place, series, facts }])[0] ?? null;
+  const show = (place, series, facts, { isBrief = false } = {}) => showTogether([{ place, series, facts, isBrief }])[0] ?? null;
 
   return { show, showTogether, rate: 0 };
 })();

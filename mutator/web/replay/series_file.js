@@ -183,7 +183,7 @@ const SeriesFile = (() => {
   }
 
   /** The series that the page contains: { runs, of }, texts in base64 and the numbers of each experiment's golden and faulty
-   *  one; null if the page loads files. A page alone contains them, and requests no file. */
+   *  one; null if it contains none. A page alone contains those of the worst; another page that of the worst one only. */
   const embedded = (() => {
     let data; // parsed on first use
     return () => (data === undefined ? (data = JSON.parse(document.getElementById("embedded-series")?.textContent ?? "null")) : data);
@@ -195,8 +195,9 @@ const SeriesFile = (() => {
     const { runs, of } = embedded();
     if (!Object.hasOwn(of, id)) return null;
     const [reference, entry] = of[id];
-    if (!goldens.has(reference)) goldens.set(reference, decodedText(runs[reference], null));
-    const golden = await goldens.get(reference);
+    const key = `embedded ${reference}`;
+    if (!goldens.has(key)) goldens.set(key, decodedText(runs[reference], null));
+    const golden = await goldens.get(key);
     return buildSeries(id, expected, golden, await decodedText(runs[entry], golden));
   }
 
@@ -209,8 +210,9 @@ const SeriesFile = (() => {
   }
 
   async function findSeries(id, expected, isNew) {
-    if (embedded()) return readEmbedded(id, expected);
     const there = JSON.parse(document.getElementById("facts").textContent).series; // so that no missing files are requested
+    const isInside = !isNew && embedded() && Object.hasOwn(embedded().of, id);
+    if (isInside || !there || there.alone) return readEmbedded(id, expected); // a page of a comparison has no files either
     if (isNew || there.kept.includes(id)) { // from a rerun, perhaps because the packed series is damaged
       const series = await readKept(id, expected);
       if (series) return series;

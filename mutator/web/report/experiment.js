@@ -156,7 +156,7 @@ class Experiment {
   async #fillLate(row) {
     const id = this.text("experiment_id");
     this.#path();
-    const details = await Details.read(), expected = { trace: details.trace(row), largest: this.#largest() };
+    const details = await Details.read(), expected = { trace: details.trace(row), largest: Experiment.largestDeviations(this.table, row, this.facts) };
     const [media, series] = await Promise.all([Packed.read("media"), SeriesFile.load(id, expected).catch((error) => error)]);
     if (this.row !== row) return; // another experiment was opened in the meantime
     this.#change(details.patch(row));
@@ -168,9 +168,9 @@ class Experiment {
     else this.#noSeries(id, expected, series);
   }
 
-  /** The largest deviation of each compared channel in the whole run, if the run ended normally. */
-  #largest() {
-    const columns = Object.entries(this.facts.series.deviations).map(([name, column]) => [name, this.table.number(this.row, column)]);
+  /** The largest deviation of each compared channel in the whole run of a row, if the run ended normally. */
+  static largestDeviations(table, row, facts) {
+    const columns = Object.entries(facts.series.deviations).map(([name, column]) => [name, table.number(row, column)]);
     return Object.fromEntries(columns.filter(([, by]) => !Number.isNaN(by)));
   }
 

@@ -25,7 +25,8 @@ const Report = (() => {
     const columns = new Columns(search.parentElement, grid, state);
     const actions = { move: (by) => grid.move(by), close: () => view.close(), place: () => grid.placeOf(state.experiment) };
     const experiment = new Experiment(find("experiment"), table, state, { ...facts, run: facts.series.alone ? () => "DIR" : runFolder }, actions);
-    const view = viewOf({ table, state, search, heat, filters, grid, columns, experiment });
+    const first = facts.worst && new FirstScreen(find("worst-replay"), table, facts);
+    const view = viewOf({ table, state, search, heat, filters, grid, columns, experiment, first });
     searching(search, state);
     keyboard({ grid, experiment, search, close: view.close });
     links(grid, () => state.experiment && view.close());
@@ -61,7 +62,7 @@ const Report = (() => {
   }
 
   /** Make the function that shows the state in all components. */
-  function viewOf({ table, state, search, heat, filters, grid, columns, experiment }) {
+  function viewOf({ table, state, search, heat, filters, grid, columns, experiment, first }) {
     let drawn = null;
     let scrolled = 0; // scroll position before an experiment was opened
 
@@ -88,6 +89,7 @@ const Report = (() => {
       document.body.classList.toggle("has-experiment", isOpen);
       for (const beneath of document.querySelectorAll("main, .bar")) beneath.inert = isOpen && !matchMedia(WIDE).matches;
       experiment.show();
+      if (!isOpen) first?.show();
       if (isOpen && !wasOpen) grid.reveal();
       if (!isOpen && wasOpen) scrollTo({ top: scrolled, behavior: "instant" });
     }

@@ -9,7 +9,7 @@ import matplotlib
 import pandas as pd
 import pytest
 
-from mutator.figures import hazard_heat_map
+from mutator.figures import propagation_times
 from mutator.figures.golden_and_faulty_plot import save_figure
 from mutator.figures.style import with_page_theme
 
@@ -18,20 +18,20 @@ _DRAW = """
 import sys
 from pathlib import Path
 import pandas as pd
-from mutator.figures import hazard_heat_map
+from mutator.figures import propagation_times
 from mutator.figures.golden_and_faulty_plot import save_figure
 line = {"kind": "a/b", "scenario": "$1", "method": "guided", "is_activated": True, "is_hazard": True}
-line |= dict.fromkeys(("t_activation", "t_manifest", "t_hazard"), 1.0)
+line |= dict.fromkeys(("t_activation", "t_manifest", "t_alert", "t_hazard"), 1.0)
 line |= {"is_manifested": True, "is_alert": False}
-save_figure(hazard_heat_map.draw(pd.DataFrame([line])), [Path("a.svg")])
+save_figure(propagation_times.draw(pd.DataFrame([line])), [Path("a.svg")])
 """
 
 
 def _draw(path: Path) -> bytes:
     line = {"kind": "a/b", "scenario": "S1", "method": "guided", "is_activated": True, "is_hazard": True}
-    times = dict.fromkeys(("t_activation", "t_manifest", "t_hazard"), 1.0)
+    times = dict.fromkeys(("t_activation", "t_manifest", "t_alert", "t_hazard"), 1.0)
     flags = {"is_manifested": True, "is_alert": False}
-    save_figure(hazard_heat_map.draw(pd.DataFrame([line | times | flags])), [path])
+    save_figure(propagation_times.draw(pd.DataFrame([line | times | flags])), [path])
     return path.read_bytes()
 
 
@@ -80,4 +80,3 @@ def test_a_figure_in_a_page_follows_the_theme(tmp_path: Path) -> None:
     assert 'style="fill: #ffffff"' in svg and "#000000" in svg
     assert 'style="fill: #ffffff"' not in shown and "#000000" not in shown
     assert "prefers-color-scheme: dark" in shown
-    assert "fill: #010101" in shown

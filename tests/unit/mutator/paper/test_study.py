@@ -81,6 +81,6 @@ def test_the_origin_says_which_data_of_the_paper_are_missing(run: Path, toycar: 
     said = "the published numbers are not in this library"
     for workspace, expected in ((toycar, True), (HERE, False)):
         written = report_builder.write_report(run, workspace)
-        for text in (written.markdown.read_text(), written.page.read_text()):
+        for text in (written.markdown.read_text(), written.page.with_name("origin.html").read_text()):
             assert "driving_agent_resilience (Rubaiyat" in text
             assert (said in text) is expected

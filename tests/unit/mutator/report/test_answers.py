@@ -90,11 +90,11 @@ def test_the_worst_experiment_is_first(answer_by_name: dict[str, ReportAnswer]) 
     )
     worst, kinds = answer.tables
     assert [line[0] for line in worst.rows] == [
-        PageLink("radar/chaff/x", f"e={'0' * 16}&outcome=hazard&sort=rank"),
-        PageLink("car/speed/x", f"e={'4' * 16}&outcome=hazard&sort=rank"),
+        PageLink("radar/chaff/x", f"e={'0' * 16}&outcome=hazard&sort=rank", "in S1, trigger C1"),
+        PageLink("car/speed/x", f"e={'4' * 16}&outcome=hazard&sort=rank", "in S1, trigger C1"),
     ]
-    assert worst.heads[3:] == ("measure", "time to hazard", "alert before hazard", "more of this cause")
-    assert [line[3:-1] for line in worst.rows] == [
+    assert worst.heads[2:] == ("measure", "time to hazard", "alert before hazard", "more of this cause")
+    assert [line[2:-1] for line in worst.rows] == [
         ("contact at 4.00 m/s", "3.00 s", "none"),
         ("margin -0.50 m", "7.00 s", "none"),
     ]
@@ -144,7 +144,7 @@ def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
     frame["t_hazard"] = 2 + frame["after"]
     frame["experiment_id"] = [f"e{i}" for i in frame.index]
     same = {"outcome": "hazard", "is_activated": True, "t_activation": 2.0, "warning": NO_ALERT}
-    told = {"scenario": "S1", "warned": "none", "delta_v": math.nan}
+    told = {"scenario": "S1", "trigger": "C1", "sentence": "", "warned": "none", "delta_v": math.nan}
     for name, cell in {"hazard_names": ("H1", "H2"), "margins": (("H1", -1.0), ("H2", -2.0))}.items():
         told[name] = [cell] * len(frame)
     return frame.assign(fault=frame["kind"], place=frame.index, **same, **told)
@@ -199,19 +199,19 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
 def test_a_cause_shows_its_worst_experiment_and_how_many_more() -> None:
     """A fault type with many experiments of one hazard is one line, so that other causes are seen, too."""
     frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
-    frame = frame.assign(status="ok", t_h1=3.0, t_h2=4.0, h1=1.0, h2=1.0)
+    frame = frame.assign(status="ok", t_h1=3.0, t_h2=4.0, h1=1.0, h2=1.0, sentence="It hits.")
     frame.attrs["hazards"] = ("H1", "H2")
     metrics = [MetricFacts("margin_h1", "m", "", "lower"), MetricFacts("margin_h2", "s", "", "lower")]
     answer = most_dangerous_answer(frame, metrics, {"S1": "S1 light"}, has_alerts=True)
     assert "12 of severity S1 light, 12 without a class" in answer.paragraph
     hit, missed = answer.tables[0].rows
-    assert hit[0] == PageLink("a/hit", "e=e0&outcome=hazard&sort=rank")
-    assert hit[2:5] == (
+    assert hit[:4] == (
+        ExplainedCodes(("S1",), "", "S1 light"),
+        PageLink("It hits.", "e=e0&outcome=hazard&sort=rank", "a/hit in S1, trigger C1"),
         ExplainedCodes(("H1", "H2")),
-        ExplainedCodes(("S1",), "severity", "S1 light"),
         "margin -2.00 s",
     )
-    assert missed[0] == PageLink("b/miss", "e=e12&outcome=hazard&sort=rank")
+    assert missed[0] == "no class"
     assert hit[-1] == PageLink("11", "kind=a%2Fhit&outcome=hazard&hazards=H1&sort=rank")
     frame = frame.assign(kind=[f"k/{i}" for i in frame.index])
     assert len(most_dangerous_answer(frame, metrics, {}, has_alerts=True).tables[0].rows) == 10

@@ -161,11 +161,13 @@ def test_a_failed_proof_is_reported_first(finish: Finish) -> None:
     run = finish(4, change=lambda r: replace(r, trace_digest="0" * 64))
     build_tables(run)
     written = report_builder.write_report(run, None)
-    for text in (written.markdown.read_text(), written.page.read_text()):
-        assert text.index("The equivalence check failed") < text.index("Planned: ")
+    texts = [path.read_text() for path in (written.markdown, written.page)]
+    assert all(text.index("The equivalence check failed") < text.index("Planned: ") for text in texts)
+    origin = written.page.with_name("origin.html").read_text()
+    for text in (texts[0], origin):
         assert f"FAILED: experiment {record_ids(run)[0]} differs on the reference engine" in text
         assert "How the experiments were run" in text
-    assert "its golden run has &lt;two&gt; threads" in written.page.read_text()
+    assert "its golden run has &lt;two&gt; threads" in origin
 
 
 def test_new_results_of_the_proof_make_a_report_out_of_date(finish: Finish) -> None:

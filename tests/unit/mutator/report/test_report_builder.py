@@ -56,11 +56,19 @@ def carried(page: Path, name: str) -> Any:
     return json.loads(gzip.decompress(base64.b64decode(text)))
 
 
-def test_the_page_needs_no_other_file(run: Path) -> None:
+def test_the_page_needs_no_other_file_and_links_only_to_pages_beside_it(run: Path) -> None:
     written = report_builder.write_report(run, None)
     page = Page(written.page.read_text())
     assert page.links
-    assert all(link.startswith(("#", "data:")) for link in page.links)
+    others = {link for link in page.links if not link.startswith(("#", "data:"))}
+    assert others == {"tables.html", "origin.html"}
+    for name in others:
+        beside = Page((run / "report" / name).read_text())
+        assert beside.open == []
+        assert {link for link in beside.links if not link.startswith(("#", "data:"))} == {
+            "index.html",
+            *others,
+        }
     assert "http" not in written.page.read_text().replace("http://www.w3.org/2000/svg", "")
 
 
@@ -94,7 +102,7 @@ def test_a_link_leads_to_failed_runs_that_are_not_listed(run: Path, monkeypatch:
 
 def test_the_report_states_its_origin(run: Path) -> None:
     written = report_builder.write_report(run, None)
-    for text in (written.markdown.read_text(), written.page.read_text()):
+    for text in (written.markdown.read_text(), (run / "report" / "origin.html").read_text()):
         for fact in ("ab" * 32, "cd" * 32, "as_described", "chosen: limit", "3 of 3 planned", "2.4.6"):
             assert fact in text
 
@@ -108,7 +116,7 @@ def test_the_report_names_the_reviewers(run: Path) -> None:
     }
     write_json(run / recorded_approvals.APPROVALS_FILE, said)
     written = report_builder.ensure_report(run, None)
-    for text in (written.markdown.read_text(), written.page.read_text()):
+    for text in (written.markdown.read_text(), (run / "report" / "origin.html").read_text()):
         assert "2 groups approved by Jane (1), Joe (1)" in text
 
 
@@ -124,16 +132,17 @@ def test_a_folder_without_a_run_gets_no_report(tmp_path: Path) -> None:
         report_builder.write_report(tmp_path, None)
 
 
-def test_figures_are_in_the_markdown_and_in_the_page(run: Path) -> None:
+def test_figures_are_in_the_markdown_and_on_a_page_of_their_own(run: Path) -> None:
     other = OK | {"experiment_id": "3" * 16, "fault_id": "f3", "fault_type": "jamming", "scenario": "S2"}
     write_results(run, COLUMNS, [*LINES, other])
     written = report_builder.write_report(run, None)
-    shown = [link for link in Page(written.page.read_text()).links if link.startswith("data:image/svg")]
+    page = run / "report" / "figures.html"
+    shown = [link for link in Page(page.read_text()).links if link.startswith("data:image/svg")]
     files = sorted((run / "report" / "figures").glob("*.svg"))
     embedded = [base64.b64decode(link.partition(",")[2]).decode() for link in shown]
     assert sorted(embedded) == sorted(with_page_theme(file.read_text()) for file in files)
-    assert len(shown) == 3
-    assert written.markdown.read_text().count("](figures/") == 3
+    assert len(shown) == 1
+    assert written.markdown.read_text().count("](figures/") == 1
 
 
 def test_experiments_and_runs_are_counted_separately(run: Path) -> None:
@@ -274,7 +283,7 @@ def test_the_report_shows_the_spread_of_several_seeds(run: Path) -> None:
     write_results(run, COLUMNS, [line | {"seed": "2"} for line in LINES] + more)
     written = report_builder.write_report(run, None)
     assert "## Seeds\n\n3 seeds (2 to 11). Each seed repeats" in written.markdown.read_text()
-    assert '<section class="part" id="seeds">' in written.page.read_text()
+    assert '<section class="part" id="seeds">' in (run / "report" / "tables.html").read_text()
     assert (run / "report" / "tables" / "seeds_by_fault_type.csv").is_file()
     assert (
         (run / "report" / "tables" / "seeds.csv").read_text().startswith("faults,what,of,all seeds: count,")

@@ -1,0 +1,134 @@
+"""What the page shows first: the worst experiment in words, and four numbers with their intervals."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isnan
+
+import pandas as pd
+
+from mutator.config.yaml_files import load_yaml
+from mutator.errors import MutatorError
+from mutator.model import Record
+from mutator.report.answer_parts import ALERT_BEFORE_HAZARD, SILENT_HAZARD_WARNINGS, filtered_list_fragment
+from mutator.report.reported_run import ReportedRun
+from mutator.results.experiment_sentence import ExperimentSentences
+from mutator.results.result_rows import ResultRow, rows_of
+from mutator.statistics.median_intervals import median_interval
+from mutator.statistics.shares import share
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import CAMPAIGN_FILE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyNumber:
+    """One number of the first screen: `value` is the number, `meaning` the sentence that it begins,
+    `evidence` its counts and its 95 % interval. `fragment` opens the list of what it counts; '' if there is
+    nothing to list. `percents` has the rate and the ends of its interval for the drawing; None for a time.
+    """
+
+    value: str
+    meaning: str
+    evidence: str
+    fragment: str
+    percents: tuple[float, float, float] | None = None
+
+
+def worst_row(run: ReportedRun) -> ResultRow | None:
+    """Return the worst usable experiment, with its sentence; None without one."""
+    ranks = run.experiment_facts.worst_first_ranks
+    if not len(ranks):
+        return None
+    worst = run.results.iloc[[int(ranks.argmin())]]
+    [row] = rows_of(worst, run.faults, ExperimentSentences.of_run(run.folder.head))
+    return row if row.usable else None
+
+
+def worst_record(run: ReportedRun) -> Record | None:
+    """Return the record of the worst usable experiment; None without one."""
+    row = worst_row(run)
+    return run.records.get(row.experiment_id) if row else None
+
+
+def key_numbers(frame: pd.DataFrame, *, has_alerts: bool) -> tuple[KeyNumber, ...]:
+    """Return how many faults acted, how many of these led to a hazard, how many hazards were silent, and how
+    soon the hazard came. `frame` has the usable experiments, with their `warning`. A target without alerts
+    has the share of faults that changed an actuator instead of silent hazards.
+    """
+    active, hazards = frame[frame["is_activated"]], frame[frame["outcome"] == "hazard"]
+    silent = hazards[hazards["warning"] != ALERT_BEFORE_HAZARD]
+    numbers = [
+        _share_number(active, frame, "faults", "acted (activated)", {}, "t_activation>=0"),
+        _share_number(hazards, active, "activated faults", "led to a hazard", {"outcome": ["hazard"]}),
+    ]
+    if has_alerts:
+        filters = {"warning": SILENT_HAZARD_WARNINGS}
+        numbers.append(_share_number(silent, hazards, "hazards", "came without an alert before", filters))
+    else:
+        manifested = active[active["is_manifested"]]
+        query = "t_manifest>=0"
+        numbers.append(
+            _share_number(manifested, active, "activated faults", "changed an actuator", {}, query)
+        )
+    return (*numbers, _time_number(hazards))
+
+
+def _share_number(
+    part: pd.DataFrame,
+    whole: pd.DataFrame,
+    plural_noun: str,
+    verb: str,
+    filters: Mapping[str, tuple[str, ...] | list[str]],
+    query: str = "",
+) -> KeyNumber:
+    result = share(len(part), len(whole))
+    meaning = f"of the {plural_noun} {verb}"
+    if not result.of:
+        return KeyNumber(value="-", meaning=meaning, evidence=f"there were no {plural_noun}", fragment="")
+    rate, low, high = (100 * value for value in (result.rate, result.low, result.high))
+    return KeyNumber(
+        value=f"{rate:.0f} %",
+        meaning=meaning,
+        evidence=f"{result.count:,} of {result.of:,}; 95 % interval {low:.0f} to {high:.0f} %",
+        fragment=filtered_list_fragment(filters or {"q": [query]}) if result.count else "",
+        percents=(rate, low, high),
+    )
+
+
+def _time_number(hazards: pd.DataFrame) -> KeyNumber:
+    times = (hazards["t_hazard"] - hazards["t_activation"]).dropna().round(6)
+    meaning = "from fault to hazard (median)"
+    if times.empty:
+        return KeyNumber(value="-", meaning=meaning, evidence="there were no hazards", fragment="")
+    low, high = median_interval(times, hazards.loc[times.index, "fault_id"])
+    interval = (
+        "no interval: too few different faults" if isnan(low) else f"95 % interval {low:.2f} to {high:.2f} s"
+    )
+    return KeyNumber(
+        value=f"{times.median():.2f} s",
+        meaning=meaning,
+        evidence=f"{times.min():.2f} s at the soonest; {interval}",
+        fragment=filtered_list_fragment({"outcome": ["hazard"]}, "time_to_hazard"),
+    )
+
+
+def sample_note(folder: RunFolder) -> str:
+    """Return what the shares are shares of, if the experiments are an even sample; '' otherwise. Such a
+    sample takes each variant equally often, so it has no rate of all experiments of the campaign.
+    """
+    limit = folder.head.choices.limit
+    if (limit is None or folder.head.experiments < limit) and not _has_even_sample(folder):
+        return ""
+    return (
+        "The experiments are an even sample, which takes each variant equally often. The shares are those of "
+        "this mixture, not of all experiments that the campaign describes."
+    )
+
+
+def _has_even_sample(folder: RunFolder) -> bool:
+    try:
+        campaign = load_yaml(folder.path / CAMPAIGN_FILE).data
+    except MutatorError:
+        return False
+    if not isinstance(campaign, dict) or campaign.get("sample") is None:
+        return False
+    return not campaign.get("proportional")

@@ -1,0 +1,63 @@
+"""The first part of a report: the worst experiment in words, with its replay, and four numbers."""
+
+from mutator.report.answer_parts import warning_filter_values
+from mutator.report.first_screen import key_numbers, sample_note, worst_row
+from mutator.report.panel import Panel, rendered
+from mutator.report.reported_run import ReportedRun
+from mutator.results.result_rows import ResultRow
+
+_HTML_TEMPLATE = """\
+<section class="first-screen" aria-label="The worst experiment, and four numbers">
+{% if worst %}
+<div class="worst">
+<p class="kicker">{{ kicker }}</p>
+<h2>{{ worst.sentence or worst.fault }}</h2>
+<p class="under"><span class="ending {{ worst.ending }}">{{ worst.ending | replace("_", " ") }}</span>
+<span class="fault">{{ worst.fault }}</span> in {{ worst.scenario }}, trigger {{ worst.trigger }}.
+<a href="#e={{ worst.experiment_id }}">Open it: diff, plots, metrics</a></p>
+<div id="worst-replay"></div>
+</div>
+{% endif %}
+<div class="key-numbers">
+<ul>
+{% for number in numbers %}
+<li>
+{% if number.fragment %}
+<a href="#{{ number.fragment }}"><b>{{ number.value }}</b> {{ number.meaning }}</a>
+{% else %}
+<p><b>{{ number.value }}</b> {{ number.meaning }}</p>
+{% endif %}
+{% if number.percents %}
+<span class="interval" style="--rate: {{ number.percents[0] }}; --low: {{ number.percents[1] }};
+--high: {{ number.percents[2] }}"></span>
+{% endif %}
+<span class="quiet">{{ number.evidence }}</span>
+</li>
+{% endfor %}
+</ul>
+{% if note %}
+<p class="quiet">{{ note }}</p>
+{% endif %}
+</div>
+</section>
+"""
+
+
+def build_first_screen_panel(run: ReportedRun) -> Panel:
+    worst = worst_row(run)
+    frame = run.frame.assign(warning=warning_filter_values(run.frame))
+    numbers, note = key_numbers(frame, has_alerts=run.folder.has_alerts), sample_note(run.folder)
+    kicker = _kicker(worst) if worst else ""
+    lines = [f"* **{number.value}** {number.meaning} ({number.evidence})" for number in numbers]
+    parts = [_worst_markdown(kicker, worst) if worst else "", "\n".join(lines), note]
+    html = rendered(_HTML_TEMPLATE, worst=worst, kicker=kicker, numbers=numbers, note=note)
+    return Panel(anchor="first", link="Summary", markdown="\n\n".join(filter(None, parts)), html=html)
+
+
+def _kicker(worst: ResultRow) -> str:
+    return "The worst experiment" if worst.hazards else "No hazard occurred. The worst experiment"
+
+
+def _worst_markdown(kicker: str, worst: ResultRow) -> str:
+    place = f"{worst.fault} in {worst.scenario}, trigger {worst.trigger}, `{worst.experiment_id}`"
+    return f"**{kicker}:** {worst.sentence} ({place})" if worst.sentence else f"**{kicker}:** {place}"

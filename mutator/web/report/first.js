@@ -1,0 +1,46 @@
+// @ts-check
+"use strict";
+// The replay of the worst experiment on the first screen. It starts by itself once it is visible, unless the reader wants
+// less motion, and pauses when it is no longer visible.
+
+class FirstScreen {
+  static VISIBLE = 0.6; // share of the replay that must be visible
+
+  constructor(place, table, facts) {
+    this.place = place;
+    this.table = table;
+    this.facts = facts;
+    this.player = null; // null until it is shown, and without channels
+    this.wasStarted = false;
+  }
+
+  /** Show the replay when it is first needed; later calls do nothing. */
+  show() {
+    this.shown ??= this.#fill();
+    return this.shown;
+  }
+
+  async #fill() {
+    const { el } = Dom, { id, trace } = this.facts.worst, row = this.table.find(id);
+    const series = await SeriesFile.load(id, { trace, largest: Experiment.largestDeviations(this.table, row, this.facts) }).catch((error) => error);
+    if (series instanceof Error) this.place.replaceChildren(el("p", { role: "alert" }, series.message));
+    else if (!series) this.place.replaceChildren(el("p.quiet", {}, this.#reason(row)));
+    else this.player = Replay.show(this.place, series, { ...this.facts, title: "Replay of the worst experiment" }, { isBrief: true });
+    if (this.player) new IntersectionObserver(([entry]) => this.#seen(entry.isIntersecting), { threshold: FirstScreen.VISIBLE }).observe(this.place);
+  }
+
+  /** Why there is no replay. */
+  #reason(row) {
+    return Experiment.ENDINGS[this.table.text(row, "status")] ? `${Experiment.ENDINGS[this.table.text(row, "status")]}, so there are no channels.`
+      : this.facts.series.reason_if_missing;
+  }
+
+  #seen(isVisible) {
+    const { clock } = this.player;
+    if (!isVisible) clock.pause();
+    else if (!this.wasStarted && !clock.calm.matches) {
+      this.wasStarted = true;
+      clock.play();
+    }
+  }
+}

@@ -1,0 +1,112 @@
+"""The worst experiment and the four numbers of a report's first screen."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import yaml
+
+from mutator._common.hashing import as_json_types
+from mutator.model import Status
+from mutator.report.first_screen import key_numbers, sample_note, worst_record, worst_row
+from mutator.report.panels.first_screen_panel import build_first_screen_panel
+from mutator.report.reported_run import ReportedRun
+from mutator.store.plan_choices import Choices
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import CAMPAIGN_FILE
+
+from .made_run import make_run
+
+SILENT, LATE, WARNED = "no alert at all", "alert only after the hazard", "alert before the hazard"
+#  outcome, t_activation, t_manifest, t_hazard, warning
+RUNS = [
+    ("hazard", 2.0, 2.1, 3.5, SILENT),
+    ("hazard", 2.0, 2.1, 6.0, LATE),
+    ("hazard", 2.0, 2.1, 4.0, WARNED),
+    ("sdc", 2.0, 2.1, None, ""),
+    ("masked", 2.0, None, None, ""),
+    ("not_activated", None, None, None, ""),
+]
+
+
+@pytest.fixture
+def frame() -> pd.DataFrame:
+    names = ["outcome", "t_activation", "t_manifest", "t_hazard", "warning"]
+    frame = pd.DataFrame(RUNS, columns=names).astype(dict.fromkeys(names[1:4], float))
+    flags = {f"is_{flag}": frame[f"t_{time}"].notna() for flag, time in TIMES.items()}
+    return frame.assign(fault_id=[f"f{i}" for i in frame.index], **flags)
+
+
+TIMES = {"activated": "activation", "manifested": "manifest"}
+
+
+def test_each_number_has_its_counts_its_interval_and_its_list(frame: pd.DataFrame) -> None:
+    """The intervals are Wilson's, computed by hand: of 5 of 6, 3 of 5 and 2 of 3."""
+    acted, dangerous, silent, time = key_numbers(frame, has_alerts=True)
+    assert (acted.value, acted.evidence) == ("83 %", "5 of 6; 95 % interval 44 to 97 %")
+    assert acted.fragment == "q=t_activation%3E%3D0"
+    assert (dangerous.value, dangerous.evidence) == ("60 %", "3 of 5; 95 % interval 23 to 88 %")
+    assert (silent.value, silent.evidence) == ("67 %", "2 of 3; 95 % interval 21 to 94 %")
+    assert silent.fragment == "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
+    assert silent.percents == pytest.approx((66.67, 20.77, 93.85), abs=0.01)
+    assert time.value == "2.00 s"
+    assert time.evidence == "1.50 s at the soonest; 95 % interval 1.50 to 4.00 s"
+    assert (time.percents, time.fragment) == (None, "outcome=hazard&sort=time_to_hazard")
+
+
+def test_a_target_without_alerts_has_no_silent_hazards(frame: pd.DataFrame) -> None:
+    third = key_numbers(frame, has_alerts=False)[2]
+    assert (third.value, third.meaning) == ("80 %", "of the activated faults changed an actuator")
+
+
+def test_a_number_without_a_base_has_no_value_and_no_interval(frame: pd.DataFrame) -> None:
+    numbers = key_numbers(frame[5:], has_alerts=True)
+    assert [number.value for number in numbers] == ["0 %", "-", "-", "-"]
+    assert [number.evidence for number in numbers[1:]] == [
+        "there were no activated faults",
+        "there were no hazards",
+        "there were no hazards",
+    ]
+    assert {number.fragment for number in numbers} == {""}
+
+
+def test_times_of_one_fault_have_no_interval(frame: pd.DataFrame) -> None:
+    time = key_numbers(frame.assign(fault_id="f0"), has_alerts=True)[3]
+    assert time.evidence.endswith("no interval: too few different faults")
+
+
+@pytest.mark.parametrize(
+    ("campaign", "is_even"),
+    [({"sample": 3}, True), ({"sample": 3, "proportional": True}, False), ({}, False), ([], False)],
+)
+def test_an_even_sample_is_said_to_have_no_rate_of_all(
+    tmp_path: Path, campaign: object, is_even: bool
+) -> None:
+    folder = RunFolder.open(make_run(tmp_path, choices=as_json_types(Choices())))
+    (tmp_path / CAMPAIGN_FILE).write_text(yaml.safe_dump(campaign))
+    assert ("even sample" in sample_note(folder)) == is_even
+
+
+def test_a_limit_makes_an_even_sample_unless_it_left_out_nothing(tmp_path: Path) -> None:
+    assert "even sample" in sample_note(RunFolder.open(make_run(tmp_path)))
+    (tmp_path / "other").mkdir()
+    assert not sample_note(RunFolder.open(make_run(tmp_path / "other", experiments=2)))
+
+
+def test_the_worst_usable_experiment_is_the_first(tmp_path: Path) -> None:
+    run = ReportedRun.open(RunFolder.open(make_run(tmp_path)), None)
+    worst = worst_row(run)
+    assert worst is not None and worst.experiment_id == "0" * 16
+    panel = build_first_screen_panel(run)
+    assert "radar/chaff/distance 35.0 m" in panel.html and 'href="#e=0000000000000000"' in panel.html
+    assert panel.markdown.startswith(
+        "**The worst experiment:** radar/chaff/distance 35.0 m in S1, trigger C2"
+    )
+    assert worst_record(run) is None  # this made-up run has no records
+
+
+def test_a_run_without_a_usable_experiment_has_no_worst_one(tmp_path: Path) -> None:
+    run = ReportedRun.open(RunFolder.open(make_run(tmp_path)), None)
+    failed = run.results.assign(status=Status.HARNESS_ERROR.value, outcome="")
+    assert worst_row(replace(run, results=failed)) is None
