@@ -16,8 +16,8 @@ class FirstScreen {
 
   /** Show the replay when it is first needed; later calls do nothing. */
   show() {
-    this.shown ??= this.#fill();
-    return this.shown;
+    this.filling ??= this.#fill();
+    return this.filling;
   }
 
   async #fill() {
@@ -26,7 +26,7 @@ class FirstScreen {
     if (series instanceof Error) this.place.replaceChildren(el("p", { role: "alert" }, series.message));
     else if (!series) this.place.replaceChildren(el("p.quiet", {}, this.#reason(row)));
     else this.player = Replay.show(this.place, series, { ...this.facts, title: "Replay of the worst experiment" }, { isBrief: true });
-    if (this.player) new IntersectionObserver(([entry]) => this.#seen(entry.isIntersecting), { threshold: FirstScreen.VISIBLE }).observe(this.place);
+    if (this.player) new IntersectionObserver(([entry]) => this.#playIfVisible(entry.isIntersecting), { threshold: FirstScreen.VISIBLE }).observe(this.place);
   }
 
   /** Why there is no replay. */
@@ -35,7 +35,7 @@ class FirstScreen {
       : this.facts.series.reason_if_missing;
   }
 
-  #seen(isVisible) {
+  #playIfVisible(isVisible) {
     const { clock } = this.player;
     if (!isVisible) clock.pause();
     else if (!this.wasStarted && !clock.calm.matches) {
