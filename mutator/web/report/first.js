@@ -12,6 +12,7 @@ class FirstScreen {
     this.facts = facts;
     this.player = null; // null until it is shown, and without channels
     this.wasStarted = false;
+    this.filling = null; // promise of the replay, once it was needed
   }
 
   /** Show the replay when it is first needed; later calls do nothing. */
