@@ -12,7 +12,7 @@ orders[3].unshift(...orders[1]); // the server adds its scripts to a report
 function constants(folder) {
   const [first, ...others] = orders.filter((order) => order.some((name) => name.startsWith(`${folder}/`)));
   const names = first.filter((name) => others.every((order) => order.includes(name)))
-    .flatMap((file) => lines(file).flatMap((line) => line.match(/^(?:const|class) (\w+)/)?.[1] ?? []));
+    .flatMap((file) => lines(file).flatMap((line) => line.match(/^(?:const|class|var) (\w+)/)?.[1] ?? []));
   return Object.fromEntries(names.map((name) => [name, "readonly"]));
 }
 
@@ -35,7 +35,7 @@ const rules = {
 
 export default [
   js.configs.recommended,
-  { ignores: ["**/*.js", "!mutator/web/**", "!docs/_static/*"] },
+  { ignores: ["**/*.js", "!mutator/web/**", "!docs/_static/*", "mutator/web/uplot/*"] },
   ...["shared", "replay", ...PAGES].map((folder) => ({
     files: [`${WEB}/${folder}/*.js`],
     languageOptions: { sourceType: "script", globals: { ...globals.browser, ...constants(folder) } },

@@ -1,4 +1,5 @@
-"""Generate the page of licences, as stated by the installed packages that constraints.txt lists.
+"""Generate the page of licences, as stated by the installed packages that constraints.txt lists, and of the
+code of others that the repository contains.
 
 `python -m mutator.reference.licences` writes it. `python -m mutator.reference` does not, since it depends on
 the installed packages.
@@ -27,6 +28,17 @@ as the package states it. Binary wheels can include libraries under other licenc
 `examples`), or only other packages in this table.
 
 """
+_PAGE_END = """
+## Code of others in the package
+
+Pages that `mutator` writes contain [uPlot](https://github.com/leeoniya/uPlot) {version} by Leon Sorokin,
+which draws plots. `mutator/web/uplot` has its minified files as npm's package `uplot` has them, and its
+licence:
+
+> {licence}
+"""
+UPLOT_FOLDER = Path("mutator", "web", "uplot")
+_UPLOT_BANNER_PATTERN = re.compile(r"github\.com/leeoniya/uPlot \(v([\d.]+)\)")
 _TABLE_ROW_PATTERN = re.compile(r"^\| ([\w.-]+) \| [^|]* \| ([^|]+) \|$", re.MULTILINE)
 
 
@@ -44,7 +56,25 @@ def write_licences(clone: Path) -> None:
         for name in packages_in_constraints(clone)
     ]
     table = TextTable(heads=("package", "needed by", "licence"), rows=rows).as_markdown(escape=False)
-    page_path.write_text(f"{_PAGE_HEAD}{table}\n", encoding="utf-8")
+    page_path.write_text(f"{_PAGE_HEAD}{table}\n{_vendored_code(clone)}", encoding="utf-8")
+
+
+def uplot_version(clone: Path) -> str:
+    """Return the version that the vendored file of uPlot states."""
+    text = (clone / UPLOT_FOLDER / "uPlot.iife.min.js").read_text(encoding="utf-8")
+    match = _UPLOT_BANNER_PATTERN.search(text)
+    if match is None:
+        raise MutatorError("no version", where=UPLOT_FOLDER, expected="uPlot's own first line")
+    return match[1]
+
+
+def _vendored_code(clone: Path) -> str:
+    """Return the section on vendored code; empty for a clone without it."""
+    if not (clone / UPLOT_FOLDER).is_dir():
+        return ""
+    licence = (clone / UPLOT_FOLDER / "LICENSE").read_text(encoding="utf-8").strip()
+    quoted = "\n".join(f"> {line}".rstrip() for line in licence.splitlines())
+    return _PAGE_END.format(version=uplot_version(clone), licence=quoted.removeprefix("> "))
 
 
 def licence_by_package_in(page: str) -> dict[str, str]:

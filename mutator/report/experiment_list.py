@@ -39,6 +39,7 @@ from mutator.results.outcome_counting import (
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.review.patch_shapes import PatchShape, shapes_of_patches
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
+from mutator.statistics.sheet_selection import DEFAULT_DRIVER_REACTION_S
 from mutator.store.embedded_series import EMBEDDED_SERIES_ELEMENT, embed_worst
 from mutator.store.run_folder import RunFolder
 from mutator.store.time_series_folder import TimeSeriesFolder
@@ -94,6 +95,7 @@ def build_list_data(run: ReportedRun) -> ExperimentListData:
         "severity": as_json_types(folder.head.severity),
         "hazards": as_json_types(folder.head.about_hazards),
         "meanings": code_meanings_by_column(run),
+        "reaction_s": DEFAULT_DRIVER_REACTION_S,
     }
     worst_facts, worst_scripts = first_replay_data(run)
     scripts = {name: Markup(packed_script_element(value, name)) for name, value in data.items()}

@@ -73,6 +73,14 @@ def spread_of_times(times: pd.Series) -> TimeSpread:
     )
 
 
+def share_of_hazards_within(frame: pd.DataFrame, time_s: float) -> Share:
+    """Return the share, among the runs with a hazard after the activation, of those whose first hazard came
+    no later than `time_s` after it.
+    """
+    times = frame["time_to_hazard"].dropna()
+    return share(int((times.round(6) <= time_s).sum()), len(times))
+
+
 def propagation_spreads_by_step(frame: pd.DataFrame) -> dict[str, TimeSpread]:
     """Return the times from activation to the first actuator difference, alert and hazard, and from the first
     alert to the first hazard if the alert came first.

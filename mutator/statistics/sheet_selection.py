@@ -12,7 +12,7 @@ from mutator.statistics.results_frame import select_common_columns
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.statistics.tallies import tally_by_fault_type, tally_by_scenario
 
-_DEFAULT_DRIVER_REACTION_S = (
+DEFAULT_DRIVER_REACTION_S = (
     1.8  # a driver's reaction time to a visible warning; used if no publication states one
 )
 
@@ -49,7 +49,7 @@ def run_sheets(
         ]
     sheets.append(event_time_tables.propagation_sheet(frame, published, has_alerts=has_alerts))
     if end_by_scenario is not None and has_alerts:
-        driver_s = published.driver_reaction_s if published else _DEFAULT_DRIVER_REACTION_S
+        driver_s = published.driver_reaction_s if published else DEFAULT_DRIVER_REACTION_S
         sheets.append(event_time_tables.alert_to_hazard_sheet(frame, end_by_scenario, driver_s))
     if first_alerts_by_hazard_run is not None and first_alerts_by_hazard_run.keys() >= set(
         frame.loc[frame["is_hazard"], "experiment_id"]

@@ -16,12 +16,14 @@ from mutator.report.panels import (
     seeds_panel,
     source_panel,
     tables_panel,
+    values_panel,
 )
 from mutator.report.reported_run import ReportedRun
 
 PanelBuilder = Callable[[ReportedRun], Panel | None]
 
 PANELS: tuple[PanelBuilder, ...] = (
+    values_panel.build_values_panel,
     mutation_score_panel.build_mutation_score_panel,
     source_panel.build_source_panel,
     fault_paths_panel.build_fault_paths_panel,

@@ -26,7 +26,8 @@ const Report = (() => {
     const actions = { move: (by) => grid.move(by), close: () => view.close(), place: () => grid.placeOf(state.experiment) };
     const experiment = new Experiment(find("experiment"), table, state, { ...facts, run: facts.series.alone ? () => "DIR" : runFolder }, actions);
     const first = facts.worst && new FirstScreen(find("worst-replay"), table, facts);
-    const view = viewOf({ table, state, search, heat, filters, grid, columns, experiment, first });
+    const values = new ValuePanel(find("value-plots"), table, state, facts);
+    const view = viewOf({ table, state, search, heat, filters, grid, columns, experiment, first, values });
     searching(search, state);
     keyboard({ grid, experiment, search, close: view.close });
     links(grid, () => state.experiment && view.close());
@@ -62,9 +63,10 @@ const Report = (() => {
   }
 
   /** Make the function that shows the state in all components. */
-  function viewOf({ table, state, search, heat, filters, grid, columns, experiment, first }) {
+  function viewOf({ table, state, search, heat, filters, grid, columns, experiment, first, values }) {
     let drawn = null;
     let scrolled = 0; // scroll position before an experiment was opened
+    let opener = null; // the plot from which it was opened
 
     /** Show the state. Rows are searched and sorted again only if their inputs changed. */
     function update() {
@@ -79,13 +81,17 @@ const Report = (() => {
         find("found").textContent = foundText(table, state, rows.length);
         if (search.value !== state.query) search.value = state.query;
       } else grid.show(grid.rows);
+      values.show();
       arrange();
     }
 
     /** Show the open experiment next to the list, or on the full page on a narrow screen. */
     function arrange() {
       const isOpen = Boolean(state.experiment), wasOpen = experiment.isOpen;
-      if (isOpen && !wasOpen) scrolled = scrollY;
+      if (isOpen && !wasOpen) {
+        scrolled = scrollY;
+        opener = document.activeElement?.closest("#value-plots") ? document.activeElement : null;
+      }
       document.body.classList.toggle("has-experiment", isOpen);
       for (const beneath of document.querySelectorAll("main, .bar")) beneath.inert = isOpen && !matchMedia(WIDE).matches;
       experiment.show();
@@ -96,6 +102,7 @@ const Report = (() => {
 
     function close() {
       state.set({ experiment: "" });
+      if (opener) return opener.focus({ preventScroll: true });
       grid.reveal();
       grid.focus();
     }

@@ -1,7 +1,7 @@
 // @ts-check
 "use strict";
 // The view's state, kept in the address after #, so that it can be shared and Back works:
-// #e=EXPERIMENT&q=words&kind=sensor%2Fshifted&scenario=S1,S2&sort=-t_hazard&heat=silent&cols=kind,delta_v
+// #e=EXPERIMENT&q=words&kind=sensor%2Fshifted&scenario=S1,S2&sort=-t_hazard&heat=silent&cols=kind,delta_v&plot=sensor%2Fbias [m]&y=delta_v
 
 class State {
   /** `changed(state)` is called after every change. */
@@ -39,11 +39,13 @@ class State {
     this.sort = firstValue("sort", "");
     this.heat = firstValue("heat", "");
     this.columns = (valuesByName.get("cols") || []).filter(Boolean); // columns of the list; empty: the defaults
+    this.plot = { fault: firstValue("plot", ""), y: firstValue("y", ""), reaction: firstValue("react", "") }; // of "Value and margin"
+    this.beside = firstValue("with", ""); // the experiment with which the open one is compared
     this.chosen = new Map();
     for (const { name, none } of Rows.FACETS) {
       if (valuesByName.has(name)) this.chosen.set(name, new Set(valuesByName.get(name).map((value) => (value === "none" && none) || value)));
     }
-    const names = ["e", "q", "sort", "heat", "cols", ...Rows.FACETS.map(({ name }) => name)];
+    const names = ["e", "with", "q", "sort", "heat", "cols", "plot", "y", "react", ...Rows.FACETS.map(({ name }) => name)];
     this.unknown = [...valuesByName.keys()].filter((name) => name && !names.includes(name)); // filters that this page does not have
   }
 
@@ -52,6 +54,7 @@ class State {
     const parts = [];
     const add = (name, values) => parts.push(`${name}=${values.map(encodeURIComponent).join(",")}`);
     if (experiment) add("e", [experiment]);
+    if (this.beside && experiment === this.experiment) add("with", [this.beside]);
     if (this.query) add("q", [this.query]);
     for (const { name } of Rows.FACETS) {
       const values = this.chosen.get(name);
@@ -60,11 +63,14 @@ class State {
     if (this.sort) add("sort", [this.sort]);
     if (this.heat) add("heat", [this.heat]);
     if (this.columns.length) add("cols", this.columns);
+    for (const [name, value] of [["plot", this.plot.fault], ["y", this.plot.y], ["react", this.plot.reaction]]) if (value) add(name, [value]);
     return parts.join("&");
   }
 
-  /** Change the state (`{query, sort, heat, columns, experiment}`); `replace`: Back does not stop at this step. */
+  /** Change the state (`{query, sort, heat, columns, plot, experiment, beside}`); `replace`: Back does not stop at this step.
+   *  Another experiment is not yet compared with any. */
   set(change, { replace = false } = {}) {
+    if (change.experiment !== undefined && change.experiment !== this.experiment) this.beside = "";
     Object.assign(this, change);
     this.#write(replace);
   }

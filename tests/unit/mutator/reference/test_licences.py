@@ -1,5 +1,6 @@
 """The page of licences lists every dependency with the licence that its package states."""
 
+import hashlib
 import sys
 from email.message import Message
 from pathlib import Path
@@ -9,9 +10,11 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.reference.licences import (
     PAGE_PATH,
+    UPLOT_FOLDER,
     licence_by_package_in,
     packages_in_constraints,
     stated_licence,
+    uplot_version,
     write_licences,
 )
 
@@ -58,3 +61,23 @@ def test_a_package_that_is_not_installed_keeps_its_licence(tmp_path: Path) -> No
     assert "| pytest | mutator | MIT |" in page.read_text()
     with pytest.raises(MutatorError, match="no known licence for another; install another"):
         write_licences(clone(tmp_path, "another"))
+
+
+def test_the_page_has_the_licence_and_version_of_vendored_code() -> None:
+    page = (CLONE / PAGE_PATH).read_text(encoding="utf-8")
+    assert uplot_version(CLONE) == "1.6.32"
+    assert "uPlot](https://github.com/leeoniya/uPlot) 1.6.32 by Leon Sorokin" in page
+    licence = (CLONE / UPLOT_FOLDER / "LICENSE").read_text(encoding="utf-8")
+    assert all(f"> {line}".rstrip() in page for line in licence.splitlines())
+
+
+def test_vendored_code_is_as_its_authors_published_it() -> None:
+    """The digests are those of the files of npm's package uplot 1.6.32."""
+    digests = {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in (CLONE / UPLOT_FOLDER).iterdir()
+    }
+    assert digests == {
+        "LICENSE": "8f989229699b4fe2f1a0432d0e9edc338a8a911e250e2d1b01ecd770a5f5b1bd",
+        "uPlot.iife.min.js": "19c8d4c6ad88929a79f4ae49d6f7161566dfd0ba3d15cc495e974f787eb78f1f",
+        "uPlot.min.css": "df630c6a8d6f8eeaff264b50f73ce5b114f646ffd9a0bb74f049b0a00135fa04",
+    }

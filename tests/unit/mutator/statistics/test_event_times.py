@@ -39,6 +39,12 @@ def test_times_are_measured_from_the_activation() -> None:
     assert (found["alert to hazard"].n, found["alert to hazard"].mean) == (1, 2.0)
 
 
+def test_a_hazard_exactly_at_a_time_has_come_by_then() -> None:
+    frame = results(*({"time_to_hazard": time} for time in (0.3, 1.8, 1.8000001, 4.0, nan)))
+    shares = [event_times.share_of_hazards_within(frame, time) for time in (0.0, 0.3, 1.8, 9.0)]
+    assert [(share.count, share.of) for share in shares] == [(0, 4), (1, 4), (3, 4), (4, 4)]
+
+
 def test_a_reaction_time_needs_an_earlier_alert() -> None:
     frame = results(run(9.0, 9.0), run(9.5, 9.0), run(nan, 9.0))
     assert event_times.propagation_spreads_by_step(frame)["alert to hazard"].n == 0

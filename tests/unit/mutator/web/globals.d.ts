@@ -22,4 +22,6 @@ interface HTMLElementEventMap {
   filled: CustomEvent; // an experiment is shown
 }
 
+declare const uPlot: any; // mutator/web/uplot
+
 declare const DOCUMENTATION_OPTIONS: { SHOW_SEARCH_SUMMARY: boolean }; // of Sphinx
