@@ -100,6 +100,19 @@ def test_the_page_leads_from_the_verdict_to_both_replays(
         assert serious_faults(page) == []
 
 
+def test_both_plots_have_the_line_of_the_other_run_over_them(
+    found: Comparison, opened: Open, tmp_path: Path
+) -> None:
+    page = opened(comparison_files.write_comparison(found, tmp_path / "out").page)
+    legends = page.locator(".plots .legend")
+    assert legends.count() == 2
+    assert legends.first.inner_text().endswith("after")
+    assert found.names.a in legends.last.inner_text()
+    plotted = page.locator(".plot-of .value.beside")
+    assert plotted.count() >= 2
+    assert all(text.strip() for text in plotted.all_inner_texts())
+
+
 def test_the_page_links_to_the_reports_that_exist(found: Comparison, opened: Open, tmp_path: Path) -> None:
     """Names of runs can be hostile: they are neither markup nor a scheme of the address."""
     page = opened(comparison_files.write_comparison(found, tmp_path / "out").page)

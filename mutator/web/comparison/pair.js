@@ -44,7 +44,9 @@
       if (side.series instanceof Error) side.place.replaceChildren(el("p", { role: "alert" }, side.series.message));
       else if (!side.series) side.place.replaceChildren(el("p.quiet", {}, reason(side, i)));
     });
-    Replay.showTogether(drawn.filter(({ series }) => series && !(series instanceof Error)));
+    const replayed = drawn.filter(({ series }) => series && !(series instanceof Error));
+    if (replayed.length === 2) replayed.forEach((side, i) => { side.beside = { name: replayed[1 - i].facts.title, series: replayed[1 - i].series }; });
+    Replay.showTogether(replayed);
     panel.dataset.ready = String(now);
   }
 

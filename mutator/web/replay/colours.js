@@ -15,7 +15,7 @@ const ReplayColours = (() => {
   function read() {
     const style = getComputedStyle(document.documentElement), of = (name) => style.getPropertyValue(`--${name}`).trim();
     const names = ["golden", "faulty", "hazard", "ink", "quiet", "line", "raised", "road", "verge", "post", "paint", "other", "glass", "edge", "halo", "burst",
-      "active", "after", "late", "between", "belief"];
+      "active", "after", "late", "between", "belief", "beside"];
     const colours = Object.fromEntries(names.map((name) => [name, of(`replay-${name}`) || of(name)]));
     return Object.assign(colours, { ground: of("raised"), alert: of("sdc"), manifest: of("masked"), activation: of("ink"), goldenText: of("accent") });
   }

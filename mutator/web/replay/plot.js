@@ -1,28 +1,33 @@
 // @ts-check
 "use strict";
-// Plots a channel over time: golden as a broad line, faulty as a narrow line above it, grey after the drive.
+// Plots a channel over time: golden as a broad line, faulty as a narrow line above it, grey after the drive. The faulty line of
+// another experiment can lie above them, dashed.
 
 class ReplayPlot {
   static HEIGHT = 84; // px
   static LEFT = 58; // px for the labels of the axis
   static RIGHT = 8;
 
-  constructor(channel, axis, series) {
+  /** `beside` is another experiment over the same time: {name, series}, or null. */
+  constructor(channel, axis, series, beside) {
     const { el } = Dom, unit = ReplayData.unit(channel);
     this.channel = channel;
     this.axis = axis;
     this.series = series;
+    this.beside = beside;
+    this.other = beside?.series.channels.find(({ name }) => name === channel.name) ?? null; // its channel
     this.end = ReplayData.until(series);
     this.places = ReplayData.digits(axis);
     this.largest = ReplayData.largest(channel, this.end);
     this.golden = el("span.value.golden");
     this.faulty = el("span.value.faulty");
     this.by = el("span.value.by");
+    this.ofOther = this.other ? el("span.value.beside", { title: beside.name }) : null;
     this.canvas = el("canvas", { role: "img", "aria-label": this.#inWords() });
     this.cursor = el("span.cursor");
     this.room = el("div.room", {}, this.canvas, this.cursor);
     this.element = el("div.plot-of", { "data-channel": channel.name }, el("div.head", {},
-      el("span.name", { title: channel.about || null }, channel.name, unit ? ` [${unit}]` : ""), this.golden, this.faulty, this.by), this.room, this.#note());
+      el("span.name", { title: channel.about || null }, channel.name, unit ? ` [${unit}]` : ""), this.golden, this.faulty, this.by, this.ofOther), this.room, this.#note());
   }
 
   #text = (value) => ReplayData.text(value, this.places);
@@ -30,7 +35,7 @@ class ReplayPlot {
   #inWords() {
     const { by, t } = this.largest;
     const most = by ? `largest difference ${this.#text(by)} at ${t.toFixed(2)} s` : "no difference";
-    return `${this.channel.name} from golden to faulty: ${most}, up to ${this.end.toFixed(2)} s`;
+    return `${this.channel.name} from golden to faulty: ${most}, up to ${this.end.toFixed(2)} s${this.other ? `; dashed: ${this.beside.name}` : ""}`;
   }
 
   #note() {
@@ -64,6 +69,7 @@ class ReplayPlot {
     this.#happened(context, x, width, colours);
     this.#between(context, x, y, view, colours.between);
     this.#lines(context, x, y, view, colours);
+    if (this.other) this.#besideLine(context, x, y, view, colours.beside);
     context.restore();
   }
 
@@ -102,7 +108,7 @@ class ReplayPlot {
   }
 
   /** The time until which a value holds: that of the next value, or the end. */
-  #holds = (i) => this.channel.t[i + 1] ?? this.series.end;
+  #holds = (i, channel = this.channel, end = this.series.end) => channel.t[i + 1] ?? end;
 
   /** The area between both runs during the drive, from activation. */
   #between(context, x, y, view, colour) {
@@ -123,21 +129,38 @@ class ReplayPlot {
       Object.assign(context, { lineWidth: width, globalAlpha: alpha });
       for (const [begin, end, colour] of [[Math.max(from, this.end), to, colours.late], [from, Math.min(to, this.end), colours[run]]]) {
         context.strokeStyle = colour;
-        this.#line(context, x, y, this.channel[run], begin, end);
+        this.#line(context, x, y, this.channel, run, begin, end);
       }
     }
     context.globalAlpha = 1;
   }
 
-  /** Draw a line between two times. Each value holds until the next. */
-  #line(context, x, y, values, from, to) {
-    const { t } = this.channel;
+  /** The other experiment's line up to the end of its drive, with its hazards. */
+  #besideLine(context, x, y, { from, to }, colour) {
+    const { series } = this.beside, end = ReplayData.until(series);
+    Object.assign(context, { strokeStyle: colour, lineWidth: 1.8 });
+    context.setLineDash([7, 4]);
+    this.#line(context, x, y, this.other, "faulty", Math.max(from, series.start), Math.min(to, end), series.end);
+    context.setLineDash([1, 3]);
+    for (const [kind, t] of series.marks) {
+      if (kind !== "hazard") continue;
+      context.beginPath();
+      context.moveTo(x(t), 0);
+      context.lineTo(x(t), ReplayPlot.HEIGHT);
+      context.stroke();
+    }
+    context.setLineDash([]);
+  }
+
+  /** Draw a line of a channel between two times. Each value holds until the next. */
+  #line(context, x, y, channel, run, from, to, last = this.series.end) {
+    const { t } = channel, values = channel[run];
     let isDown = false;
     context.beginPath();
     for (let i = ReplayData.index(t, from); i < t.length && t[i] < to; i++) {
       const isThere = Number.isFinite(values[i]), height = y(Math.max(-1e9, Math.min(1e9, values[i])));
       if (isThere) context[isDown ? "lineTo" : "moveTo"](x(Math.max(t[i], from)), height);
-      if (isThere) context.lineTo(x(Math.min(this.#holds(i), to)), height);
+      if (isThere) context.lineTo(x(Math.min(this.#holds(i, channel, last), to)), height);
       isDown = isThere;
     }
     context.stroke();
@@ -159,5 +182,6 @@ class ReplayPlot {
     this.golden.textContent = this.#text(golden);
     this.faulty.textContent = this.#text(faulty);
     this.by.textContent = ReplayData.same(golden, faulty) ? "" : this.#difference(by);
+    if (this.ofOther) this.ofOther.textContent = this.#text(ReplayData.valueAt(this.other, "faulty", t));
   }
 }

@@ -8,15 +8,17 @@ class ReplayPlots {
   static SMALLEST_VISIBLE = 0.002; // the smallest visible difference, as a share of the axis
   static FACTOR = 1.6; // ratio of a zoom step
 
-  constructor(channels, axes, series, clock, zoomed) {
+  /** `beside` is another experiment over the same time: {name, series}, or null. */
+  constructor(channels, axes, series, clock, zoomed, beside = null) {
     const { el } = Dom;
     this.series = series;
+    this.beside = beside;
     this.clock = clock;
     this.zoomed = zoomed;
     this.hovered = null;
     this.written = -Infinity;
     this.colours = null;
-    this.plots = channels.map((channel, i) => new ReplayPlot(channel, axes[i], series));
+    this.plots = channels.map((channel, i) => new ReplayPlot(channel, axes[i], series, beside));
     this.view = { from: series.start, to: series.end };
     this.axis = el("canvas.axis", { "aria-hidden": "true" });
     this.list = el("div.list", { onpointerdown: (event) => this.#press(event), onpointermove: (event) => this.#hover(event),
@@ -42,7 +44,8 @@ class ReplayPlots {
     const button = (text, name, todo) => el("button", { type: "button", title: name, "aria-label": name, onclick: todo }, text);
     return el("div.tools", {},
       el("p.legend", {}, el("span.key.golden"), "golden", el("span.key.faulty"), "faulty", this.series.active ? [el("span.key.active"), "fault active"] : null,
-        this.series.tEnd === null ? null : [el("span.key.after"), "after the end of the drive"]),
+        this.series.tEnd === null ? null : [el("span.key.after"), "after the end of the drive"],
+        this.beside ? [el("span.key.beside"), this.beside.name] : null),
       this.timeLabel,
       el("div.buttons", { role: "group", "aria-label": "Time range shown" },
         button("−", "Zoom out (−)", () => this.zoom(-1)), button("+", "Zoom in (+)", () => this.zoom(1)),

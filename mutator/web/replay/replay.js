@@ -18,9 +18,10 @@ const Replay = (() => {
   class Player {
     /** `clock`, `axes` by channel and `toggle(name)` of a channel's plot are those of all players that are shown together.
      *  `isBrief`: the scene without instruments and plots; without a scene, two plots. */
-    constructor({ place, series, facts, isBrief = false }, { clock, axes, toggle }) {
+    constructor({ place, series, facts, isBrief = false, beside = null }, { clock, axes, toggle }) {
       this.place = place;
       this.isBrief = isBrief;
+      this.beside = beside;
       this.series = series;
       this.facts = facts;
       this.channels = [...series.channels].sort((a, b) => Number(b.role === "actuator") - Number(a.role === "actuator"));
@@ -49,7 +50,7 @@ const Replay = (() => {
       this.bar = new ReplayBar(series, clock, (t) => this.describe(t));
       const plotting = { isPlotted: (name) => this.plots.isPlotted(name), toggle: this.toggle };
       this.gauges = new ReplayGauges(this.channels, this.axes, plotting);
-      this.plots = new ReplayPlots(this.channels, this.axes, series, clock, (from, to) => this.bar.zoomed(from, to));
+      this.plots = new ReplayPlots(this.channels, this.axes, series, clock, (from, to) => this.bar.zoomed(from, to), this.beside);
       this.gauges.pressed();
       this.time = el("span.now");
       this.states = el("span.states");
@@ -120,9 +121,15 @@ const Replay = (() => {
       const differ = this.channels.filter((c) => !ReplayData.same(ReplayData.valueAt(c, "faulty", t), ReplayData.valueAt(c, "golden", t)));
       for (const channel of (differ.length ? differ : this.channels).slice(0, SPOKEN)) {
         const places = ReplayData.digits(this.axes[this.channels.indexOf(channel)]), of = (run) => ReplayData.text(ReplayData.valueAt(channel, run, t), places);
-        words.push([channel.name, of("faulty"), ReplayData.unit(channel), differ.length ? `(golden ${of("golden")})` : ""].filter(Boolean).join(" "));
+        words.push([channel.name, of("faulty"), ReplayData.unit(channel), differ.length ? `(golden ${of("golden")})` : "", this.#besideAt(channel.name, t, places)].filter(Boolean).join(" "));
       }
       return `${words.join(", ")}${differ.length ? "" : ", same as golden"}`;
+    }
+
+    /** A channel's value in the other experiment, as text; empty without one. */
+    #besideAt(name, t, places) {
+      const channel = this.beside?.series.channels.find((of) => of.name === name);
+      return channel ? `(${this.beside.name} ${ReplayData.text(ReplayData.valueAt(channel, "faulty", t), places)})` : "";
     }
 
     /** [kind, text] of each state at a time: fault active, manifested, earlier alerts and hazards, the end. */
@@ -223,8 +230,9 @@ const Replay = (() => {
   let current = []; // the players on the page
   for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", () => current.forEach((player) => player.draw()));
 
-  /** Fill the places of `sides`, each {place, series, facts, isBrief}, with replays that share clock, axes and choice of plots. Returns
-   *  their players, without those of series that have no channels. */
+  /** Fill the places of `sides`, each {place, series, facts, isBrief, beside}, with replays that share clock, axes and choice of
+   *  plots. Plots also have the faulty line of the experiment `beside`, {name, series}. Returns the players, without those of
+   *  series that have no channels. */
   function showTogether(sides) {
     current.forEach(({ clock }) => clock.pause());
     current = current.filter(({ place, root }) => root.isConnected && !sides.some((side) => side.place === place));
@@ -235,7 +243,7 @@ const Replay = (() => {
       player.plots.toggle(name);
       player.gauges.pressed();
     });
-    const shared = { clock: clockOf(all, () => players.forEach((player) => player.draw())), axes: axesOf(all), toggle };
+    const shared = { clock: clockOf(all, () => players.forEach((player) => player.draw())), axes: axesOf([...all, ...drawable.flatMap(({ beside }) => beside?.series ?? [])]), toggle };
     for (const side of drawable) players.push(new Player(side, shared));
     if (players.length > 1) align(players);
     current.push(...players);
@@ -253,9 +261,9 @@ const Replay = (() => {
     }
   }
 
-  /** Fill `place` with the replay of a series (SeriesFile.load); `facts` has scene and hazards. Returns the player, or null
-   *  if the series has no channels. */
-  const show = (place, series, facts, { isBrief = false } = {}) => showTogether([{ place, series, facts, isBrief }])[0] ?? null;
+  /** Fill `place` with the replay of a series (SeriesFile.load); `facts` has scene and hazards, and `beside` is an experiment
+   *  whose faulty line the plots have, too: {name, series}. Returns the player, or null if the series has no channels. */
+  const show = (place, series, facts, { isBrief = false, beside = null } = {}) => showTogether([{ place, series, facts, isBrief, beside }])[0] ?? null;
 
   return { show, showTogether, rate: 0 };
 })();

@@ -164,7 +164,7 @@ class Experiment {
     this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "The plan of this run folder does not contain this experiment."));
     this.#pictures(id, [media?.[id]].find((pictures) => pictures?.stills.length || pictures?.films.length));
     const place = this.#content("replay");
-    if (series && !(series instanceof Error)) Replay.show(place, series, this.facts);
+    if (series && !(series instanceof Error)) new ReplayBeside(place, { table: this.table, row, state: this.state, facts: this.facts }, series).show();
     else this.#noSeries(id, expected, series);
   }
 
