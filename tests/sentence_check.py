@@ -57,7 +57,7 @@ def _wrong_claims(sentence: str, drive: Drive) -> Iterator[str]:
             yield "the traces differ, but nothing was active"
         return
     first_time = re.search(rf" from {_NUMBER} s", sentence)
-    if not first_time or not _is_near(float(first_time[1]), start):
+    if not first_time or not _is_time(float(first_time[1]), start):
         yield f"active from {start}"
     if not _holds(drive, start):
         yield f"the condition {drive.condition} does not hold at {start}"
@@ -93,7 +93,7 @@ def _wrong_hazards(sentence: str, drive: Drive, start: float) -> Iterator[str]:
     before = start
     for name, time in times.items():
         match = said[name]
-        if match and not _is_near(float(match[1] or 0.0), time - before):
+        if match and not _is_time(float(match[1] or 0.0), time - before):
             yield f"{name} {time - before} later"
         before = time
     end = times.get("touches", math.inf)
@@ -143,7 +143,7 @@ def _wrong_alert(sentence: str, drive: Drive, start: float) -> Iterator[str]:
         yield f"alert {name}"
         return
     expected = time if hazard is None else abs(hazard - time)
-    if match[2] is not None and not _is_near(float(match[2]), expected):
+    if match[2] is not None and not _is_time(float(match[2]), expected):
         yield f"alert {expected} s"
     if hazard is not None and abs(hazard - time) > _SLACK and ("before" in match[3]) != (time < hazard):
         yield "alert before or after the hazard"
@@ -189,6 +189,11 @@ def _compare(pattern: str, sentence: str, expected: float) -> Iterator[str]:
     match = re.search(pattern, sentence)
     if not match or not _is_near(float(match[1]), expected):
         yield f"{pattern}: {match[1] if match else 'nothing'}, not {expected}"
+
+
+def _is_time(said: float, seconds: float) -> bool:
+    """Whether a spoken time is the time of the step, which is 10 ms long."""
+    return abs(said - seconds) <= _SLACK
 
 
 def _is_near(said: float, number: float) -> bool:

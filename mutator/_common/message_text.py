@@ -3,13 +3,29 @@
 import difflib
 import re
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
+
+SHORT_ID_LENGTH = 8  # characters of an id for people, or as many as make it unique
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
     """Return a count with its noun: 1 run, 2 runs. Give irregular plurals."""
     return f"{count} {noun}" if count == 1 else f"{count} {plural or noun + 's'}"
+
+
+def shortened_ids(ids: Iterable[str]) -> list[str]:
+    """Return ids with eight characters, or as many as make them different."""
+    names = list(ids)
+    length = short_id_length(names)
+    return [name[:length] for name in names]
+
+
+def short_id_length(ids: Collection[str]) -> int | None:
+    """Return how many characters tell ids apart, at least eight; None: all of them are needed."""
+    names = set(ids)
+    lengths = range(SHORT_ID_LENGTH, max(map(len, names), default=0))
+    return next((n for n in lengths if len({name[:n] for name in names}) == len(names)), None)
 
 
 def describe_choices(names: Iterable[str]) -> str:

@@ -9,6 +9,7 @@ CHANGED_HOLE, FUNCTION_HOLE, FILE_HOLE = "changed", "function", "file"  # in phr
 
 _HOLE_PATTERN = re.compile(r"\{([^{}]*)\}")
 _WHOLE_FROM = 100.0  # from here on, measured numbers have no decimals
+_LEAST_WITH_HUNDREDTHS_S = 0.1
 _ROUNDING = 1e-9  # measured numbers below this are 0
 _LARGEST_EXACT = 1e15
 
@@ -30,7 +31,7 @@ def fill_phrase(texts: Sequence[str], values: Mapping[str, str]) -> str:
 
 
 def measured_number(number: float, unit: str = "") -> str:
-    """Return a measured number as one says it: `124 s`, `24.6 s`, `0.46 s`."""
+    """Return a measured number as one says it: `124 m`, `24.6 m/s`, `0.46 m`."""
     size = abs(number)
     if size >= _WHOLE_FROM:
         text = f"{number:.0f}"
@@ -39,6 +40,11 @@ def measured_number(number: float, unit: str = "") -> str:
     else:
         text = f"{number if size >= _ROUNDING else 0.0:.2g}"
     return with_unit(text, unit)
+
+
+def measured_time(seconds: float) -> str:
+    """Return a time in a drive as tables show it: `24.60 s`; a shorter one than 0.1 s with two digits."""
+    return f"{seconds:.2f} s" if abs(seconds) >= _LEAST_WITH_HUNDREDTHS_S else f"{seconds:.2g} s"
 
 
 def planned_number(number: float, unit: str = "") -> str:

@@ -2,6 +2,7 @@
 
 VERSION = "0.2.0"
 DISTRIBUTION = "mutator-fi"  # on the package index, `mutator` is another project
+EARLIER_DISTRIBUTION = "mutator"  # what `pip` called the harness before; today, only another project
 
 
 def extra_install_command(extra: str) -> str:

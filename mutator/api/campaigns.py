@@ -7,11 +7,10 @@ from mutator._common.argument_checks import check_type, check_whole_number
 from mutator.api.runs import Run
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.engines.engine_choice import check_engine_is_offered
-from mutator.errors import CheckFailed, IncompleteRun
+from mutator.errors import IncompleteRun
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.distributor_choice import choose_distributor
 from mutator.execution.session import ProgressCallback, Summary
-from mutator.report.golden_run_page import with_golden_run_pages
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 
@@ -54,21 +53,18 @@ def run(
     if choices is not None:
         check_type("choices", choices, Choices, "mutator.Choices")
     opened_workspace, folder = open_workspace(workspace), Path(out)
-    try:
-        summary = run_campaign(
-            opened_workspace,
-            campaign,
-            folder,
-            workers=workers,
-            choices=choices,
-            engine=engine,
-            reviewed=reviewed,
-            accept_versions=accept_versions,
-            distributor=choose_distributor(cluster, insecure=insecure_network),
-            notify=progress,
-        )
-    except CheckFailed as error:
-        raise with_golden_run_pages(error, folder, opened_workspace) from None
+    summary = run_campaign(
+        opened_workspace,
+        campaign,
+        folder,
+        workers=workers,
+        choices=choices,
+        engine=engine,
+        reviewed=reviewed,
+        accept_versions=accept_versions,
+        distributor=choose_distributor(cluster, insecure=insecure_network),
+        notify=progress,
+    )
     if summary.exit_code:
         warnings.warn(_describe_unfinished(summary), IncompleteRun, stacklevel=2)
     return Run(RunFolder.open(folder), opened_workspace, summary)

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from mutator.campaigns.row_filters import compile_filter
-from mutator.results.experiment_sentence import ExperimentSentences
+from mutator.campaigns.row_filters import matching_items
+from mutator.results.experiment_sentence import ExperimentSentences, Row
 from mutator.results.result_rows import ResultRow, cells_by_row, rows_of
 from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_ranks, worst_of_each_cause
@@ -25,18 +25,20 @@ def worst_results(
         worst_first_ranks(frame).argsort().tolist()
     )  # sort all rows first, because filtering keeps the order
     if only is not None:
-        accepts = compile_filter(only, list(frame.columns))
         batches = range(0, len(frame), _ROWS_PER_BATCH)
         rows = (row for first in batches for row in cells_by_row(frame.iloc[first : first + _ROWS_PER_BATCH]))
-        is_match = [
-            # filters know None; an empty cell is a text
-            accepts({name: None if cell == "" else cell for name, cell in row.items()})
-            for row in rows
-        ]
-        row_indices = [row for row in row_indices if is_match[row]]
+        matches = matching_items(enumerate(rows), only, list(frame.columns), _filter_row)
+        matching_indices = {index for index, _ in matches}
+        row_indices = [index for index in row_indices if index in matching_indices]
     sentences = ExperimentSentences.of_run(load_head(run))
     worst = rows_of(frame.iloc[row_indices[:limit]], plan_file.load_faults(run), sentences)
     return worst, len(row_indices)
+
+
+def _filter_row(numbered_row: tuple[int, Row]) -> Row:
+    """Return the row as filters know it: with None for an empty cell, which is a text."""
+    _, row = numbered_row
+    return {name: None if cell == "" else cell for name, cell in row.items()}
 
 
 def worst_causes(run: Path, limit: int | None = None) -> tuple[list[tuple[ResultRow, int]], int]:

@@ -9,7 +9,7 @@ from mutator._common.files import make_folder, write_atomic
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.campaigns.git_clone import find_user_name
 from mutator.campaigns.plan import build_plan
-from mutator.campaigns.row_filters import compile_filter
+from mutator.campaigns.row_filters import matching_items
 from mutator.errors import MutatorError
 from mutator.review import mutant_groups
 from mutator.review.approval_gate import describe_experiment_count, unapproved_reason
@@ -60,8 +60,15 @@ class ReviewedGroups:
         groups = self.groups
         for text, keeps_matches in ((only, True), (exclude, False)):
             if text is not None:
-                accepts = compile_filter(text, GROUP_FILTER_COLUMNS)
-                groups = tuple(g for g in groups if accepts(group_facts(self.review, g)) is keeps_matches)
+                groups = tuple(
+                    matching_items(
+                        groups,
+                        text,
+                        GROUP_FILTER_COLUMNS,
+                        lambda group: group_facts(self.review, group),
+                        keeps_matches=keeps_matches,
+                    )
+                )
         return replace(self, groups=groups)
 
     def find(self, starts: Sequence[str]) -> list[Group]:

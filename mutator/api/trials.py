@@ -1,7 +1,7 @@
 """Run one fault once, outside a campaign or as a rerun of a campaign's experiment."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
@@ -10,7 +10,7 @@ from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
 from mutator.api.target_and_fault_selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
-from mutator.campaigns.phrase_collection import phrases_of_fault
+from mutator.campaigns.phrase_collection import phrases_of_fault, phrases_of_trigger
 from mutator.errors import MutatorError
 from mutator.execution.single_run import SingleRun, run_single
 from mutator.figures.golden_and_faulty_plot import save_figure
@@ -149,7 +149,10 @@ def try_fault(
     check_only_plain_files(folder)
     single = run_single(selected_target.workspace, selected_target.manifest, experiment, folder)
     scale = selected_target.workspace.scale_of(selected_target.manifest)
-    phrases = phrases_of_fault(selected_target.workspace, selected_target.manifest, experiment.fault)
+    phrases = replace(
+        phrases_of_fault(selected_target.workspace, selected_target.manifest, experiment.fault),
+        situations=phrases_of_trigger(selected_target.workspace, experiment.trigger),
+    )
     return build_trial(single, selected_target.manifest, scale=scale, phrases=phrases, temporary=temporary)
 
 

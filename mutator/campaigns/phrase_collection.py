@@ -6,7 +6,7 @@ from mutator.campaigns.campaign_files import Campaign
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec
-from mutator.model import OPERATOR_FAULTS_MODULE, Fault
+from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import PhraseByCase, Phrases
 from mutator.workspace import Workspace
@@ -49,6 +49,19 @@ def phrases_of_fault(workspace: Workspace, manifest: TargetManifest, fault: Faul
         faults=phrases_of_variants(_specs_of(workspace, used.variants, ()), used.variants, fault.reading),
         models=phrases_of_models(workspace.fault_models(), used.models),
         **target_phrases(manifest),
+    )
+
+
+def phrases_of_trigger(workspace: Workspace, trigger: Trigger) -> Mapping[str, PhraseByCase]:
+    """Return the phrase of the context that a trigger is; nothing for another trigger."""
+    tables = map(workspace.context_table, workspace.context_tables)
+    return _without_empty(
+        {
+            row.id: row.phrase
+            for table in tables
+            for row in table.rows
+            if (row.id, row.condition) == (trigger.name, trigger.condition)
+        }
     )
 
 

@@ -17,7 +17,7 @@ from mutator.campaigns.campaign_files import Campaign, check_readings, load_camp
 from mutator.campaigns.chunks import chunk_lengths_of_runs
 from mutator.campaigns.neutral_faults import NeutralFaultWarner
 from mutator.campaigns.plan_tally import FaultTypeAndMethod, PlanPart, PlanTally, plan_digest
-from mutator.campaigns.row_filters import compile_filter
+from mutator.campaigns.row_filters import matching_items
 from mutator.campaigns.sampling import draw_balanced, draw_balanced_pairs, draw_in_proportion
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
 from mutator.errors import MutatorError
@@ -266,8 +266,9 @@ def _choose_experiments(
         experiments = _sample_experiments(experiments, campaign, campaign.sample_size, seed)
     for text, selects in ((choices.only, True), (choices.exclude, False)):
         if text is not None:
-            accepts = compile_filter(text, PLAN_COLUMN_NAMES)
-            experiments = tuple(e for e in experiments if accepts(plan_row(e)) is selects)
+            experiments = tuple(
+                matching_items(experiments, text, PLAN_COLUMN_NAMES, plan_row, keeps_matches=selects)
+            )
     return (
         experiments if most_experiments is None else draw_balanced_pairs(experiments, most_experiments, seed)
     )

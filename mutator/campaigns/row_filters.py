@@ -6,16 +6,19 @@ match(fault_type, "ghost*") and not method == "random"
 
 import ast
 import operator
-from collections.abc import Callable, Collection, Mapping
+import warnings
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
+from typing import TypeVar
 
 from mutator._common.message_text import operator_hint, spelling_suggestion
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, MutatorWarning
 from mutator.results.renamed_columns import RENAMED_COLUMNS
 
 FilterRow = Mapping[str, object]
 RowPredicate = Callable[[FilterRow], bool]
 CellGetter = Callable[[FilterRow], object]
+Item = TypeVar("Item")
 
 _ORDER_OPERATORS: dict[type[ast.cmpop], Callable[[object, object], bool]] = {
     ast.Lt: operator.lt,  # type: ignore[dict-item]
@@ -24,9 +27,66 @@ _ORDER_OPERATORS: dict[type[ast.cmpop], Callable[[object, object], bool]] = {
     ast.GtE: operator.ge,  # type: ignore[dict-item]
 }
 _MOST_CHARACTERS = 2000  # more than anybody writes; limits how deep an expression can nest
+_MOST_LISTED_VALUES = 25  # a column with more, such as an id, is not searched for similar values
 _ALLOWED_SYNTAX = (
     'columns, numbers, "strings", ==, !=, <, <=, >, >=, in, not in, and, or, not, match(column, "glob*")'
 )
+
+
+def matching_items(
+    items: Iterable[Item],
+    text: str,
+    columns: Collection[str],
+    row_of: Callable[[Item], FilterRow],
+    *,
+    keeps_matches: bool = True,
+) -> Iterator[Item]:
+    """Yield the items whose rows match a filter; without `keeps_matches`, the others.
+
+    MutatorError as for `compile_filter`; MutatorWarning for a text that is compared with a column of few
+    values and is none of them, because it is probably misspelt; it comes after the last item.
+    """
+    accepts = compile_filter(text, columns)
+    compared_texts = list(_compared_texts(ast.parse(text.strip(), mode="eval")))
+    values_by_column: dict[str, set[object]] = {column: set() for column, _ in compared_texts}
+    for item in items:
+        row = row_of(item)
+        for column, values in values_by_column.items():
+            if len(values) <= _MOST_LISTED_VALUES:
+                values.add(row[column])
+        if accepts(row) is keeps_matches:
+            yield item
+    for column, compared_text in compared_texts:
+        _warn_if_unknown(column, compared_text, values_by_column[column])
+
+
+def _compared_texts(tree: ast.AST) -> Iterator[tuple[str, str]]:
+    """Yield each column with a text that it is compared with for equality."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Compare) or len(node.ops) != 1:
+            continue
+        left, right = node.left, node.comparators[0]
+        if isinstance(node.ops[0], ast.Eq | ast.NotEq) and isinstance(right, ast.Name):
+            left, right = right, left
+        elif not isinstance(node.ops[0], ast.Eq | ast.NotEq | ast.In | ast.NotIn):
+            continue
+        constants = right.elts if isinstance(right, ast.Tuple | ast.List | ast.Set) else [right]
+        for constant in constants:
+            is_text = isinstance(constant, ast.Constant) and isinstance(constant.value, str)
+            if isinstance(left, ast.Name) and is_text:
+                yield left.id, constant.value  # type: ignore[attr-defined]
+
+
+def _warn_if_unknown(column: str, text: str, values: set[object]) -> None:
+    texts = sorted(value for value in values if isinstance(value, str) and value)
+    if not texts or text in values or not text or len(values) > _MOST_LISTED_VALUES:
+        return
+    suggestion = spelling_suggestion(text, texts) or "."
+    warnings.warn(
+        f"`{column}` is never '{text}' here{suggestion} Its values: {', '.join(texts)}",
+        MutatorWarning,
+        stacklevel=3,
+    )
 
 
 def compile_filter(text: str, columns: Collection[str]) -> RowPredicate:

@@ -17,7 +17,7 @@ from packaging.requirements import Requirement
 
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.message_text import counted
-from mutator._common.version import DISTRIBUTION
+from mutator._common.version import DISTRIBUTION, EARLIER_DISTRIBUTION
 from mutator.checks.fast_engine_check import import_and_fork_finding
 from mutator.checks.findings import CheckState, Finding
 from mutator.engines.sandbox import reason_sandbox_unavailable as shortcoming_of_sandbox
@@ -39,6 +39,7 @@ def examine_machine(workspace: "Workspace | MutatorError") -> list[Finding]:
     findings = [
         _python_finding(),
         *_package_findings(),
+        *_earlier_distribution_findings(),
         _cores_finding(),
         _memory_finding(),
         _disk_finding(),
@@ -80,6 +81,20 @@ def _package_findings() -> Iterator[Finding]:
         else:
             level = CheckState.FAIL if problem == NOT_INSTALLED else CheckState.WARN
             yield Finding(name=requirement.name, level=level, found=problem, remedy=remedy)
+
+
+def _earlier_distribution_findings() -> Iterator[Finding]:
+    """Report another distribution with a package `mutator`: whichever was installed last has its files."""
+    try:
+        version = importlib.metadata.version(EARLIER_DISTRIBUTION)
+    except importlib.metadata.PackageNotFoundError:
+        return
+    yield Finding(
+        name=EARLIER_DISTRIBUTION,
+        level=CheckState.WARN,
+        found=f"{version} is installed, too; it overwrites the package `mutator` of {DISTRIBUTION}",
+        remedy=f"`pip uninstall {EARLIER_DISTRIBUTION} {DISTRIBUTION}`, then install {DISTRIBUTION} again",
+    )
 
 
 def _cores_finding() -> Finding:

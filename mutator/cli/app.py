@@ -258,9 +258,13 @@ def _encoding_error(characters: str) -> MutatorError:
 def _warnings_in_one_line() -> Iterator[None]:
     with warnings.catch_warnings():
         show_other_warning = warnings.showwarning
+        shown_texts: set[str] = set()
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
             if issubclass(category, MutatorWarning):
+                if str(message) in shown_texts:
+                    return
+                shown_texts.add(str(message))
                 progress_events.report_warning(str(message))
                 Terminal().print_note(f"warning: {message}")
             else:

@@ -169,8 +169,9 @@ def _fail_on_findings(
     for finding in failing:
         experiment = (finding.description, finding.experiment_id, finding.sentence)
         gates_by_experiment.setdefault(experiment, []).append(finding.gate.value)
+    length = terminal.id_length(experiment_id for _, experiment_id, _ in gates_by_experiment)
     lines = [
-        f"{', '.join(kinds)}: {description} [{experiment_id}]{sentence and f': {sentence}'}"
+        f"{', '.join(kinds)}: {description} [{experiment_id[:length]}]{sentence and f': {sentence}'}"
         for (description, experiment_id, sentence), kinds in gates_by_experiment.items()
     ]
     for line in lines[:MOST_LISTED_FINDINGS]:

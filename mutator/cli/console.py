@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from mutator._common import progress_events
 from mutator._common.hashing import as_json_types
-from mutator._common.message_text import NO_BREAK_SPACE, bind_units, wrap_text
+from mutator._common.message_text import NO_BREAK_SPACE, bind_units, short_id_length, wrap_text
 from mutator._common.table_rendering import TextTable
 from mutator.cli.terminal_tables import TerminalTable
 from mutator.errors import MutatorError
@@ -45,7 +45,6 @@ STYLE_BY_ENDING = {
 }
 
 
-SHORT_ID_LENGTH = 8  # characters of an id in a terminal, or as many as make it unique
 # the consoles of progress bars; what is printed by the same console stands above its bar
 _live_consoles: "list[Console]" = []
 
@@ -155,9 +154,7 @@ class Terminal:
         """
         if self.as_json or self.wide or not self.out.is_terminal:
             return None
-        names = set(ids)
-        lengths = range(SHORT_ID_LENGTH, max(map(len, names), default=0))
-        return next((n for n in lengths if len({name[:n] for name in names}) == len(names)), None)
+        return short_id_length(set(ids))
 
     def print_command(self, introduction: str, command: str) -> None:
         """Print a command to copy, which is never folded: behind its introduction, or on a line of its

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from mutator.campaigns.row_filters import compile_filter
+from mutator.campaigns.row_filters import matching_items
 from mutator.model import Experiment, Record, Value
 from mutator.preflight import equivalence_check
 from mutator.results.experiment_sentence import ExperimentSentences
@@ -63,10 +63,9 @@ def load_compared_run(run: Path, only: str | None = None) -> ComparedRun:
     folder = RunFolder.open(run)
     records = folder.records()
     equivalence_check.compare_sample(folder, records)
-    accepts = compile_filter(only, PLAN_COLUMN_NAMES) if only else None
-    experiments = tuple(
-        e for e in plan_file.load_experiments(folder.path) if accepts is None or accepts(plan_row(e))
-    )
+    experiments = tuple(plan_file.load_experiments(folder.path))
+    if only:
+        experiments = tuple(matching_items(experiments, only, PLAN_COLUMN_NAMES, plan_row))
     faults = {e.fault.id: e.fault for e in experiments}
     sentences = ExperimentSentences.of_run(folder.head)
     return ComparedRun(

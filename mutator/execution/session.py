@@ -33,7 +33,14 @@ from mutator.campaigns.run_provenance import (
 from mutator.engines.engine_choice import choose_engine, reason_not_to_fork
 from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import ensure_work_folder
-from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, DiskFull, MutatorError, MutatorWarning
+from mutator.errors import (
+    EXIT_HARNESS_ERRORS,
+    EXIT_OK,
+    CheckFailed,
+    DiskFull,
+    MutatorError,
+    MutatorWarning,
+)
 from mutator.execution.finished_outcome_cache import (
     FinishedRunOutcome,
     find_finished_run,
@@ -43,6 +50,7 @@ from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record
 from mutator.preflight import equivalence_check
+from mutator.preflight.golden_run_page import with_golden_run_pages
 from mutator.preflight.preflight_checks import (
     checks_and_goldens_exist,
     describe_unreached_triggers,
@@ -165,7 +173,7 @@ class Session:
         if pending_chunks or self.proof or not checks_and_goldens_exist(self.folder):
             check_requirements(self.manifest)
             accepted_version_differences(self.folder, accept=self.accept_versions)
-            run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
+            self._run_checks()
             for remark in describe_unreached_triggers(self.workspace, self.folder):
                 warnings.warn(remark, MutatorWarning, stacklevel=2)
             self.folder = begin_session_environment(
@@ -179,6 +187,12 @@ class Session:
             self._ledger_at_start = file_digests.load_ledger(self.folder.path)
         self.pending = pending_chunks
         self._records = None if pending_chunks else records
+
+    def _run_checks(self) -> None:
+        try:
+            run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
+        except CheckFailed as error:
+            raise with_golden_run_pages(error, self.folder.path, self.workspace) from None
 
     def note_machine(self, machine: WorkerMachine) -> None:
         self.folder = append_worker_machine(self.folder, machine)

@@ -24,6 +24,7 @@ from mutator.store.records import PROOF_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
 
 _MIN_SAMPLE = 20  # finds an engine that changes one record in seven with a chance of 95%
+_PROOF_ERROR_PREFIX = "in the proof: "
 _EXPERIMENTS_PER_SAMPLED_EXPERIMENT = 100  # one experiment in this many
 
 
@@ -51,7 +52,18 @@ class EquivalenceResult:
 
     def __str__(self) -> str:
         sampled = counted(self.sampled, "experiment")
-        return f"{self.same} of {sampled} came out the same on the reference engine"
+        same = f"{self.same} of {sampled} came out the same on the reference engine"
+        if self.is_complete:
+            return same
+        # a difference raises CheckFailed, so the others have no result
+        others = f"{same}; the others" if self.same else f"none of {sampled}"
+        return f"{others} could {'not ' if self.same else ''}be judged: {self._reason_not_judged()}"
+
+    def _reason_not_judged(self) -> str:
+        if not self.errors:
+            return "they have no result yet"
+        first_detail = self.errors[0][1].removeprefix(_PROOF_ERROR_PREFIX)
+        return f"{counted(len(self.errors), 'harness error')} ({first_detail})"
 
 
 def mark_check_as_needed(run: Path) -> None:
@@ -162,7 +174,7 @@ def compare_sample(folder: RunFolder, records: Mapping[str, Record]) -> Equivale
         if record is None or not _is_result(record):
             continue
         if not _is_result(reference_record):
-            errors.append((name, f"in the proof: {reference_record.detail}"))
+            errors.append((name, f"{_PROOF_ERROR_PREFIX}{reference_record.detail}"))
             continue
         if record != reference_record:
             raise CheckFailed(

@@ -81,7 +81,6 @@ def _describe_equivalence(folder: RunFolder, records: Mapping[str, Record]) -> t
         return text, "none needed", False
     same = f"{check.same} of {check.sampled} same"
     if not check.is_complete:
-        text = f"The equivalence check is not finished: so far, {check}, byte for byte. The rest of the "
-        text += "sample has not been rerun."
-        return text, f"not finished: {same}", False
+        judged = f"{check.same} of {check.sampled} judged, none differs"
+        return f"The equivalence check is not finished: {check}.", f"not finished: {judged}", False
     return f"Equivalence check: of a sample rerun from the start, {check}, byte for byte.", same, False

@@ -2,7 +2,7 @@
 warned.
 
 It follows from the experiment's row in the results, its fault and the phrases that the run stores. What a row
-lacks is left out, never guessed.
+lacks is left out, never guessed. Times have hundredths, as in tables, so that both show the same number.
 """
 
 import re
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.phrase_texts import fill_phrase, measured_number
+from mutator._common.phrase_texts import fill_phrase, measured_number, measured_time, planned_number
 from mutator.model import Fault, Hold, Outcome, Status
 from mutator.results.fault_phrases import describe_fault
 from mutator.targets.contact_severity import SeverityScale
@@ -104,7 +104,7 @@ class ExperimentSentences:
         is_name = clause == fault.label  # a name keeps its letters
         begin, situation = _number(row, "t_activation"), self._situation(row)
         if begin is not None:
-            text = f"{clause} from {measured_number(begin, 's')}{situation}"
+            text = f"{clause} from {measured_time(begin)}{situation}"
             return f"{text}." if is_name else _as_sentence(text)
         planned = clause if is_name else _decapitalized(clause)
         return f"Planned: {planned}{_planned_begin(row)}{situation}."
@@ -114,7 +114,7 @@ class ExperimentSentences:
         hold, condition = row.get("hold") or "", str(row.get("condition") or "")
         if hold == Hold.FOR:
             seconds = _number(row, "hold_s")
-            return "" if seconds is None else f" for {measured_number(seconds, 's')}"
+            return "" if seconds is None else f" for {planned_number(seconds, 's')}"
         if hold != Hold.WHILE or condition == "True" or _TIME_CONDITION_PATTERN.match(condition):
             return ""
         phrase = self.phrases.situations.get(str(row.get("trigger") or ""), {}).get("", ())
@@ -187,10 +187,10 @@ def _decapitalized(clause: str) -> str:
 
 
 def _planned_begin(row: Row) -> str:
-    """` from 24.6 s`, ` once gap < 30`; '' for a fault that is active while a condition holds."""
+    """` from 24.60 s`, ` once gap < 30`; '' for a fault that is active while a condition holds."""
     condition = str(row.get("condition") or "")
     if time := _TIME_CONDITION_PATTERN.match(condition):
-        return f" from {measured_number(float(time[1]), 's')}"
+        return f" from {measured_time(float(time[1]))}"
     return "" if row.get("hold") == Hold.WHILE or condition in ("", "True") else f" once {condition}"
 
 
@@ -233,13 +233,13 @@ def _speed_texts(row: Row) -> dict[str, str]:
 
 
 def _later(time: float, before: float | None, *, is_first: bool) -> str:
-    """`4.5 s later`; after another hazard, `4.5 s after that`."""
+    """`4.52 s later`; after another hazard, `4.52 s after that`."""
     if before is None:
-        return f"at {measured_number(time, 's')}"
+        return f"at {measured_time(time)}"
     gap = round(time - before, 6)
     if gap <= 0.0:
         return "at once" if is_first else "at the same time"
-    return f"{measured_number(gap, 's')} {'later' if is_first else 'after that'}"
+    return f"{measured_time(gap)} {'later' if is_first else 'after that'}"
 
 
 def _joined(clauses: Sequence[str]) -> str:
@@ -258,12 +258,12 @@ def _alert(row: Row, hazards: Sequence[tuple[HazardFacts, float]]) -> str:
     if time is None:
         return "No alert."
     if not hazards:
-        return f"Alert {name} at {measured_number(time, 's')}."
+        return f"Alert {name} at {measured_time(time)}."
     ahead = round(hazards[0][1] - time, 6)
     hazard = "the hazard" if len(hazards) == 1 else "the first hazard"
     if ahead == 0.0:
         return f"Alert {name} only in the moment of {hazard}."
-    gap = measured_number(abs(ahead), "s")
+    gap = measured_time(abs(ahead))
     return (
         f"Alert {name} {gap} before {hazard}." if ahead > 0.0 else f"Alert {name} only {gap} after {hazard}."
     )

@@ -14,6 +14,7 @@ from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bou
 from mutator._common.confined_files import path_below
 from mutator._common.files import check_path_encodable
 from mutator._common.hashing import as_json_types
+from mutator._common.message_text import shortened_ids
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import file_digests, integrity, plan_file
@@ -274,6 +275,6 @@ class RunFolder:
         raise MutatorError(
             f"{len(hits)} experiments start with '{prefix}'",
             where=self.path,
-            expected=f"one of {', '.join(hits[:MOST_LISTED_IDS])}{more}",
+            expected=f"one of {', '.join(shortened_ids(hits)[:MOST_LISTED_IDS])}{more}",
             remedy="give more of the id",
         )

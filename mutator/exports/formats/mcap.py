@@ -19,7 +19,7 @@ import numpy as np
 from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
 from mutator._common.message_text import counted
-from mutator.campaigns.row_filters import compile_filter
+from mutator.campaigns.row_filters import matching_items
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.execution.run_traces import RunTraces
 from mutator.exports import Export, ExportRequest
@@ -238,9 +238,12 @@ def _selected_ids(folder: RunFolder, only: str | None) -> list[str]:
     frame = Results.up_to_date(folder.path).indexed_frame().reset_index()
     if only is None:
         return list(frame["experiment_id"])
-    accepts = compile_filter(only, tuple(map(str, frame.columns)))
-    rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
-    return [row["experiment_id"] for row in rows if accepts({str(k): v for k, v in row.items()})]
+    rows = [
+        {str(column): cell for column, cell in row.items()}
+        for row in frame.astype(object).where(frame.notna(), None).to_dict("records")
+    ]
+    columns = tuple(map(str, frame.columns))
+    return [row["experiment_id"] for row in matching_items(rows, only, columns, lambda row: row)]
 
 
 def _trace_topics(trace: Trace, manifest: TargetManifest) -> Iterator[Topic]:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mutator._common.message_text import operator_hint, unbreakable_parts
+from mutator._common.message_text import operator_hint, shortened_ids, unbreakable_parts
 from mutator.campaigns.row_filters import compile_filter
 from mutator.errors import MutatorError
 from mutator.triggers.conditions import canonical_condition
@@ -43,3 +43,10 @@ def test_units_comparisons_and_commands_are_not_folded() -> None:
         "run",
         "`pip\u00a0install\u00a0x`",
     ]
+
+
+def test_ids_have_eight_characters_where_that_is_unique() -> None:
+    """Otherwise as many as make them different, or all."""
+    assert shortened_ids(["0123456789abcdef", "1123456789abcdef"]) == ["01234567", "11234567"]
+    assert shortened_ids(["0123456789abcdef", "0123456780abcdef"]) == ["0123456789", "0123456780"]
+    assert shortened_ids(["short", "shorter"]) == ["short", "shorter"]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mutator._common.phrase_texts import fill_phrase, measured_number, planned_number
+from mutator._common.phrase_texts import fill_phrase, measured_number, measured_time, planned_number
 
 
 @pytest.mark.parametrize(
@@ -31,3 +31,18 @@ def test_the_first_text_whose_holes_have_values_is_used() -> None:
     assert fill_phrase(texts, {"speed": "3 m/s", "later": "now"}) == "at 3 m/s, now"
     assert fill_phrase(texts, {"speed": "", "later": "now"}) == "now"
     assert fill_phrase(texts, {}) == ""
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "0 s"),
+        (0.03, "0.03 s"),
+        (0.5, "0.50 s"),
+        (24.6, "24.60 s"),
+        (129.91, "129.91 s"),
+        (0.002, "0.002 s"),
+    ],
+)
+def test_a_time_has_the_hundredths_of_tables(seconds: float, text: str) -> None:
+    assert measured_time(seconds) == text

@@ -1,8 +1,11 @@
 """Valid and invalid filter expressions, which never run as code."""
 
+import re
+import warnings
+
 import pytest
 
-from mutator.campaigns.row_filters import compile_filter
+from mutator.campaigns.row_filters import compile_filter, matching_items
 from mutator.errors import MutatorError
 
 ROW = {"fault_type": "ghost_vehicle", "scenario": "S2", "value": 120, "unit": None, "method": "guided"}
@@ -91,3 +94,40 @@ def test_comparing_incompatible_values_is_a_mutator_error(text: str) -> None:
     accepts = compile_filter(text, ROW)
     with pytest.raises(MutatorError):
         accepts(ROW)
+
+
+@pytest.mark.parametrize(
+    ("text", "warning"),
+    [
+        ("fault_type == 'chaf'", "did you mean .chaff.[?] Its values: chaff, ghost_vehicle$"),
+        ("'chaf' != fault_type", "`fault_type` is never 'chaf' here; did you mean 'chaff'[?] Its"),
+        (
+            "value > 1 and hazard in ('H1', 'H9')",
+            "`hazard` is never 'H9' here. Its values: H1$",
+        ),
+        ("hazard == 'zzz'", "`hazard` is never 'zzz' here. Its values: H1$"),
+        ("fault_type == 'chaff' or 'cha' in fault_type or hazard == None or hazard == ''", None),
+        ("name == 'n'", None),
+    ],
+)
+def test_a_text_that_a_column_never_has_is_a_warning(text: str, warning: str | None) -> None:
+    """A misspelt value would otherwise leave nothing without a word. Columns of many values are exempt."""
+    rows: list[dict[str, object]] = [
+        {"fault_type": "chaff", "hazard": None, "value": 1, "name": "a"},
+        {"fault_type": "ghost_vehicle", "hazard": "H1", "value": 2, "name": "b"},
+        *({"fault_type": "chaff", "hazard": None, "value": 0, "name": str(i)} for i in range(30)),
+    ]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        list(matching_items(rows, text, rows[0], lambda row: row))
+    assert len(caught) == (warning is not None)
+    if warning is not None:
+        assert re.search(warning, str(caught[0].message))
+
+
+def test_matching_items_are_kept_or_left_out() -> None:
+    rows = [{"value": number} for number in range(5)]
+    assert list(matching_items(rows, "value > 2", ["value"], lambda row: row)) == rows[3:]
+    assert (
+        list(matching_items(rows, "value > 2", ["value"], lambda row: row, keeps_matches=False)) == rows[:3]
+    )

@@ -1,6 +1,7 @@
 """The check of the machine by `doctor`."""
 
 import importlib.metadata
+from pathlib import Path
 
 import pytest
 
@@ -38,6 +39,20 @@ def test_a_harness_that_pip_did_not_install_is_a_warning(monkeypatch: pytest.Mon
     [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "no-such-mutator"]
     assert (finding.level, finding.found) == (CheckState.WARN, "not installed")
     assert "pip install" in finding.remedy
+
+
+def test_a_distribution_with_the_earlier_name_is_a_warning(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Both would write the package `mutator`."""
+    assert "mutator" not in {f.name for f in doctor.examine_machine(NO_LIBRARY)}
+    info = tmp_path / "mutator-0.1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mutator\nVersion: 0.1.0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "mutator"]
+    assert finding.level is CheckState.WARN and finding.found.startswith("0.1.0 is installed, too")
+    assert "`pip uninstall mutator mutator-fi`" in finding.remedy
 
 
 def test_another_version_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:

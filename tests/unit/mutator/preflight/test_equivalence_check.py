@@ -13,6 +13,7 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment
 from mutator.preflight import equivalence_check
+from mutator.preflight.equivalence_check import EquivalenceResult
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter, read_segment
 from mutator.store.plan_choices import Choices
@@ -130,6 +131,29 @@ def test_an_error_that_runs_share_fails_the_campaign(
         assert code and name in found and told in found
     else:
         assert (code, found) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("same", "errors", "text"),
+    [
+        (8, (), "8 of 8 experiments came out the same on the reference engine"),
+        (0, ("no memory",) * 8, "none of 8 experiments could be judged: 8 harness errors (no memory)"),
+        (
+            7,
+            ("no memory",),
+            "7 of 8 experiments came out the same on the reference engine; the others could not be judged: "
+            "1 harness error (no memory)",
+        ),
+        (0, (), "none of 8 experiments could be judged: they have no result yet"),
+    ],
+)
+def test_a_proof_without_results_does_not_read_like_a_difference(
+    same: int, errors: tuple[str, ...], text: str
+) -> None:
+    result = EquivalenceResult(
+        sampled=8, same=same, errors=tuple(("id", f"in the proof: {detail}") for detail in errors)
+    )
+    assert str(result) == text
 
 
 def test_only_large_campaigns_fork_by_default(toycar: Workspace) -> None:

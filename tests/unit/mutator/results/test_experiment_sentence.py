@@ -62,13 +62,13 @@ HAZARD = {
 } | SPEEDS  # fmt: skip
 NO_HAZARD = HAZARD | {"outcome": "sdc", "t_h1": None, "t_end": None, "contact_speed": None, "severity": ""}
 NEVER = {"status": "ok", "outcome": "not_activated", "t_activation": None}
-START = "The speed sensor reads 50 mph too low from 24.6 s."
-DRIVE = "The car accelerates to 37 m/s and touches the lead 4.5 s later"
+START = "The speed sensor reads 50 mph too low from 24.60 s."
+DRIVE = "The car accelerates to 37 m/s and touches the lead 4.46 s later"
 CASES: dict[str, tuple[dict[str, Any], str]] = {
     "a hazard": (HAZARD, f"{START} {DRIVE} at 19.6 m/s (severe). No alert."),
     "an alert before": (
         HAZARD | {"alerts": "fcw;late", "t_alert": 27.0},
-        f"{START} {DRIVE} at 19.6 m/s (severe). Alert fcw 2.1 s before the hazard.",
+        f"{START} {DRIVE} at 19.6 m/s (severe). Alert fcw 2.06 s before the hazard.",
     ),
     "an alert after": (
         HAZARD | {"alerts": "fcw", "t_alert": 29.5},
@@ -87,30 +87,30 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "two hazards": (
         HAZARD | {"t_h3": 30.5},
-        f"{START} The car accelerates to 37 m/s, touches the lead 4.5 s later at 19.6 m/s and leaves its "
-        "lane 1.4 s after that. Severity: severe. No alert.",
+        f"{START} The car accelerates to 37 m/s, touches the lead 4.46 s later at 19.6 m/s and leaves its "
+        "lane 1.44 s after that. Severity: severe. No alert.",
     ),
     "two hazards in one step": (
         HAZARD | {"t_h3": 29.06},
-        f"{START} The car accelerates to 37 m/s, touches the lead 4.5 s later at 19.6 m/s and leaves its "
+        f"{START} The car accelerates to 37 m/s, touches the lead 4.46 s later at 19.6 m/s and leaves its "
         "lane at the same time. Severity: severe. No alert.",
     ),
     "a hazard without a phrase": (
         NO_HAZARD | {"outcome": "hazard", "t_h2": 30.0},
-        f"{START} The car accelerates to 37 m/s and hazard H2 (the car has stopped) occurs 5.4 s later. "
+        f"{START} The car accelerates to 37 m/s and hazard H2 (the car has stopped) occurs 5.40 s later. "
         "No alert.",
     ),
     "a hazard before any actuator differs": (
         HAZARD | {"t_manifest": 29.5, "severity": ""},
-        f"{START} The car touches the lead 4.5 s later at 19.6 m/s. No alert.",
+        f"{START} The car touches the lead 4.46 s later at 19.6 m/s. No alert.",
     ),
     "columns that an older run lacks": (
         {name: cell for name, cell in HAZARD.items() if name not in (*SPEEDS, "first_actuator")},
-        f"{START} The car touches the lead 4.5 s later at 19.6 m/s (severe). No alert.",
+        f"{START} The car touches the lead 4.46 s later at 19.6 m/s (severe). No alert.",
     ),
     "a drive without a speed": (
         {name: cell for name, cell in HAZARD.items() if name not in SPEEDS},
-        f"{START} The car gives more gas and touches the lead 4.5 s later at 19.6 m/s (severe). No alert.",
+        f"{START} The car gives more gas and touches the lead 4.46 s later at 19.6 m/s (severe). No alert.",
     ),
     "a golden run that is as fast": (
         NO_HAZARD | {"golden_highest_speed": 37.0},
@@ -126,7 +126,7 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "an alert without a hazard": (
         NO_HAZARD | {"alerts": "fcw", "t_alert": 25.3},
-        f"{START} The car accelerates to 37 m/s. No hazard follows. Alert fcw at 25.3 s.",
+        f"{START} The car accelerates to 37 m/s. No hazard follows. Alert fcw at 25.30 s.",
     ),
     "masked": (
         NO_HAZARD | {"outcome": "masked", "stopped_at": "radard;lkas"},
@@ -137,22 +137,22 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "while a context holds": (
         NO_HAZARD | {"outcome": "masked", "hold": "while", "trigger": "C2", "condition": "hwt <= 2.0"},
-        "The speed sensor reads 50 mph too low from 24.6 s while the car is close behind a slower lead. "
+        "The speed sensor reads 50 mph too low from 24.60 s while the car is close behind a slower lead. "
         "It changes no actuator. No hazard follows. No alert.",
     ),
     "while a condition holds": (
         NO_HAZARD | {"outcome": "masked", "hold": "while", "trigger": "when", "condition": "gap < 30"},
-        "The speed sensor reads 50 mph too low from 24.6 s while gap < 30. It changes no actuator. "
+        "The speed sensor reads 50 mph too low from 24.60 s while gap < 30. It changes no actuator. "
         "No hazard follows. No alert.",
     ),
     "for a time": (
         NO_HAZARD | {"outcome": "masked", "hold": "for", "hold_s": 2.0},
-        "The speed sensor reads 50 mph too low from 24.6 s for 2 s. It changes no actuator. "
+        "The speed sensor reads 50 mph too low from 24.60 s for 2 s. It changes no actuator. "
         "No hazard follows. No alert.",
     ),
     "never active after a time": (
         NEVER | {"condition": "t >= 24.63", "hold": "to_end"},
-        "Planned: the speed sensor reads 50 mph too low from 24.6 s. It was never active: the changed code "
+        "Planned: the speed sensor reads 50 mph too low from 24.63 s. It was never active: the changed code "
         "did not run then.",
     ),
     "never active in a context": (
@@ -232,9 +232,9 @@ def test_a_name_keeps_its_letters() -> None:
     """A fault without words has its name in the sentence, with the letters that find it."""
     for spec in ("sensors/other/x", "Sensors/other/x"):
         named = fault(spec, model="unknown")
-        assert SENTENCES.sentence(HAZARD, named).startswith(f"{spec} 50 mph from 24.6 s. The car ")
+        assert SENTENCES.sentence(HAZARD, named).startswith(f"{spec} 50 mph from 24.60 s. The car ")
         planned = SENTENCES.sentence(NEVER | {"condition": "t >= 24.6"}, named)
-        assert planned.startswith(f"Planned: {spec} 50 mph from 24.6 s. It was never active")
+        assert planned.startswith(f"Planned: {spec} 50 mph from 24.60 s. It was never active")
 
 
 def test_a_target_without_alerts_has_no_word_about_them() -> None:

@@ -1,8 +1,15 @@
 """Every shipped fault has words of its own, in each reading."""
 
+from dataclasses import replace
+
 import pytest
 
-from mutator.campaigns.phrase_collection import phrases_of_fault, phrases_of_models, phrases_of_variants
+from mutator.campaigns.phrase_collection import (
+    phrases_of_fault,
+    phrases_of_models,
+    phrases_of_trigger,
+    phrases_of_variants,
+)
 from mutator.errors import MutatorError
 from mutator.faults.injection_parameters import resolve_injection
 from mutator.faults.spec_expansion import expand_spec
@@ -32,6 +39,14 @@ def test_a_reading_has_the_numbers_of_its_own_injections(clone: Workspace) -> No
         "as_described": "the speed sensor reads 60 mph too low",
         "as_coded": "the speed sensor reads 26.8 km/h too low",
     }
+
+
+def test_a_context_without_a_campaign_has_its_phrase(clone: Workspace) -> None:
+    """A trigger that only has a context's name is none."""
+    table = clone.context_table("accelerate_decelerate")
+    [context] = table.triggers(rows=("C2",))
+    assert phrases_of_trigger(clone, context)["C2"][""][0].startswith("while the car is close")
+    assert phrases_of_trigger(clone, replace(context, condition="t >= 1.0")) == {}
 
 
 def test_every_shipped_fault_model_describes_its_examples(clone: Workspace) -> None:

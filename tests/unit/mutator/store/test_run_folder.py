@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -69,8 +70,9 @@ def test_a_folder_that_is_not_a_run_is_refused(tmp_path: Path) -> None:
 def test_a_unique_prefix_of_an_id_finds_the_experiment(folder: RunFolder) -> None:
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
         folder.experiment_id_from("zz")
-    with pytest.raises(MutatorError, match="24 experiments start with ''"):
+    with pytest.raises(MutatorError, match="24 experiments start with ''") as error:
         folder.experiment_id_from("")
+    assert re.match("one of [0-9a-f]{8}, [0-9a-f]{8}, ", str(error.value.expected))
 
 
 def test_a_run_folder_has_one_owner(folder: RunFolder) -> None:

@@ -61,7 +61,7 @@ def test_hazards_pass_by_default_and_harness_errors_are_errors(run: Path) -> Non
         assert [child.tag for child in case] == ["properties"]
         told = {p.get("name"): p.get("value") for p in case.iter("property")}
         assert (told["ending"], told["hazard H3 [s]"], told["alerts"]) == ("hazard", "4.00", "brake_hard")
-        assert "Hazard H3 occurs 2 s later" in told["sentence"]
+        assert "Hazard H3 occurs 2.00 s later" in told["sentence"]
     for case in found["silence"]:
         assert case.find("error").get("message") == "no <disk>? & so on"  # type: ignore[union-attr]
     skipped = {
@@ -77,7 +77,9 @@ def test_hazards_can_be_selected_as_failures(run: Path, tmp_path: Path) -> None:
         export(run, Format.JUNIT, tmp_path / "j.xml", selection=ExportSelection(failures=["hazard"]))
     )
     messages = [str(c.find("failure").get("message")) for c in found["lane"]]  # type: ignore[union-attr]
-    assert all("Hazard H3 occurs 2 s later. Alert brake_hard 1 s before" in message for message in messages)
+    assert all(
+        "Hazard H3 occurs 2.00 s later. Alert brake_hard 1.00 s before" in message for message in messages
+    )
     assert not any(list(c.iter("failure")) for c in found["distance"])
 
 

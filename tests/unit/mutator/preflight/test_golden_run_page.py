@@ -10,6 +10,8 @@ import pytest
 
 import mutator
 from mutator.errors import CheckFailed
+from mutator.execution.session import open_session
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 
@@ -43,3 +45,15 @@ def test_the_error_names_a_page_with_the_drive(
     drive = json.loads(gzip.decompress(base64.b64decode(packed[1])))
     assert [label for kind, _, label in drive["marks"] if kind == "hazard"][:1] == hazards
     assert {len(channel["values"]) for channel in drive["channels"]} == {len(drive["t"])}
+
+
+def test_a_campaign_under_pytest_leaves_the_page_too(toycar: Workspace, tmp_path: Path) -> None:
+    """`pytest --campaign` prints the error of the session that it prepares."""
+    entry = toycar.library.parent / "tree/toycar/world.py"
+    entry.write_text(entry.read_text().replace('case["gap"]', "0.0", 1))
+    with (
+        pytest.raises(CheckFailed, match="look at the drive"),
+        open_session(toycar, "small", tmp_path / "run", workers=0, choices=Choices()) as session,
+    ):
+        session.prepare()
+    assert list((tmp_path / "run").glob("report/golden-*.html"))
