@@ -17,8 +17,9 @@ from mutator.outcomes.fault_paths import FaultPath, FaultPathFinder, fault_paths
 from mutator.outcomes.series_sampling import traces_of_series
 from mutator.outcomes.trace_loading import Trace
 from mutator.results.experiment_sentence import ExperimentSentences
+from mutator.results.finished_experiment import ResultColumn
 from mutator.results.plan_columns import PlanColumn
-from mutator.results.table_columns import ResultColumn, result_columns_of
+from mutator.results.table_columns import result_columns_of
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.session_environments import SessionEnvironment

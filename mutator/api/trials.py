@@ -18,8 +18,10 @@ from mutator.model import Experiment, Method, Record
 from mutator.outcomes.hazards_and_metrics import load_judged_run
 from mutator.outcomes.trace_loading import Trace, load_trace
 from mutator.results.experiment_sentence import ExperimentSentences
+from mutator.results.finished_experiment import ResultColumn
 from mutator.results.plan_columns import PlanColumn
-from mutator.results.table_columns import ResultColumn, result_columns, severity_and_time_columns
+from mutator.results.severity_and_sentence_columns import severity_and_time_columns
+from mutator.results.table_columns import result_columns
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import Phrases

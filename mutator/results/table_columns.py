@@ -4,76 +4,29 @@ from an experiment and its record.
 Hazards, compared channels and metrics of a target add columns; the others are the same for all targets.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
-from mutator.model import Experiment, Record, Status
-from mutator.outcomes.verdict_rules import (
-    classified_hazard_of,
-    manifestation_to_hazard_time,
-    missing_severity_reason,
-    reaction_time,
-    time_to_hazard,
-)
+from mutator.outcomes.verdict_rules import reaction_time
+from mutator.results.finished_experiment import FinishedExperiment, ResultColumn, rounded_time
 from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, HOLD_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
-from mutator.results.table_writers import TableColumn
-from mutator.targets.contact_severity import SeverityScale
-from mutator.targets.manifest import TargetManifest
-from mutator.targets.stored_phrases import (
-    GOLDEN_HIGHEST_SPEED,
-    GOLDEN_LOWEST_SPEED,
-    HIGHEST_SPEED,
-    LOWEST_SPEED,
-    SPEED_AT_ACTIVATION,
+from mutator.results.severity_and_sentence_columns import (
+    FIRST_CHANGE_COLUMNS,
+    SPEED_COLUMNS,
+    severity_and_time_columns,
 )
+from mutator.results.table_writers import TableColumn
+from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN, MetricFacts
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from mutator.outcomes.fault_paths import FaultPathFinder
     from mutator.store.run_head import RunHead
 
 UNIT_OF_CHANNEL = "as its channel"  # a unit
-_TIME_DIGITS = 6  # decimals of a time in s: finer than any step, coarser than a double's precision
-
-
-class FinishedExperiment:
-    """An experiment with its record, from which the cells of its row follow."""
-
-    def __init__(
-        self,
-        experiment: Experiment,
-        record: Record,
-        scale: SeverityScale | None = None,
-        fault_paths: "FaultPathFinder | None" = None,
-    ) -> None:
-        self.experiment, self.record, self.severity_scale = experiment, record, scale
-        self.is_ok = record.status is Status.OK
-        self.hazards, self.metrics = dict(record.hazards), dict(record.metrics)
-        self.max_dev = dict(record.max_dev)
-        self.dev = self.max_dev | dict(record.dev)  # up to the end of the drive, where a hazard ended it
-        self.classified = classified_hazard_of(record, scale)
-        self.untimed_path = fault_paths.untimed_path(experiment.fault, record) if fault_paths else None
-
-
-@dataclass(frozen=True, slots=True)
-class ResultColumn(TableColumn):
-    """A column that is known after a run. None is an empty cell."""
-
-    cell_of: Callable[[FinishedExperiment], object]
-
-
-def _rounded_time(value: float | None) -> float | None:
-    return None if value is None else round(value, _TIME_DIGITS)
-
-
-def _speed(name: str, finished: FinishedExperiment) -> float | None:
-    return dict(finished.record.speeds).get(name)
-
 
 _COLUMNS_TO_MANIFESTATION = (
     ResultColumn(
@@ -98,7 +51,7 @@ _COLUMNS_TO_MANIFESTATION = (
         "number",
         "s",
         "time of the first activation",
-        lambda f: _rounded_time(f.record.activation.first) if f.record.activation else None,
+        lambda f: rounded_time(f.record.activation.first) if f.record.activation else None,
     ),
     ResultColumn(
         "activations",
@@ -119,7 +72,7 @@ _COLUMNS_TO_MANIFESTATION = (
         "number",
         "s",
         "when an actuator output first differed from golden after the activation",
-        lambda f: _rounded_time(f.record.t_manifest),
+        lambda f: rounded_time(f.record.t_manifest),
     ),
 )
 _COLUMNS_TO_REACTION = (
@@ -135,83 +88,15 @@ _COLUMNS_TO_REACTION = (
         "number",
         "s",
         "time of the first alert",
-        lambda f: _rounded_time(f.record.alerts[0][1]) if f.record.alerts else None,
+        lambda f: rounded_time(f.record.alerts[0][1]) if f.record.alerts else None,
     ),
     ResultColumn(
         "reaction_time",
         "number",
         "s",
         "time from the first alert to the first hazard; empty unless the alert came first",
-        lambda f: _rounded_time(reaction_time(f.record.hazards, f.record.alerts)),
+        lambda f: rounded_time(reaction_time(f.record.hazards, f.record.alerts)),
     ),
-)
-SEVERITY_COLUMN = ResultColumn(
-    "severity",
-    "text",
-    "",
-    "highest severity class of a hazard in the drive; empty without a class",
-    lambda f: f.classified.severity if f.classified else None,
-)
-CLASSIFIED_HAZARD_COLUMNS = (
-    ResultColumn(
-        "severity_hazard",
-        "text",
-        "",
-        "the hazard that has this class; of several, the first",
-        lambda f: f.classified.hazard if f.classified else None,
-    ),
-    ResultColumn(
-        "no_severity",
-        "text",
-        "",
-        "why no hazard has a class; empty with a class, and without a hazard",
-        lambda f: missing_severity_reason(f.record, f.severity_scale),
-    ),
-)
-TIME_TO_HAZARD_COLUMNS = (
-    ResultColumn(
-        "time_to_hazard",
-        "number",
-        "s",
-        "time from the activation to the first hazard, also if the fault had ended by then",
-        lambda f: _rounded_time(time_to_hazard(f.record)),
-    ),
-    ResultColumn(
-        "manifest_to_hazard",
-        "number",
-        "s",
-        "time from the manifestation to the first hazard; empty if the hazard came first",
-        lambda f: _rounded_time(manifestation_to_hazard_time(f.record)),
-    ),
-)
-FIRST_CHANGE_COLUMNS = (
-    ResultColumn(
-        "first_actuator",
-        "text",
-        "",
-        "the actuator output that first differed from golden; of several, the manifest's first",
-        lambda f: f.record.first_change[0] if f.record.first_change else None,
-    ),
-    ResultColumn(
-        "first_change",
-        "text",
-        "",
-        "whether it was then `higher` or `lower` than in the golden run",
-        lambda f: f.record.first_change[1] if f.record.first_change else None,
-    ),
-)
-SPEED_COLUMNS = tuple(
-    ResultColumn(name, "number", "m/s", about, partial(_speed, name))
-    for name, about in (
-        (SPEED_AT_ACTIVATION, "the car's speed at the activation"),
-        (
-            HIGHEST_SPEED,
-            "its highest speed from the activation to the first hazard, or to the end of the drive",
-        ),
-        (LOWEST_SPEED, "its lowest speed in this time"),
-        (GOLDEN_HIGHEST_SPEED, "the highest speed of the golden run in this time"),
-        (GOLDEN_LOWEST_SPEED, "the lowest speed of the golden run in this time"),
-    )
 )
 PATH_COLUMNS = (
     ResultColumn(
@@ -321,12 +206,6 @@ def row_of(columns: Iterable[PlanColumn | ResultColumn], finished: FinishedExper
     }
 
 
-def severity_and_time_columns(*, has_classes: bool) -> tuple[ResultColumn, ...]:
-    """Return the columns of a target whose hazards can have classes of severity, or have none."""
-    severity = (SEVERITY_COLUMN, *CLASSIFIED_HAZARD_COLUMNS) if has_classes else ()
-    return (*severity, *TIME_TO_HAZARD_COLUMNS)
-
-
 def _deviation_column(channel: str, column: str) -> ResultColumn:
     about = f"largest difference of `{channel}` from golden"
     return ResultColumn(column, "number", UNIT_OF_CHANNEL, about, lambda f: f.max_dev.get(channel))
@@ -340,9 +219,7 @@ def _drive_deviation_column(channel: str, column: str) -> ResultColumn:
 def _metric_column(metric: MetricFacts) -> ResultColumn:
     name = metric.name
     if name == DRIVE_END_COLUMN:
-        return ResultColumn(
-            name, "number", metric.unit, metric.about, lambda f: _rounded_time(f.record.t_end)
-        )
+        return ResultColumn(name, "number", metric.unit, metric.about, lambda f: rounded_time(f.record.t_end))
     return ResultColumn(name, "number", metric.unit, metric.about, lambda f: f.metrics.get(name))
 
 
@@ -363,7 +240,7 @@ def hazard_columns(hazard: str) -> tuple[ResultColumn, ResultColumn]:
             "number",
             "s",
             "time of its first occurrence",
-            lambda f: _rounded_time(f.hazards.get(hazard)),
+            lambda f: rounded_time(f.hazards.get(hazard)),
         ),
     )
 

@@ -15,8 +15,9 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
 from mutator.results import table_building
 from mutator.results.experiment_sentence import ExperimentSentences
+from mutator.results.finished_experiment import FinishedExperiment
 from mutator.results.result_rows import ResultRow, rows_of
-from mutator.results.table_columns import FinishedExperiment, cells_by_column, result_columns_of
+from mutator.results.table_columns import cells_by_column, result_columns_of
 from mutator.results.table_writers import TableColumn, parquet_batch, parquet_schema
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder

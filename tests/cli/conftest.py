@@ -1,6 +1,7 @@
 """The command line, run in this process on a copy of the toy target and its library."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -62,3 +63,32 @@ def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         monkeypatch.delenv(f"MUTATOR_{name}", raising=False)
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.fixture(scope="session")
+def shared_run(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
+    """A list of the shared run folder and, once known, its seal."""
+    return [tmp_path_factory.mktemp("shared") / "run"]
+
+
+@pytest.fixture
+def sealed(cli: Cli, root: Path, shared_run: list[Any]) -> str:
+    """The seal that `mutator run` prints. All tests share the folder `run`, because they have the same
+    library."""
+    kept, *seals = shared_run
+    if not seals:
+        ran = cli("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "fork")
+        assert ran.code == 0, ran.err
+        found = re.search(r"^seal: ([0-9a-f]{64})$", ran.out, re.MULTILINE)
+        assert found
+        shared_run.append(found[1])
+        shutil.copytree("run", kept)
+    elif not Path("run").exists():
+        shutil.copytree(kept, "run")
+    return str(shared_run[1])
+
+
+@pytest.fixture
+def copy(cli: Cli, sealed: str, tmp_path: Path) -> Path:
+    """A copy of the sealed run, which a test can change."""
+    return Path(shutil.copytree("run", tmp_path / "copy"))

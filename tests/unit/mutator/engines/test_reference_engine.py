@@ -5,10 +5,7 @@ import os
 import resource
 import shutil
 import signal
-import subprocess
-import sys
 import threading
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +19,8 @@ from mutator.errors import DiskFull, MutatorError
 from mutator.model import Limits, Status
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
+
+from .ended_processes import ended
 
 LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
 Run = Callable[..., JobResult]
@@ -278,57 +277,6 @@ def test_grandchildren_end_with_the_run(run: Run, tmp_path: Path) -> None:
     )
     assert run(entry(body)).status is Status.OK
     assert ended(int(note.read_text()))
-
-
-def ended(pid: int) -> bool:
-    """Return whether the process ends, or becomes a zombie, within a few seconds."""
-    deadline = time.monotonic() + 5.0
-    while time.monotonic() < deadline:
-        try:
-            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-        except (FileNotFoundError, ProcessLookupError):
-            return True
-        if state == "Z":
-            return True
-        time.sleep(0.05)
-    return False
-
-
-SLEEPER = """
-import sys
-from pathlib import Path
-from mutator.engines.engine_jobs import Job
-from mutator.engines.reference_engine import ReferenceEngine
-from mutator.model import Limits
-from mutator.workspace import Workspace
-library, templates, folder, note = map(Path, sys.argv[1:])
-toycar = Workspace(library=library, templates=templates)
-engine = ReferenceEngine(toycar.manifest("toycar"), folder / "work", Limits())
-body = f"import os, pathlib, time; pathlib.Path({str(note)!r}).write_text(str(os.getpid())); time.sleep(60)"
-job = Job(name="x", scenario=toycar.scenario("A"), seed=1, changed_files={"toycar/go.py": body.encode()})
-engine.execute(job, folder / "work" / "x")
-"""
-
-
-def test_a_run_ends_when_its_engine_is_killed(toycar: Workspace, tmp_path: Path) -> None:
-    note = tmp_path / "pid"
-    (tmp_path / "work").mkdir()
-    arguments = [toycar.library, toycar.templates, tmp_path, note]
-    engine = subprocess.Popen([sys.executable, "-c", SLEEPER, *map(str, arguments)])
-    try:
-        deadline = time.monotonic() + 30.0
-        while not (note.exists() and note.read_text()) and time.monotonic() < deadline:
-            time.sleep(0.02)
-        pid = int(note.read_text())
-        assert not ended_now(pid)
-    finally:
-        engine.send_signal(signal.SIGKILL)
-        engine.wait()
-    assert ended(pid)
-
-
-def ended_now(pid: int) -> bool:
-    return not Path(f"/proc/{pid}").exists()
 
 
 def test_a_full_disk_is_not_a_crash(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

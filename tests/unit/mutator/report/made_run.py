@@ -5,7 +5,8 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 from mutator._common.hashing import as_json_types
-from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
+from mutator.results.severity_and_sentence_columns import TIME_TO_HAZARD_COLUMNS
+from mutator.results.table_columns import result_columns
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import DigestLedger
 from mutator.store.plan_choices import Choices

@@ -24,7 +24,8 @@ from mutator.report.most_dangerous_experiments import most_dangerous_answer
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.reported_run import ReportedRun
 from mutator.report.what_to_fix_first import fix_first_answer
-from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
+from mutator.results.severity_and_sentence_columns import TIME_TO_HAZARD_COLUMNS
+from mutator.results.table_columns import result_columns
 from mutator.store.checksummed_lines import line_file_bytes
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA

@@ -13,7 +13,8 @@ from mutator.results.outcome_counting import (
     count_table,
     fault_types_of,
 )
-from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
+from mutator.results.severity_and_sentence_columns import TIME_TO_HAZARD_COLUMNS
+from mutator.results.table_columns import result_columns
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
 from tests.made_head import made_head

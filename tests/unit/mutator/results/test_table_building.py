@@ -21,12 +21,8 @@ from mutator.errors import MutatorWarning
 from mutator.model import Record
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.results import propagation_columns, table_building, table_writers
-from mutator.results.table_columns import (
-    TIMING_COLUMNS,
-    FinishedExperiment,
-    cells_by_column,
-    result_columns_of,
-)
+from mutator.results.finished_experiment import FinishedExperiment
+from mutator.results.table_columns import TIMING_COLUMNS, cells_by_column, result_columns_of
 from mutator.results.table_writers import TableColumn
 from mutator.store import plan_file
 from mutator.store.checksummed_lines import LineWriter

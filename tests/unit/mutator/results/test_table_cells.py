@@ -8,12 +8,9 @@ import pytest
 from mutator._common.hashing import as_json_types
 from mutator._common.typed_json import from_json_types
 from mutator.model import Experiment, Method, Outcome, Record, Status
-from mutator.results.table_columns import (
-    FinishedExperiment,
-    cells_by_column,
-    result_columns,
-    severity_and_time_columns,
-)
+from mutator.results.finished_experiment import FinishedExperiment
+from mutator.results.severity_and_sentence_columns import severity_and_time_columns
+from mutator.results.table_columns import cells_by_column, result_columns
 from mutator.targets.contact_severity import SeverityScale
 
 HAZARDS = ("H1", "H2", "H3")

@@ -10,7 +10,8 @@ import pandas as pd
 
 from mutator.model import Status
 from mutator.results.result_rows import ResultRow, rows_of
-from mutator.results.table_columns import result_columns, severity_and_time_columns
+from mutator.results.severity_and_sentence_columns import severity_and_time_columns
+from mutator.results.table_columns import result_columns
 from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import (
     causes_of,

@@ -10,7 +10,8 @@ from markupsafe import escape
 from mutator.report.panel import Panel
 from mutator.report.panels.tables_panel import build_tables_panel
 from mutator.report.reported_run import ReportedRun
-from mutator.results.table_columns import TIME_TO_HAZARD_COLUMNS, result_columns
+from mutator.results.severity_and_sentence_columns import TIME_TO_HAZARD_COLUMNS
+from mutator.results.table_columns import result_columns
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
