@@ -162,13 +162,14 @@ def _components_with_columns(path: FaultPath) -> Iterator[tuple[Any, int]]:
 @dataclass(slots=True, kw_only=True)
 class PathCounts:
     """Counts over the paths of some faults. By link: how many reached its start, and how many passed it if
-    its end is recorded. By component: how many were injected, stopped, and masked there.
-    `masked_by_component_set` counts masked faults by the set of components that stopped them.
+    its end is recorded. By component: how many came there by a link, were injected, stopped, and masked
+    there. `masked_by_component_set` counts masked faults by the set of components that stopped them.
     """
 
     active_fault_count: int = 0
     reached_by_link: Counter[str] = field(default_factory=Counter)
     passed_by_link: Counter[str] = field(default_factory=Counter)
+    entered_by_component: Counter[str] = field(default_factory=Counter)
     injected_by_component: Counter[str] = field(default_factory=Counter)
     stopped_by_component: Counter[str] = field(default_factory=Counter)
     masked_by_component: Counter[str] = field(default_factory=Counter)
@@ -184,6 +185,7 @@ class PathCounts:
                 [n for n, _, state in link_states if state in (LinkState.THROUGH, LinkState.STOPPED)],
             ),
             (self.passed_by_link, [name for name, _, state in link_states if state is LinkState.THROUGH]),
+            (self.entered_by_component, {tip for _, tip, state in link_states if state is LinkState.THROUGH}),
             (self.injected_by_component, path.injected),
             (self.stopped_by_component, stopped.union(path.stopped_at)),
             (self.masked_by_component, path.stopped_at),

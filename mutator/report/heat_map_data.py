@@ -10,6 +10,7 @@ import pandas as pd
 
 from mutator.report.reported_run import ReportedRun
 from mutator.statistics.results_frame import hazard_names
+from mutator.statistics.shares import CONFIDENCE
 from mutator.targets.contact_severity import SEVERITY_CLASSES
 
 HeatMapCells = list[list[Any]]  # by row; each cell has a count or value, and its base (the number of runs)
@@ -86,15 +87,27 @@ def _median_and_worst_cells(
     for row in range(shape[0]):
         in_row = np.ones(len(values), dtype=bool) if row == shape[0] - 1 else y == row
         for column in range(shape[1]):
-            cell_values = values[in_row if column == shape[1] - 1 else in_row & (x == column)]
-            medians.append(
-                [_rounded(np.median(cell_values)) if cell_values.size else None, int(cell_values.size)]
-            )
+            cell_values = np.sort(values[in_row if column == shape[1] - 1 else in_row & (x == column)])
+            medians.append([*_median_and_count(cell_values), *_median_bounds(cell_values)])
             worst = (
                 (cell_values.max() if worse == "higher" else cell_values.min()) if cell_values.size else None
             )
             worsts.append([None if worst is None else _rounded(worst), int(cell_values.size)])
     return {f"median-{name}": medians, f"worst-{name}": worsts}
+
+
+def _median_and_count(sorted_values: np.ndarray) -> tuple[float | None, int]:
+    return (_rounded(np.median(sorted_values)) if sorted_values.size else None), int(sorted_values.size)
+
+
+def _median_bounds(sorted_values: np.ndarray) -> list[float | None]:
+    """Return the ends of the 95 % interval of the median from order statistics, as in heat.js; empty if there
+    are too few values.
+    """
+    from scipy.stats import binom  # type: ignore[import-untyped]
+
+    rank = int(binom.ppf((1 - CONFIDENCE) / 2, sorted_values.size, 0.5)) if sorted_values.size else 0
+    return [_rounded(sorted_values[rank - 1]), _rounded(sorted_values[-rank])] if rank else []
 
 
 def _rounded(value: np.floating[Any]) -> float | None:

@@ -8,6 +8,7 @@ from typing import Any
 from urllib.parse import quote
 
 from mutator.report.fault_path_data import PathCounts, link_name
+from mutator.statistics.shares import share
 from mutator.stpa import svg_shapes
 from mutator.stpa.analysis_files import ControlStructureModel, LinkModel
 from mutator.stpa.structure_layout import ComponentBox, LinkArrow, lay_out_structure
@@ -15,6 +16,21 @@ from mutator.stpa.svg_shapes import path_data
 
 _WIDEST_LINE_PX = 7.0  # px, width of a link that passed all its faults
 _THINNEST_LINE_PX = 1.8
+
+
+def structure_with_paths(structure: ControlStructureModel, links: Collection[str]) -> ControlStructureModel:
+    """Return the part of a control structure that faults can take by these `links`: their ends, and all links
+    between them.
+    """
+    ends = {end for name in links if (link := structure.links.get(name)) for end in (link.from_, link.to)}
+    return structure.model_copy(
+        update={
+            "components": {
+                name: component for name, component in structure.components.items() if name in ends
+            },
+            "links": {n: link for n, link in structure.links.items() if {link.from_, link.to} <= ends},
+        }
+    )
 
 
 def draw_path_counts(structure: ControlStructureModel, counts: PathCounts, links: Collection[str]) -> str:
@@ -53,20 +69,19 @@ def counts_for_drawing(
         "links": {
             name: _link_look(counts.passed_by_link[name], counts.reached_by_link[name]) for name in links
         },
-        "components": {
-            name: _box_look(
-                counts.injected_by_component[name],
-                counts.stopped_by_component[name],
-                counts.masked_by_component[name],
-            )
-            for name in structure.components
-        },
+        "components": {name: _box_look(name, counts) for name in structure.components},
     }
 
 
 def describe_passed_share(passed: int, reached: int) -> str:
     """For example `12 of 40, 30 %`; '' if no fault reached the link."""
     return f"{passed} of {reached}, {100 * passed / reached:.0f} %" if reached else ""
+
+
+def describe_interval(passed: int, reached: int) -> str:
+    """Return the 95 % interval of the share; '' if no fault reached the link."""
+    result = share(passed, reached)
+    return f"95 % interval {100 * result.low:.0f} to {100 * result.high:.0f} %" if reached else ""
 
 
 def _is_short(arrow: LinkArrow) -> bool:
@@ -82,13 +97,13 @@ def _idle_link_svg(arrow: LinkArrow, link: LinkModel) -> Iterator[str]:
 
 
 def _link_svg(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
-    kind, width, share = _link_look(counts.passed_by_link[name], counts.reached_by_link[name])
+    kind, width, count, interval = _link_look(counts.passed_by_link[name], counts.reached_by_link[name])
     short = _is_short(arrow)
-    first, _, last = share.partition(", ") if short else (share, "", "")
+    first, _, last = count.partition(", ") if short else (count, "", "")
     yield (
         f'<a class="link is-{kind}" data-link="{escape(name)}"{" data-short" if short else ""} '
         f'href="#through={quote(link_name(link.from_, link.to))}">'
-        f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}</title>"
+        f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}\n{interval}</title>"
         f'<path class="hit" d="{path_data(arrow.points)}"/><path class="line" d="{path_data(arrow.points)}" '
         f'style="stroke-width: {width}" marker-end="url(#path-tip-{kind})"/>'
         f"{svg_shapes.label_line(arrow, escape(link.label))}"
@@ -97,27 +112,31 @@ def _link_svg(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) 
     )
 
 
-def _link_look(passed: int, reached: int) -> tuple[str, str, str]:
-    """Return a link's kind, the width of its line, and its count."""
+def _link_look(passed: int, reached: int) -> tuple[str, str, str, str]:
+    """Return a link's kind, the width of its line, its count, and the interval of its share."""
     kind = "through" if passed else "stopped" if reached else "quiet"
     width = _THINNEST_LINE_PX + (_WIDEST_LINE_PX - _THINNEST_LINE_PX) * (passed / reached if reached else 0.0)
-    return kind, f"{width:.1f}px", describe_passed_share(passed, reached)
+    count, interval = describe_passed_share(passed, reached), describe_interval(passed, reached)
+    return kind, f"{width:.1f}px", count, interval
 
 
-def _box_look(injected: int, stopped: int, masked: int) -> tuple[str, str, str]:
-    """Return a box's classes, and its two lines of counts."""
-    counts = {"injected": injected, "stopped": stopped}
-    has = "".join(f" has-{what}" for what, n in counts.items() if n)
-    first = ", ".join(f"{n} {what}" for what, n in counts.items() if n)
-    return f"box{has}", first, f"{masked} masked" if masked else ""
+def _box_look(name: str, counts: PathCounts) -> tuple[str, str, str]:
+    """Return a box's classes, and its two lines of counts. Where no fault was injected or stopped, the first
+    line says how many came there.
+    """
+    faults = {"injected": counts.injected_by_component[name], "stopped": counts.stopped_by_component[name]}
+    has = "".join(f" has-{what}" for what, n in faults.items() if n)
+    first = ", ".join(f"{n} {what}" for what, n in faults.items() if n)
+    masked = counts.masked_by_component[name]
+    return (
+        f"box{has}",
+        first or f"{counts.entered_by_component[name]} came here",
+        f"{masked} masked" if masked else "",
+    )
 
 
 def _box_svg(name: str, box: ComponentBox, label: str, about: str, counts: PathCounts) -> Iterator[str]:
-    classes, first, last = _box_look(
-        counts.injected_by_component[name],
-        counts.stopped_by_component[name],
-        counts.masked_by_component[name],
-    )
+    classes, first, last = _box_look(name, counts)
     middle, top = box.x + box.width / 2, box.y + box.height / 2
     yield (
         f'<a class="{classes}" data-component="{escape(name)}" href="#stopped_at={quote(name)}">'

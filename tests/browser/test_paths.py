@@ -116,9 +116,12 @@ def test_the_control_structure_shows_counts_and_filters_the_list(opened: "Page")
         f"{held} stopped",
         f"{held} masked",
     ]
-    assert opened.page.text_content("#path-counts-table [data-link='commands'] td:last-child") == share
+    cell = opened.page.text_content("#path-counts-table [data-link='commands'] td:last-child")
+    assert cell.startswith(f"{share}; 95 % interval ")
     opened.page.select_option("#path-counts-kind", "sensor/distance")
     assert opened.page.text_content(count) == f"0 of {held}, 0 %"
+    title = opened.page.text_content("#path-counts [data-link='commands'] title")
+    assert "\n95 % interval 0 to " in title
     opened.page.click("#path-counts [data-component='pedals']")
     assert opened.fragment == "stopped_at=pedals&kind=sensor%2Fdistance"
     assert "Stopped at: Pedals" in opened.page.inner_text("body").replace("stopped at", "Stopped at")

@@ -7,6 +7,7 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 import pytest
+from scipy.stats import quantile_test
 
 from mutator.report import report_builder
 from mutator.report.panels import figures_panel
@@ -251,16 +252,34 @@ MEDIANS = """async () => {
     const metrics = [["t_activation", "s", "", "higher"]];
     new HeatMap(place, picker, table, state, metrics).show(table.filter("", new Map()).rows);
     const cell = place.querySelector('[aria-label^="all fault types in all scenarios"]');
-    return [cell.textContent, [...picker.querySelectorAll("option")].map((o) => o.textContent)];
+    const options = [...picker.querySelectorAll("option")].map((o) => o.textContent);
+    return [cell.textContent, cell.getAttribute("aria-label"), options];
 }"""
 
 
 def test_the_map_shows_the_median_of_a_metric(page: "Page", rows: list[dict[str, str]]) -> None:
     used = [row for row in rows if row["status"] != "harness_error"]
     times = [float(row["t_activation"]) for row in used if row["t_activation"]]
-    text, options = page.page.evaluate(MEDIANS)
+    text, about, options = page.page.evaluate(MEDIANS)
     assert float(text) == pytest.approx(median(times), rel=1e-2)
+    ends = quantile_test(times, p=0.5).confidence_interval(0.95)
+    assert f"({ends.low:.3g} to {ends.high:.3g}), over {len(times)}" in about
     assert options[-2:] == ["median t activation [s]", "worst t activation [s]"]
+
+
+def test_rows_of_the_map_with_nothing_to_count_are_named_and_left_out(
+    page: "Page", rows: list[dict[str, str]]
+) -> None:
+    hazard = next(row for row in rows if row["outcome"] == "hazard")
+    page.page.fill("#search", hazard["experiment_id"])
+    page.wait_for_rows(1)
+    kind = f"{hazard['module']}/{hazard['fault_type']}"
+    assert page.texts("#heat th[scope=row]") == [kind, "all"]
+    assert page.texts("#heat th[scope=col]") == [hazard["scenario"], "all"]
+    others = {f"{row['module']}/{row['fault_type']}" for row in rows} - {kind}
+    note = page.page.inner_text("#heat .omitted")
+    assert note.startswith("Nothing to count: fault types ") and all(other in note for other in others)
+    assert page.texts("#heat .cell") == ["1/1"] * 4
 
 
 def test_columns_and_searches_are_in_the_address(page: "Page", rows: list[dict[str, str]]) -> None:

@@ -37,6 +37,19 @@ def test_a_narrow_screen_does_not_scroll_sideways(browser: Any, run: Path, schem
     context.close()
 
 
+@pytest.mark.parametrize("width", [1000, 1440])
+def test_value_and_trigger_stay_visible_beside_an_opened_experiment(page: "Page", width: int) -> None:
+    page.page.set_viewport_size({"width": width, "height": 900})
+    page.page.click("#grid tr[data-at] >> nth=1")
+    page.page.wait_for_selector("#experiment .diff")
+    box = page.page.locator("#grid").bounding_box()
+    for name in ("kind", "value", "trigger", "ending"):
+        cell = page.page.locator(f'#grid th[data-column="{name}"]').bounding_box()
+        assert cell["x"] >= box["x"] and cell["x"] + cell["width"] <= box["x"] + box["width"] + 1
+        assert cell["width"] > 50
+    assert any(page.column("value")) and all(page.column("trigger"))
+
+
 TITLES = """[...document.querySelectorAll("h1")].filter((h) => h.checkVisibility() && !h.closest("[inert]"))
     .map((h) => h.textContent)"""
 

@@ -1,6 +1,9 @@
 """The panel of fault paths: what passed each link, and where faults stopped."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from markupsafe import Markup
 
 from mutator._common.table_rendering import TextTable
 from mutator.report.fault_path_data import (
@@ -10,9 +13,16 @@ from mutator.report.fault_path_data import (
     path_counts_by_fault_type,
 )
 from mutator.report.panel import Panel, rendered
-from mutator.report.path_drawing import counts_for_drawing, describe_passed_share, draw_path_counts
+from mutator.report.path_drawing import (
+    counts_for_drawing,
+    describe_interval,
+    describe_passed_share,
+    draw_path_counts,
+    structure_with_paths,
+)
 from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import fault_types_of
+from mutator.stpa.analysis_files import ControlStructureModel
 from mutator.web import json_script_element
 
 _INTRODUCTION = (
@@ -23,9 +33,9 @@ _NONE_STOPPED = "None: every active fault changed an actuator."
 _HTML_TEMPLATE = """\
 <h2>Fault paths</h2>
 <p>{{ about }}</p>
-{% if figure %}
+{% if drawing %}
 <p class="quiet">Links: the thicker, the more faults got through; dashed if none did; thin if the end is not
-recorded; dotted if it is feedback, or a link from or to people, which belong to no path. Boxes: orange if
+recorded; dotted if it belongs to no path, such as feedback. Boxes: orange if
 faults were <strong>injected</strong> here; green if faults were <strong>stopped</strong> here, so they got
 no further through this component. A fault that two components stopped is counted at both. A
 <strong>masked</strong> fault changed no actuator at all. Select a link to list the experiments whose faults
@@ -38,11 +48,14 @@ got through it, or a box to list those whose faults were masked there.</p>
 <span class="quiet" id="path-counts-active"
 role="status">{{ counts[all].active_fault_count }} active</span></div>
 <div class="scroll" id="path-counts" tabindex="0" role="group"
-aria-label="Control structure">{{ figure }}</div>
-{{ data }}
+aria-label="Control structure">{{ drawing.figure }}</div>
+{% if drawing.omitted %}
+<p class="quiet">Not drawn, because no path leads there: {{ drawing.omitted }}.</p>
 {% endif %}
-<details{{ "" if figure else " open" }}>
-<summary>{{ "The same numbers as a table" if figure else "Links" }}</summary>
+{{ drawing.data }}
+{% endif %}
+<details{{ "" if drawing else " open" }}>
+<summary>{{ "The same numbers as a table" if drawing else "Links" }}</summary>
 <div class="scroll"><table id="path-counts-table"><thead><tr><th scope="col">from</th><th scope="col">to</th>
 <th scope="col">what it carries</th><th scope="col">got through, of those that reached it</th></tr></thead>
 <tbody>
@@ -61,6 +74,9 @@ names all components that stopped it.</p>
 <p>{{ none_stopped }}</p>
 {% endif %}
 """
+
+
+LinkPartsByName = Mapping[str, tuple[str, str, str]]  # tail, tip, and what the link carries
 
 
 def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
@@ -84,29 +100,46 @@ def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
         _links_table(links, counts[ALL_FAULT_TYPES], paths).as_markdown(),
     ]
     parts += ["### Where masked faults were stopped", stops.as_markdown() if stops else _NONE_STOPPED]
-    figure = data = None
-    if structure:
-        figure = draw_path_counts(structure, counts[ALL_FAULT_TYPES], links)
-        drawn = {kind: counts_for_drawing(structure, of_kind, links) for kind, of_kind in counts.items()}
-        data = json_script_element(drawn, "path-counts-data")
     html = rendered(
         _HTML_TEMPLATE,
         about=_INTRODUCTION,
-        figure=figure and _markup(figure),
+        drawing=_draw(structure, counts, links) if structure else None,
         kinds=list(counts),
         all=ALL_FAULT_TYPES,
         counts=counts,
-        data=data and _markup(data),
         links=links,
         label=paths.component_label,
-        share=lambda through, came: describe_passed_share(through, came) or "none reached it",
+        share=_describe_share_with_interval,
         stops=stops,
         none_stopped=_NONE_STOPPED,
     )
     return Panel(anchor="fault-paths", link="Fault paths", markdown="\n\n".join(parts), html=html)
 
 
-LinkPartsByName = Mapping[str, tuple[str, str, str]]  # tail, tip, and what the link carries
+class _Drawing(NamedTuple):
+    figure: Markup
+    data: Markup  # script element with the counts of each fault type
+    omitted: str  # components that no path leads to
+
+
+def _draw(
+    structure: ControlStructureModel, counts: Mapping[str, PathCounts], links: LinkPartsByName
+) -> _Drawing:
+    drawn = structure_with_paths(structure, links)
+    count_texts = {kind: counts_for_drawing(drawn, of_kind, links) for kind, of_kind in counts.items()}
+    omitted = [c.label for name, c in structure.components.items() if name not in drawn.components]
+    return _Drawing(
+        figure=Markup(draw_path_counts(drawn, counts[ALL_FAULT_TYPES], links)),
+        data=Markup(json_script_element(count_texts, "path-counts-data")),
+        omitted=", ".join(omitted),
+    )
+
+
+def _describe_share_with_interval(passed: int, reached: int) -> str:
+    """`12 of 40, 30 %; 95 % interval 18 to 45 %`, as path_counts.js joins it."""
+    if not reached:
+        return "none reached it"
+    return f"{describe_passed_share(passed, reached)}; {describe_interval(passed, reached)}"
 
 
 def _links_in_order(paths: RunFaultPaths) -> LinkPartsByName:
@@ -134,7 +167,7 @@ def _links_table(links: LinkPartsByName, counts: PathCounts, paths: RunFaultPath
             paths.component_label(tail),
             paths.component_label(tip),
             carries,
-            describe_passed_share(counts.passed_by_link[name], came),
+            _describe_share_with_interval(counts.passed_by_link[name], came),
         )
         for name, (tail, tip, carries) in links.items()
         if (came := counts.reached_by_link[name])
@@ -170,9 +203,3 @@ def _masked_faults_table(counts: Mapping[str, PathCounts], paths: RunFaultPaths)
         for kind in order
     ]
     return TextTable(heads=heads, rows=rows, right_aligned=range(1, len(heads)))
-
-
-def _markup(text: str):  # type: ignore[no-untyped-def]  # markupsafe is imported where a page is made
-    from markupsafe import Markup
-
-    return Markup(text)

@@ -7,16 +7,17 @@ class Grid {
   static SPARE = 8; // extra rows rendered above and below the visible ones
   static PRINTED = 500; // rows printed on paper
 
-  /** Column name, title, width in px and cell content. `narrow` columns are also shown on a phone.
+  /** Column name, title, width in px and cell content. `narrow` columns are also shown on a phone, `beside` ones beside an opened
+   *  experiment.
    *  @type {any[]} */
   static COLUMNS = [
-    { name: "kind", title: "fault type", px: 174, narrow: true },
+    { name: "kind", title: "fault type", px: 174, narrow: true, beside: true, cell: (t, r) => Grid.kind(t.text(r, "kind")) },
     { name: "variant", title: "variant", px: 72 },
-    { name: "value", title: "value", px: 70, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
+    { name: "value", title: "value", px: 70, beside: true, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
     { name: "scenario", title: "scenario", px: 76, narrow: true },
     { name: "method", title: "method", px: 66 },
-    { name: "trigger", title: "trigger", px: 92 },
-    { name: "ending", title: "outcome", px: 102, narrow: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
+    { name: "trigger", title: "trigger", px: 92, beside: true },
+    { name: "ending", title: "outcome", px: 102, narrow: true, beside: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
     { name: "severity", title: "severity", px: 124, narrow: true, cell: (t, r) => Grid.severity(t.called("severity", t.text(r, "severity"))) },
     { name: "t_activation", title: "activated", px: 80, time: true },
     { name: "t_manifest", title: "manifested", px: 92, time: true },
@@ -27,6 +28,12 @@ class Grid {
     { name: "reaction_time", title: "reaction", px: 74, time: true },
     { name: "experiment_id", title: "id", px: 76, cell: (t, r) => Dom.el("code", {}, t.text(r, "experiment_id").slice(0, 8)) },
   ];
+
+  /** A fault type; its module is left out where there is little room. */
+  static kind(text) {
+    const [module, ...rest] = text.split(/(?<=\/)/);
+    return rest.length ? [Dom.el("span.module", {}, module), ...rest] : text;
+  }
 
   /** The outcome or status as a coloured label. */
   static ending(text) {
@@ -98,7 +105,7 @@ class Grid {
   }
 
   static #classes(column) {
-    return `${column.narrow ? "narrow" : "wide"}${column.time || column.isNumber ? ".time" : ""}`;
+    return `${column.narrow ? "narrow" : "wide"}${column.beside ? ".beside" : ""}${column.time || column.isNumber ? ".time" : ""}`;
   }
 
   #sortBy(name) {

@@ -1,7 +1,7 @@
 // @ts-check
 "use strict";
-// The map of fault type by scenario. Each cell shows a share, or a metric's median or worst value, as text and colour.
-// Selecting a cell sets the filters.
+// The map of fault type by scenario. Each cell shows a share, or a metric's median or worst value, as text and colour, and
+// describes its 95 % interval. Selecting a cell sets the filters. Rows and columns with nothing to count are named below.
 
 class HeatMap {
   static ROW = "kind";
@@ -99,42 +99,67 @@ class HeatMap {
 
   /** The text, description and colour of each cell of a metric. The worst cell has full colour. */
   static #summaries({ which, turn }, cells) {
-    return HeatMap.#coloured({ turn }, cells.map((values) => {
+    return HeatMap.#coloured({ which, turn }, cells.map((values) => {
       const sorted = values.sort((a, b) => turn * (a - b)), middle = (sorted.length - 1) / 2;
       if (!sorted.length) return [NaN, 0];
-      return [which === "worst" ? sorted.at(-1) : (sorted[Math.floor(middle)] + sorted[Math.ceil(middle)]) / 2, sorted.length];
+      if (which === "worst") return [sorted.at(-1), sorted.length];
+      const rank = HeatMap.rankOfBound(sorted.length), ends = rank ? [sorted.at(rank - 1), sorted.at(-rank)].sort((a, b) => a - b) : [];
+      return [(sorted[Math.floor(middle)] + sorted[Math.ceil(middle)]) / 2, sorted.length, ...ends];
     }));
   }
 
-  /** The text, description and colour of values (null: no value), each given with its number of runs. */
-  static #coloured({ turn }, valuesWithCounts) {
+  /** The text, description and colour of values (null: no value), each given with its number of runs and, for a median, the ends
+   *  of its interval. */
+  static #coloured({ which, turn }, valuesWithCounts) {
     const values = valuesWithCounts.map(([value]) => value ?? NaN);
     const finite = values.filter(Number.isFinite), low = Math.min(...finite), high = Math.max(...finite);
     const rate = (value) => (high > low && Number.isFinite(value) ? (turn > 0 ? value - low : high - value) / (high - low) : 0);
-    return values.map((value, at) => ({ all: valuesWithCounts[at][1], text: Grid.number(value), what: `${Grid.number(value)}, over ${valuesWithCounts[at][1]}`, rate: rate(value) }));
+    const what = (value, [, count, ...ends]) => {
+      if (which === "worst") return `${Grid.number(value)}, a bound from ${count} runs`;
+      return `${Grid.number(value)} (${ends.length ? ends.map((end) => Grid.number(end ?? Infinity)).join(" to ") : "too few runs for an interval"}), over ${count}`;
+    };
+    return values.map((value, at) => ({ all: valuesWithCounts[at][1], text: Grid.number(value), what: what(value, valuesWithCounts[at]), rate: rate(value) }));
+  }
+
+  /** The rank of the lower end of the 95 % interval of a median among `count` sorted values (the sign test's): the largest for which
+   *  fewer values lie below the median with a probability of 2.5 % at most; 0 if there is none. */
+  static rankOfBound(count) {
+    let logarithm = count * Math.log(0.5), sum = 0, rank = 0;
+    for (; (sum += Math.exp(logarithm)) <= 0.025; rank++) logarithm += Math.log((count - rank) / (rank + 1));
+    return rank;
   }
 
   #draw(measure, cells, width) {
     const { el } = Dom;
     const kinds = [...this.rows.values, null], scenarios = [...this.columns.values, null];
     const focused = this.place.contains(document.activeElement) ? document.activeElement.dataset.at : null;
+    const bottom = kinds.length - 1, right = scenarios.length - 1; // the totals
+    const rows = [...kinds.keys()].filter((y) => cells[y * width + right].all), columns = [...scenarios.keys()].filter((x) => cells[bottom * width + x].all);
     const cell = (y, x) => {
       const { all, text, what, rate } = cells[y * width + x];
-      const where = `${kinds[y] || "all fault types"} in ${scenarios[x] || "all scenarios"}`, description = all ? what : "none to count";
+      const where = `${kinds[y] || "all fault types"} in ${scenarios[x] || "all scenarios"}`;
+      if (!all) return el("td", { title: `${where}\n${measure.title}: none to count` });
       const isChosen = this.#isChosen(HeatMap.ROW, kinds[y]) && this.#isChosen(HeatMap.COLUMN, scenarios[x]);
       return el("td", {}, el("button.cell", {
         type: "button", "data-at": `${y},${x}`, "aria-pressed": String(isChosen && this.#isAny), style: `--rate: ${rate.toFixed(3)}`,
-        class: `cell${all ? "" : " nothing"}${rate > 0.55 ? " strong" : ""}`,
-        title: `${where}\n${measure.title}: ${description}`, "aria-label": `${where}: ${measure.title} ${description}`,
+        class: `cell${rate > 0.55 ? " strong" : ""}`,
+        title: `${where}\n${measure.title}: ${what}`, "aria-label": `${where}: ${measure.title} ${what}`,
         onclick: () => this.#choose(kinds[y], scenarios[x], isChosen && this.#isAny),
-      }, all ? text : "·"));
+      }, text));
     };
-    const head = el("tr", {}, el("td"), scenarios.map((s) => el("th", { scope: "col", title: this.table.meaning(HeatMap.COLUMN, s) }, s || "all")));
-    const body = kinds.map((kind, y) =>
-      el("tr", {}, el("th", { scope: "row" }, kind ? kind.split(/(?<=[/_])/).flatMap((part) => [part, el("wbr")]) : "all"), scenarios.map((_, x) => cell(y, x))));
+    const head = el("tr", {}, el("td"), columns.map((x) => el("th", { scope: "col", title: this.table.meaning(HeatMap.COLUMN, scenarios[x]) }, scenarios[x] || "all")));
+    const body = rows.map((y) =>
+      el("tr", {}, el("th", { scope: "row" }, kinds[y] ? kinds[y].split(/(?<=[/_])/).flatMap((part) => [part, el("wbr")]) : "all"), columns.map((x) => cell(y, x))));
     this.place.replaceChildren(el("table.heat", { "aria-label": `${measure.title} by fault type and scenario` },
-      el("thead", {}, head), el("tbody", {}, body)));
+      el("thead", {}, head), el("tbody", {}, body)), HeatMap.#omitted(kinds.filter((_, y) => !rows.includes(y)), scenarios.filter((_, x) => !columns.includes(x))));
     if (focused) this.place.querySelector(`[data-at="${focused}"]`)?.focus();
+  }
+
+  /** The names of the rows and columns with nothing to count. */
+  static #omitted(kinds, scenarios) {
+    const named = (noun, names) => (names.length ? [`${noun}${names.length > 1 ? "s" : ""} ${names.join(", ")}`] : []);
+    const parts = [...named("fault type", kinds.filter(Boolean)), ...named("scenario", scenarios.filter(Boolean))];
+    return parts.length ? Dom.el("p.quiet.omitted", {}, `Nothing to count: ${parts.join("; ")}.`) : "";
   }
 
   get #isAny() {

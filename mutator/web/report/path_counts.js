@@ -18,13 +18,14 @@ const PathCounts = (() => {
     const filter = (element) => element.setAttribute("href", element.getAttribute("href").split("&")[0] + only);
     document.getElementById("path-counts-active").textContent = `${active} active`;
     for (const link of place.querySelectorAll("[data-link]")) {
-      const [state, width, share] = links[link.dataset.link], line = link.querySelector(".line");
+      const [state, width, share, interval] = links[link.dataset.link], line = link.querySelector(".line"), title = link.querySelector("title");
+      title.textContent = `${title.textContent.split("\n")[0]}\n${interval}`;
       link.setAttribute("class", `link is-${state}`);
       line.setAttribute("marker-end", `url(#path-tip-${state})`);
       line.style.strokeWidth = width;
       const [first, last = ""] = "short" in link.dataset ? share.split(", ") : [share];
       link.querySelectorAll(".count").forEach((line, i) => { line.textContent = i ? last : first; });
-      document.querySelector(`#path-counts-table [data-link="${CSS.escape(link.dataset.link)}"] td:last-child`).textContent = share || "none reached it";
+      document.querySelector(`#path-counts-table [data-link="${CSS.escape(link.dataset.link)}"] td:last-child`).textContent = share ? `${share}; ${interval}` : "none reached it";
       filter(link);
     }
     for (const box of place.querySelectorAll("[data-component]")) {

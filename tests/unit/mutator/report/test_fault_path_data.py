@@ -1,5 +1,6 @@
 """A report's data on fault paths."""
 
+import re
 from collections.abc import Callable
 from math import inf
 
@@ -15,7 +16,7 @@ from mutator.outcomes.fault_paths import (
     UntimedPath,
 )
 from mutator.report.fault_path_data import PathCounts, RunFaultPaths
-from mutator.report.path_drawing import counts_for_drawing, draw_path_counts
+from mutator.report.path_drawing import counts_for_drawing, draw_path_counts, structure_with_paths
 from mutator.stpa.analysis_files import load_hazard_analysis
 from mutator.targets.stored_target_facts import ChannelFacts
 from mutator.workspace import Workspace
@@ -111,6 +112,7 @@ def test_faults_are_counted_by_link_and_component() -> None:
     assert counts.active_fault_count == 4
     assert counts.passed_by_link == {"eyes-pedals": 2, "pedals-car": 2}
     assert counts.reached_by_link == {"eyes-pedals": 3, "pedals-car": 4}
+    assert counts.entered_by_component == {"pedals": 2, "car": 2}
     assert (counts.injected_by_component, counts.stopped_by_component) == (
         {"eyes": 4},
         {"car": 2, "pedals": 1},
@@ -130,11 +132,26 @@ def test_the_drawing_of_other_counts_is_the_one_that_the_page_changes_to(clone: 
     counts.masked_by_component.update({name: 2})
     drawn = counts_for_drawing(structure, counts, links)
     assert drawn["active"] == 8
-    assert drawn["links"][links[0]] == ("through", "2.5px", "1 of 8, 12 %")
-    assert drawn["links"][links[1]] == ("stopped", "1.8px", "0 of 3, 0 %")
-    assert drawn["links"][links[2]] == ("quiet", "1.8px", "")
+    assert drawn["links"][links[0]] == ("through", "2.5px", "1 of 8, 12 %", "95 % interval 2 to 47 %")
+    assert drawn["links"][links[1]] == ("stopped", "1.8px", "0 of 3, 0 %", "95 % interval 0 to 56 %")
+    assert drawn["links"][links[2]] == ("quiet", "1.8px", "", "")
     assert drawn["components"][name] == ("box has-injected", "8 injected", "2 masked")
     figure = draw_path_counts(structure, counts, links)
-    for kind, width, _ in drawn["links"].values():
+    for kind, width, *_, interval in drawn["links"].values():
         assert f'class="link is-{kind}"' in figure and f"stroke-width: {width}" in figure
+        assert f"\n{interval}</title>" in figure
     assert f'class="box has-injected" data-component="{name}"' in figure
+
+
+def test_components_that_no_path_leads_to_are_not_drawn(clone: Workspace) -> None:
+    """Links between the others stay, also those that no fault takes."""
+    structure = load_hazard_analysis(clone.library / "stpa").structure
+    name, link = next(iter(structure.links.items()))
+    part = structure_with_paths(structure, [name])
+    assert set(part.components) == {link.from_, link.to}
+    assert name in part.links and {(x.from_, x.to) for x in part.links.values()} <= {
+        (link.from_, link.to),
+        (link.to, link.from_),
+    }
+    figure = draw_path_counts(part, PathCounts(), [name])
+    assert set(re.findall(r'data-component="(\w+)"', figure)) == {link.from_, link.to}
