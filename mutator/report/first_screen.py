@@ -1,4 +1,6 @@
-"""What the page shows first: the worst experiment in words, and four numbers with their intervals."""
+"""What the page shows first: the worst experiment in words, four numbers with their intervals, and the change
+against the run before.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,6 +8,7 @@ from math import isnan
 
 import pandas as pd
 
+from mutator._common.message_text import counted
 from mutator.config.yaml_files import load_yaml
 from mutator.errors import MutatorError
 from mutator.model import Record
@@ -17,6 +20,8 @@ from mutator.statistics.median_intervals import median_interval
 from mutator.statistics.shares import share
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
+
+MOST_CHANGES = 3  # maximum number of new hazards, and of those gone, that are listed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,3 +137,47 @@ def _has_even_sample(folder: RunFolder) -> bool:
     if not isinstance(campaign, dict) or campaign.get("sample") is None:
         return False
     return not campaign.get("proportional")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescribedChange:
+    """The change against the run before, in words. `hazards` are the first new ones and those gone, each with
+    its experiment in this run.
+    """
+
+    text: str
+    advice: str
+    hazards: tuple[tuple[str, ResultRow], ...]
+
+    @property
+    def markdown(self) -> str:
+        hazards = [
+            f"* {what}: {row.sentence or row.fault} (`{row.experiment_id}`)" for what, row in self.hazards
+        ]
+        return "\n".join((f"**Since the run before:** {self.text} {self.advice}", *hazards))
+
+
+def describe_change(run: ReportedRun) -> DescribedChange | None:
+    """Describe the change against the run before; None without one."""
+    change = run.change
+    if change is None:
+        return None
+    text = "no difference"
+    if change.new_hazard_ids or change.former_hazard_ids or change.changed_count:
+        text = f"{counted(len(change.new_hazard_ids), 'new hazard')}, "
+        text += f"{len(change.former_hazard_ids):,} gone, {change.changed_count:,} changed otherwise"
+    commit = "" if change.target_commit == "-" else f", target {change.target_commit}"
+    text += f", of {change.shared_count:,} experiments that are also in {change.name} "
+    text += f"({change.date} UTC{commit})."
+    listed = {"new": change.new_hazard_ids[:MOST_CHANGES], "gone": change.former_hazard_ids[:MOST_CHANGES]}
+    results = run.results[run.results["experiment_id"].isin([*listed["new"], *listed["gone"]])]
+    rows = rows_of(results, run.faults, ExperimentSentences.of_run(run.folder.head))
+    rows_by_id = {row.experiment_id: row for row in rows}
+    command = f"mutator compare {change.name} {run.folder.path.resolve().name}"
+    return DescribedChange(
+        text=text,
+        advice=f"Compare them, in the folder that has both: `{command}`.",
+        hazards=tuple(
+            (what, rows_by_id[name]) for what, names in listed.items() for name in names if name in rows_by_id
+        ),
+    )

@@ -7,6 +7,7 @@ from mutator.errors import MutatorError
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.report_builder import build_report
 from mutator.report.report_digests import STAMP_FILE
+from mutator.report.run_before import stored_change
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -28,7 +29,7 @@ def audit_report(folder: RunFolder, workspace: Workspace | None) -> tuple[int, I
 def _differences_from_rebuilt_report(
     folder: RunFolder, workspace: Workspace | None, stored: set[str]
 ) -> Iterator[MutatorError]:
-    built = build_report(folder, workspace).files
+    built = build_report(folder, workspace, change=stored_change(folder)).files
     for name in sorted({*built, *stored}):
         path = path_below(folder.path / REPORT_FOLDER, name)
         if name not in built:

@@ -1,6 +1,7 @@
 """Builds the report of a run: REPORT.md, and a self-contained HTML page with others beside it.
 
-The only inputs are the run folder and the fault library. Equal inputs give equal bytes.
+The only inputs are the run folder, the fault library, and the change against the run before, which is stored
+beside the report. Equal inputs give equal bytes.
 """
 
 from collections.abc import Callable, Mapping
@@ -27,6 +28,7 @@ from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.panels.first_screen_panel import build_first_screen_panel
 from mutator.report.report_digests import inputs_digest, is_current, write_report_files
 from mutator.report.reported_run import ReportedRun
+from mutator.report.run_before import RUN_BEFORE_FILE, ChangeSinceRunBefore, find_change
 from mutator.report.single_file import single_file_html, single_file_name
 from mutator.results.outcome_counting import count_by_outcome_or_status
 from mutator.results.table_reader import Results
@@ -78,7 +80,8 @@ def write_report(run: Path, workspace: Workspace | None, *, single_file: bool = 
     if workspace:
         write_missing_series_of_traces(folder, workspace)
     sources = inputs_digest(folder, workspace)
-    built = build_report(folder, workspace, single_file=single_file)
+    change = find_change(folder, Results(run).frame())
+    built = build_report(folder, workspace, single_file=single_file, change=change)
     write_report_files(run, sources, built.files)
     written = _written_report(run, built.experiment_count, built.summaries)
     if built.single_file is None:
@@ -88,9 +91,17 @@ def write_report(run: Path, workspace: Workspace | None, *, single_file: bool = 
     return replace(written, single_file=path_below(run, name))
 
 
-def build_report(folder: RunFolder, workspace: Workspace | None, *, single_file: bool = False) -> BuiltReport:
-    """Build the report of a run folder whose tables are up to date, without writing anything."""
-    reported = ReportedRun.open(folder, workspace)
+def build_report(
+    folder: RunFolder,
+    workspace: Workspace | None,
+    *,
+    single_file: bool = False,
+    change: ChangeSinceRunBefore | None = None,
+) -> BuiltReport:
+    """Build the report of a run folder whose tables are up to date, without writing anything. `change` is
+    that against the run before, if the report shows it.
+    """
+    reported = replace(ReportedRun.open(folder, workspace), change=change)
     with computing_in_background(
         lambda: build_list_data(reported), process_count_for(len(reported.results))
     ) as wait_for_list_data:
@@ -100,6 +111,8 @@ def build_report(folder: RunFolder, workspace: Workspace | None, *, single_file:
     files = {name: data for panel in panels for name, data in panel.files.items()}
     files |= {MARKDOWN_FILE: report_markdown(content).encode(), PAGE_FILE: report_html(content).encode()}
     files |= {page.file_name: page_html(content, page).encode() for page in content.all_pages}
+    if change:
+        files |= {RUN_BEFORE_FILE: change.as_bytes()}
     if study:
         files |= {"STUDY.md": page_markdown(content, study).encode()}
     summaries = tuple(panel.summary for panel in panels if panel.summary)

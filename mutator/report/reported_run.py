@@ -15,6 +15,7 @@ from mutator.report.engine_summary import EngineSummary, summarize_engines
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN, ExperimentFacts
 from mutator.report.fault_path_data import RunFaultPaths
 from mutator.report.panel import Panel
+from mutator.report.run_before import ChangeSinceRunBefore
 from mutator.report.source_lines import SourceLines
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import Results
@@ -34,7 +35,7 @@ class ReportedRun:
     """The data that a report is made from. `results` are all experiments with a record, `frame` the usable
     ones. `faults` are those of the plan; `experiments` (the plan) and `records` are read on access. Without a
     workspace, no experiment can be rerun, and there is no study. `has_study_page`: the study has its own
-    page on these results.
+    page on these results. `change` is that against the run before.
     """
 
     folder: RunFolder
@@ -45,6 +46,7 @@ class ReportedRun:
     experiment_facts: ExperimentFacts
     engine_summary: EngineSummary | None = None
     has_study_page: bool = False
+    change: ChangeSinceRunBefore | None = None
     run_fault_paths: RunFaultPaths | None = None
     source_lines: SourceLines | None = None
     faults: Mapping[str, Fault] = field(default_factory=dict)

@@ -68,14 +68,14 @@ class History:
     left_out: tuple[str, ...]  #: for each run folder that is not in the history, the reason
 
 
-def _run_folders(folder: Path) -> list[Path]:
+def run_folders(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob("*") if RunFolder.exists(path))
 
 
 def write_history(folder: Path) -> History:
     """Write the history of the runs in a folder. Raise MutatorError if none has results."""
     runs, omission_reasons = [], []
-    for path in _run_folders(folder):
+    for path in run_folders(folder):
         try:
             runs.append(_past_run(path))
         except MutatorError as err:
@@ -99,15 +99,27 @@ def write_history(folder: Path) -> History:
 def _past_run(path: Path) -> PastRun:
     folder = RunFolder.open_unverified(path)
     rows = {row.experiment_id: row for row in Results(path).rows()}
+    cpu_s = sum(float(line["cpu_s"]) for line in folder.timings().values())
+    return PastRun(
+        folder=folder,
+        date=last_ending(folder),
+        target_commit=target_commit_of(folder),
+        rows_by_id=rows,
+        cpu_s=cpu_s,
+    )
+
+
+def target_commit_of(folder: RunFolder) -> str:
+    """Return the commit of the target in the last session, or `-` if none is known."""
     sessions = folder.session_environments  # none: nothing has run yet
     state = (sessions[-1].git or {}).get("target") if sessions else None
-    commit = f"{state.commit[:8]}{' with changes' if state.changed else ''}" if state else "-"
-    cpu_s, date = 0.0, None
-    for line in folder.timings().values():
-        cpu_s += float(line["cpu_s"])
-        if (ended := ending_of(line)) and (date is None or ended > date):
-            date = ended
-    return PastRun(folder=folder, date=date, target_commit=commit, rows_by_id=rows, cpu_s=cpu_s)
+    return f"{state.commit[:8]}{' with changes' if state.changed else ''}" if state else "-"
+
+
+def last_ending(folder: RunFolder) -> datetime | None:
+    """Return when the last experiment of a run ended; None if the run has no times."""
+    endings = filter(None, map(ending_of, folder.timings().values()))
+    return max(endings, default=None)
 
 
 def _order(run: PastRun) -> tuple[datetime, str]:

@@ -24,7 +24,13 @@ ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any
     *("series/*.js", "series/*.blocks"),
     *(f"{TRACES_FOLDER}/*/*", *(f"plots/*.{kind}" for kind in ("svg", "jpg", "png", "mp4", "gif"))),
     *("results.csv", "results.parquet", "propagation.parquet", "timings.parquet", "results.json"),
-    *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
+    *(
+        "report/*.md",
+        "report/*.html",
+        "report/made_from.json",
+        "report/run_before.json",
+        "report/series/*.js",
+    ),
     *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
     *(
         "exports/mcap/*.mcap",

@@ -1,7 +1,7 @@
 """The first part of a report: the worst experiment in words, with its replay, and four numbers."""
 
 from mutator.report.answer_parts import warning_filter_values
-from mutator.report.first_screen import key_numbers, sample_note, worst_row
+from mutator.report.first_screen import describe_change, key_numbers, sample_note, worst_row
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.results.result_rows import ResultRow
@@ -39,6 +39,18 @@ _HTML_TEMPLATE = """\
 <p class="quiet">{{ note }}</p>
 {% endif %}
 </div>
+{% if change %}
+<div class="change">
+<p><b>Since the run before:</b> {{ change.text }} {{ change.advice | marked }}</p>
+{% if change.hazards %}
+<ul>
+{% for what, row in change.hazards %}
+<li>{{ what }}: <a href="#e={{ row.experiment_id }}">{{ row.sentence or row.fault }}</a></li>
+{% endfor %}
+</ul>
+{% endif %}
+</div>
+{% endif %}
 </section>
 """
 
@@ -48,9 +60,15 @@ def build_first_screen_panel(run: ReportedRun) -> Panel:
     frame = run.frame.assign(warning=warning_filter_values(run.frame))
     numbers, note = key_numbers(frame, has_alerts=run.folder.has_alerts), sample_note(run.folder)
     kicker = _kicker(worst) if worst else ""
+    change = describe_change(run)
     lines = [f"* **{number.value}** {number.meaning} ({number.evidence})" for number in numbers]
-    parts = [_worst_markdown(kicker, worst) if worst else "", "\n".join(lines), note]
-    html = rendered(_HTML_TEMPLATE, worst=worst, kicker=kicker, numbers=numbers, note=note)
+    parts = [
+        _worst_markdown(kicker, worst) if worst else "",
+        "\n".join(lines),
+        note,
+        change.markdown if change else "",
+    ]
+    html = rendered(_HTML_TEMPLATE, worst=worst, kicker=kicker, numbers=numbers, note=note, change=change)
     return Panel(anchor="first", link="Summary", markdown="\n\n".join(filter(None, parts)), html=html)
 
 

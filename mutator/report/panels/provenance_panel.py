@@ -33,6 +33,8 @@ def build_provenance_panel(run: ReportedRun) -> Panel:
     """Return the panel with engines, equivalence check, plan, choices, sources and versions."""
     engines, facts = run.engine_summary, _provenance_facts(run)
     unsealed = list(unsealed_facts(run.folder).items())
+    if run.change:
+        unsealed.append(("run before", f"{run.change.name}, with which the report compares this run"))
     parts = []
     if engines:
         parts += ["## How the experiments were run", engines.equivalence_text, engines.table.as_markdown()]

@@ -8,9 +8,11 @@ from mutator._common.hashing import as_json_types
 from mutator.results.severity_and_sentence_columns import TIME_TO_HAZARD_COLUMNS
 from mutator.results.table_columns import result_columns
 from mutator.store import file_digests, plan_file
+from mutator.store.checksummed_lines import LineWriter
 from mutator.store.file_digests import DigestLedger
 from mutator.store.plan_choices import Choices
 from mutator.store.session_environments import SessionEnvironment
+from mutator.store.timings import TIMINGS_SCHEMA
 from tests.made_head import made_head
 from tests.made_up_results import write_results
 
@@ -76,6 +78,28 @@ def make_run(folder: Path, **head: object) -> Path:
     (folder / "plots").mkdir()
     (folder / "plots" / ("0" * 16 + "-14.50s.jpg")).write_bytes(b"picture")
     return folder
+
+
+COST = {"cpu_s": 1.0, "wall_s": 1.0, "host": "h", "worker": "a", "engine": "reference", "why": ""}
+
+
+def make_two_runs(folder: Path) -> None:
+    """Write the runs `before` and `after` of one plan: the hazard of one experiment is gone, and another has
+    one.
+    """
+    calm = OK | NONE | {"outcome": "masked"}
+    for hour, (name, lines) in enumerate((("before", (OK, calm, calm)), ("after", (calm, OK, calm))), 1):
+        (folder / name).mkdir()
+        run = make_run(folder / name)
+        named = [{"experiment_id": f"{i}" * 16, "fault_id": "f"} | line for i, line in enumerate(lines)]
+        write_results(run, COLUMNS, named)
+        timings = LineWriter(
+            run / "timings" / "0001-a.jsonl", {"schema": TIMINGS_SCHEMA, "plan": HEAD["plan"]}
+        )
+        for line in named[::-1]:  # the last line is not the last experiment that ended
+            ended = f"2026-11-24T{hour:02}:0{line['experiment_id'][0]}:00Z"
+            timings.append(COST | {"experiment_id": line["experiment_id"], "ended": ended})
+        timings.close()
 
 
 class Page(HTMLParser):

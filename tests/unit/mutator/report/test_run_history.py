@@ -9,30 +9,13 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.report.run_history import write_history
-from mutator.store.checksummed_lines import LineWriter
-from mutator.store.timings import TIMINGS_SCHEMA
-from tests.made_up_results import write_results
 
-from .made_run import COLUMNS, HEAD, NONE, OK, Page, make_run
-
-COST = {"cpu_s": 1.0, "wall_s": 1.0, "host": "h", "worker": "a", "engine": "reference", "why": ""}
+from .made_run import Page, make_two_runs
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    calm = OK | NONE | {"outcome": "masked"}
-    for hour, (name, lines) in enumerate((("before", (OK, calm, calm)), ("after", (calm, OK, calm))), 1):
-        (tmp_path / name).mkdir()
-        run = make_run(tmp_path / name)
-        named = [{"experiment_id": f"{i}" * 16, "fault_id": "f"} | line for i, line in enumerate(lines)]
-        write_results(run, COLUMNS, named)
-        timings = LineWriter(
-            run / "timings" / "0001-a.jsonl", {"schema": TIMINGS_SCHEMA, "plan": HEAD["plan"]}
-        )
-        for line in named[::-1]:  # the last line is not the last experiment that ended
-            ended = f"2026-11-24T{hour:02}:0{line['experiment_id'][0]}:00Z"
-            timings.append(COST | {"experiment_id": line["experiment_id"], "ended": ended})
-        timings.close()
+    make_two_runs(tmp_path)
     (tmp_path / "broken").mkdir()
     shutil.copy(tmp_path / "before" / "run.json", tmp_path / "broken")
     return tmp_path
