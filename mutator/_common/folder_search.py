@@ -40,7 +40,9 @@ def library_yaml_files(library: Path, folder: str) -> dict[str, Path]:
     """Return the YAML files in a library folder by name, sorted; errors are those of `files_inside`."""
     base = library / folder
     paths = files_inside(library, folder, "*.yaml")
-    files = {checked_relative_path(p.relative_to(base).with_suffix("").as_posix(), p): p for p in paths}
+    # not `with_suffix`: for names such as `...yaml`, its result depends on the version of Python
+    names = [path.relative_to(base).as_posix().removesuffix(".yaml") for path in paths]
+    files = {checked_relative_path(name, path): path for name, path in zip(names, paths, strict=True)}
     return dict(sorted(files.items()))
 
 

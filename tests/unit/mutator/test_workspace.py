@@ -193,7 +193,9 @@ def test_links_that_stay_in_the_library_are_followed(toycar: Workspace) -> None:
     assert toycar.scenario("A").read_bytes() == (toycar.library / "shared.yaml").read_bytes()
 
 
-@pytest.mark.parametrize("name", ["...yaml", "a\u202eb.yaml", "a\nb.yaml", "a\x1b[2J.yaml"])
+@pytest.mark.parametrize(
+    "name", [".yaml", "..yaml", "...yaml", "a\u202eb.yaml", "a\nb.yaml", "a\x1b[2J.yaml"]
+)
 def test_a_scenarios_name_is_a_plain_name(toycar: Workspace, name: str) -> None:
     """Names become folders of golden runs, and are printed."""
     (toycar.library / "scenarios" / name).write_bytes((toycar.library / "scenarios" / "A.yaml").read_bytes())
