@@ -235,33 +235,40 @@ def test_shards_of_other_machines_merge_if_their_golden_runs_agree(
     assert code == 1 and "the golden run A differs from the one in" in err
 
 
-def _installed_python(minor: int) -> Path:
-    """Return a working `python3.minor` from the PATH or pyenv. The test is skipped if there is none."""
-    places = [*map(Path, os.environ["PATH"].split(os.pathsep)), *Path.home().glob(".pyenv/versions/*/bin")]
-    for path in (place / f"python3.{minor}" for place in places):
-        if shutil.which(path) and not subprocess.run([path, "-c", ""], capture_output=True).returncode:
-            return path
-    pytest.skip(f"python3.{minor} is not installed")
+OTHER_PYTHONS = [f"python3.{minor}" for minor in range(11, 16) if minor != sys.version_info.minor]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("minor", [minor for minor in range(11, 16) if minor != sys.version_info.minor])
-def test_another_installed_python_resumes_only_if_accepted(
-    minor: int, toy: Workspace, tmp_path: Path
-) -> None:
-    python, home = _installed_python(minor), tmp_path / "environment"
+@pytest.fixture(scope="module", params=OTHER_PYTHONS)
+def other(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The command `mutator`, installed for another Python."""
+    name, home = request.param, tmp_path_factory.mktemp("other") / "environment"
+    places = [*os.environ["PATH"].split(os.pathsep), *Path.home().glob(".pyenv/versions/*/bin")]
+    found = [found for place in places if (found := shutil.which(name, path=place))]
+    # a stub of pyenv is there, but fails
+    python = next(
+        (one for one in found if not subprocess.run([one, "-c", ""], capture_output=True).returncode), None
+    )
+    if python is None:
+        pytest.skip(f"{name} is not installed")
     subprocess.run([python, "-m", "venv", home], check=True)
-    # from wheels alone, because some packages take long to compile
+    # wheels only, because some packages take long to compile
     install = [home / "bin" / "pip", "install", "-q", "--only-binary", ":all:"]
     install += ["-c", CLONE / "constraints.txt", "-e", CLONE]
     done = subprocess.run(install, capture_output=True, text=True, check=False)
     if done.returncode:
-        pytest.skip(f"mutator cannot be installed for python3.{minor}: {done.stderr[-500:]}")
+        pytest.skip(f"mutator cannot be installed for {name}: {done.stderr[-500:]}")
+    return home / "bin" / "mutator"
+
+
+@pytest.mark.slow
+def test_another_installed_python_resumes_only_if_accepted(
+    other: Path, toy: Workspace, tmp_path: Path
+) -> None:
     out = tmp_path / "run"
     assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 2
 
     def run(*words: str) -> "subprocess.CompletedProcess[str]":
-        command = [home / "bin" / "mutator", "run", "small", "--out", out, *words]
+        command = [other, "run", "small", "--out", out, *words]
         places = {"MUTATOR_ROOT": str(toy.library.parent)}
         return subprocess.run(command, env=os.environ | places, capture_output=True, text=True, check=False)
 
@@ -273,3 +280,19 @@ def test_another_installed_python_resumes_only_if_accepted(
     assert accepted.returncode == 0, accepted.stderr
     assert "12 of 12 experiments done, 10 now" in accepted.stderr + accepted.stdout
     assert len({stretch.python for stretch in RunFolder.open(out).session_environments}) == 2
+
+
+@pytest.fixture(scope="module")
+def quickstart_results(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    out = tmp_path_factory.mktemp("quickstart") / "run"
+    run_campaign(Workspace.find(root=CLONE), "quickstart", out, workers=2)
+    return (out / "results.csv").read_bytes()
+
+
+@pytest.mark.slow
+def test_another_installed_python_gives_the_same_results(
+    other: Path, quickstart_results: bytes, tmp_path: Path
+) -> None:
+    out = tmp_path / "run"
+    subprocess.run([other, "run", "quickstart", "--out", out, "-n", "2"], cwd=CLONE, check=True)
+    assert (out / "results.csv").read_bytes() == quickstart_results
