@@ -2,9 +2,11 @@
 
 import types
 from collections.abc import Callable
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
@@ -306,3 +308,69 @@ def test_a_missing_byte_is_an_error(toy: Make, value: Any, index: int) -> None:
     )
     with pytest.raises(ValueError, match=f"has no byte {index} to corrupt"):
         made.run("x", lambda: value)
+
+
+class _Scan:
+    """A reading that its program updates in place."""
+
+    def __init__(self, number: int) -> None:
+        self.ranges = [number]
+
+    def set(self, number: int) -> None:
+        self.ranges[0] = number
+
+
+IN_PLACE = {
+    "list": ([0], lambda scan, n: scan.__setitem__(0, n), lambda scan: scan[0]),
+    "dict": ({"r": [0]}, lambda scan, n: scan["r"].__setitem__(0, n), lambda scan: scan["r"][0]),
+    "array": (np.zeros(2), lambda scan, n: scan.fill(n), lambda scan: int(scan[0])),
+    "object": (_Scan(0), _Scan.set, lambda scan: scan.ranges[0]),
+}
+MEMORIES = {
+    "stuck": ({}, "--xxxx", [1, 2, 3, 3, 3, 3]),
+    "delay": ({"delay": 0.2}, "--xxxx", [1, 2, 3, 3, 3, 4]),
+    "stale": ({"steps": 1}, "--xxxx", [1, 2, 3, 3, 4, 5]),
+}
+
+
+@pytest.mark.parametrize("kind", IN_PLACE)
+@pytest.mark.parametrize("model", MEMORIES)
+def test_what_a_fault_remembers_is_not_updated_in_place(toy: Make, kind: str, model: str) -> None:
+    """A program can fill the same array in each step, and change what it got back."""
+    reading, update, first = IN_PLACE[kind]
+    params, marks, expected = MEMORIES[model]
+    reading = deepcopy(reading)
+    made = toy(
+        "def f(scan):\n    x = scan\n    return x\n",
+        AnchorKind.AFTER_ASSIGN,
+        "x",
+        model,
+        target="x",
+        **params,
+    )
+    found = []
+    for number, mark in enumerate(marks, 1):
+        update(reading, number)
+        (result,) = made.run(mark, lambda: reading)
+        found.append(first(result))
+        if mark == "x":
+            update(result, 99)
+    assert found == expected
+
+
+def test_the_result_of_a_slow_call_is_not_updated_in_place(toy: Make) -> None:
+    source = "def f(read):\n    x = read()\n    return x[0]\n"
+    made = toy(source, AnchorKind.RESULT, "read", "slow_call", duration=0.2)
+    buffer, numbers = [0], iter(range(1, 9))
+
+    def read() -> list[int]:
+        buffer[0] = next(numbers)
+        return buffer
+
+    assert made.run("--xxxx", lambda: read) == [1, 2, 3, 3, 3, 3]
+
+
+def test_what_cannot_be_copied_is_refused_by_name(toy: Make) -> None:
+    made = toy("def f(x):\n    y = x\n    return y\n", AnchorKind.AFTER_ASSIGN, "y", "stuck", target="y")
+    with pytest.raises(TypeError, match="generator cannot be copied to repeat it later: "):
+        made.run("x", lambda: (number for number in ()))
