@@ -26,10 +26,10 @@ from mutator.mutants.mutant_building import build
 from mutator.results import table_building
 from mutator.statistics.results_frame import load_usable_results
 from mutator.store import file_digests, plan_file
+from mutator.store.checks_file import CHECKS_FILE as CHECKS
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.file_digests import FileDigest
 from mutator.store.packed_patches import PatchWriter
-from mutator.store.preflight_results import CHECKS_FILE as CHECKS
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

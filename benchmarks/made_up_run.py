@@ -35,11 +35,11 @@ from mutator.outcomes.trace_loading import load_trace
 from mutator.preflight import equivalence_check
 from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store import file_digests, plan_file
+from mutator.store.checks_file import CHECKS_FILE as CHECKS
+from mutator.store.checks_file import CHECKS_SCHEMA
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.file_digests import FileDigest
 from mutator.store.packed_patches import _PatchPacker
-from mutator.store.preflight_results import CHECKS_FILE as CHECKS
-from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.records import PROOF_FOLDER, RECORDS_SCHEMA, record_as_json
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.series_format import encode_series

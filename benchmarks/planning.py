@@ -15,7 +15,6 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
-from mutator._common.files import json_bytes
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines.engine_jobs import Job, JobResult
@@ -23,8 +22,8 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.preflight import check_run_problems, preflight_cache, preflight_checks
+from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.preflight_results import CHECKS_FILE, CHECKS_SCHEMA
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -78,7 +77,7 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
             (out / name).write_bytes(bytes(500_000))
         goldens[key] = check_run_problems.output_digest_of(looked_at.manifest, out)
     said = {"schema": CHECKS_SCHEMA, "digest": looked_at.digest, "results": [], "goldens": goldens}
-    looked_at._store_in_run_folder(json_bytes(said | {"run_cpu_s": 1.0}))
+    looked_at._store_in_run_folder(said | {"run_cpu_s": 1.0})
     preflight_cache.store_passed_checks(
         preflight_cache.cached_checks_path(looked_at.digest),
         folder.path,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from mutator._common.argument_checks import check_whole_number
 from mutator._common.message_text import counted
 from mutator.api.target_and_fault_selection import SelectedTarget
+from mutator.engines.run_limits import limits_before_measuring
 from mutator.errors import MutatorError
 from mutator.model import Fault, Limits
 from mutator.operators.executed_lines import GoldenRunInputs, measure_executed_lines
@@ -42,8 +43,9 @@ def draw_operator_faults(
     executed = None
     if choice.scenario is not None:
         scenario = selected_target.workspace.scenario(choice.scenario)
+        limits = limits_before_measuring(Limits())
         drive = GoldenRunInputs(scenario=scenario, changes=(), seed=choice.seed)
-        [executed] = measure_executed_lines(selected_target.manifest, [drive], Limits())
+        [executed] = measure_executed_lines(selected_target.manifest, [drive], limits)
     operators = unique_operator_names(choice.operators)
     candidates = select_mutations(
         selected_target.manifest, selected_target.models, operators, choice.places, executed

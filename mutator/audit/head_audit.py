@@ -15,8 +15,8 @@ from mutator.errors import MutatorError
 from mutator.model import Outcome
 from mutator.outcomes.trace_loading import trace_digest
 from mutator.store import file_digests, plan_file
-from mutator.store.preflight_results import CHECKS_FILE as CHECKS
-from mutator.store.preflight_results import CHECKS_SCHEMA
+from mutator.store.checks_file import CHECKS_FILE as CHECKS
+from mutator.store.checks_file import CHECKS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.targets.manifest import TargetManifest

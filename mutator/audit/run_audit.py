@@ -27,10 +27,10 @@ from mutator.campaigns.plan_tally import plan_digest
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.store import file_digests, plan_file
+from mutator.store.checks_file import CHECKS_FILE as CHECKS
+from mutator.store.checks_file import CHECKS_SCHEMA
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.file_digests import FileDigest
-from mutator.store.preflight_results import CHECKS_FILE as CHECKS
-from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD
 from mutator.workspace import Workspace

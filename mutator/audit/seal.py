@@ -22,9 +22,9 @@ from mutator._common.files import read_json
 from mutator._common.hashing import canonical_json, digest
 from mutator.campaigns.plan_freezing import PLAN_CSV
 from mutator.store import file_digests, plan_file
+from mutator.store.checks_file import CHECKS_FILE as CHECKS
+from mutator.store.checks_file import CHECKS_SCHEMA, MEASURED_LIMITS_KEY
 from mutator.store.checksummed_lines import intact_lines, unread_segment
-from mutator.store.preflight_results import CHECKS_FILE as CHECKS
-from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.recorded_approvals import review_digest
 from mutator.store.records import PROOF_FOLDER, parse_ending
 from mutator.store.run_folder import RunFolder
@@ -36,7 +36,8 @@ _RUNS_SCHEMA = "results-digest/1"  # of the plan and its runs, as the seal inclu
 # Everything else in these files is sealed, including keys that later versions add.
 UNSEALED_KEYS_BY_FILE = {
     HEAD: ("stretches", "choices.shard", "choices.series_mb"),
-    CHECKS: ("digest", "run_cpu_s"),  # the key of a cache, which depends on the machine; a cost
+    # the key of a cache, which depends on the machine; a cost, and the limits that follow from it
+    CHECKS: ("digest", "run_cpu_s", MEASURED_LIMITS_KEY),
 }
 KEYS_OUTSIDE_RESULTS_DIGEST = ("schema", "provenance", *UNSEALED_KEYS_BY_FILE[HEAD])  # of run.json
 _SEALED_FILES = (CAMPAIGN_FILE, PLAN_CSV, plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE)

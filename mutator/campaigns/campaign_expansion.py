@@ -46,7 +46,7 @@ class CampaignExpansion:
         self._scenario_digests: dict[str, str] = {}
         self._library_specs: list[tuple[FaultSpec, ...]] = []
         self._fault_models = workspace.fault_models()
-        self._operator_faults = OperatorFaultFinder(manifest, self._fault_models, campaign.limits)
+        self._operator_faults = OperatorFaultFinder(manifest, self._fault_models, campaign.golden_run_limits)
 
     def with_seed(self, seed: int) -> "CampaignExpansion":
         """Return the same expansion with another seed, without reading files again."""

@@ -17,6 +17,7 @@ from mutator.campaigns.installed_studies import CheckableStudy, load_installed_s
 from mutator.campaigns.operator_selection import MutantActivity, OperatorSelection
 from mutator.config.yaml_files import load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_measuring
 from mutator.errors import MutatorError
 from mutator.faults.library_readings import READINGS_FILE, SpecReadings
 from mutator.model import AfterHazard, Limits, Method
@@ -72,6 +73,16 @@ class Campaign:
     def seed(self) -> int:
         """The seed, or the first of several."""
         return self.seeds[0]
+
+    @property
+    def measured_limit_names(self) -> frozenset[str]:
+        """The limits that the file does not name, and that golden runs therefore determine."""
+        return LIMITS_THAT_ARE_MEASURED - set(self.yaml_source.data.get("limits") or ())
+
+    @property
+    def golden_run_limits(self) -> Limits:
+        """The limits of runs without a fault."""
+        return limits_before_measuring(self.limits, self.measured_limit_names)
 
     def armed_after_s_in(self, reading: str) -> float | None:
         """Return the time at which triggers are armed; None if the campaign does not set it."""

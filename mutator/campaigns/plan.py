@@ -21,7 +21,7 @@ from mutator.campaigns.row_filters import matching_items
 from mutator.campaigns.sampling import draw_balanced, draw_balanced_pairs, draw_in_proportion
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
 from mutator.errors import MutatorError
-from mutator.model import AfterHazard, Experiment
+from mutator.model import AfterHazard, Experiment, MeasuredLimits
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.store import plan_file
 from mutator.store.plan_choices import Choices
@@ -52,6 +52,7 @@ class PlanCost:
     disk_bytes: int
     workers: int
     is_measured: bool  # whether `cpu_s` is based on golden runs of the run folder
+    cpu_limit_s: int | None  # what a run that hangs costs; None: ten times its golden run, not measured yet
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -68,6 +69,8 @@ class Plan:
     runs: int  #: the number of runs; a run that several scenarios share is counted once
     digest: str  #: the digest: equal on every machine for the same campaign, choices, library and scenarios
     run_cpu_s: float | None = None  #: the measured CPU time of one run in s; None: not measured
+    #: the CPU time in s at which a run is cut off; None: it follows from golden runs that have not run yet
+    cpu_limit_s: int | None = None
     operator_notes: tuple[str, ...] = ()  #: how many mutants the operators produced, and what was left out
 
     def __repr__(self) -> str:
@@ -133,6 +136,7 @@ class Plan:
             disk_bytes=len(self.experiments) * _BYTES_PER_EXPERIMENT + goldens * _BYTES_PER_GOLDEN,
             workers=workers,
             is_measured=self.run_cpu_s is not None,
+            cpu_limit_s=self.cpu_limit_s,
         )
 
 
@@ -251,6 +255,7 @@ def build_plan(workspace: Workspace, campaign: str | Path, choices: Choices | No
         canary=canary,
         digest=plan_digest([e.id for e in experiments], chunks, canary.id, loaded),
         runs=sum(part.run_count for part in parts),
+        cpu_limit_s=None if "cpu_s" in loaded.measured_limit_names else loaded.limits.cpu_s,
         operator_notes=planning.operator_notes,
     )
 
@@ -294,8 +299,10 @@ def load_plan(folder: RunFolder, tally: PlanTally | None = None) -> Plan:
     """
     head = folder.head
     large = head.experiments > _MOST_EXPERIMENTS_IN_MEMORY
+    campaign, limits = load_campaign(folder.path / CAMPAIGN_FILE), folder.limits
+    is_limit_known = isinstance(limits, MeasuredLimits) or "cpu_s" not in campaign.measured_limit_names
     plan = Plan(
-        campaign=load_campaign(folder.path / CAMPAIGN_FILE),
+        campaign=campaign,
         choices=head.choices,
         seed=head.seed,
         reading=head.reading,
@@ -307,6 +314,7 @@ def load_plan(folder: RunFolder, tally: PlanTally | None = None) -> Plan:
         runs=head.runs,
         digest=head.plan,
         run_cpu_s=mean_golden_run_cpu_s(folder),
+        cpu_limit_s=limits.cpu_s if is_limit_known else None,
         operator_notes=head.operators,
     )
     if tally is not None:

@@ -26,6 +26,7 @@ from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.fork_engine import ForkEngine
 from mutator.engines.in_target.nondeterminism_watch import CLOCK, THREAD
 from mutator.engines.reference_engine import ReferenceEngine
+from mutator.engines.run_limits import limits_before_measuring, measure_limits
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import NotForkable
 from mutator.model import Experiment, Limits
@@ -44,7 +45,7 @@ from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 _OTHER_HASH_SEED = 4242  # any but 0, the seed of ordinary runs
-_MOST_REPEATED_RUN_S = 5.0  # slower golden runs are not repeated for the fast engines
+_MOST_REPEATED_RUN_S = 5.0  # of CPU; slower golden runs are not repeated for the fast engines
 _MOST_PLACES = 20  # places listed in a finding
 
 
@@ -73,6 +74,16 @@ class _GoldenRuns:
     again: JobResult
 
 
+@dataclass(frozen=True, kw_only=True)
+class _CanaryToTry:
+    """A campaign's canary, its hazard, and the limits of its runs."""
+
+    campaign: str
+    experiment: Experiment
+    hazard: str
+    limits: Limits
+
+
 class _RunningCheck:
     def __init__(self, workspace: Workspace, target: str, scenarios: Sequence[str], scratch: Path) -> None:
         self.workspace = workspace
@@ -88,7 +99,7 @@ class _RunningCheck:
         settings = [_campaign_changes(workspace, campaign) for campaign in self.campaigns] or [()]
         self.usual_changes = () if () in settings else settings[0]
         self.changes_of_campaigns = list(dict.fromkeys(settings))
-        limits = self.campaigns[0].limits if self.campaigns else Limits()
+        limits = self.campaigns[0].golden_run_limits if self.campaigns else limits_before_measuring(Limits())
         self.seed = self.campaigns[0].seed if self.campaigns else 0
         self._scratch = scratch
         self._run_numbers = itertools.count()
@@ -114,7 +125,8 @@ class _RunningCheck:
             )
             for name, golden in goldens.items():
                 self._record_reach(name, self.usual_changes, golden.watched_counting)
-            canaries = pool.map(self._canary_finding, self._distinct_canaries())
+            golden_cpu_s = [golden.first.cpu_s for golden in goldens.values()]
+            canaries = pool.map(self._canary_finding, self._distinct_canaries(golden_cpu_s))
             self._run_with_further_changes()
             return [*findings, *self.reach_tracker.findings(), *canaries]
 
@@ -156,10 +168,11 @@ class _RunningCheck:
         )
 
     def _execute(self, job: Job) -> JobResult:
+        return self.engine.execute(job, self._new_run_folder(job))
+
+    def _new_run_folder(self, job: Job) -> Path:
         # numbered, because the same job can run again, and two campaigns can have the same canary
-        return self.engine.execute(
-            job, path_below(self.engine.work_folder, f"{next(self._run_numbers)}-{job.name}")
-        )
+        return path_below(self.engine.work_folder, f"{next(self._run_numbers)}-{job.name}")
 
     def _check_run(self, execution: JobResult) -> CheckRun:
         return read_check_run(self.manifest, execution)
@@ -174,7 +187,7 @@ class _RunningCheck:
         )
         problem = golden_pair_problem(first, again)
         if not problem and not (problem := null_mutant_problem(first, watched)):
-            success = f"the same bytes twice, in {golden.first.wall_s:.1f} s each"
+            success = f"the same bytes twice, in {golden.first.cpu_s:.1f} s of CPU each"
             return Finding(name=name, level=CheckState.OK, found=success)
         if first.problem or again.problem or watched.problem or first.output_digest == again.output_digest:
             remedy = "fix the target, the scenario or the manifest: no campaign can start"
@@ -242,7 +255,7 @@ class _RunningCheck:
         This is tried only if the run is fast and deterministic; otherwise, only its threads are checked.
         """
         scenario, golden = next(iter(goldens.items()))
-        is_tried = is_deterministic and golden.first.wall_s <= _MOST_REPEATED_RUN_S
+        is_tried = is_deterministic and golden.first.cpu_s <= _MOST_REPEATED_RUN_S
         refusal = forkable.find_obstacle_before_loading(self.manifest)
         if not refusal:
             refusal = (
@@ -252,7 +265,7 @@ class _RunningCheck:
             )
         if refusal is None and not is_tried:
             why = (
-                f"because a golden run takes {golden.first.wall_s:.0f} s"
+                f"because a golden run takes {golden.first.cpu_s:.0f} s of CPU"
                 if is_deterministic
                 else "because a golden run fails or is not deterministic"
             )
@@ -325,31 +338,38 @@ class _RunningCheck:
 
     # Canaries
 
-    def _distinct_canaries(self) -> list[tuple[str, Experiment, str]]:
-        """Campaign, canary and hazard. Canaries that differ only in their setting are tried once."""
-        canaries: dict[object, tuple[str, Experiment, str]] = {}
+    def _distinct_canaries(self, golden_cpu_s: Sequence[float]) -> list[_CanaryToTry]:
+        """Return the canaries of the campaigns. Those that differ only in their setting are tried once."""
+        canaries: dict[object, _CanaryToTry] = {}
         for campaign in sorted(self.campaigns, key=lambda c: len(_campaign_changes(self.workspace, c))):
             reading = _reading_of(self.workspace, campaign)
             if campaign.canary not in canaries and campaign.canary.scenario in self.scenarios:
                 experiment = CampaignExpansion(
                     self.workspace, campaign, self.manifest, campaign.seed, reading
                 ).build_canary()
-                canaries[campaign.canary] = (campaign.name, experiment, campaign.canary.hazard)
+                canaries[campaign.canary] = _CanaryToTry(
+                    campaign=campaign.name,
+                    experiment=experiment,
+                    hazard=campaign.canary.hazard,
+                    limits=measure_limits(campaign.limits, campaign.measured_limit_names, golden_cpu_s),
+                )
         return list(canaries.values())
 
-    def _canary_finding(self, canary_experiment: tuple[str, Experiment, str]) -> Finding:
-        campaign, experiment, hazard = canary_experiment
+    def _canary_finding(self, canary_to_try: _CanaryToTry) -> Finding:
+        experiment = canary_to_try.experiment
+        engine = ReferenceEngine(self.manifest, self.engine.work_folder, canary_to_try.limits)
 
         def run(tried: Experiment) -> CheckRun:
-            return self._check_run(
-                self._execute(canary.build_canary_job(self.workspace, self.manifest, tried))
-            )
+            job = canary.build_canary_job(self.workspace, self.manifest, tried)
+            return self._check_run(engine.execute(job, self._new_run_folder(job)))
 
         problem, success = canary.run_until_hazard(
-            canary.canary_with_other_values(self.workspace, self.manifest, experiment), run, hazard
+            canary.canary_with_other_values(self.workspace, self.manifest, experiment),
+            run,
+            canary_to_try.hazard,
         )
         return Finding(
-            name=f"canary {campaign}",
+            name=f"canary {canary_to_try.campaign}",
             level=CheckState.FAIL if problem else CheckState.OK,
             found=f"{experiment.fault.spec} in {experiment.scenario} {problem or success}",
             remedy="choose another fault, an earlier time or another scenario for `canary`"

@@ -168,7 +168,15 @@ def _describe_cost(cost: "PlanCost") -> str:
     source = "measured in this folder" if cost.is_measured else "estimated with a default time per run"
     time, disk = describe_duration(cost.wall_s), cost.disk_bytes / 1e6
     workers = counted(cost.workers, "worker")
-    return f"{time} with {workers} ({describe_duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}"
+    limit = (
+        "ten times the CPU time of the golden run, at least 10 s"
+        if cost.cpu_limit_s is None
+        else f"{describe_duration(cost.cpu_limit_s)} of CPU"
+    )
+    return (
+        f"{time} with {workers} ({describe_duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}; "
+        f"a run that hangs costs {limit}"
+    )
 
 
 RUN_EXAMPLES = """\b

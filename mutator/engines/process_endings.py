@@ -86,12 +86,12 @@ def _find_status_if_stopped(limits: Limits, ending: ProcessEnding) -> tuple[Stat
     if ending.stopped == GUARD_LOST:
         return Status.HARNESS_ERROR, f"the process that guarded the run is gone (exit code {ending.code})"
     if ending.stopped == process_guard.WALL:
-        return Status.TIMEOUT, f"wall time limit of {limits.wall_s} s"
+        return Status.TIMEOUT, limits.wall_limit_text
     if ending.stopped == process_guard.DISK:
         return Status.TIMEOUT, f"disk limit of {limits.disk_mb} MiB"
     # the kernel sends SIGXCPU at the limit, and SIGKILL soon after to a process that ignores it
     if killed is signal.SIGXCPU or (killed is signal.SIGKILL and ending.cpu_s >= limits.cpu_s):
-        return Status.TIMEOUT, f"CPU time limit of {limits.cpu_s} s"
+        return Status.TIMEOUT, limits.cpu_limit_text
     if killed in _OUTSIDE_SIGNALS:
         return Status.HARNESS_ERROR, f"killed from outside by {killed.name}"
     return None

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from mutator._common.confined_files import open_below, path_below
-from mutator._common.files import raising_disk_full, read_json, write_atomic, writing_atomic
+from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic, writing_atomic
 from mutator._common.folder_locks import lock_run_folder
 from mutator._common.message_text import counted
 from mutator.audit.seal import UNSEALED_KEYS_BY_FILE, without_keys
@@ -20,11 +20,11 @@ from mutator.results import table_building
 from mutator.results.table_reader import frame_of_experiments
 from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experiment
 from mutator.store import file_digests, integrity, plan_file, run_deletion
+from mutator.store.checks_file import CHECKS_FILE as CHECKS
+from mutator.store.checks_file import CHECKS_SCHEMA, measured_limits_as_json
 from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.packed_patches import PatchWriter
 from mutator.store.plain_contents_check import check_plain_contents
-from mutator.store.preflight_results import CHECKS_FILE as CHECKS
-from mutator.store.preflight_results import CHECKS_SCHEMA
 from mutator.store.recorded_approvals import APPROVALS_FILE as REVIEWED
 from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
@@ -212,13 +212,16 @@ def _copy_shards(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Se
     files = {
         name: file_digest
         for name, file_digest in ledger.files.items()
-        if file_digest.lines is None and name != HEAD and (reviewed or name != REVIEWED)
+        if file_digest.lines is None and name not in (HEAD, CHECKS) and (reviewed or name != REVIEWED)
     }
     for name in files:
         place = path_below(out, name)
         place.parent.mkdir(parents=True, exist_ok=True)
         with open_below(first.path, name) as source, writing_atomic(place) as copy:
             shutil.copyfileobj(source, copy)
+    checks = _merged_checks(folders)
+    write_atomic(out / CHECKS, checks)
+    files[CHECKS] = FileDigest.of_bytes(checks)
     for folder in folders:
         _copy_patches(folder, out)
         assert folder.shard is not None
@@ -229,6 +232,17 @@ def _copy_shards(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Se
     file_digests.save_ledger(out, DigestLedger(files=files | {HEAD: FileDigest.of_bytes(head)}))
     file_digests.add_segments_to_ledger(out, finished=True)
     write_atomic(out / HEAD, head)
+
+
+def _merged_checks(folders: Sequence[RunFolder]) -> bytes:
+    """Return the first shard's checks, with the longest limits that any shard measured: a run that finished
+    in its shard must also finish when it is repeated.
+    """
+    first, limits = folders[0], [folder.limits for folder in folders]
+    longest = replace(
+        limits[0], cpu_s=max(each.cpu_s for each in limits), wall_s=max(each.wall_s for each in limits)
+    )
+    return json_bytes({**read_json(first.path / CHECKS, CHECKS_SCHEMA), **measured_limits_as_json(longest)})
 
 
 def _copy_patches(folder: RunFolder, out: Path) -> None:

@@ -14,6 +14,7 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
 from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
+from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_measuring, measure_limits
 from mutator.errors import CheckFailed
 from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
 from mutator.model import Experiment, Limits, Record, Status
@@ -49,10 +50,19 @@ def run_single(
 ) -> SingleRun:
     """Run an experiment; write golden/ (unless given), faulty/ and mutant.patch into the folder `out`.
 
+    Without `limits`, the golden run determines those of the faulty run.
+
     faulty/ is empty if the mutant could not be built. Raises CheckFailed if the golden run fails.
     """
-    with _engine_in_folder(manifest, out, limits or Limits()) as engine:
-        reference = golden or _run_golden_on_engine(workspace, engine, experiment, out / "golden")
+    golden_limits = limits or limits_before_measuring(Limits())
+    with _engine_in_folder(manifest, out, golden_limits) as engine:
+        if golden is None:
+            reference, cpu_s = _run_golden_on_engine(workspace, engine, experiment, out / "golden")
+            if limits is None:
+                measured = measure_limits(Limits(), LIMITS_THAT_ARE_MEASURED, [cpu_s])
+                engine = ReferenceEngine(manifest, engine.work_folder, measured)
+        else:
+            reference = golden
         goldens = LoadedGoldens(manifest, lambda experiment: reference)
         runner = ExperimentRunner(manifest, workspace.fault_models(), engine, goldens, workspace.scenario)
         (finished,) = _storing_output(runner.run([experiment]), out)
@@ -74,7 +84,7 @@ def run_golden(
     Raises CheckFailed if the run fails.
     """
     with _engine_in_folder(manifest, out, limits) as engine:
-        return _run_golden_on_engine(workspace, engine, experiment, out / "golden")
+        return _run_golden_on_engine(workspace, engine, experiment, out / "golden")[0]
 
 
 def rerun_experiment(
@@ -137,7 +147,8 @@ def _engine_in_folder(manifest: TargetManifest, out: Path, limits: Limits) -> It
 
 def _run_golden_on_engine(
     workspace: Workspace, engine: ReferenceEngine, experiment: Experiment, destination: Path
-) -> Path:
+) -> tuple[Path, float]:
+    """Return the output folder, and the CPU time of the run in s."""
     job = Job(
         name="golden",
         scenario=workspace.scenario(experiment.scenario),
@@ -158,7 +169,7 @@ def _run_golden_on_engine(
             remedy="correct the target or the scenario first",
         )
     _replace_folder(execution.out, destination)
-    return destination
+    return destination, execution.cpu_s
 
 
 def _storing_output(finished_runs: Iterator[RecordedExperiment], out: Path) -> Iterator[RecordedExperiment]:

@@ -1,6 +1,6 @@
 """The runs of the checks before a campaign: golden runs, each twice, null mutants, the canary."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,9 +10,11 @@ from typing import Any
 from mutator._common import cache_layout_and_pruning
 from mutator._common.confined_files import path_below
 from mutator._common.files import remove_folder
+from mutator.campaigns.campaign_files import Campaign
 from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.model import Experiment
+from mutator.engines.run_limits import measure_limits
+from mutator.model import Experiment, Limits
 from mutator.mutants.mutant_building import build
 from mutator.preflight import canary, unreached_triggers
 from mutator.preflight.check_run_problems import CheckRun, read_check_run
@@ -38,15 +40,17 @@ class CheckRunner:
     folder: RunFolder
     manifest: TargetManifest
     pending_folder: Path
+    campaign: Campaign
 
     def run_all(self, workers: int, notify: OnProgress) -> tuple[CheckRunByName, tuple[str, str]]:
         """Do all runs of all checks, `workers` at a time. Return them with the result of the canary."""
         with self._engine_and_pool(workers) as (engine, pool):
-            judged = pool.submit(self._judge_canary, engine)
             futures = {
                 name: pool.submit(self._run_job, engine, name, job)
                 for name, job in self._jobs_by_name().items()
             }
+            # last, because it waits for the golden runs, which have then begun
+            judged = pool.submit(self._judge_canary, engine, futures)
             nulls = [future for name, future in futures.items() if name[0] == NULL_MUTANT]
             _report_progress("checks", [judged, *nulls], notify)
             _report_progress(
@@ -73,16 +77,29 @@ class CheckRunner:
         work.mkdir(parents=True)
         pool = ThreadPoolExecutor(max(1, workers))
         try:
-            yield ReferenceEngine(self.manifest, work, self.folder.limits), pool
+            yield ReferenceEngine(self.manifest, work, self.campaign.golden_run_limits), pool
         finally:
             pool.shutdown(cancel_futures=True)
             remove_folder(work)
 
-    def _judge_canary(self, engine: ReferenceEngine) -> tuple[str, str]:
+    def measure_limits(self, golden_runs: Iterable[CheckRun]) -> Limits:
+        """Return the limits of faulty runs, measured if the campaign leaves them to the golden runs."""
+        campaign = self.campaign
+        return measure_limits(
+            campaign.limits, campaign.measured_limit_names, [run.cpu_s for run in golden_runs]
+        )
+
+    def _judge_canary(
+        self, engine: ReferenceEngine, futures: Mapping[tuple[str, Any], Future[CheckRun]]
+    ) -> tuple[str, str]:
+        goldens = [future.result() for name, future in futures.items() if name[0] == GOLDEN]
+        canary_engine = ReferenceEngine(self.manifest, engine.work_folder, self.measure_limits(goldens))
 
         def run(experiment: Experiment) -> CheckRun:
             return self._run_job(
-                engine, (_CANARY, None), canary.build_canary_job(self.workspace, self.manifest, experiment)
+                canary_engine,
+                (_CANARY, None),
+                canary.build_canary_job(self.workspace, self.manifest, experiment),
             )
 
         hazard = self.folder.head.canary_hazard

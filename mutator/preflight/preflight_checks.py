@@ -1,7 +1,7 @@
 """The checks that must pass before a campaign starts: equal golden runs, null mutants, canary, anchors."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,11 @@ from mutator._common.confined_files import path_below
 from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import digest
 from mutator.campaigns import run_environment
+from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import scenarios_sharing_runs
 from mutator.errors import CheckFailed, DiskFull, InvalidMutant, MutatorError
+from mutator.model import Limits
 from mutator.mutants.mutant_building import build
 from mutator.preflight import preflight_cache, unreached_triggers
 from mutator.preflight.check_run_problems import (
@@ -33,9 +35,11 @@ from mutator.preflight.check_runner import (
     OnProgress,
 )
 from mutator.store import file_digests, plan_file
+from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA, MEASURED_LIMITS_KEY, measured_limits_as_json
 from mutator.store.file_digests import FileDigest
-from mutator.store.preflight_results import CHECKS_FILE, CHECKS_SCHEMA, CheckResult
+from mutator.store.preflight_results import CheckResult
 from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_head import CAMPAIGN_FILE
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
@@ -104,6 +108,7 @@ class _PreflightChecks:
         self.manifest: TargetManifest = workspace.manifest(head.target)
         self.models = workspace.fault_models()
         self.golden_runs = folder.golden_runs
+        self.campaign = load_campaign(folder.path / CAMPAIGN_FILE)
         now = RunInputs.from_workspace(workspace, self.manifest, folder.scenarios).digest_by_source()
         self.fault_by_variant = {fault.spec: fault for fault in plan_file.load_faults(folder.path).values()}
         places = sorted(
@@ -116,7 +121,7 @@ class _PreflightChecks:
             head.seed,
             folder.canary.id,
             head.canary_hazard,
-            head.limits,
+            _limits_that_checks_depend_on(self.campaign),
         ]
         self.digest = digest([*content, places])
 
@@ -143,7 +148,7 @@ class _PreflightChecks:
             ):
                 return None  # forged, or no longer true
             self._check_goldens_same_as_before(stored["goldens"])
-            self._store_in_run_folder(read_bounded(copy / CHECKS_FILE))
+            self._store_in_run_folder(stored)
         return results
 
     def _passed_results(self, stored: dict[str, Any] | None, folder: Path) -> tuple[CheckResult, ...] | None:
@@ -163,20 +168,22 @@ class _PreflightChecks:
         if not anchors.passed:  # the runs would take minutes
             yield anchors
             return
-        runs, canary_verdict = self._build_check_runner(self.pending_folder).run_all(workers, notify)
+        check_runner = self._build_check_runner(self.pending_folder)
+        runs, canary_verdict = check_runner.run_all(workers, notify)
         results = [anchors, *self._judge_goldens(runs), _build_check_result("canary", *canary_verdict)]
         goldens = {golden_run.key: runs[GOLDEN, golden_run].output_digest for golden_run in self.golden_runs}
         self._check_goldens_same_as_before(goldens)
-        cpu = [runs[GOLDEN, key].cpu_s for key in self.golden_runs]
+        golden_runs = [runs[GOLDEN, key] for key in self.golden_runs]
         checks = {
             "schema": CHECKS_SCHEMA,
             "digest": self.digest,
             "results": [asdict(result) for result in results],
             "goldens": goldens,
             "packages": self._loaded_packages(runs),
-            "run_cpu_s": sum(cpu) / len(cpu),
+            "run_cpu_s": sum(run.cpu_s for run in golden_runs) / len(golden_runs),
+            **measured_limits_as_json(check_runner.measure_limits(golden_runs)),
         }
-        self._store_in_run_folder(json_bytes(checks))
+        self._store_in_run_folder(checks)
         yield from results
 
     def _build_check_runner(self, pending_folder: Path) -> CheckRunner:
@@ -185,9 +192,14 @@ class _PreflightChecks:
             folder=self.folder,
             manifest=self.manifest,
             pending_folder=pending_folder,
+            campaign=self.campaign,
         )
 
-    def _store_in_run_folder(self, checks: bytes) -> None:
+    def _store_in_run_folder(self, results: Mapping[str, Any]) -> None:
+        """Store golden runs and the results of the checks, with limits that an earlier session measured."""
+        earlier = self._stored_checks() or {}
+        kept = {MEASURED_LIMITS_KEY: earlier[MEASURED_LIMITS_KEY]} if MEASURED_LIMITS_KEY in earlier else {}
+        checks = json_bytes({**results, **kept})
         run, golden = self.folder.path, self.pending_folder / "golden"
         golden.mkdir(parents=True, exist_ok=True)
         files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}
@@ -268,6 +280,14 @@ class _PreflightChecks:
         return _build_check_result(
             "anchors", text, f"{len(self.fault_by_variant)} variants found their statements"
         )
+
+
+def _limits_that_checks_depend_on(campaign: Campaign) -> dict[str, Any] | Limits:
+    """Return the limits without those that golden runs determine: these only cut runs off."""
+    measured_names = campaign.measured_limit_names
+    if "cpu_s" not in measured_names:
+        return campaign.limits
+    return {name: limit for name, limit in asdict(campaign.limits).items() if name not in measured_names}
 
 
 def _build_check_result(name: str, problem: str, success: str) -> CheckResult:

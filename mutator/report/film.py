@@ -14,11 +14,12 @@ from mutator._common.confined_files import open_below, path_below
 from mutator._common.files import ScratchFolder, make_folder, writing_temporary_path
 from mutator.engines import pyc_files
 from mutator.engines.process_endings import environment_variables_of_run
+from mutator.engines.run_limits import limits_before_measuring
 from mutator.engines.sandbox import Sandbox
 from mutator.errors import MutatorError
 from mutator.execution.single_run import is_same_record, manifest_of_unchanged_target, run_golden, run_single
 from mutator.figures.golden_and_faulty_plot import event_marks
-from mutator.model import Experiment, Record
+from mutator.model import Experiment, Limits, MeasuredLimits, Record
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import FILM_FOLDER, TargetManifest
 from mutator.targets.placeholders import fill_placeholders
@@ -52,11 +53,15 @@ class ExperimentFilmer:
         manifest = manifest_of_unchanged_target(workspace, folder)
         return cls(workspace, folder, manifest, manifest.with_film_recording())
 
+    @property
+    def _limits(self) -> Limits:
+        """The limits of a filmed run, which takes longer than the runs for which limits were measured."""
+        limits = self.folder.limits
+        return limits_before_measuring(limits) if isinstance(limits, MeasuredLimits) else limits
+
     def rerun_golden(self, experiment: Experiment, out: Path) -> Path:
         """Rerun an experiment's golden run into the folder `out`."""
-        return run_golden(
-            self.workspace, self.film_recording_target, experiment, out, limits=self.folder.limits
-        )
+        return run_golden(self.workspace, self.film_recording_target, experiment, out, limits=self._limits)
 
     def rerun_and_write_shots(
         self,
@@ -76,7 +81,7 @@ class ExperimentFilmer:
                 self.film_recording_target,
                 experiment,
                 scratch,
-                limits=self.folder.limits,
+                limits=self._limits,
                 golden=golden,
             )
             record = single.record

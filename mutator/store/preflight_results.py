@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 
 from mutator._common.files import read_json
+from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA
 from mutator.store.run_folder import RunFolder
-
-CHECKS_SCHEMA = "checks/1"
-CHECKS_FILE = "checks.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,6 +19,7 @@ from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import file_digests, integrity, plan_file
 from mutator.store.allowed_contents import SCRATCH_FOLDER, TRACES_FOLDER
+from mutator.store.checks_file import limits_of_run
 from mutator.store.packed_patches import PatchFolder
 from mutator.store.plain_contents_check import check_plain_contents
 from mutator.store.records import load_records
@@ -171,7 +172,8 @@ class RunFolder:
 
     @property
     def limits(self) -> Limits:
-        return self.head.limits
+        """The limits of faulty runs: the campaign's, or those that the checks of this run measured."""
+        return limits_of_run(self.path, self.head.limits)
 
     @property
     def severity_scale(self) -> SeverityScale | None:

@@ -32,9 +32,10 @@ from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.execution.cluster.unpacked_bundle import BUNDLE_SCHEMA, META_FILE, UnpackedBundle
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import TEMPLATE_FOLDER_GLOBS
+from mutator.model import MeasuredLimits
 from mutator.results.table_columns import check_column_names
-from mutator.store.preflight_results import CHECKS_FILE as CHECKS
-from mutator.store.preflight_results import CHECKS_SCHEMA
+from mutator.store.checks_file import CHECKS_FILE as CHECKS
+from mutator.store.checks_file import CHECKS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
@@ -100,7 +101,8 @@ def _bundle_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Itera
         "schema": BUNDLE_SCHEMA,
         "mutator": VERSION,
         "engine": engine,
-        "limits": as_json_types(head.limits),
+        "limits": as_json_types(folder.limits),
+        "are_limits_measured": isinstance(folder.limits, MeasuredLimits),
         "seed": head.seed,
         "series": bool(folder.series_budget_mb),
         "several_seeds": len(folder.seeds) > 1,

@@ -8,11 +8,12 @@ from typing import Any
 from mutator._common.confined_files import checked_relative_path, path_below
 from mutator._common.files import read_json
 from mutator.errors import MutatorError
-from mutator.model import Limits
+from mutator.model import Limits, MeasuredLimits
 from mutator.store.run_folder import GoldenRun
 
 BUNDLE_SCHEMA = "bundle/1"
 META_FILE = "meta.json"
+_META_KEYS = {"are_limits_measured", "engine", "seed", "series", "several_seeds"}
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class UnpackedBundle:
             goldens = [(GoldenRun.from_stored(entry["golden"]), entry["digest"]) for entry in meta["goldens"]]
             for golden, _ in goldens:
                 checked_relative_path(golden.key, path)
-            if Limits(**meta["limits"]) and meta.keys() >= {"engine", "seed", "series", "several_seeds"}:
+            if Limits(**meta["limits"]) and meta.keys() >= _META_KEYS:
                 return meta
         except (KeyError, TypeError, ValueError):
             pass
@@ -39,7 +40,8 @@ class UnpackedBundle:
 
     @property
     def limits(self) -> Limits:
-        return Limits(**self.meta["limits"])
+        kind = MeasuredLimits if self.meta["are_limits_measured"] else Limits
+        return kind(**self.meta["limits"])
 
     def scenario_path(self, name: str) -> Path:
         return path_below(self.folder / "scenarios", f"{name}.yaml")

@@ -6,7 +6,7 @@ import pytest
 
 import mutator
 from mutator.errors import MutatorError
-from mutator.model import Outcome, Status
+from mutator.model import MeasuredLimits, Outcome, Status
 from mutator.workspace import Workspace
 
 
@@ -81,3 +81,9 @@ def test_an_unknown_name_is_an_error_that_lists_the_known_ones(
 ) -> None:
     with pytest.raises(MutatorError, match=said):
         mutator.try_fault(fault, scenario, trigger, workspace=toycar)
+
+
+@pytest.mark.slow
+def test_a_fault_that_hangs_costs_ten_times_its_golden_run(toycar: Workspace) -> None:
+    trial = mutator.try_fault("hostile/hang", "A", 1.0, workspace=toycar)
+    assert (trial.status, trial.record.detail) == (Status.TIMEOUT, MeasuredLimits().cpu_limit_text)

@@ -14,7 +14,7 @@ from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.campaigns.run_provenance import accepted_version_differences, begin_session_environment
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
 from mutator.execution.distributor_choice import choose_distributor, packages_of_distributor
-from mutator.store.preflight_results import CHECKS_SCHEMA
+from mutator.store.checks_file import CHECKS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.session_environments import GitCloneState
 from mutator.workspace import Workspace

@@ -1,15 +1,19 @@
 """Shards from elsewhere are merged without reaching anything outside of them and of the result."""
 
+import json
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from mutator.errors import UnsafePath
-from mutator.execution.shard_merging import merge_shards
+from mutator.execution.shard_merging import _merged_checks, merge_shards
+from mutator.model import Limits, MeasuredLimits
 from mutator.store import file_digests
+from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA, limits_of_run
 from mutator.store.file_digests import FileDigest
 from mutator.workspace import Workspace
 
@@ -68,3 +72,17 @@ def test_nothing_is_merged_into_a_folder_with_a_link(shard: Path, out: Path, nam
     with pytest.raises(UnsafePath, match="a link"):
         merge_shards([shard], out)
     assert [path.read_text() for path in mine.iterdir()] == ["mine"]
+
+
+def test_the_longest_limits_of_the_shards_are_kept(tmp_path: Path) -> None:
+    """What finished in a shard on a slow machine must also finish when it is repeated."""
+    shards = []
+    for name, cpu_s, wall_s in (("one", 10, 600), ("two", 20, 300)):
+        (tmp_path / name).mkdir()
+        measured = {"cpu_s": cpu_s, "wall_s": wall_s}
+        checks = {"schema": CHECKS_SCHEMA, "goldens": {}, "measured_limits": measured}
+        (tmp_path / name / CHECKS_FILE).write_text(json.dumps(checks))
+        shards.append(SimpleNamespace(path=tmp_path / name, limits=limits_of_run(tmp_path / name, Limits())))
+    (tmp_path / "whole").mkdir()
+    (tmp_path / "whole" / CHECKS_FILE).write_bytes(_merged_checks(shards))  # type: ignore[arg-type]
+    assert limits_of_run(tmp_path / "whole", Limits()) == MeasuredLimits(cpu_s=20, wall_s=600)

@@ -1,5 +1,6 @@
 """The checks before a campaign."""
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -10,10 +11,12 @@ from mutator.campaigns import run_environment
 from mutator.campaigns.plan import build_plan, load_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.errors import CheckFailed
+from mutator.errors import CheckFailed, MutatorError
+from mutator.model import Limits, MeasuredLimits
 from mutator.preflight.canary import run_until_hazard
 from mutator.preflight.check_run_problems import CheckRun
 from mutator.preflight.preflight_checks import run_checks
+from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
@@ -177,3 +180,70 @@ def test_a_canary_whose_run_was_killed_is_run_again_once(toycar: Workspace, tmp_
     assert run_until_hazard([canary], lambda _: next(runs), "H3") == ("", "reached H3")
     ended = iter([CheckRun(problem="crashed")] * 2)  # a third run is not allowed
     assert "(crashed)" in run_until_hazard([canary], lambda _: next(ended), "H3")[0]
+
+
+def name_no_cpu_limit(toycar: Workspace) -> None:
+    path = toycar.campaign("small")
+    path.write_text(path.read_text().replace("cpu_s: 20, wall_s: 60, ", ""))
+
+
+def test_the_golden_runs_determine_a_limit_that_the_campaign_does_not_name(
+    toycar: Workspace, tmp_path: Path
+) -> None:
+    """It is measured once, kept when golden runs are repeated, and in no digest."""
+    name_no_cpu_limit(toycar)
+    plan = build_plan(toycar, "small")
+    assert plan.cost().cpu_limit_s is None
+    folder = freeze_plan(plan, tmp_path / "run", toycar)
+    assert folder.limits == Limits(memory_mb=1024, steps=200)
+    run_checks(toycar, folder)
+    assert folder.limits == MeasuredLimits(cpu_s=10, wall_s=300, memory_mb=1024, steps=200)
+    assert folder.head.limits == Limits(memory_mb=1024, steps=200)
+    assert load_plan(folder).cost().cpu_limit_s == 10
+    path = folder.path / CHECKS_FILE
+    checks = json.loads(path.read_text())
+    path.write_text(json.dumps(checks | {"measured_limits": {"cpu_s": 30, "wall_s": 300}}))
+    shutil.rmtree(folder.golden_folder("A"))
+    run_checks(toycar, folder)
+    assert folder.limits.cpu_s == 30
+    assert json.loads(path.read_text())["digest"] == checks["digest"]
+
+
+def test_a_limit_that_the_campaign_names_is_kept(toycar: Workspace, tmp_path: Path) -> None:
+    folder = frozen(toycar, tmp_path)
+    run_checks(toycar, folder)
+    assert folder.limits == Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=200)
+    assert "measured_limits" not in json.loads((folder.path / CHECKS_FILE).read_text())
+
+
+@pytest.mark.parametrize(
+    "measured", [7, {"cpu_s": 10}, {"cpu_s": 0, "wall_s": 300}, {"cpu_s": "1", "wall_s": 1}]
+)
+def test_damaged_measured_limits_are_refused(toycar: Workspace, tmp_path: Path, measured: object) -> None:
+    name_no_cpu_limit(toycar)
+    folder = frozen(toycar, tmp_path)
+    checks = {"schema": CHECKS_SCHEMA, "measured_limits": measured}
+    (folder.path / CHECKS_FILE).write_text(json.dumps(checks))
+    with pytest.raises(MutatorError, match=r"checks.json: damaged at 'measured_limits' \("):
+        _ = folder.limits
+
+
+@pytest.mark.slow
+def test_a_canary_that_hangs_costs_its_measured_limit(toycar: Workspace, tmp_path: Path) -> None:
+    name_no_cpu_limit(toycar)
+    path = toycar.campaign("small")
+    path.write_text(path.read_text().replace("sensor/lane/shifted, scenario", "hostile/hang/it, scenario"))
+    folder = frozen(toycar, tmp_path)
+    with pytest.raises(CheckFailed, match=r"\(timeout: CPU time limit, ten times the golden run's\)"):
+        run_checks(toycar, folder, workers=1)
+
+
+def test_a_golden_run_that_loses_an_observed_value_fails_its_check(toycar: Workspace, tmp_path: Path) -> None:
+    manifest = toycar.manifest("toycar").path
+    channel = "  d_rel: {unit: m, role: truth, from: gap}\nobservation:\n"
+    manifest.write_text(manifest.read_text().replace("observation:\n", channel, 1))
+    lost = "now = self.frame * STEP\n        if now > 1.02:\n            self.gap = float('nan')"
+    change(toycar, "now = self.frame * STEP", lost, "world")
+    text = "golden A: truth: d_rel is NaN at 1.05 s, and stays so to the end of the drive"
+    with pytest.raises(CheckFailed, match=text):
+        run_checks(toycar, frozen(toycar, tmp_path))

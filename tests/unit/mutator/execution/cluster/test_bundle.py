@@ -14,6 +14,8 @@ from mutator.execution.cluster.bundle import Bundle, load_run_inputs, unpack_bun
 from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.session import open_session
+from mutator.model import MeasuredLimits
+from mutator.store.checks_file import CHECKS_FILE
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -39,6 +41,20 @@ def prepared(checked: Path, tmp_path: Path) -> Prepared:
     (home / "notes.txt").write_text("my secret")
     [library] = home.glob("lib/**/fault_library")
     return Workspace(library=library, templates=library.parent / "templates"), RunFolder.open(home / "run")
+
+
+@pytest.mark.parametrize("measured", [None, {"cpu_s": 20, "wall_s": 300}])
+def test_a_worker_has_the_limits_of_the_run(
+    prepared: Prepared, tmp_path: Path, measured: dict[str, int] | None
+) -> None:
+    """They are the campaign's, or those that the command measured, never the worker's own measurement."""
+    workspace, folder = prepared
+    if measured:
+        checks = json.loads((folder.path / CHECKS_FILE).read_text()) | {"measured_limits": measured}
+        (folder.path / CHECKS_FILE).write_text(json.dumps(checks))
+    unpack_bundle(Bundle.pack_for_run(workspace, folder, "reference").data, tmp_path / "worker")
+    assert UnpackedBundle(tmp_path / "worker").limits == folder.limits
+    assert isinstance(folder.limits, MeasuredLimits) == bool(measured)
 
 
 def with_argument(workspace: Workspace, text: str) -> None:

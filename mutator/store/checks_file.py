@@ -1,0 +1,42 @@
+"""`checks.json`: its name and schema, and the limits that the checks measured."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+from mutator._common.files import read_json
+from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED
+from mutator.errors import MutatorError
+from mutator.model import MOST_LIMIT_OR_TIME, Limits, MeasuredLimits
+
+CHECKS_SCHEMA = "checks/1"
+CHECKS_FILE = "checks.json"
+MEASURED_LIMITS_KEY = "measured_limits"
+
+
+def limits_of_run(run: Path, campaign_limits: Limits) -> Limits:
+    """Return the limits of the faulty runs in the folder `run`: the campaign's, or those that its checks
+    measured.
+    """
+    path = run / CHECKS_FILE
+    measured = read_json(path, CHECKS_SCHEMA).get(MEASURED_LIMITS_KEY) if path.is_file() else None
+    if measured is None:
+        return campaign_limits
+    if (
+        not isinstance(measured, dict)
+        or measured.keys() != LIMITS_THAT_ARE_MEASURED
+        or not all(type(limit) is int and 1 <= limit <= MOST_LIMIT_OR_TIME for limit in measured.values())
+    ):
+        raise MutatorError(
+            f"damaged at '{MEASURED_LIMITS_KEY}' ({measured!r})",
+            where=path,
+            expected=f"whole numbers of s: {', '.join(sorted(LIMITS_THAT_ARE_MEASURED))}",
+            remedy="restore the file from a copy of the run folder",
+        )
+    return MeasuredLimits(**asdict(campaign_limits) | measured)
+
+
+def measured_limits_as_json(limits: Limits) -> dict[str, dict[str, int]]:
+    """Return what checks.json stores of limits: nothing, if they are the campaign's own."""
+    if not isinstance(limits, MeasuredLimits):
+        return {}
+    return {MEASURED_LIMITS_KEY: {name: getattr(limits, name) for name in sorted(LIMITS_THAT_ARE_MEASURED)}}
