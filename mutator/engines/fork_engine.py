@@ -279,7 +279,7 @@ class ForkEngine:
         home.unlock()
         report = home.read_report(threads=list)
         if report is not None:
-            check_fork_report(job, report)
+            check_fork_report(job, report, is_golden=observe)
         status, detail = status_of_ending(self._limits, ended, report, job)
         if status is not Status.OK and was_disk_full(self._work_folder, report):
             raise disk_full_error(self._work_folder)

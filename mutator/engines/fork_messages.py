@@ -48,13 +48,17 @@ def fork_request(
     }
 
 
-def check_fork_report(job: Job, report: dict[str, Any]) -> None:
-    """Raise NotForkable if the child did not run the mutant's code, or if threads are left."""
+def check_fork_report(job: Job, report: dict[str, Any], *, is_golden: bool) -> None:
+    """Raise NotForkable if the child did not run the mutant's code, or if threads of a golden run are left.
+
+    A mutant has started its threads itself after the fork, as it would in a fresh interpreter. A golden run
+    that starts threads could not be forked after that.
+    """
     if report["ended"] == "swap refused":
         raise NotForkable(str(report.get("why")))
     if report["outside"]:
         raise NotForkable(f"the target was also imported from {', '.join(report['outside'])}")
-    if report["threads"]:
+    if is_golden and report["threads"]:
         others = report["threads"]
         raise NotForkable(f"at its end {describe_too_many_threads(others)}", remedy_for_threads(others))
     if report["ended"] == "ok" and (problem := job.problem_of_probe_report(report["probe"])):

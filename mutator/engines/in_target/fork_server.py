@@ -197,7 +197,7 @@ class ForkingProcess:
         )
         report["threads"] = thread_names.other_thread_names()
         Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
-        if not report["threads"]:  # with other threads, the result is not used
+        if job["watch"] is None or not report["threads"]:  # a golden run with other threads is not used
             run_exit_handlers_and_flush()
         os._exit(0)
 

@@ -73,9 +73,39 @@ def test_a_target_that_behaves_differently_step_by_step_is_not_forked(fork: Fork
     assert "its log.npz differs when it is driven step by step" in execution.fallback_reason
 
 
+STARTED = {
+    "a daemon": "threading.Thread(target=time.sleep, args=(100,), daemon=True).start()",
+    "one that ends later": "threading.Thread(target=time.sleep, args=(0.3,)).start()",
+    "a pool": "self.pool = ThreadPoolExecutor(2); self.pool.submit(abs, gap).result()",
+    "a library's": "_thread.start_new_thread(time.sleep, (100,))",
+}
+
+
+@pytest.mark.parametrize("what", STARTED)
+def test_a_thread_that_only_the_faulty_run_starts_does_not_waste_its_fork(
+    fork: Fork, edit: Edit, what: str
+) -> None:
+    """A fresh interpreter would start it, too: the results have the same bytes."""
+    edit(
+        "tree/toycar/sensing.py",
+        "        self.publish((gap",
+        "        if gap > 45.0:\n            import _thread, threading, time\n"
+        "            from concurrent.futures import ThreadPoolExecutor\n"
+        f"            {STARTED[what]}\n        self.publish((gap",
+    )
+    job = fork.job(trigger_at_time(5.9))
+    execution = fork.run(job)
+    assert (execution.status, execution.mode, execution.fallback_reason) == (Status.OK, RunMode.FORK, "")
+    again = fork.engine.reference.execute(job, fork.folder / "again")
+    for name in ("log.npz", "said.json"):
+        assert (execution.out / name).read_bytes() == (again.out / name).read_bytes()
+    assert execution.probe_report == again.probe_report
+
+
 @pytest.mark.slow
-def test_a_run_that_leaves_a_thread_is_repeated_by_the_reference_engine(fork: Fork, edit: Edit) -> None:
-    fork.limits = replace(LIMITS, wall_s=3)
+def test_a_thread_that_never_ends_costs_the_wall_limit_once(fork: Fork, edit: Edit) -> None:
+    """A process ends only with its last thread, unless that is a daemon."""
+    fork.limits = replace(LIMITS, wall_s=6)
     edit(
         "tree/toycar/sensing.py",
         "        self.publish((gap",
@@ -83,11 +113,20 @@ def test_a_run_that_leaves_a_thread_is_repeated_by_the_reference_engine(fork: Fo
         "            threading.Thread(target=time.sleep, args=(100,)).start()\n        self.publish((gap",
     )
     execution = fork.run(fork.job(trigger_at_time(5.9)))
-    assert (execution.status, execution.mode) == (Status.TIMEOUT, RunMode.REFERENCE)
-    assert (
-        execution.fallback_reason.startswith("at its end it has ")
-        and "'Thread-1 (sleep)'" in execution.fallback_reason
+    assert (execution.status, execution.mode) == (Status.TIMEOUT, RunMode.FORK)
+
+
+def test_a_golden_run_that_leaves_a_thread_is_not_forked(fork: Fork, edit: Edit) -> None:
+    edit(
+        "tree/toycar/go.py",
+        "        from zipfile import",
+        "        import threading\n        threading.Thread(target=threading.Event().wait, name='poll',"
+        " daemon=True).start()\n        from zipfile import",
     )
+    execution = fork.run(fork.job(trigger_at_time(2.0)))
+    assert (execution.status, execution.mode) == (Status.OK, RunMode.REFERENCE)
+    assert execution.fallback_reason.startswith("at its end it has 2 threads")
+    assert "'poll'" in execution.fallback_reason
 
 
 @pytest.mark.slow
