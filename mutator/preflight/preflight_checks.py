@@ -197,9 +197,7 @@ class _PreflightChecks:
 
     def _store_in_run_folder(self, results: Mapping[str, Any]) -> None:
         """Store golden runs and the results of the checks, with limits that an earlier session measured."""
-        earlier = self._stored_checks() or {}
-        kept = {MEASURED_LIMITS_KEY: earlier[MEASURED_LIMITS_KEY]} if MEASURED_LIMITS_KEY in earlier else {}
-        checks = json_bytes({**results, **kept})
+        checks = json_bytes({**results, **_limits_of_earlier_session(self._stored_checks())})
         run, golden = self.folder.path, self.pending_folder / "golden"
         golden.mkdir(parents=True, exist_ok=True)
         files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}
@@ -288,6 +286,12 @@ def _limits_that_checks_depend_on(campaign: Campaign) -> dict[str, Any] | Limits
     if "cpu_s" not in measured_names:
         return campaign.limits
     return {name: limit for name, limit in asdict(campaign.limits).items() if name not in measured_names}
+
+
+def _limits_of_earlier_session(stored: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return the limits in stored checks, which runs may have used; nothing if a check failed."""
+    is_used = stored is not None and all(result["passed"] for result in stored["results"])
+    return {key: stored[key] for key in (MEASURED_LIMITS_KEY,) if is_used and stored and key in stored}
 
 
 def _build_check_result(name: str, problem: str, success: str) -> CheckResult:
