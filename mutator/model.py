@@ -329,7 +329,7 @@ class Record:
     experiment_id: str  #: id of the experiment
     status: Status  #: whether the experiment itself worked
     outcome: Outcome | None  #: what the fault did; None unless the status is `ok`
-    detail: str  #: why the status is not `ok`; empty if it is
+    detail: str  #: why the status is not `ok`, or why the fault was never active; else empty
     tree: str  #: digest of the source tree that ran
     activation: ObservedActivation | None  #: when and how often injected statements ran; None: never
     t_manifest: float | None  #: when a compared channel first left its tolerance, in s

@@ -12,7 +12,7 @@ from mutator.glue import Run
 
 class Drive(Run):
     def __init__(self, scenario, seed):
-        super().__init__(step_s=0.05, duration_s=1.0)
+        super().__init__(step_s=0.05, duration_s=scenario["duration_s"])
         self.y, self.v = 1.0, 0.0
         self.controller = Control()
 
@@ -77,7 +77,7 @@ def small_loop(folder: Path, files: dict[str, str], *, manifest: str = "", **pla
     texts = {
         "overlays/o/drive.py": _DRIVE,
         "targets/t.yaml": _MANIFEST.format(packages=f"[{', '.join(packages)}]") + manifest,
-        "scenarios/s.yaml": "{}\n",
+        "scenarios/s.yaml": "duration_s: 1.0\n",
         "faults/c/f.yaml": _SPEC + "".join(variants),
     }
     for path, text in texts.items():

@@ -25,6 +25,7 @@ from mutator.engines import forkable
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.fork_engine import ForkEngine
 from mutator.engines.in_target.nondeterminism_watch import CLOCK, THREAD
+from mutator.engines.reach_jobs import watched_job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import limits_before_measuring, measure_limits
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
@@ -157,7 +158,7 @@ class _RunningCheck:
 
     def _counting_job(self, scenario: str, changes: tuple[str, ...]) -> Job:
         mutant = self.reach_tracker.counting_mutant
-        return replace(
+        job = replace(
             self._pristine_job("counting", scenario, changes),
             changed_files=mutant.files,
             mutant_id=mutant.id,
@@ -166,6 +167,7 @@ class _RunningCheck:
             hash_seed=_OTHER_HASH_SEED,
             watch_nondeterminism=True,
         )
+        return watched_job(job, self.reach_tracker.location_by_id)
 
     def _execute(self, job: Job) -> JobResult:
         return self.engine.execute(job, self._new_run_folder(job))
@@ -303,9 +305,7 @@ class _RunningCheck:
     # Statements and triggers
 
     def _record_reach(self, scenario: str, changes: tuple[str, ...], execution: JobResult) -> None:
-        self.reach_tracker.record_run(
-            scenario, changes, execution.probe_report, execution.watch_report.get("seen", ())
-        )
+        self.reach_tracker.record_run(scenario, changes, self._counting_job(scenario, changes), execution)
 
     def _run_with_further_changes(self) -> None:
         """Run with the changes that faults and campaigns make, until every statement and trigger is reached

@@ -4,10 +4,9 @@ One mutant has a counting probe call at each of these statements. A statement is
 there would be active if the fault's trigger always held.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,16 +14,24 @@ from mutator._common.message_text import counted
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.checks.findings import CheckState, Finding, FindingPlace
-from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind
-from mutator.model import Fault, FaultLocation, Injection, Method, Trigger
-from mutator.mutants.mutant_building import Mutant, build
+from mutator.engines.engine_jobs import Job, JobResult
+from mutator.model import FaultLocation, Method, Trigger
+from mutator.mutants.counting_mutant import build_counting_mutant
+from mutator.outcomes.inactivity_reasons import PlaceReach, Reach, reach_of_place
 from mutator.preflight.unreached_triggers import armed_condition_of, is_ever_active
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
+from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 
-_COUNTING_MODEL = "count_only"
 _MOST_PLACES = 20  # places listed in a finding
+_UNREACHED_REMEDY = (
+    "faults there are never active: anchor them elsewhere, or add a scenario that reaches these statements"
+)
+_ELSEWHERE_TEXTS = {
+    Reach.BEFORE_RUN: "run only before the first observation",
+    Reach.IN_CHILD: "run only in a child process",
+    Reach.REPLACED: "belong to a function that another replaces",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,9 +58,10 @@ class ReachTracker:
         self._manifest = manifest
         statements = list(_spec_statements(workspace, manifest))
         self._statement_count = len(statements)
-        self.counting_mutant, self._location_by_id = _build_counting_mutant(
-            workspace, manifest, [statement.location for statement in statements]
+        self.counting_mutant, self.location_by_id = build_counting_mutant(
+            manifest, workspace.fault_models(), [statement.location for statement in statements]
         )
+        self._last_reach: dict[FaultLocation, PlaceReach] = {}  # of statements that no run has executed
         self.unexecuted_statements = statements
         self.unreached_triggers = list(_library_triggers(workspace, manifest, campaigns))
         self._trigger_count = len(self.unreached_triggers)
@@ -67,23 +75,27 @@ class ReachTracker:
         self,
         scenario: str,
         changes: Sequence[str],
-        probe: Mapping[str, Any] | None,
-        observations: Iterable[Sequence[float]],
+        job: Job,
+        result: JobResult,
     ) -> None:
-        """Remove the statements and triggers that a run of the counting mutant reached, according to its
-        probe's report and its observations (`observations`).
+        """Remove the statements and triggers that a watched run of the counting mutant reached.
 
         A statement is removed only if the run had the changes that its fault needs.
         """
         self._scenarios_run.append("+".join((scenario, *changes)))
-        counts = (probe or {}).get("injections", {})
-        executed = {self._location_by_id[name] for name, entry in counts.items() if entry["count"]}
+        executed = set()
+        for name, location in self.location_by_id.items():
+            place = reach_of_place(self._manifest, job, result, name, location)
+            if place.reach is Reach.IN_RUN:
+                executed.add(location)
+            elif place.reach is not Reach.NEVER or location not in self._last_reach:
+                self._last_reach[location] = place
         self.unexecuted_statements = [
             statement
             for statement in self.unexecuted_statements
             if statement.location not in executed or not set(statement.changes) <= set(changes)
         ]
-        rows = np.array(list(observations), dtype=float)
+        rows = np.array(list(result.watch_report.get("seen", ())), dtype=float)
         self.unreached_triggers = [
             statement
             for statement in self.unreached_triggers
@@ -92,13 +104,7 @@ class ReachTracker:
 
     def findings(self) -> list[Finding]:
         return [
-            self._reach_finding(
-                "statement",
-                self._statement_count,
-                [statement.place for statement in self.unexecuted_statements],
-                "faults there are never active: anchor them elsewhere, or add a scenario that reaches these "
-                "statements",
-            ),
+            *self._statement_findings(),
             self._reach_finding(
                 "trigger",
                 self._trigger_count,
@@ -107,6 +113,39 @@ class ReachTracker:
                 "it from the campaigns",
             ),
         ]
+
+    def _statement_findings(self) -> Iterator[Finding]:
+        """Yield a finding on statements that no run reaches, and one for each other reason."""
+        never = {Reach.NEVER, Reach.NOT_IMPORTED}
+        reaches = {statement: self._reach_of(statement) for statement in self.unexecuted_statements}
+        unreached = [
+            replace(
+                s.place,
+                what=f"{s.place.what}: {place.text}" if place.reach is not Reach.NEVER else s.place.what,
+            )
+            for s, place in reaches.items()
+            if place.reach in never
+        ]
+        elsewhere = [(s, place) for s, place in reaches.items() if place.reach not in never]
+        if unreached or not elsewhere:
+            yield self._reach_finding("statement", self._statement_count, unreached, _UNREACHED_REMEDY)
+        for reach in dict.fromkeys(place.reach for _, place in elsewhere):
+            places = [(s, place) for s, place in elsewhere if place.reach is reach]
+            whole, runs = counted(self._statement_count, "statement"), ", ".join(self._scenarios_run)
+            yield Finding(
+                name="statements",
+                level=CheckState.WARN,
+                found=f"{len(places)} of {whole} {_ELSEWHERE_TEXTS[reach]} in {runs}",
+                remedy="faults there are never active: anchor where the result arrives in the run",
+                places=tuple(
+                    replace(s.place, what=f"{s.place.what}: {place.text}")
+                    for s, place in places[:_MOST_PLACES]
+                ),
+            )
+
+    def _reach_of(self, statement: SpecStatement) -> PlaceReach:
+        never = PlaceReach(reach=Reach.NEVER, text="")
+        return self._last_reach.get(statement.location, never)
 
     def _reach_finding(
         self, noun: str, count: int, unreached: Sequence[FindingPlace], remedy: str
@@ -139,35 +178,6 @@ def _spec_statements(workspace: Workspace, manifest: TargetManifest) -> Iterator
                         file=str(spec.path), line=spec.source.line_of(injection.keys), what=what
                     )
                     yield SpecStatement(location=at, place=place, changes=variant.changes)
-
-
-def _build_counting_mutant(
-    workspace: Workspace, manifest: TargetManifest, locations: Iterable[FaultLocation]
-) -> tuple[Mutant, Mapping[str, FaultLocation]]:
-    """Return the mutant that counts at all these places, and the location of each injection id."""
-    models, once = workspace.fault_models(), list(dict.fromkeys(locations))
-    injections = tuple(Injection(location=location, model=_COUNTING_MODEL) for location in once)
-    fault = Fault(
-        _COUNTING_MODEL, _COUNTING_MODEL, _COUNTING_MODEL, _COUNTING_MODEL, None, "", "", injections
-    )
-    mutant = build(manifest, _with_counting_model(models), fault, always_trigger())
-    return mutant, dict(zip(mutant.injection_ids, once, strict=True))
-
-
-def _with_counting_model(models: FaultModels) -> FaultModels:
-    some = next(iter(models))
-    count = FaultModel(
-        name=_COUNTING_MODEL,
-        kind=SnippetKind.INSERT,
-        about="counts",
-        params=(),
-        examples=(),
-        template='_fi.active("{{ fi }}")\n',
-        expression_template="{{ original }}",
-        source=some.source,
-        template_path=some.template_path,
-    )
-    return replace(models, models={**models.models, _COUNTING_MODEL: count})
 
 
 def _library_triggers(

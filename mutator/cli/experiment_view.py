@@ -153,7 +153,7 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     manifest = _manifest_if_any(result)
     ending = _ending_of(record)
     terminal.print_result(f"verdict: {ending}", style=STYLE_BY_ENDING.get(ending))
-    if record.detail:
+    if record.detail and record.outcome is None:  # the sentence says why a fault was never active
         terminal.print_text(record.detail)
     activation_s = record.activation.first if record.activation else None
     events = _list_events(record, manifest)
@@ -270,7 +270,7 @@ def print_trial(terminal: Terminal, trial: "Trial", *, with_plot: bool) -> None:
         terminal.print_text(
             f"the fault-free run also reaches {reached}: the fault is not necessarily the cause"
         )
-    if trial.log.strip() and trial.record.detail:
+    if trial.log.strip() and trial.record.outcome is None:
         terminal.print_text("last lines of the run:")
         terminal.print_text(trial.log.strip(), without_folding=True)
     if plot_path:

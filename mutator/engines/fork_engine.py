@@ -23,6 +23,7 @@ from mutator._common.files import (
     remove_folder,
 )
 from mutator._common.hashing import content_id
+from mutator._common.message_text import counted
 from mutator.engines.code_swap_planning import CodeSwap, plan_swap
 from mutator.engines.engine_jobs import EngineArguments, Job, JobResult, RunMode, harness_error_result
 from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
@@ -268,6 +269,9 @@ class ForkEngine:
             raise NotForkable(
                 describe_too_many_threads(reply["threads"]), remedy_for_threads(reply["threads"])
             )
+        if count := reply["processes"]:
+            started = f"it has started {counted(count, 'process', 'processes')}, which forks would share"
+            raise NotForkable(started, "do the work of other processes in the step itself")
         if reply["touched"]:
             self.close()
             raise NotForkable("it writes into its own tree")

@@ -31,6 +31,7 @@ def fork_request(
         "log": str(home.log_path),
         "report": str(home.report_path),
         "inactive": str(home.inactive_marker),
+        "child_activations": str(home.child_activations_path),
         "args": None,
         "cpu_s": limits.cpu_s,
         "memory_mb": limits.memory_mb,

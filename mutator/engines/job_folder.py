@@ -26,6 +26,7 @@ PLAIN_OUTPUT_FOLDER = "output"  # the name of the folder with the output's plain
 _OUT_FOLDER, _LOG_FILE, _REPORT_FILE, _INACTIVE_MARKER = "out", "log", "report.json", "inactive"
 
 
+_CHILD_ACTIVATIONS_FILE = "child_activations"  # what forked children of the target append
 _DISTURBANCE_ERRNOS = (errno.ENOENT, errno.EEXIST, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENOTEMPTY)
 _LOCKED_ERRNOS = (errno.EACCES, errno.EPERM)
 
@@ -54,6 +55,7 @@ class JobFolder:
         self.output_folder, self.log_path = path / _OUT_FOLDER, path / _LOG_FILE
         self.report_path = path / _REPORT_FILE
         self.inactive_marker = path / _INACTIVE_MARKER  # the first activation deletes it
+        self.child_activations_path = path / _CHILD_ACTIVATIONS_FILE
         self._open_handles = ExitStack()
 
     def __enter__(self) -> "JobFolder":

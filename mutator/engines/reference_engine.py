@@ -162,6 +162,7 @@ class ReferenceEngine:
             third_party_modules=tuple(report["modules"]) if report else (),
             watch_report=report.get("watched", {}) if report else {},
             executed_lines=report.get("lines", {}) if report else {},
+            reach_report=report.get("reach", {}) if report else {},
         )
 
     def _job_request(self, job: Job, home: JobFolder) -> dict[str, Any]:
@@ -182,6 +183,8 @@ class ReferenceEngine:
             "out": str(home.output_folder),
             "report": str(home.report_path),
             "inactive": str(home.inactive_marker),
+            "child_activations": str(home.child_activations_path),
+            "watched_places": job.watched_places,
             "cpu_s": self.limits.cpu_s,
             "wall_s": self.limits.wall_s,
             "memory_mb": self.limits.memory_mb,

@@ -14,6 +14,7 @@ from mutator._common.hashing import digest
 from mutator.campaigns.shared_runs import group_by_run
 from mutator.engines.engine_jobs import Engine, Job, JobResult, RunMode
 from mutator.errors import BadAddition, BadOutput, InvalidMutant, MutatorError
+from mutator.execution.inactivity_check import InactivityCheck
 from mutator.faults.fault_models import FaultModels
 from mutator.model import AfterHazard, Experiment, ObservedActivation, Record, Status
 from mutator.mutants.mutant_building import Mutant, build
@@ -131,7 +132,9 @@ class ExperimentRunner:
         scenario_file: Callable[[str], Path],
         *,
         with_series: bool = False,
+        inactivity_check: InactivityCheck | None = None,
     ) -> None:
+        self.inactivity_check = inactivity_check  # None: records do not say why a fault was never active
         self.manifest = manifest
         self.models = models
         self.engine = engine
@@ -150,6 +153,12 @@ class ExperimentRunner:
             for other in shared[finished.experiment.id][1:]:
                 record = replace(finished.record, experiment_id=other.id)
                 yield replace(finished, experiment=other, record=record, cpu_s=0.0, wall_s=0.0)
+
+    def close(self) -> None:
+        """End the processes that the engines keep between runs."""
+        self.engine.close()
+        if self.inactivity_check is not None:
+            self.inactivity_check.close()
 
     def _run_distinct(self, experiments: Iterable[Experiment]) -> Iterator[RecordedExperiment]:
         refused: deque[RecordedExperiment] = deque()
@@ -294,7 +303,7 @@ class ExperimentRunner:
             experiment_id=experiment.id,
             status=Status.OK,
             outcome=outcome_of(activation=activation, t_manifest=difference.t_first, hazards=hazards),
-            detail="",
+            detail=self._reason_inactive(experiment, execution) if activation is None else "",
             tree=mutant.tree_digest,
             activation=activation,
             t_manifest=difference.t_first,
@@ -314,6 +323,12 @@ class ExperimentRunner:
                 self.manifest, reference, faulty, activation, hazards[0][1] if hazards else judged.t_end
             ),
         )
+
+    def _reason_inactive(self, experiment: Experiment, execution: JobResult) -> str:
+        if self.inactivity_check is None:
+            return ""
+        scenario = self.scenario_file(experiment.scenario)
+        return self.inactivity_check.reason(experiment, scenario, execution.probe_report or {})
 
     def _record_of_failed_run(self, experiment: Experiment, mutant: Mutant, execution: JobResult) -> Record:
         status, detail = judge_failure(

@@ -12,11 +12,12 @@ from mutator._common.files import make_folder, raising_disk_full, remove_folder,
 from mutator._common.folder_locks import locking_folder
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
-from mutator.engines.engine_jobs import Job
+from mutator.engines.engine_jobs import EngineArguments, Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_measuring, measure_limits
 from mutator.errors import CheckFailed
 from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
+from mutator.execution.inactivity_check import InactivityCheck
 from mutator.model import Experiment, Limits, Record, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.preflight.check_run_problems import read_check_run
@@ -64,7 +65,14 @@ def run_single(
         else:
             reference = golden
         goldens = LoadedGoldens(manifest, lambda experiment: reference)
-        runner = ExperimentRunner(manifest, workspace.fault_models(), engine, goldens, workspace.scenario)
+        models = workspace.fault_models()
+        arguments = EngineArguments(
+            manifest=manifest, models=models, work_folder=engine.work_folder, limits=engine.limits
+        )
+        check = InactivityCheck(arguments)
+        runner = ExperimentRunner(
+            manifest, models, engine, goldens, workspace.scenario, inactivity_check=check
+        )
         (finished,) = _storing_output(runner.run([experiment]), out)
     return SingleRun(
         experiment=experiment,

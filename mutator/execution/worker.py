@@ -25,6 +25,7 @@ from mutator.execution.experiment_runner import (
     RecordedExperiment,
     record_without_outcome,
 )
+from mutator.execution.inactivity_check import InactivityCheck
 from mutator.execution.written_files import FileDigests
 from mutator.model import Experiment, Status
 from mutator.preflight import equivalence_check
@@ -125,7 +126,7 @@ class Worker:
         return self._writer.sha256_by_segment
 
     def close(self) -> None:
-        self._runner.engine.close()
+        self._runner.close()
         self._writer.close()
 
     def _make_runner(self, engine: Engine, *, with_series: bool = False) -> ExperimentRunner:
@@ -148,11 +149,15 @@ class Worker:
             goldens,
             inputs.scenario_files.__getitem__,
             with_series=with_series,
+            inactivity_check=InactivityCheck(self._engine_arguments()),
         )
 
     def _make_engine(self, name: str) -> Engine:
+        return make_engine(name, self._engine_arguments())
+
+    def _engine_arguments(self) -> EngineArguments:
         folder = self.folder
-        setting = EngineArguments(
+        return EngineArguments(
             manifest=self._manifest,
             models=self._inputs.fault_models,
             work_folder=folder.scratch_folder,
@@ -160,7 +165,6 @@ class Worker:
             parent_pid=self._assignment.parent_pid,
             secret=self._assignment.secret,
         )
-        return make_engine(name, setting)
 
     def _make_independent_engine(self) -> Engine:
         folder = self.folder

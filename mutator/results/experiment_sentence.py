@@ -200,6 +200,8 @@ def _failure(status: Status, row: Row) -> str:
 
 
 def _why_not_active(row: Row) -> str:
+    if detail := str(row.get("detail") or ""):
+        return f"It was never active: {detail}."
     when = "then" if row.get("hold") == Hold.TO_END else "at any such time"
     return f"It was never active: the changed code did not run {when}."
 

@@ -79,6 +79,8 @@ class ForkingProcess:
         ] = []  # files outside the tree from which the target's packages were imported
         self.begin_run: Any = None
         self.golden_run: Any = None
+        self.waiting_children: set[int] = set()  # processes that this one forked to wait at later steps
+        self.inherited_processes = 0  # processes that the run had started before this one was forked
         self.step = 0
 
     def send_reply(self, reply: dict[str, Any], handle: int | None = None) -> None:
@@ -125,8 +127,12 @@ class ForkingProcess:
         """
         child_socket, harness_socket = socket.socketpair()
         prepare_to_fork()
-        if not os.fork():
+        processes = self.count_run_processes()
+        if pid := os.fork():
+            self.waiting_children.add(pid)
+        else:
             try:
+                self.waiting_children, self.inherited_processes = set(), processes
                 harness_socket.close()
                 self.connection.close()
                 self.connection = child_socket
@@ -171,7 +177,9 @@ class ForkingProcess:
         each fork.
         """
         if others := thread_names.other_thread_names():
-            return {"threads": others}
+            return {"threads": others, "processes": 0}
+        if processes := self.count_run_processes():
+            return {"threads": [], "processes": processes}
         space_limit = process_guard.DiskGrowthLimit(home, disk_mb)
         prepare_to_fork()
         ending = process_guard.fork_guarded(self.connection.fileno(), wall_s=wall_s, space_limit=space_limit)
@@ -179,7 +187,12 @@ class ForkingProcess:
             self.become_mutant(marshal.loads(job))
         if ending["stopped"] == process_guard.ABANDONED:
             raise NoLongerNeeded
-        return {**ending, "threads": [], "touched": self.was_tree_changed()}
+        return {**ending, "threads": [], "processes": 0, "touched": self.was_tree_changed()}
+
+    def count_run_processes(self) -> int:
+        """Count the processes that the golden run has started, which its forks would share."""
+        children = set(process_guard.child_pids(os.getpid())) - self.waiting_children
+        return self.inherited_processes + len(children)
 
     def become_mutant(self, job: dict[str, Any]) -> NoReturn:
         """In a new child: continue the run to its end as a mutant, and report."""
@@ -229,6 +242,7 @@ class ForkingProcess:
             mutant_installation.run_probe_value_setters(job["settings"], probe)
             probe.limit(job["steps"])
             run_once.delete_marker_on_activation(probe, job["inactive"])
+            run_once.child_activations.count_in_children(probe, job["child_activations"])
             # give the probe the state that it would have if it had observed from the start
             holder, state = job["probe_state"]
             for name, value in state.items():
@@ -254,6 +268,7 @@ class ForkingProcess:
             report |= run_once.describe_failure(err, self.start_message["tree"], job["probe_name"])
         if probe is not None:
             report |= run_once.collect_probe_report(probe, self.start_message["tree"], job["probe_name"])
+            run_once.child_activations.add_children(report["probe"], job["child_activations"])
         return report
 
 

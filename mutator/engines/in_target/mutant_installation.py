@@ -57,6 +57,8 @@ def find_live_function(module: str, name_path: Sequence[str], code: types.CodeTy
     if module not in sys.modules:
         raise SwapRefused(f"{module} is not loaded")
     holder: Any = sys.modules[module]
+    if other := _other_module_of_file(holder):
+        raise SwapRefused(f"the file of {module} is also loaded as {other}")
     for name in name_path[:-1]:
         holder = vars(holder).get(_mangled_name(holder, name))
         if not isinstance(holder, type):
@@ -69,6 +71,12 @@ def find_live_function(module: str, name_path: Sequence[str], code: types.CodeTy
     if _count_references_to_code(live) > _REFERENCES_TO_IDLE_CODE:
         raise SwapRefused(f"{where} is running, or exists more than once")
     return live
+
+
+def _other_module_of_file(module: types.ModuleType) -> str | None:
+    file = getattr(module, "__file__", None)
+    names = (name for name, other in list(sys.modules.items()) if getattr(other, "__file__", None) == file)
+    return next((name for name in names if sys.modules[name] is not module), None) if file else None
 
 
 def _count_references_to_code(function: types.FunctionType) -> int:

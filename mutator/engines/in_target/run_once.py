@@ -39,6 +39,7 @@ def load_neighbour(name: str) -> Any:
 
 
 process_guard = load_neighbour("process_guard")
+child_activations = load_neighbour("child_activations")
 
 
 class HarnessImportFinder:
@@ -88,6 +89,7 @@ def run_job(job: dict[str, Any]) -> None:
         load_neighbour("line_recorder").LineRecorder(job["tree"], *job["lines"]) if job["lines"] else None
     )
     observations: list[Any] = []
+    reach_watcher = None
     try:
         if watcher:
             watcher.begin()
@@ -96,7 +98,12 @@ def run_job(job: dict[str, Any]) -> None:
         if job["probe"]:
             probe = importlib.import_module(job["probe"])
             probe.limit(job["steps"])
+            if job["watched_places"]:
+                watch = load_neighbour("reach_watch").ReachWatcher
+                reach_watcher = watch(probe, job["tree"], job["watched_places"])
+                reach_watcher.begin()
             delete_marker_on_activation(probe, job["inactive"])
+            child_activations.count_in_children(probe, job["child_activations"])
         if probe and job["observe"]:
             observations = load_neighbour("mutant_installation").keep_observations(probe, *job["observe"])
         if probe and watcher:
@@ -112,6 +119,9 @@ def run_job(job: dict[str, Any]) -> None:
     if line_recorder:
         report["lines"] = line_recorder.stop_and_collect()
     report |= collect_probe_report(probe, job["tree"], job["probe"]) if probe else {"probe": None}
+    child_activations.add_children(report["probe"], job["child_activations"])
+    if reach_watcher:
+        report["reach"] = reach_watcher.as_json()
     report["outside"] = files_imported_elsewhere(job["packages"], job["tree"], sys.modules)
     report["modules"] = third_party_modules(modules_before, job["packages"])
     report["files"] = tree_file_digests(job["tree"])

@@ -33,6 +33,7 @@ from mutator.execution.cluster.golden_cache import GoldenRunCache
 from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceKind, PieceResult
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
+from mutator.execution.inactivity_check import InactivityCheck
 from mutator.execution.worker import timing_of
 from mutator.model import Experiment
 from mutator.preflight.check_run_problems import read_check_run
@@ -82,24 +83,24 @@ class PieceRunner:
 
     def close(self) -> None:
         for runner in self._runners_by_kind.values():
-            runner.engine.close()
+            runner.close()
 
     def _runner_of_kind(self, kind: PieceKind) -> ExperimentRunner:
         if kind not in self._runners_by_kind:
             bundle = self._bundle
+            arguments = EngineArguments(
+                manifest=self._manifest,
+                models=self._models,
+                work_folder=self._work_folder,
+                limits=bundle.limits,
+                parent_pid=self._parent_pid,
+            )
             if kind is PieceKind.PROVE:
                 engine = ReferenceEngine(
                     self._manifest, self._work_folder, bundle.limits, self._parent_pid, independent=True
                 )
             else:
-                setting = EngineArguments(
-                    manifest=self._manifest,
-                    models=self._models,
-                    work_folder=self._work_folder,
-                    limits=bundle.limits,
-                    parent_pid=self._parent_pid,
-                )
-                engine = make_engine(bundle.meta["engine"], setting)  # type: ignore[assignment]
+                engine = make_engine(bundle.meta["engine"], arguments)  # type: ignore[assignment]
             goldens = LoadedGoldens(
                 self._manifest,
                 lambda experiment: path_below(self._goldens_folder, self._golden_of(experiment).key),
@@ -111,7 +112,13 @@ class PieceRunner:
             )
             with_series = kind is PieceKind.RUN and bundle.meta["series"]
             self._runners_by_kind[kind] = ExperimentRunner(
-                self._manifest, self._models, engine, goldens, bundle.scenario_path, with_series=with_series
+                self._manifest,
+                self._models,
+                engine,
+                goldens,
+                bundle.scenario_path,
+                with_series=with_series,
+                inactivity_check=InactivityCheck(arguments),
             )
         return self._runners_by_kind[kind]
 

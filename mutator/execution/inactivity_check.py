@@ -1,0 +1,94 @@
+"""Finds out why faults were never active, by running their statements without the faults."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mutator._common.confined_files import path_below
+from mutator._common.files import remove_folder
+from mutator._common.hashing import content_id
+from mutator.engines.engine_jobs import EngineArguments, Job
+from mutator.engines.reach_jobs import watched_job
+from mutator.engines.reference_engine import ReferenceEngine, make_reference_engine
+from mutator.errors import MutatorError
+from mutator.model import Experiment, FaultLocation, Status
+from mutator.mutants.counting_mutant import build_counting_mutant
+from mutator.mutants.probe import was_triggered
+from mutator.outcomes.inactivity_reasons import UNTRIGGERED_REASON, Reach, reach_of_place
+
+
+class InactivityCheck:
+    """Finds the reasons on the reference engine, so they are the same for every engine.
+
+    Where statements execute depends only on the golden run, because a fault that was never active changed
+    nothing. So one run serves all faults at the same places of a golden run.
+    """
+
+    def __init__(self, arguments: EngineArguments) -> None:
+        self._arguments = arguments
+        self._engine: ReferenceEngine | None = None
+        self._reasons: dict[object, tuple[tuple[Reach, str], ...]] = {}
+
+    def reason(self, experiment: Experiment, scenario: Path, probe_report: Mapping[str, Any]) -> str:
+        """Return why the experiment's fault was never active; empty if it cannot be found."""
+        if not was_triggered(probe_report):
+            return UNTRIGGERED_REASON
+        unset = probe_report.get("unset")
+        if isinstance(unset, dict) and unset:
+            return "; ".join(dict.fromkeys(map(str, unset.values())))
+        locations = tuple(dict.fromkeys(injection.location for injection in experiment.fault.injections))
+        key = (
+            experiment.scenario,
+            experiment.scenario_digest,
+            experiment.changes,
+            experiment.seed,
+            locations,
+        )
+        if key not in self._reasons:
+            self._reasons[key] = self._find_reach(experiment, scenario, locations)
+        return self._text(experiment, self._reasons[key])
+
+    def _text(self, experiment: Experiment, places: tuple[tuple[Reach, str], ...]) -> str:
+        limited = any(i.where or i.call or i.every for i in experiment.fault.injections)
+        selected = " and `where`, `call` or `every` selects it" if limited else ""
+        texts = [f"{text}{selected if reach is Reach.IN_RUN else ''}" for reach, text in places]
+        return "; ".join(dict.fromkeys(texts))
+
+    def _find_reach(
+        self, experiment: Experiment, scenario: Path, locations: tuple[FaultLocation, ...]
+    ) -> tuple[tuple[Reach, str], ...]:
+        arguments = self._arguments
+        try:
+            mutant, location_by_id = build_counting_mutant(arguments.manifest, arguments.models, locations)
+        except MutatorError:
+            return ()  # a foreign fault model can allow places that cannot be counted
+        job = watched_job(
+            Job(
+                name=f"reach-{content_id([experiment.id])}",
+                scenario=scenario,
+                seed=experiment.seed,
+                scenario_changes=experiment.changes,
+                changed_files=mutant.files,
+                mutant_id=mutant.id,
+                injection_ids=mutant.injection_ids,
+            ),
+            location_by_id,
+        )
+        if self._engine is None:
+            self._engine = make_reference_engine(arguments)
+        folder = path_below(arguments.work_folder, self._engine.folder_of_job(job).name)
+        try:
+            result = self._engine.execute(job, folder)
+        finally:
+            remove_folder(folder)
+        if result.status is not Status.OK:
+            return ()
+        reached = [
+            reach_of_place(arguments.manifest, job, result, name, location)
+            for name, location in location_by_id.items()
+        ]
+        return tuple((place.reach, place.text) for place in reached)
+
+    def close(self) -> None:
+        if self._engine is not None:
+            self._engine.close()
