@@ -9,9 +9,9 @@ from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.engines.run_limits import limits_before_measuring
 from mutator.errors import MutatorError
 from mutator.model import Fault, Limits
-from mutator.operators.executed_lines import GoldenRunInputs, measure_executed_lines
+from mutator.operators.executed_lines import GoldenRunInputs, measure_executed_lines, measure_variable_types
 from mutator.operators.mutation_selection import sample_mutations, select_mutations
-from mutator.operators.operator_lookup import unique_operator_names
+from mutator.operators.operator_lookup import any_needs_types, unique_operator_names
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,15 +40,17 @@ def draw_operator_faults(
     check_whole_number("seed", choice.seed)
     if choice.sample is not None:
         check_whole_number("sample", choice.sample, least=1)
-    executed = None
+    executed = types = None
+    operators = unique_operator_names(choice.operators)
     if choice.scenario is not None:
         scenario = selected_target.workspace.scenario(choice.scenario)
         limits = limits_before_measuring(Limits())
         drive = GoldenRunInputs(scenario=scenario, changes=(), seed=choice.seed)
         [executed] = measure_executed_lines(selected_target.manifest, [drive], limits)
-    operators = unique_operator_names(choice.operators)
+        if any_needs_types(operators):
+            types = measure_variable_types(selected_target.manifest, [drive], limits)
     candidates = select_mutations(
-        selected_target.manifest, selected_target.models, operators, choice.places, executed
+        selected_target.manifest, selected_target.models, operators, choice.places, executed, types
     )
     if not candidates.mutations:
         raise MutatorError(

@@ -3,14 +3,21 @@
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+from mutator._common.hashing import digest
 from mutator._common.message_text import counted
 from mutator.campaigns.operator_selection import MutantActivity, OperatorSelection
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, Limits
-from mutator.operators.executed_lines import ExecutedLines, GoldenRunInputs, measure_executed_lines
+from mutator.operators.executed_lines import (
+    ExecutedLines,
+    GoldenRunInputs,
+    measure_executed_lines,
+    measure_variable_types,
+)
 from mutator.operators.mutation_selection import SelectedMutations, sample_mutations, select_mutations
 from mutator.operators.mutations import Mutation
+from mutator.operators.operator_lookup import any_needs_types
 from mutator.operators.statement_facts import statement_facts_of
 from mutator.targets.manifest import TargetManifest
 
@@ -30,7 +37,7 @@ class OperatorFaultFinder:
     def __init__(self, manifest: TargetManifest, models: FaultModels, limits: Limits) -> None:
         self._manifest, self._models, self._limits = manifest, models, limits
         self._mutations_by_selection: dict[
-            tuple[OperatorSelection, frozenset[tuple[str, frozenset[int]]]], SelectedMutations
+            tuple[OperatorSelection, frozenset[tuple[str, frozenset[int]]], str], SelectedMutations
         ] = {}
         self.notes: dict[str, None] = {}  # lines that say what was found and left out, without duplicates
 
@@ -41,16 +48,10 @@ class OperatorFaultFinder:
         seed: int,
         reading: str,
     ) -> list[OperatorFault]:
-        executed = dict(
-            zip(
-                golden_inputs_by_scenario,
-                measure_executed_lines(
-                    self._manifest, list(golden_inputs_by_scenario.values()), self._limits
-                ),
-                strict=True,
-            )
-        )
-        mutations = self._find_mutations(selection, list(executed.values()))
+        golden_runs = list(golden_inputs_by_scenario.values())
+        lines_by_run = measure_executed_lines(self._manifest, golden_runs, self._limits)
+        executed = dict(zip(golden_inputs_by_scenario, lines_by_run, strict=True))
+        mutations = self._find_mutations(selection, golden_runs, list(executed.values()))
         draw = sample_mutations(mutations, selection.sample_size, seed)
         if not draw:
             raise MutatorError(
@@ -72,14 +73,21 @@ class OperatorFaultFinder:
         ]
 
     def _find_mutations(
-        self, selection: OperatorSelection, executed: Sequence[ExecutedLines]
+        self,
+        selection: OperatorSelection,
+        golden_runs: Sequence[GoldenRunInputs],
+        executed: Sequence[ExecutedLines],
     ) -> SelectedMutations:
+        types = None
+        if any_needs_types(selection.operators):
+            types = measure_variable_types(self._manifest, golden_runs, self._limits)
         files = dict.fromkeys(path for lines in executed for path in lines)
         union = {path: frozenset().union(*(lines.get(path, ()) for lines in executed)) for path in files}
-        key = (selection, frozenset(union.items()))
+        # types follow from the golden runs, and so do the lines; seeds can differ in types alone
+        key = (selection, frozenset(union.items()), digest(types))
         if key not in self._mutations_by_selection:
             self._mutations_by_selection[key] = select_mutations(
-                self._manifest, self._models, selection.operators, selection.places, union
+                self._manifest, self._models, selection.operators, selection.places, union, types
             )
         return self._mutations_by_selection[key]
 

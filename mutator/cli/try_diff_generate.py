@@ -340,9 +340,11 @@ def _parse_operator_choice(
             where="generate",
             expected="no specs and no campaign, at least one --in, and either --scenario or --all-lines",
         )
-    names = OPERATORS.names() if operators == "all" else operators.split(",")
+    from mutator.operators.operator_lookup import names_in_all
+
+    names = [name.strip() for name in operators.split(",")]
     return mutator.OperatorChoice(
-        operators=[name.strip() for name in names],
+        operators=[one for name in names for one in (names_in_all() if name == "all" else [name])],
         places=places,
         scenario=scenario,
         sample=sample,

@@ -49,6 +49,7 @@ class Job:
     # like `keep_observations`; also note calls that make a target nondeterministic
     watch_nondeterminism: bool = False
     note_executed_lines: bool = False  # note which lines of the tree run from the first observation on
+    note_variable_types: bool = False  # note the types of variables when these lines begin
     # note where the injections' statements execute: file and function of each (`reach_jobs.watched_job`)
     watched_places: tuple[tuple[str, str], ...] = ()
 
@@ -107,7 +108,8 @@ class JobResult:
     * `fork_step`: the step before which the run was forked
     * `was_stopped_at_hazard`: whether a terminal hazard ended the run early
     * `third_party_modules`: the third-party top-level modules that the run imported
-    * `watch_report`, `executed_lines` (from 1, by file), `reach_report`: what the reference engine noted
+    * `watch_report`, `executed_lines` (from 1, by file), `reach_report`, `variable_types` (by file, line and
+      name): what the reference engine noted
     """
 
     status: Status
@@ -127,6 +129,7 @@ class JobResult:
     watch_report: Mapping[str, Any] = field(default_factory=dict)
     executed_lines: Mapping[str, list[int]] = field(default_factory=dict)
     reach_report: Mapping[str, Any] = field(default_factory=dict)
+    variable_types: Mapping[str, Mapping[str, Mapping[str, str]]] = field(default_factory=dict)
 
 
 def harness_error_result(reason: str, out: Path, mode: RunMode) -> JobResult:

@@ -162,6 +162,7 @@ class ReferenceEngine:
             third_party_modules=tuple(report["modules"]) if report else (),
             watch_report=report.get("watched", {}) if report else {},
             executed_lines=report.get("lines", {}) if report else {},
+            variable_types=report.get("types", {}) if report else {},
             reach_report=report.get("reach", {}) if report else {},
         )
 
@@ -195,6 +196,7 @@ class ReferenceEngine:
             "watch": job.watch_nondeterminism,
             "observe": self._observed_names() if job.watch_nondeterminism or job.keep_observations else None,
             "lines": self._observation_lines() if job.note_executed_lines else None,
+            "types": self._observation_lines() if job.note_variable_types else None,
         }
 
     def _observation_lines(self) -> tuple[str, list[int]]:

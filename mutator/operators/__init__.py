@@ -37,10 +37,15 @@ class Operator:
 
     `examples` are its tests. They map the body of `def f(self, a, b):` to all changes that the operator makes
     in it. `replacements` describe them on the reference page, in Markdown: where, and the replacement.
+
+    With `needs_types`, golden runs measure the types of variables first. `all` leaves out an operator without
+    `is_in_all`.
     """
 
     about: str
     replacements: tuple[tuple[str, str], ...]
     examples: Mapping[str, Sequence[str]]
     rules: "Callable[[Expression, StatementFacts], Iterable[MutationRule]] | None" = None
+    needs_types: bool = False
+    is_in_all: bool = True
     omits: "Callable[[Statement, StatementFacts], bool] | None" = None

@@ -1,7 +1,7 @@
 """Selects mutations by operator, by place in the source, and by the lines that golden runs execute."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 from mutator._common.hashing import digest
@@ -12,6 +12,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.mutants.anchors import parsed_file
 from mutator.mutants.refused_places import refusal_reason_of_function
 from mutator.operators.equal_code_filter import drop_equal_code
+from mutator.operators.executed_lines import TypesByFile
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutations import Mutation
 from mutator.operators.statement_facts import statement_facts_of
@@ -55,11 +56,13 @@ def select_mutations(
     operators: Collection[str],
     places: Sequence[str],
     executed: LinesByFile | None = None,
+    types: TypesByFile | None = None,
 ) -> SelectedMutations:
     """Return the operators' mutations at these places, sorted by file and line.
 
     A place is `PATH` or `PATH::FUNCTION`; `*` is a wildcard, and `**` also matches across folders. `executed`
-    limits the mutations to these lines. MutatorError if a place matches nothing.
+    limits the mutations to these lines; `types` are those of variables in golden runs. MutatorError if a
+    place matches nothing.
     """
     functions_by_path: dict[str, dict[str, None]] = {}
     for place in places:
@@ -68,7 +71,8 @@ def select_mutations(
     selected = SelectedMutations()
     for path in sorted(functions_by_path):
         selected = _merge(
-            selected, _select_in_file(manifest, models, operators, path, functions_by_path[path], executed)
+            selected,
+            _select_in_file(manifest, models, operators, path, functions_by_path[path], executed, types),
         )
     return selected
 
@@ -80,8 +84,11 @@ def _select_in_file(
     path: str,
     functions: Collection[str],
     executed: LinesByFile | None,
+    types: TypesByFile | None,
 ) -> SelectedMutations:
     file, facts = parsed_file(manifest.tree, path), statement_facts_of(manifest.tree, path)
+    if types is not None:
+        facts = replace(facts, types_by_line=types.get(path, {}))
     mutations_by_function = {name: mutations_of(file, facts, name, models, operators) for name in functions}
     refused = {name for name in functions if refusal_reason_of_function(manifest, path, name)}
     mutations = [m for name in functions if name not in refused for m in mutations_by_function[name]]

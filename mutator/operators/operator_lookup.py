@@ -12,7 +12,7 @@ _OPERATOR_MODEL_SUFFIXES = ("constant", "drop", "empty", "infix", "prefix", "swa
 OPERATOR_MODELS = (
     *(f"operator_{name}" for name in _OPERATOR_MODEL_SUFFIXES),
     "omission",
-)  # fault models that shipped operators use
+)  # fault models that the operators in `all` use
 
 
 @cache
@@ -21,6 +21,16 @@ def find_operator(name: str) -> Operator:
     operator = doors.OPERATORS.load(name)
     assert isinstance(operator, Operator)
     return operator
+
+
+def names_in_all() -> tuple[str, ...]:
+    """Return the operators that `all` stands for."""
+    return tuple(name for name in doors.OPERATORS.names() if find_operator(name).is_in_all)
+
+
+def any_needs_types(names: Iterable[str]) -> bool:
+    """Return whether one of these operators needs the types of variables in golden runs."""
+    return any(find_operator(name).needs_types for name in names)
 
 
 def operator_name_of(fault: Fault) -> str | None:

@@ -1,11 +1,12 @@
 """Collects the facts about a file's statements that operators need, using `ast`."""
 
 import ast
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator.mutants.expression_roles import blocks_of
+from mutator.operators.variable_kinds import FunctionNames, TypesByName, names_of_functions
 from mutator.targets.source_tree import SourceTree
 
 NodeExtent = tuple[int, int, int | None, int | None]
@@ -23,12 +24,24 @@ class StatementFacts:
     * `first_binding_line_by_name`: in a function. The key has its `def` line, because a property and its
       setter share a name
     * `statement_lines`: the lines of each statement without those of nested statements
+    * `function_names`: the local names of each function
+    * `types_by_line`: the types of variables in golden runs, by the line that then begins; None without runs
     """
 
     augmenting_operator_by_extent: dict[NodeExtent, ast.operator] = field(default_factory=dict)
     source_by_line: dict[int, str] = field(default_factory=dict)
     first_binding_line_by_name: dict[tuple[int, str], int] = field(default_factory=dict)
     statement_lines: list[range] = field(default_factory=list)
+    function_names: tuple[FunctionNames, ...] = ()
+    types_by_line: Mapping[int, TypesByName] | None = None
+
+    def types_at(self, line: int) -> TypesByName | None:
+        """Return the types of variables where the statement on a line begins; None without golden runs."""
+        if self.types_by_line is None:
+            return None
+        around = [lines for lines in self.statement_lines if line in lines]
+        lines = min(around, key=len, default=range(line, line + 1))
+        return next((self.types_by_line[n] for n in lines if n in self.types_by_line), {})
 
     def extend_to_statements(self, lines: Collection[int]) -> frozenset[int]:
         """Extend the lines to whole statements."""
@@ -47,8 +60,9 @@ def statement_facts_of(tree: SourceTree, path: str) -> StatementFacts:
 
 
 def _collect_facts(path: str, data: bytes, root: Path) -> StatementFacts:
-    facts = StatementFacts()
-    _collect_block(ast.parse(data).body, None, facts)
+    module = ast.parse(data)
+    facts = StatementFacts(function_names=names_of_functions(module))
+    _collect_block(module.body, None, facts)
     return facts
 
 

@@ -115,7 +115,11 @@ PATH_COLUMNS = (
     ),
 )
 DETAIL_COLUMN = ResultColumn(
-    "detail", "text", "", "why the status is not `ok`", lambda f: f.record.detail or None
+    "detail",
+    "text",
+    "",
+    "why the status is not `ok`, or why the fault was never active",
+    lambda f: f.record.detail or None,
 )
 TIMING_COLUMNS = (
     TableColumn("experiment_id", "text", "", "the experiment"),

@@ -88,6 +88,8 @@ def run_job(job: dict[str, Any]) -> None:
     line_recorder = (
         load_neighbour("line_recorder").LineRecorder(job["tree"], *job["lines"]) if job["lines"] else None
     )
+    if job["types"]:
+        line_recorder = load_neighbour("type_recorder").TypeRecorder(job["tree"], *job["types"])
     observations: list[Any] = []
     reach_watcher = None
     try:
@@ -118,6 +120,8 @@ def run_job(job: dict[str, Any]) -> None:
         report["watched"] = {**(watcher.as_json() if watcher else {}), "seen": observations}
     if line_recorder:
         report["lines"] = line_recorder.stop_and_collect()
+    if job["types"]:
+        report["types"] = line_recorder.collect_types()
     report |= collect_probe_report(probe, job["tree"], job["probe"]) if probe else {"probe": None}
     child_activations.add_children(report["probe"], job["child_activations"])
     if reach_watcher:
