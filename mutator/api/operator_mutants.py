@@ -21,7 +21,7 @@ class OperatorChoice:
     In each function, each operator is sampled in proportion to its mutants.
     """
 
-    operators: Sequence[str]  #: names of mutation operators
+    operators: Sequence[str]  #: names of mutation operators, or `all`
     #: `PATH::FUNCTION` or `PATH`; `*` is a wildcard, and `**` also matches across folders
     places: Sequence[str]
     #: only lines that the golden run of this scenario executes; None: all lines

@@ -243,7 +243,7 @@ def generate(
         str | None,
         typer.Option(
             metavar="NAMES",
-            help=f"Use mutation operators instead of specs: {OPERATOR_NAMES}; or all. "
+            help=f"Use mutation operators instead of specs: {OPERATOR_NAMES}; or all (without variable). "
             "Other packages can add operators.",
         ),
     ] = None,
@@ -340,11 +340,8 @@ def _parse_operator_choice(
             where="generate",
             expected="no specs and no campaign, at least one --in, and either --scenario or --all-lines",
         )
-    from mutator.operators.operator_lookup import names_in_all
-
-    names = [name.strip() for name in operators.split(",")]
     return mutator.OperatorChoice(
-        operators=[one for name in names for one in (names_in_all() if name == "all" else [name])],
+        operators=[name.strip() for name in operators.split(",")],
         places=places,
         scenario=scenario,
         sample=sample,

@@ -9,6 +9,7 @@ from mutator.model import OPERATOR_FAULTS_MODULE, Fault
 from mutator.operators import Operator
 
 _OPERATOR_MODEL_SUFFIXES = ("constant", "drop", "empty", "infix", "prefix", "swap")
+ALL_NAME = "all"  # stands for the operators with `is_in_all`
 OPERATOR_MODELS = (
     *(f"operator_{name}" for name in _OPERATOR_MODEL_SUFFIXES),
     "omission",
@@ -39,8 +40,12 @@ def operator_name_of(fault: Fault) -> str | None:
 
 
 def unique_operator_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names without duplicates; MutatorError for an unknown name or an empty list."""
-    unique_names = tuple(dict.fromkeys(names))
+    """Return the names without duplicates, with those that `all` stands for.
+
+    MutatorError for an unknown name or an empty list.
+    """
+    named = (each for name in names for each in (names_in_all() if name == ALL_NAME else (name,)))
+    unique_names = tuple(dict.fromkeys(named))
     for name in unique_names:
         find_operator(name)
     if not unique_names:

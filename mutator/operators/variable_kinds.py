@@ -48,7 +48,7 @@ def replacements_of_name(
     around = [function for function in functions if node.lineno in function.lines[1:]]
     if not around:
         return []
-    function = max(around, key=lambda one: one.lines.start)
+    function = max(around, key=lambda candidate: candidate.lines.start)
     hidden = {n for lines, names in function.inner_names if node.lineno in lines for n in names}
     if node.id in {*hidden, *_OWN_OBJECT_NAMES} or node.id not in function.names:
         return []
@@ -100,8 +100,8 @@ def _names_of_function(function: _Function) -> FunctionNames:
         for node in ast.walk(function)
         if isinstance(node, _Comprehension | ast.Lambda)
     )
-    kept = {name: local for name, local in names.items() if name not in outer_names}
-    return FunctionNames(lines=lines, names=kept, inner_names=inner)
+    local_names = {name: local for name, local in names.items() if name not in outer_names}
+    return FunctionNames(lines=lines, names=local_names, inner_names=inner)
 
 
 def _statements(body: Sequence[ast.stmt], end: int) -> Iterator[tuple[ast.stmt, int]]:
@@ -146,8 +146,8 @@ def _names_in_target(target: ast.expr, kind: str, value: ast.expr | None) -> Ite
         case ast.Tuple(elts=parts) | ast.List(elts=parts):
             values = value.elts if isinstance(value, ast.Tuple | ast.List) else []
             for i, part in enumerate(parts):
-                own = _kind_of_value(values[i]) if len(values) == len(parts) else f"part of {kind}"
-                yield from _names_in_target(part, own or f"line {part.lineno}", None)
+                part_kind = _kind_of_value(values[i]) if len(values) == len(parts) else f"part of {kind}"
+                yield from _names_in_target(part, part_kind or f"line {part.lineno}", None)
         case ast.Starred(value=part):
             yield from _names_in_target(part, f"rest of {kind}", None)
 

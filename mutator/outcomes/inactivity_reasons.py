@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from mutator._common.confined_files import path_below
 from mutator._common.message_text import counted
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.model import FaultLocation
@@ -101,7 +102,7 @@ def _alias_hint(manifest: TargetManifest, path: str, loaded: Sequence[str]) -> s
     """Return a hint at another name of the same file, under which the run imports it; empty without one."""
     for other in _same_files(manifest, path):
         if other in loaded:
-            real = {os.path.realpath(manifest.tree.root / name) for name in (path, other)}
+            real = {os.path.realpath(path_below(manifest.tree.root, name)) for name in (path, other)}
             what = "the same file" if len(real) == 1 else "a copy of it"
             return f"; {other}, {what}, is imported: name that file"
     return ""

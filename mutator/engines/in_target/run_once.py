@@ -120,8 +120,8 @@ def run_job(job: dict[str, Any]) -> None:
         report["watched"] = {**(watcher.as_json() if watcher else {}), "seen": observations}
     if line_recorder:
         report["lines"] = line_recorder.stop_and_collect()
-    if job["types"]:
-        report["types"] = line_recorder.collect_types()
+        if job["types"]:
+            report["types"] = line_recorder.collect_types()
     report |= collect_probe_report(probe, job["tree"], job["probe"]) if probe else {"probe": None}
     child_activations.add_children(report["probe"], job["child_activations"])
     if reach_watcher:
