@@ -16,6 +16,8 @@ from mutator.mutants.counting_mutant import build_counting_mutant
 from mutator.mutants.probe import was_triggered
 from mutator.outcomes.inactivity_reasons import UNTRIGGERED_REASON, Reach, reach_of_place
 
+_UNKNOWN = ((Reach.NEVER, "its code did not run while the trigger held"),)
+
 
 class InactivityCheck:
     """Finds the reasons on the reference engine, so they are the same for every engine.
@@ -30,7 +32,7 @@ class InactivityCheck:
         self._reasons: dict[object, tuple[tuple[Reach, str], ...]] = {}
 
     def reason(self, experiment: Experiment, scenario: Path, probe_report: Mapping[str, Any]) -> str:
-        """Return why the experiment's fault was never active; empty if it cannot be found."""
+        """Return why the experiment's fault was never active."""
         if not was_triggered(probe_report):
             return UNTRIGGERED_REASON
         unset = probe_report.get("unset")
@@ -61,7 +63,7 @@ class InactivityCheck:
         try:
             mutant, location_by_id = build_counting_mutant(arguments.manifest, arguments.models, locations)
         except MutatorError:
-            return ()  # a foreign fault model can allow places that cannot be counted
+            return _UNKNOWN  # a foreign fault model can allow places that cannot be counted
         job = watched_job(
             Job(
                 name=f"reach-{content_id([experiment.id])}",
@@ -82,7 +84,7 @@ class InactivityCheck:
         finally:
             remove_folder(folder)
         if result.status is not Status.OK:
-            return ()
+            return _UNKNOWN
         reached = [
             reach_of_place(arguments.manifest, job, result, name, location)
             for name, location in location_by_id.items()
