@@ -3,10 +3,10 @@ import { readFileSync } from "node:fs";
 import js from "@eslint/js";
 import globals from "globals";
 
-const WEB = "mutator/web", PAGES = ["comparison", "report", "review", "serve", "golden"];
+const WEB = "mutator/web", PAGES = ["comparison", "report", "review", "serve", "golden", "trial"];
 const lines = (file) => readFileSync(`${WEB}/${file}`, "utf8").trim().split("\n");
 const orders = PAGES.map((page) => lines(`${page}/order.txt`).filter((name) => name.endsWith(".js")));
-orders[3].unshift(...orders[1]); // the server adds its scripts to a report
+for (const page of [3, 5]) orders[page].unshift(...orders[1]); // the server adds its scripts to a report, or to most of its scripts
 
 /** The constants of the scripts that are in every page with scripts of `folder`. */
 function constants(folder) {

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from mutator._common.confined_files import open_descriptor_below, unlink_below
+from mutator._common.confined_files import open_descriptor_below, read_below, unlink_below
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError, UnsafePath
 
@@ -50,6 +50,28 @@ def lock_run_folder(run: Path, patience_s: float = _WORKER_PATIENCE_S) -> Iterat
                 (run / WORKERS_FOLDER).rmdir()  # never follows a link
     finally:
         os.close(fd)
+
+
+def is_owner_alive(run: Path) -> bool:
+    """Whether a process of this machine holds the lock of `run`. Asking never gets in a command's way, as
+    trying to lock would.
+    """
+    try:
+        pid = int(read_below(run, OWNER_LOCK_FILE))
+        descriptors = list(Path(f"/proc/{pid}/fd").iterdir())
+    except PermissionError:  # a process of another user
+        return True
+    except (OSError, ValueError, MutatorError):
+        return False
+    lock = str(run.resolve() / OWNER_LOCK_FILE)
+    return any(_link_target(descriptor) == lock for descriptor in descriptors)
+
+
+def _link_target(path: Path) -> str:
+    try:
+        return str(path.readlink())
+    except OSError:  # closed meanwhile
+        return ""
 
 
 @contextmanager

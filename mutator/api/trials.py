@@ -11,6 +11,7 @@ from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
 from mutator.api.target_and_fault_selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.campaigns.phrase_collection import phrases_of_fault, phrases_of_trigger
+from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.execution.single_run import SingleRun, run_single
 from mutator.figures.golden_and_faulty_plot import save_figure
@@ -22,6 +23,7 @@ from mutator.results.finished_experiment import ResultColumn
 from mutator.results.plan_columns import PlanColumn
 from mutator.results.severity_and_sentence_columns import severity_and_time_columns
 from mutator.results.table_columns import result_columns
+from mutator.store.trial_file import StoredTrial
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import Phrases
@@ -150,6 +152,13 @@ def try_fault(
     folder = checked_path_inside(out_folder, path_below(out_folder, experiment.id))
     check_only_plain_files(folder)
     single = run_single(selected_target.workspace, selected_target.manifest, experiment, folder)
+    inputs = RunInputs.from_workspace(selected_target.workspace, selected_target.manifest, [str(scenario)])
+    StoredTrial(
+        target=selected_target.manifest.name,
+        sources=inputs.digest_by_source(),
+        experiment=experiment,
+        record=single.record,
+    ).write(folder)
     scale = selected_target.workspace.scale_of(selected_target.manifest)
     phrases = replace(
         phrases_of_fault(selected_target.workspace, selected_target.manifest, experiment.fault),

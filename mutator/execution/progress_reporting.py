@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from mutator.execution.session import Session
 from mutator.preflight import equivalence_check
-from mutator.store.records import PROOF_FOLDER
+from mutator.store.records import PROOF_FOLDER, RECORDS_FOLDER
 from mutator.store.run_progress import Progress, RecordTail
 
 _NOTIFY_INTERVAL_S = 0.5  # a live bar needs no more, and each poll reads files
@@ -35,12 +35,12 @@ def reporting_progress(session: Session) -> Iterator[None]:
 def _progress_stages(session: Session) -> Iterator[Progress]:
     """Yield the current progress: of the experiments until all have a record, then of the proof."""
     folder = session.folder
-    experiments = RecordTail("experiments", folder.path / "records", folder.planned_experiment_count)
+    experiments = RecordTail("experiments", folder.path, RECORDS_FOLDER, folder.planned_experiment_count)
     while (progress := experiments.poll()).done < progress.total:
         yield progress
     yield progress
     proof = RecordTail(
-        "proof", folder.path / PROOF_FOLDER, len(equivalence_check.sample_ids_in_folder(folder))
+        "proof", folder.path, PROOF_FOLDER, len(equivalence_check.sample_ids_in_folder(folder))
     )
     while session.proof:
         yield proof.poll()

@@ -67,6 +67,11 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress, progress_label
 from mutator.store.series_packing import list_unpacked_worker_files, pack_series
 from mutator.store.session_environments import WorkerMachine
+from mutator.store.session_progress import (
+    SessionProgress,
+    remove_session_progress,
+    write_session_progress,
+)
 from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
 
@@ -133,7 +138,8 @@ class Session:
         self.folder = folder
         self.workers = workers
         self.accept_versions = accept_versions
-        self.notify: ProgressCallback = notify or (lambda progress: None)
+        self._notify = notify
+        self._latest_progress = Progress(stage="plan")
         self.pending: tuple[PendingChunk, ...] = ()
         self.proof: tuple[equivalence_check.SampledExperiment, ...] = ()
         self.manifest = workspace.manifest(folder.head.target)
@@ -152,6 +158,20 @@ class Session:
         self._finished_count_before = 0
         self._records: Mapping[str, Record] | None = None
         self._earlier_outcome: FinishedRunOutcome | None = None
+
+    def notify(self, progress: Progress) -> None:
+        """Tell whoever started or watches the session how far it is."""
+        self._latest_progress = progress
+        write_session_progress(self.folder.path, SessionProgress.of(progress))
+        if self._notify:
+            self._notify(progress)
+
+    def note_end(self, problem: str) -> None:
+        """Leave the cause for those who watch the session if it failed, or nothing."""
+        if problem:
+            write_session_progress(self.folder.path, SessionProgress.of(self._latest_progress, problem))
+        else:
+            remove_session_progress(self.folder.path)
 
     def prepare(self, packages: Iterable[str] = ()) -> None:
         """Find the work to do. If there is any, run the checks and begin a stretch, which records the
@@ -368,14 +388,24 @@ def open_session(
         for path in chain(*candidates):
             if is_half_written(path.name) and path.is_file():
                 path.unlink()
+        session = Session(
+            workspace,
+            folder,
+            workers=workers,
+            engine=engine,
+            accept_versions=accept_versions,
+            notify=notify,
+        )
+        write_session_progress(folder.path, SessionProgress.of(Progress(stage="plan")))
         try:
-            yield Session(
-                workspace,
-                folder,
-                workers=workers,
-                engine=engine,
-                accept_versions=accept_versions,
-                notify=notify,
-            )
+            yield session
+        except Exception as error:
+            session.note_end(str(error) or type(error).__name__)
+            raise
+        except BaseException:  # an interruption is no failure
+            session.note_end("")
+            raise
+        else:
+            session.note_end(session.problem)
         finally:
             remove_anything_at(folder.scratch_folder)

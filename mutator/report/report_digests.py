@@ -28,6 +28,7 @@ from mutator.store.allowed_contents import (
     is_allowed_top_name,
 )
 from mutator.store.run_folder import RunFolder
+from mutator.store.session_progress import PROGRESS_FILE
 from mutator.workspace import Workspace
 
 STAMP_SCHEMA = "report/1"
@@ -40,6 +41,7 @@ _TOP_NAMES_NOT_READ = {
     DAMAGED_FOLDER,
     SCRATCH_FOLDER,
     "workers",
+    PROGRESS_FILE,
     *SIGNATURE_FILES,
 }
 _ASSET_SUFFIXES = (".css", ".html", ".js", ".txt")

@@ -15,7 +15,8 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
 from mutator.results import table_building
 from mutator.results.experiment_sentence import ExperimentSentences
-from mutator.results.finished_experiment import FinishedExperiment
+from mutator.results.finished_experiment import FinishedExperiment, ResultColumn
+from mutator.results.plan_columns import PlanColumn
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_columns import cells_by_column, result_columns_of
 from mutator.results.table_writers import TableColumn, parquet_batch, parquet_schema
@@ -192,17 +193,27 @@ def frame_of_experiments(folder: RunFolder, experiments: Iterable[Experiment]) -
     """Return the frame of the `experiments` with a record, computed from plan and records. It is as from
     `Results.frame`, but the columns of the fault's path are empty.
     """
-    import pyarrow as pa
-
-    columns, records, scale = result_columns_of(folder.head), folder.records(), folder.severity_scale
+    records, scale = folder.records(), folder.severity_scale
     finished = (
         FinishedExperiment(experiment, records[experiment.id], scale)
         for experiment in experiments
         if experiment.id in records
     )
-    pieces = iter(lambda: list(islice(finished, _EXPERIMENTS_PER_BATCH)), [])
+    return frame_of_finished(result_columns_of(folder.head), finished, folder.head.hazards)
+
+
+def frame_of_finished(
+    columns: Sequence[PlanColumn | ResultColumn],
+    finished: Iterable[FinishedExperiment],
+    hazards: Iterable[str],
+) -> "pd.DataFrame":
+    """Return the frame of experiments with their records, as from `Results.frame`."""
+    import pyarrow as pa
+
+    remaining = iter(finished)
+    pieces = iter(lambda: list(islice(remaining, _EXPERIMENTS_PER_BATCH)), [])
     batches = [parquet_batch(columns, cells_by_column(columns, piece)) for piece in pieces]
-    return typed_frame(pa.Table.from_batches(batches, parquet_schema(columns)), folder.head.hazards)
+    return typed_frame(pa.Table.from_batches(batches, parquet_schema(columns)), hazards)
 
 
 def typed_frame(table: Any, hazards: Iterable[str]) -> "pd.DataFrame":

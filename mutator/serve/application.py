@@ -1,6 +1,5 @@
 """The application, with its routes."""
 
-import re
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -16,18 +15,20 @@ from starlette.routing import Route
 
 from mutator.errors import MutatorError, NotServed
 from mutator.serve.home_and_error_pages import form_choices, home_page
-from mutator.serve.job_requests import TRIALS_FOLDER, JobCommand, RequestChecker
+from mutator.serve.job_requests import JobCommand, RequestChecker
 from mutator.serve.jobs import ServeJobs
 from mutator.serve.json_api import JobApi, ReviewApi, selected_groups
 from mutator.serve.page_tokens import HOME_PAGE, PageTokens, review_page_name
 from mutator.serve.report_pages import RunPages
-from mutator.serve.responses import OpenFileResponse, media_type_of, on_error
+from mutator.serve.responses import media_type_of, on_error
+from mutator.serve.run_states import RUNNING, state_of_run
 from mutator.serve.served_reviews import ServedReviews
-from mutator.serve.served_runs import ServedRuns, open_plain_file, report_address, summarize_run
+from mutator.serve.served_runs import REPORT_PAGE, ServedRuns, live_address, report_address, summarize_run
+from mutator.serve.watch_pages import WatchPages
+from mutator.store.run_folder import RunFolder
 from mutator.web import asset_names, asset_text
 from mutator.workspace import Workspace
 
-_PLOT_FILE = "plot.svg"
 AsyncHandler = Callable[[Request], Awaitable[Response]]
 
 
@@ -49,7 +50,9 @@ class ServedSite:
         self.jobs = ServeJobs(self.most_jobs_at_once, self._report_address)
 
     def summarize_runs(self) -> list[dict[str, Any]]:
-        return [summarize_run(key, path) for key, path in self.runs.folders_by_key().items()]
+        """Return all runs, the one that was worked on last first."""
+        runs = [summarize_run(key, path) for key, path in self.runs.folders_by_key().items()]
+        return sorted(runs, key=lambda run: run["changed"], reverse=True)
 
     def _report_address(self, command: JobCommand) -> str | None:
         key = self.runs.key_of(command.run_folder) if command.run_folder else None
@@ -106,6 +109,8 @@ def _json_post(answer: Callable[[Request, bytes], Response]) -> AsyncHandler:
 
 
 def _page_routes(site: ServedSite) -> list[Route]:
+    watching = WatchPages(site.workspace, site.runs, site.jobs, site.tokens)
+
     def home(_: Request) -> Response:
         return HTMLResponse(home_page(site.workspace, site.summarize_runs(), site.tokens.token_of(HOME_PAGE)))
 
@@ -113,21 +118,18 @@ def _page_routes(site: ServedSite) -> list[Route]:
         return RedirectResponse(report_address(request.path_params["run"]))
 
     def run_file(request: Request) -> Response:
-        return site.run_pages.run_file(request.path_params["run"], request.path_params["path"])
+        key, name = request.path_params["run"], request.path_params["path"]
+        if (
+            name == REPORT_PAGE
+            and state_of_run(RunFolder.open_unverified(site.runs.folder(key))).state == RUNNING
+        ):
+            return RedirectResponse(live_address(key))
+        return site.run_pages.run_file(key, name)
 
     def comparison_file(request: Request) -> Response:
         parameters = request.path_params
         return site.run_pages.comparison_file(
             parameters["a"], parameters["b"], parameters.get("name") or "index.html"
-        )
-
-    def trial_plot(request: Request) -> Response:
-        trial_name = re.fullmatch(r"[0-9a-f]{16}", request.path_params["name"])
-        if trial_name is None:
-            raise NotServed("no such plot")
-        return OpenFileResponse(
-            open_plain_file(site.runs.folder_for_new_runs, f"{TRIALS_FOLDER}/{trial_name[0]}/{_PLOT_FILE}"),
-            _PLOT_FILE,
         )
 
     def review_html(request: Request) -> Response:
@@ -144,7 +146,12 @@ def _page_routes(site: ServedSite) -> list[Route]:
         Route("/runs/{run}/{path:path}", _in_thread(run_file)),
         Route("/compare/{a}/{b}/", _in_thread(comparison_file)),
         Route("/compare/{a}/{b}/{name}", _in_thread(comparison_file)),
-        Route(f"/{TRIALS_FOLDER}/{{name}}/{_PLOT_FILE}", _in_thread(trial_plot)),
+        Route("/live/{run}", _in_thread(watching.live_html)),
+        Route("/live/{run}/{experiment}", _in_thread(watching.live_experiment_html)),
+        Route("/trial/{trial}", _in_thread(watching.trial_html)),
+        Route("/api/runs/{run}/live", _in_thread(watching.live_data)),
+        Route("/api/runs/{run}/experiments/{experiment}", _in_thread(watching.live_experiment_data)),
+        Route("/api/trials/{trial}", _in_thread(watching.trial_data)),
         Route("/review/{target}", _in_thread(review_html)),
     ]
 

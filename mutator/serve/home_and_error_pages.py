@@ -1,60 +1,134 @@
 """The first page, the choices in its forms, and the error page."""
 
 from collections.abc import Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
 
+from mutator.config.yaml_files import load_yaml
 from mutator.errors import MutatorError
-from mutator.web import asset_text
+from mutator.mutants.injected_lines import tags_for_page_scripts
+from mutator.serve.served_trials import range_as_json
+from mutator.web import asset_text, json_script_element, load_order
 from mutator.workspace import Workspace
 
-_MOST_PAIRS = 20  # pairs of runs offered for comparison
+_SCRIPTS_OF_WHOLE_RUNS = (
+    "report/first.js",
+    "report/path.js",
+    "report/path_counts.js",
+    "report/report.js",
+)
 
 
 def home_page(workspace: Workspace, runs: Sequence[Mapping[str, Any]], token: str) -> str:
+    """Return the first page; `runs` are the served runs, the newest first."""
     targets = tuple(workspace.targets)
+    compared = [run for run in runs if run["outcomes"] and run["state"] != "running"]
+    by_campaign = {
+        run["campaign"]: [r for r in compared if r["campaign"] == run["campaign"]] for run in compared
+    }
     return _render_html_page(
-        "home.html", runs=runs, pairs=_consecutive_comparable_pairs(runs), targets=targets, token=token
+        "serve/home.html",
+        runs=runs,
+        runs_by_campaign=by_campaign if len(compared) > 1 else {},
+        suggestion=_newest_comparable_pair(compared),
+        targets=targets,
+        token=token,
+    )
+
+
+def live_page(key: str, token: str) -> str:
+    """Return the page that watches the run with this key."""
+    return _render_html_page("serve/live.html", key=key, token=token)
+
+
+def trial_page(data_address: str, back_address: str, back_text: str, *, token: str) -> str:
+    """Return the page of one experiment, whose data its script gets from `data_address`."""
+    styles = (*load_order("report", ".css"), *load_order("serve", ".css"), *load_order("trial", ".css"))
+    scripts = [name for name in load_order("report", ".js") if name not in _SCRIPTS_OF_WHOLE_RUNS]
+    return _render_html_page(
+        "trial/trial.html",
+        data_address=data_address,
+        back_address=back_address,
+        back_text=back_text,
+        token=token,
+        styles=styles,
+        scripts=(*scripts, *load_order("trial", ".js")),
+        tags=Markup(json_script_element(tags_for_page_scripts(), "tags")),
     )
 
 
 def error_page(facts: Mapping[str, Any]) -> str:
-    return _render_html_page("error.html", **facts)
+    return _render_html_page("serve/error.html", **facts)
 
 
 def form_choices(workspace: Workspace) -> dict[str, Any]:
-    """Return the choices in the forms. The first entry that cannot be read is reported as `problem`."""
-    names = ("targets", "scenarios", "campaigns")
-    choices: dict[str, Any] = {name: [*getattr(workspace, name)] for name in names}
-    choices |= {"specs": [], "contexts": [], "readings": [], "problem": None}
+    """Return the choices in the forms, with what each is, in words. The first entry that cannot be read is
+    reported as `problem`.
+    """
+    choices: dict[str, Any] = {"targets": [*workspace.targets]}
+    choices |= {
+        "scenarios": [],
+        "campaigns": [],
+        "specs": [],
+        "contexts": [],
+        "readings": [],
+        "problem": None,
+    }
     try:
-        choices["readings"] = [*workspace.readings().names]
+        for names, files in (("scenarios", workspace.scenarios), ("campaigns", workspace.campaigns)):
+            choices[names] = [{"name": name, "about": _about_file(path)} for name, path in files.items()]
+        readings = workspace.readings()
+        choices["readings"] = [
+            {"name": name, "about": about}
+            for name, about in zip(readings.names, readings.descriptions, strict=True)
+        ]
         choices["contexts"] = [
-            {"name": row.id, "condition": row.condition}
+            {"name": row.id, "condition": row.condition, "table": table.name}
             for table in map(workspace.context_table, workspace.context_tables)
             for row in table.rows
         ]
         choices["specs"] = [
-            {"name": spec.name, "variants": [variant.name for variant in spec]} for spec in workspace.specs()
+            {
+                "name": spec.name,
+                "module": spec.module,
+                "about": spec.about,
+                "variants": [
+                    {"name": variant.name, "about": variant.about, "range": range_as_json(variant.draw)}
+                    for variant in spec
+                ],
+            }
+            for spec in workspace.specs()
         ]
     except MutatorError as err:
         choices["problem"] = err.got
     return choices
 
 
-def _consecutive_comparable_pairs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
-    """Return pairs of consecutive runs with the same campaign and target."""
-    latest: dict[tuple[str, str], str] = {}
-    pairs = []
-    for run in runs:
-        if run["outcomes"]:
-            kind = (run["campaign"], run["target"])
-            if kind in latest:
-                pairs.append((latest[kind], run["key"]))
-            latest[kind] = run["key"]
-    return pairs[-_MOST_PAIRS:]
+def _about_file(path: Path) -> str:
+    """Return the title of a scenario's or campaign's file; '' if the file has a format of its own."""
+    try:
+        data = load_yaml(path).data
+    except MutatorError:
+        return ""
+    about = (data.get("title") or data.get("about")) if isinstance(data, dict) else ""
+    return about.strip() if isinstance(about, str) else ""
+
+
+def _newest_comparable_pair(runs: Sequence[Mapping[str, Any]]) -> tuple[str, str]:
+    """Return the newest run with an earlier one of the same campaign and target, the older one first; without
+    such a pair, the two newest.
+    """
+    for number, run in enumerate(runs):
+        for earlier in runs[number + 1 :]:
+            if (earlier["campaign"], earlier["target"]) == (run["campaign"], run["target"]):
+                return earlier["key"], run["key"]
+    newest = [run["key"] for run in runs[:2]]
+    return (newest[-1], newest[0]) if newest else ("", "")
 
 
 def _render_html_page(name: str, **content: Any) -> str:
@@ -62,5 +136,17 @@ def _render_html_page(name: str, **content: Any) -> str:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["quoted"] = lambda text: quote(text, safe="")
-    text = asset_text(f"serve/{name}")
+    environment.filters["moment"] = _describe_moment
+    environment.filters["state"] = _describe_state
+    text = asset_text(name)
     return environment.from_string(text).render(content)
+
+
+def _describe_moment(seconds: float) -> str:
+    """Return a time in s since 1970 as local time; '' if unknown."""
+    return datetime.fromtimestamp(seconds).strftime("%Y-%m-%d %H:%M") if seconds else ""
+
+
+def _describe_state(run: Mapping[str, Any]) -> str:
+    """Return the state of a run with its stage or problem; web/serve/runs.js writes the same."""
+    return ": ".join(str(run[name]) for name in ("state", "stage", "problem") if run[name])

@@ -18,7 +18,9 @@ from mutator.campaigns.row_filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES
+from mutator.serve.page_tokens import TRIAL_PAGE, live_page_name, run_page_name
 from mutator.serve.served_runs import ServedRuns, report_address
+from mutator.serve.served_trials import TRIALS_FOLDER, check_value_declared
 from mutator.store import plan_file
 from mutator.triggers.conditions import canonical_condition
 from mutator.workspace import Workspace
@@ -30,7 +32,6 @@ def _check_plain_text(text: str) -> str:
     return text
 
 
-TRIALS_FOLDER = "try"  # folder of the results of `try`, next to the runs
 PlainText = Annotated[str, Field(max_length=500), AfterValidator(_check_plain_text)]
 ExperimentId = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
@@ -103,7 +104,7 @@ class JobCommand:
     title: str
     argv: tuple[str, ...]
     run_folder: Path | None = None
-    requesting_run: Path | None = None  # the run whose report can request it
+    requesting_page: str | None = None  # the page that can request it besides the first one (`page_tokens`)
     result_address: str | None = None  # the page with the result
 
 
@@ -153,7 +154,7 @@ class RequestChecker:
             title=f"{request.experiment} of {request.run}: {what}",
             argv=(*arguments, f"--run={folder}", *self._workspace_options()),
             run_folder=folder,
-            requesting_run=folder,
+            requesting_page=run_page_name(folder),
             result_address=f"{report_address(request.run)}#e={request.experiment}",
         )
 
@@ -166,7 +167,7 @@ class RequestChecker:
             title=title,
             argv=arguments,
             run_folder=folder,
-            requesting_run=folder,
+            requesting_page=run_page_name(folder),
             result_address=result,
         )
 
@@ -184,6 +185,8 @@ class RequestChecker:
             if requested is not None and requested not in accepted:
                 raise _unknown_name_error(what, requested, accepted)
         self._check_trigger(request.trigger, request.target)
+        if request.value is not None:
+            check_value_declared(spec, request.variant, request.value)
         options = {
             "--scenario": request.scenario,
             "--trigger": request.trigger,
@@ -194,11 +197,12 @@ class RequestChecker:
             "--manifest": request.target,
             "--out": self._new_folder(TRIALS_FOLDER),
         }
-        arguments = ("try", request.spec, "--plot", *_joined_options(options), *self._workspace_options())
+        arguments = ("try", request.spec, *_joined_options(options), *self._workspace_options())
         return JobCommand(
             job_request=request,
             title=f"{request.spec} in {request.scenario}, {request.trigger}",
             argv=arguments,
+            requesting_page=TRIAL_PAGE,
         )
 
     def _campaign_command(self, request: CampaignRequest) -> JobCommand:
@@ -219,6 +223,7 @@ class RequestChecker:
             title=f"{request.campaign} into {request.name}",
             argv=("run", request.campaign, *_joined_options(options), *self._workspace_options()),
             run_folder=folder,
+            requesting_page=live_page_name(folder),
         )
 
     def _check_trigger(self, text: str, target: str | None) -> None:

@@ -19,8 +19,9 @@ from mutator._common.progress_events import EVENTS_FD_VARIABLE
 from mutator.errors import JobAlreadyEnded, MutatorError, NotServed
 from mutator.execution.progress_text import describe_outcomes
 from mutator.serve.job_events import EventReader, FileEvent, JobEvent, PhaseEvent
-from mutator.serve.job_requests import TRIALS_FOLDER, JobCommand
+from mutator.serve.job_requests import JobCommand
 from mutator.serve.responses import without_absolute_folders
+from mutator.serve.served_trials import trial_address
 
 _GUARD_MODULE = "mutator.serve.job_guard"
 _OUTPUT_COLUMNS = "200"  # line width of a job's output; pages wrap the lines
@@ -64,6 +65,8 @@ class ServeJob:
         order = self.job_command.job_request
         facts: dict[str, Any] = {"id": self.id, "kind": order.kind, "title": self.job_command.title}
         facts |= {name: getattr(order, name, None) for name in ("run", "experiment")}
+        if folder := self.job_command.run_folder:
+            facts["run"] = facts["run"] or folder.name
         facts |= {"state": self.state.value, "progress": self.progress, "message": self.message}
         facts |= {
             "result": self.result_address,
@@ -254,8 +257,8 @@ class ServeJobs:
 
     def _result_address(self, job: ServeJob) -> str | None:
         if job.job_command.job_request.kind == "try":
-            plot = job.path_by_kind.get("plot")
-            return f"/{TRIALS_FOLDER}/{Path(plot).parent.name}/plot.svg" if plot else None
+            folder = job.path_by_kind.get("trial")
+            return trial_address(Path(folder).name) if folder else None
         return job.job_command.result_address or self._report_at(job.job_command)
 
 

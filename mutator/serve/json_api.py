@@ -8,7 +8,7 @@ from starlette.responses import JSONResponse, Response
 from mutator.errors import GroupsChanged, JobAlreadyEnded, MutatorError
 from mutator.serve.job_requests import JobCommand, RequestChecker
 from mutator.serve.jobs import ServeJobs
-from mutator.serve.page_tokens import HOME_PAGE, TOKEN_HEADER, PageTokens, review_page_name, run_page_name
+from mutator.serve.page_tokens import HOME_PAGE, TOKEN_HEADER, PageTokens, review_page_name
 from mutator.serve.responses import error_facts
 from mutator.serve.served_reviews import GroupSelection, SentDecisions, ServedReviews
 from mutator.serve.served_runs import ServedRuns
@@ -64,8 +64,8 @@ class ReviewApi:
 
 
 class JobApi:
-    """Jobs for the first page, which can start and cancel all, and for a report, which can start and cancel
-    those of its run.
+    """Jobs for the first page, which can start and cancel all, and for the page of a report, a watched run or
+    a trial, which can start and cancel its own.
     """
 
     def __init__(self, request_checker: RequestChecker, jobs: ServeJobs, tokens: PageTokens) -> None:
@@ -92,7 +92,7 @@ class JobApi:
         return JSONResponse({"id": job.id})
 
     def _check_token(self, request: Request, command: JobCommand) -> None:
-        pages = [run_page_name(command.requesting_run)] if command.requesting_run else []
+        pages = [command.requesting_page] if command.requesting_page else []
         self._tokens.check_page(_token_of(request), HOME_PAGE, *pages)
 
 

@@ -2,7 +2,7 @@
 
 The cookie says who asks, and every page sends it. Only a page that the server built also carries a token,
 and its script sends the token along. So a decision comes from the review's own page, and a job from the page
-of its run or from the first page.
+of its run, from that of a trial, or from the first page.
 """
 
 import hashlib
@@ -15,6 +15,7 @@ from mutator.errors import RequestFromWrongPage
 
 TOKEN_HEADER = "x-mutator-page"
 HOME_PAGE = "home"
+TRIAL_PAGE = "trial"  # every trial: the page of one starts the next
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,11 @@ class PageTokens:
 def run_page_name(folder: Path) -> str:
     """Return the name of a run's report for `PageTokens`."""
     return f"run {folder}"
+
+
+def live_page_name(folder: Path) -> str:
+    """Return the name of the page that watches a run."""
+    return f"live {folder}"
 
 
 def review_page_name(target: str) -> str:

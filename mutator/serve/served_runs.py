@@ -8,11 +8,15 @@ from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import quote
 
-from mutator._common.confined_files import open_below
+from mutator._common.confined_files import open_below, path_below
+from mutator._common.folder_locks import is_owner_alive
 from mutator._common.folder_search import RUN_HEAD_FILE
 from mutator.errors import MutatorError, NotServed, UnsafePath
+from mutator.execution.progress_text import stage_title
 from mutator.results.outcome_counting import count_by_outcome_or_status
 from mutator.results.table_reader import Results
+from mutator.serve.run_states import FINISHED, RUNNING, RunState, count_records, state_of_run
+from mutator.store.file_digests import DIGESTS_FILE
 from mutator.store.run_folder import RunFolder
 
 REPORT_PAGE = "report/index.html"
@@ -48,6 +52,14 @@ class ServedRuns:
     def key_of(self, folder: Path) -> str | None:
         return next((key for key, path in self.folders_by_key().items() if path == folder.resolve()), None)
 
+    def unplanned_folder(self, key: str) -> Path | None:
+        """Return a folder of this name in which a command is planning a run; None if there is none."""
+        try:
+            folders = [path_below(root.resolve(), key) for root in self.roots]
+        except UnsafePath:
+            return None
+        return next((folder for folder in folders if is_owner_alive(folder)), None)
+
     @property
     def folder_for_new_runs(self) -> Path:
         return next((root for root in self.roots if not RunFolder.exists(root)), self.roots[0].parent)
@@ -76,26 +88,50 @@ def _unused_key(name: str, used_keys: Iterable[str]) -> str:
     return key
 
 
+def live_address(key: str) -> str:
+    """Return the address of the page that watches a run."""
+    return f"/live/{quote(key, safe='')}"
+
+
 def summarize_run(key: str, path: Path) -> dict[str, Any]:
     facts: dict[str, Any] = {"key": key, "campaign": "", "target": "", "planned": 0, "done": 0}
-    facts |= {"report": report_address(key)}
-    facts |= {"state": "damaged", "outcomes": {}, "problem": ""}
+    facts |= {"report": report_address(key), "live": live_address(key), "changed": _last_change(path)}
+    facts |= {"state": "damaged", "stage": "", "outcomes": {}, "problem": ""}
     try:
         folder = RunFolder.open_unverified(path)
+        run_state = state_of_run(folder)
         facts |= {"campaign": folder.head.campaign, "target": folder.head.target}
-        facts |= {
-            "planned": folder.planned_experiment_count,
-            "state": "finished" if folder.is_finished else "unfinished",
-        }
-        with suppress(FileNotFoundError):
-            table = Results(path).path.stat()
-            outcomes = _count_outcomes(path, table.st_mtime_ns, table.st_size)
-            facts |= {"outcomes": outcomes, "done": sum(outcomes.values())}
+        facts |= {"planned": folder.planned_experiment_count, "state": run_state.state}
+        outcomes = _outcomes_so_far(folder, run_state)
+        facts |= {"outcomes": outcomes, "done": sum(outcomes.values()), "problem": run_state.problem}
+        if run_state.state == RUNNING:
+            facts["stage"] = stage_title(run_state.progress) if run_state.progress else "starting"
     except MutatorError as err:
         facts["problem"] = err.got
     except (LookupError, TypeError, ValueError):
         facts["problem"] = "run.json is damaged"
     return facts
+
+
+def _outcomes_so_far(folder: RunFolder, run_state: RunState) -> dict[str, int]:
+    """Count the experiments of a run by outcome or status."""
+    progress = run_state.progress
+    if run_state.state == RUNNING and progress and progress.stage == "experiments":
+        return dict(progress.outcomes)
+    if run_state.state == FINISHED:
+        with suppress(FileNotFoundError):
+            table = Results(folder.path).path.stat()
+            return _count_outcomes(folder.path, table.st_mtime_ns, table.st_size)
+    return count_records(folder.path)
+
+
+def _last_change(run: Path) -> float:
+    """Return when a command last began or ended work on a run, in s since 1970; 0 if unknown."""
+    times = []
+    for name in (RUN_HEAD_FILE, DIGESTS_FILE):
+        with suppress(OSError):
+            times.append((run / name).stat().st_mtime)
+    return max(times, default=0.0)
 
 
 @lru_cache(maxsize=1000)

@@ -17,6 +17,7 @@ ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any
         "plan/*.jsonl",
         "reviewed.json",
         "checks.json",
+        "progress.json",
     ),
     *SIGNATURE_FILES,
     *("golden/*/*", "patches/*.blocks"),

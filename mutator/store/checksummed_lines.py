@@ -176,7 +176,7 @@ def read_segment(path: Path, data: bytes | None = None) -> Segment:
     damaged: list[int] = []
     last_checksum = b""
     for number, line in enumerate(data[:end].split(b"\n")[:-1], start=1):
-        if _is_intact(last_checksum, line):
+        if is_intact_line(last_checksum, line):
             lines[number] = line
         else:
             damaged.append(number)
@@ -195,7 +195,7 @@ def verified_lines(path: Path, schema: str) -> Iterator[tuple[int, int, bytes]]:
             if not line.endswith(b"\n"):  # incomplete, because the process was killed
                 return
             data = line[:-1]
-            if not _is_intact(last_checksum, data):
+            if not is_intact_line(last_checksum, data):
                 raise unread_segment(path).damage_error(number)
             if number == 1:
                 unread_segment(path, {1: data}).check_head(schema)
@@ -211,7 +211,7 @@ def intact_lines(path: Path) -> Iterator[tuple[int, bytes]]:
     with _open_lines(path) as file:
         for number, line in enumerate(read_bounded_lines(file, path), start=1):
             data = line[:-1]
-            if line.endswith(b"\n") and _is_intact(last_checksum, data):
+            if line.endswith(b"\n") and is_intact_line(last_checksum, data):
                 yield number, data
             last_checksum = line[_CHECKSUM_SLICE]
 
@@ -220,7 +220,13 @@ def unread_segment(path: Path, lines: Mapping[int, bytes] | None = None) -> Segm
     return Segment(path=path, lines=lines or {}, damaged_line_numbers=(), complete_lines_end=0)
 
 
-def _is_intact(last_checksum: bytes, line: bytes) -> bool:
+def checksum_of_line(line: bytes) -> bytes:
+    """Return the checksum that a line states, which the next line's checksum covers."""
+    return line[_CHECKSUM_SLICE]
+
+
+def is_intact_line(last_checksum: bytes, line: bytes) -> bool:
+    """Whether a line without its newline matches its checksum, after a line with `last_checksum`."""
     checksum = sha256(last_checksum + line[_BODY_START:]).hexdigest()[:_CHECKSUM_DIGITS].encode()
     return line[:_BODY_START] == b"".join((_CHECKSUM_KEY, checksum, _AFTER_CHECKSUM))
 

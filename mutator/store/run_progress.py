@@ -6,8 +6,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, open_regular, read_open_file
 from mutator.model import Status
+from mutator.store.line_tail import LineTail
 
 
 @dataclass(kw_only=True)
@@ -69,9 +69,8 @@ class StagePace:
 class RecordTail:
     """Follow the records of a run as workers append them, reading each byte once."""
 
-    def __init__(self, stage: str, folder: Path, total: int) -> None:
-        self._folder = folder
-        self._offset_by_file: dict[Path, int] = {}
+    def __init__(self, stage: str, run: Path, kind: str, total: int) -> None:
+        self._lines = LineTail(run, kind)
         self._label_by_experiment: dict[str, str] = {}
         self._read_new_lines()
         self._pace = StagePace(stage, total, len(self._label_by_experiment))
@@ -83,15 +82,8 @@ class RecordTail:
         )
 
     def _read_new_lines(self) -> None:
-        for path in self._folder.glob("*.jsonl"):
-            offset = self._offset_by_file.get(path, 0)
-            with open_regular(path) as file:
-                file.seek(offset)
-                data = read_open_file(file, path, MOST_EXPERIMENT_DATA_BYTES)
-            end = data.rfind(b"\n") + 1  # a line that is still being written is read at the next poll
-            self._offset_by_file[path] = offset + end
-            for line in data[:end].splitlines():
-                self._count_record(line)
+        for line in self._lines.read_new_lines():
+            self._count_record(line)
 
     def _count_record(self, line: bytes) -> None:
         try:

@@ -11,7 +11,7 @@ from typing import Any
 from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
-from mutator.store.checksummed_blocks import BlockWriter, read_blocks
+from mutator.store.checksummed_blocks import BlockWriter, intact_blocks, read_blocks
 from mutator.store.series_script import script_name_of, size_in_script, write_script
 from mutator.store.time_series_folder import (
     INDEX_NAME,
@@ -187,6 +187,21 @@ def _worker_series(path: Path) -> _SeriesToPack:
             name, _, golden = block.key.partition(" ")
             to_pack.experiments[name] = (golden, entry)
     return to_pack
+
+
+def unpacked_series(run: Path, experiment_id: str) -> tuple[bytes, bytes] | None:
+    """Return the encoded golden and faulty series of an experiment from the files of workers, which can still
+    be growing; None if they are not there.
+    """
+    for path in list_unpacked_worker_files(run):
+        goldens: dict[str, bytes] = {}
+        for block in intact_blocks(path):
+            name, _, golden_key = block.key.partition(" ")
+            if block.kind == GOLDEN_BLOCK:
+                goldens[block.key] = block.data
+            elif name == experiment_id and golden_key in goldens:
+                return goldens[golden_key], block.data
+    return None
 
 
 def _build_entry(data: bytes, read: ReadBytes) -> _EntryToPack:

@@ -191,13 +191,13 @@ const SeriesFile = (() => {
 
   const decodedText = (text, golden) => decoded(Uint8Array.from(atob(text), (character) => character.charCodeAt(0)), golden);
 
-  async function readEmbedded(id, expected) {
-    const { runs, of } = embedded();
+  /** A series in texts, { runs, of }. `decodedGoldens` keeps golden runs for the other experiments. */
+  async function readTexts({ runs, of }, id, expected, decodedGoldens) {
     if (!Object.hasOwn(of, id)) return null;
     const [reference, entry] = of[id];
     const key = `embedded ${reference}`;
-    if (!goldens.has(key)) goldens.set(key, decodedText(runs[reference], null));
-    const golden = await goldens.get(key);
+    if (!decodedGoldens.has(key)) decodedGoldens.set(key, decodedText(runs[reference], null));
+    const golden = await decodedGoldens.get(key);
     return buildSeries(id, expected, golden, await decodedText(runs[entry], golden));
   }
 
@@ -212,7 +212,7 @@ const SeriesFile = (() => {
   async function findSeries(id, expected, isNew) {
     const there = JSON.parse(document.getElementById("facts").textContent).series; // so that no missing files are requested
     const isInside = !isNew && embedded() && Object.hasOwn(embedded().of, id);
-    if (isInside || !there || there.alone) return readEmbedded(id, expected); // a page of a comparison has no files either
+    if (isInside || !there || there.alone) return readTexts(embedded(), id, expected, goldens); // a page of a comparison has no files either
     if (isNew || there.kept.includes(id)) { // from a rerun, perhaps because the packed series is damaged
       const series = await readKept(id, expected);
       if (series) return series;
@@ -228,10 +228,11 @@ const SeriesFile = (() => {
   }
 
   /** The series of an experiment; null if there is none. Rejects with a message if it is damaged or does not match
-   *  what the record says: `expected`, {trace, largest}. `isNew`: the series can be newer than this page. */
-  async function load(id, expected, { isNew = false } = {}) {
+   *  what the record says: `expected`, {trace, largest}. `isNew`: the series can be newer than this page. `texts`: it is in
+   *  these texts, as in a page alone. */
+  async function load(id, expected, { isNew = false, texts = null } = {}) {
     try {
-      return await findSeries(id, expected, isNew);
+      return await (texts ? readTexts(texts, id, expected, new Map()) : findSeries(id, expected, isNew));
     } catch (error) {
       throw new Error(`The series of ${id} cannot be read: ${error.message}`, { cause: error });
     }

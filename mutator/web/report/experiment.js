@@ -64,7 +64,8 @@ class Experiment {
     return this.text("status") === "ok";
   }
 
-  #buttons() {
+  /** The buttons beside the title. A page that shows one experiment alone has others. */
+  buttons() {
     const { el } = Dom;
     const button = (text, name, todo) => el("button", { type: "button", "aria-label": name, title: name, onclick: todo }, text);
     return el("div.buttons", {}, el("span.place.quiet"),
@@ -80,7 +81,7 @@ class Experiment {
   #none(id) {
     const { el } = Dom;
     document.title = this.title;
-    this.place.replaceChildren(el("header", {}, el("h2", { tabindex: -1, id: "experiment-title" }, "No such experiment"), this.#buttons()),
+    this.place.replaceChildren(el("header", {}, el("h2", { tabindex: -1, id: "experiment-title" }, "No such experiment"), this.buttons()),
       el("p", {}, "No experiment in this report has an id that begins with ", el("code", {}, id), "."));
   }
 
@@ -94,7 +95,7 @@ class Experiment {
       el("header", {},
         el("div", {}, el("h2", { tabindex: -1, id: "experiment-title" }, this.text("sentence") || this.text("fault")),
           el("p.under", {}, el("span.fault", {}, this.text("fault")), ": ", Grid.ending(this.text("ending")), Happened.ALERTED[this.text("warning")] ?? "", " in ", code("scenario"), ", trigger ", code("trigger"))),
-        this.#buttons()),
+        this.buttons()),
       el("p.id", {}, "experiment ", el("code", {}, id), " ", Dom.copyButton(() => id, "Copy id"), " ", Dom.copyButton(() => this.#link(), "Copy link")),
       this.text("detail") ? el("p.detail", {}, this.text("detail")) : "",
       el("section.happened", {}, el("h3", {}, "What happened"), new Happened(this.table, this.row, this.facts).parts),
@@ -104,7 +105,7 @@ class Experiment {
       section("Diff", "change"),
       section("Injected lines", "snippet"),
       section("Fault spec with this experiment's value", "spec"),
-      el("section.again", {}, el("h3", {}, "Run it again"), this.#commands()),
+      el("section.again", {}, el("h3", {}, "Run it again"), this.commands()),
       el("details", {}, el("summary", {}, "All results"), this.#results()));
     Experiment.open = { id, experiment: this };
     this.place.dispatchEvent(new CustomEvent("filled", { detail: Experiment.open }));
@@ -119,18 +120,19 @@ class Experiment {
     return el("div.command", {}, el("code", { tabindex: 0 }, text), Dom.copyButton(() => text));
   }
 
-  #commands() {
+  /** How to run the experiment again. */
+  commands() {
     const { el } = Dom;
     const id = this.text("experiment_id"), run = this.facts.run();
     const tried = this.text("module") === "operators" ? [] // an operator's fault has no spec
-      : [el("p", {}, "Try a variation: change the value, trigger or scenario in this command:"), this.command(this.#try())];
+      : [el("p", {}, "Try a variation: change the value, trigger or scenario in this command:"), this.command(this.tryCommand())];
     return el("div", {}, el("p", {}, "These commands rerun the experiment and compare it with its record, and show its diff, times and plot:"),
       this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`), tried);
   }
 
   /** The `mutator try` command for this fault. A random trigger becomes a time. The reading is always named, because
    *  the default depends on the library. */
-  #try() {
+  tryCommand() {
     const value = this.text("value"), isNumber = value !== "" && !Number.isNaN(Number(value));
     const quoted = (text) => (/^[\w./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
     const when = /^\w+$/.test(this.text("trigger")) ? this.text("trigger") : this.text("condition").replace(/^t >= ([\d.]+)$/, "$1");
@@ -152,12 +154,24 @@ class Experiment {
     return this.place.querySelector(`section.${name} .content`);
   }
 
+  details() {
+    return Details.read();
+  }
+
+  media() {
+    return Packed.read("media");
+  }
+
+  series(id, expected) {
+    return SeriesFile.load(id, expected);
+  }
+
   /** Fill the parts that are unpacked on first use: diff, spec, stills and series. */
   async #fillLate(row) {
     const id = this.text("experiment_id");
     this.#path();
-    const details = await Details.read(), expected = { trace: details.trace(row), largest: Experiment.largestDeviations(this.table, row, this.facts) };
-    const [media, series] = await Promise.all([Packed.read("media"), SeriesFile.load(id, expected).catch((error) => error)]);
+    const details = await this.details(), expected = { trace: details.trace(row), largest: Experiment.largestDeviations(this.table, row, this.facts) };
+    const [media, series] = await Promise.all([this.media(), this.series(id, expected).catch((error) => error)]);
     if (this.row !== row) return; // another experiment was opened in the meantime
     this.#change(details.patch(row));
     const spec = details.spec(row);

@@ -1,7 +1,7 @@
 // @ts-check
 "use strict";
 // The server's jobs on every served page: progress, cancel, log and result. The server keeps the list, so it
-// survives a reload. The first page can start and cancel any job, a report only those of its run.
+// survives a reload. The first page can start and cancel any job, the others only their own.
 
 const Jobs = (() => {
   const { el } = Dom;
@@ -9,7 +9,7 @@ const Jobs = (() => {
   const ACTIVE = ["queued", "running"];
   const token = document.querySelector('meta[name="mutator-page"]').content; // says which page sends a request
   const [, kind, run] = location.pathname.split("/");
-  const mayCancel = (job) => kind !== "runs" || job.run === decodeURIComponent(run);
+  const mayCancel = (job) => !kind || (kind === "trial" ? job.kind === "try" : job.run === decodeURIComponent(run ?? ""));
   const isActive = (job) => ACTIVE.includes(job.state);
   const rows = new Map(); // job id -> row
   const watchers = [];
@@ -87,7 +87,7 @@ const Jobs = (() => {
 
   /** The row of a job. It stays the same element, so that its buttons keep the focus. */
   function rowOf(id) {
-    const state = el("span.job-state"), title = el("b"), progress = el("progress", { max: 1 }), message = el("span.quiet"), result = el("a", {}, "Show it");
+    const state = el("span.job-state"), title = el("b"), progress = el("progress", { max: 1 }), message = el("span.quiet"), result = el("a");
     const button = (text, onclick) => el("button", { type: "button", onclick }, text);
     const cancel = button("Cancel", () => ask(`/api/jobs/${id}/cancel`, {}).then(poll, (error) => (message.textContent = error.message)));
     const log = button("Log", () => showLog(id, title.textContent));
@@ -104,8 +104,11 @@ const Jobs = (() => {
       else progress.value = job.progress;
       message.textContent = job.message;
       cancel.hidden = !isActive(job) || !mayCancel(job);
-      result.hidden = !job.result;
-      if (job.result) result.href = job.result;
+      const address = job.result || (job.kind === "campaign" && isActive(job) && `/live/${encodeURIComponent(job.run)}`);
+      result.hidden = !address || (!job.result && address === location.pathname);
+      result.textContent = job.result ? "Show it" : "Watch it";
+      result.setAttribute("aria-label", `${result.textContent}: ${job.title}`);
+      if (address) result.href = address;
     }
     return { element: el("li", {}, state, title, progress, message, el("span.job-do", {}, result, cancel, log)), update };
   }

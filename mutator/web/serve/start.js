@@ -9,10 +9,22 @@
 
   const option = (value, text = value) => el("option", { value }, text);
   const select = (name, options, more = {}) => el("select", { name, ...more }, options);
-  const labelled = (text, field, hint = "") => el("label", {}, el("span", {}, text), field, hint ? el("small.quiet", {}, hint) : null);
+  const labelled = (text, field, hint = "") => el(`label${field.tagName === "SELECT" ? ".wide" : ""}`, {}, el("span", {}, text), field, hint ? el("small.quiet", {}, hint) : null);
 
-  /** A form that starts a job; `order(fields)` returns the request. */
-  function form(title, about, fields, verb, order) {
+  const shortened = (text) => (text.length > 90 ? `${text.slice(0, 89).trimEnd()}…` : text);
+
+  /** What an option is: its name, and in words what it stands for. */
+  const described = ({ name, about }) => option(name, about ? `${name}: ${shortened(about)}` : name);
+
+  /** Options in groups, by what `groupOf` returns. */
+  function grouped(items, groupOf, optionOf) {
+    const groups = new Map();
+    for (const item of items) groups.set(groupOf(item), [...(groups.get(groupOf(item)) ?? []), item]);
+    return [...groups].map(([label, members]) => el("optgroup", { label }, members.map(optionOf)));
+  }
+
+  /** A form that starts a job; `order(fields)` returns the request, and `then(id, request, tell)` is called when it is started. */
+  function form(title, about, fields, verb, order, then) {
     const status = el("p", { role: "status" }), button = el("button.main", {}, verb);
     const element = el("form.order", { "aria-label": title, onsubmit: sent }, el("h3", {}, title), el("p.quiet", {}, about), el("div.fields", {}, fields), el("p", {}, button), status);
     async function sent(event) {
@@ -21,8 +33,10 @@
       status.className = "";
       status.textContent = "…";
       try {
-        await Jobs.start(order(Object.fromEntries(new FormData(element))));
+        const request = order(Object.fromEntries(new FormData(element)));
+        const id = await Jobs.start(request);
         status.textContent = "Added to the jobs.";
+        then(id, request, (text) => (status.textContent = text));
       } catch (error) {
         status.className = "bad";
         status.textContent = `Not started: ${error.message}.`;
@@ -36,33 +50,60 @@
   const numberOrNull = (text) => (text?.trim() ? Number(text) : null);
 
   function tryForm({ specs, scenarios, contexts, readings, targets }) {
-    const variants = select("variant", []);
-    const fill = () => {
-      const chosenSpec = specs.find((spec) => spec.name === name.value);
-      variants.replaceChildren(option("", "all"), ...(chosenSpec ? chosenSpec.variants.map((variant) => option(variant)) : []));
-    };
-    const name = el("input", { name: "spec", list: "specs", required: true, autocomplete: "off", spellcheck: "false", placeholder: specs[0]?.name || "", oninput: fill });
+    const variants = select("variant", [], { onchange: limit }), value = el("input", { name: "value", type: "number", step: "any" }), limits = el("small.quiet");
+    const name = select("spec", grouped(specs, ({ module }) => module, described), { required: true, onchange: fill });
     const time = el("input", { name: "time", type: "number", min: 0, step: "0.01", value: 10, "aria-label": "Time in seconds", hidden: true });
-    const trigger = select("trigger", [option("always"), option("time", "from a time (s)"), ...contexts.map((c) => option(c.name, `${c.name}: ${c.condition}`))],
-      { onchange: () => (time.hidden = trigger.value !== "time") });
+    const trigger = select("trigger", [option("always"), option("time", "from a time (s)"),
+      ...grouped(contexts, ({ table }) => `contexts: ${table}`, (c) => option(c.name, `${c.name}: ${c.condition}`))],
+    { onchange: () => (time.hidden = trigger.value !== "time") });
+
+    function fill() {
+      variants.replaceChildren(...specs.find((spec) => spec.name === name.value).variants.map(described));
+      limit();
+    }
+
+    /** Let the field of the value accept what the spec declares. */
+    function limit() {
+      const { range } = specs.find((spec) => spec.name === name.value).variants.find((variant) => variant.name === variants.value);
+      value.disabled = !range;
+      value.min = range ? range.low : "";
+      value.max = range ? range.high : "";
+      limits.textContent = range ? `${range.low} to ${range.high} ${range.unit}; empty: random` : "the fault has none";
+    }
+
     fill();
-    return form("Try a fault", "Inject one fault and run it once: diff, verdict and plot.", [
-      labelled("Fault", el("span", {}, name, el("datalist", { id: "specs" }, specs.map((spec) => option(spec.name))))),
-      labelled("Variant", variants), labelled("Scenario", select("scenario", scenarios.map((s) => option(s)))),
-      labelled("Trigger", el("span.two", {}, trigger, time)),
-      labelled("Value", el("input", { name: "value", inputmode: "decimal", pattern: "\\s*[\\-+]?[0-9.]+([eE][\\-+]?[0-9]+)?\\s*", title: "a number" }), "in the fault's unit; empty: random"),
+    return form("Try a fault", "Inject one fault and run it once: what happened, replay, diff and metrics, and a slider for its value.", [
+      labelled("Fault", name), labelled("Variant", variants), labelled("Scenario", select("scenario", scenarios.map(described))),
+      el("label.wide", {}, el("span", {}, "Trigger"), el("span.two", {}, trigger, time)), el("label", {}, el("span", {}, "Value"), value, limits),
       labelled("Seed", el("input", { name: "seed", type: "number", min: 0, step: 1 }), "empty: 0"),
-      readings.length > 1 ? labelled("Reading", select("reading", readings.map((r) => option(r)))) : null,
+      readings.length > 1 ? labelled("Reading", select("reading", readings.map(described))) : null,
       targets.length > 1 ? labelled("Target", select("target", targets.map((t) => option(t)))) : null,
     ], "Try it", (values) => ({
-      kind: "try", spec: values.spec.trim(), scenario: values.scenario, trigger: values.trigger === "time" ? values.time : values.trigger,
+      kind: "try", spec: values.spec, scenario: values.scenario, trigger: values.trigger === "time" ? values.time : values.trigger,
       variant: orNull(values.variant), value: numberOrNull(values.value), seed: numberOrNull(values.seed), reading: orNull(values.reading), target: orNull(values.target),
-    }));
+    }), openTrial);
+  }
+
+  let newestTrial = null;
+
+  /** Open a trial when it has been driven, unless the user tries another one meanwhile. */
+  function openTrial(id, _, tell) {
+    const isFirst = newestTrial === null;
+    newestTrial = id;
+    tell("Driving; the trial opens when it is done.");
+    if (!isFirst) return;
+    Jobs.watch((jobs) => {
+      const job = jobs.find((listed) => listed.id === newestTrial);
+      if (!job || !["done", "failed", "cancelled"].includes(job.state)) return;
+      newestTrial = ""; // opened once
+      if (job.result) location.assign(job.result);
+      else tell(`Not driven: ${job.message}.`);
+    });
   }
 
   function campaignForm({ campaigns }) {
     const name = el("input", { name: "name", required: true, pattern: "[A-Za-z0-9][A-Za-z0-9._\\-]*", title: "letters, digits, dots, hyphens", autocomplete: "off" });
-    const campaign = select("campaign", campaigns.map((c) => option(c)), { onchange: suggest });
+    const campaign = select("campaign", campaigns.map(described), { onchange: suggest });
     function suggest() {
       const now = new Date(), two = (n) => String(n).padStart(2, "0");
       name.value = `${campaign.value}-${two(now.getMonth() + 1)}${two(now.getDate())}-${two(now.getHours())}${two(now.getMinutes())}`;
@@ -76,7 +117,7 @@
       labelled("Seed", el("input", { name: "seed", type: "number", min: 0, step: 1 }), "empty: the campaign's"),
     ], "Run it", (values) => ({
       kind: "campaign", campaign: values.campaign, name: values.name.trim(), limit: Number(values.limit), only: orNull(values.only), seed: numberOrNull(values.seed),
-    }));
+    }), (_, { name: run }) => location.assign(`/live/${encodeURIComponent(run)}`));
   }
 
   Jobs.ask("/api/library").then((library) => {

@@ -10,6 +10,7 @@ import pytest
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
 from mutator.execution.worker import Worker, WorkerAssignment
+from mutator.store.session_progress import PROGRESS_FILE, read_session_progress
 from mutator.workspace import Workspace
 
 WORKER = """
@@ -76,8 +77,12 @@ def test_a_run_resumed_by_another_distributor_has_the_same_results(toycar: Works
     assert run_campaign(toycar, "small", tmp_path / "local").exit_code == 0
     summary = run_campaign(toycar, "small", tmp_path / "idle", distributor=Idle())
     assert (summary.exit_code, summary.done, summary.problem) == (3, 0, "no machine answered")
+    left = read_session_progress(tmp_path / "idle")
+    assert left is not None
+    assert (left.stage, left.problem) == ("tables", "no machine answered")
     summary = run_campaign(toycar, "small", tmp_path / "idle", distributor=InOrder())
     assert summary.exit_code == 0
+    assert not (tmp_path / "idle" / PROGRESS_FILE).exists()
     local, other = (tmp_path / name / "results.csv" for name in ("local", "idle"))
     assert other.read_bytes() == local.read_bytes()
 

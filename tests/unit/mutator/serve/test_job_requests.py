@@ -49,6 +49,9 @@ ABSENT = "0" * 16
         TRY | {"variant": "none such"},
         TRY | {"variant": "-v"},
         TRY | {"value": "1"},
+        TRY | {"value": 2.51},
+        TRY | {"value": -1e300},
+        TRY | {"spec": "sensor/silence", "value": 1},
         TRY | {"seed": -1},
         TRY | {"seed": 2**70},
         TRY | {"seed": True},
@@ -127,12 +130,11 @@ def test_requests_become_command_lines(desk: RequestChecker) -> None:
     assert still.argv == ("show", experiment, "--still=3.00", *of_run)
     assert still.result_address == f"/runs/first/report/index.html#e={experiment}"
     assert work(desk, kind="report", run="first").argv == ("report", str(run), *place)
-    given = {"value": -2.5, "seed": 3, "variant": "shifted", "trigger": "v_ego > 3"}
-    options = ("--scenario=A", "--trigger=v_ego > 3", "--variant=shifted", "--value=-2.5", "--seed=3")
+    given = {"value": 2.25, "seed": 3, "variant": "shifted", "trigger": "v_ego > 3"}
+    options = ("--scenario=A", "--trigger=v_ego > 3", "--variant=shifted", "--value=2.25", "--seed=3")
     assert work(desk, **TRY, **given).argv == (
         "try",
         "sensor/lane",
-        "--plot",
         *options,
         f"--out={run.parent}/try",
         *place,
@@ -140,6 +142,11 @@ def test_requests_become_command_lines(desk: RequestChecker) -> None:
     words = work(desk, **CAMPAIGN, only="scenario == 'A'", workers=1).argv
     options = (f"--out={run.parent}/new", "--limit=20", "--only=scenario == 'A'", "--workers=1")
     assert words == ("run", "small", *options, *place)
+
+
+def test_a_value_outside_of_the_declared_range_is_refused_in_words(desk: RequestChecker) -> None:
+    with pytest.raises(MutatorError, match=r"the value 9; expected 0 to 2\.5 m"):
+        work(desk, **TRY, value=9)
 
 
 @pytest.mark.parametrize("trigger", ["always", "10", "1.5", "near", "near_far/near", "t >= 2 and v_ego > 3"])

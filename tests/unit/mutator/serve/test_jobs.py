@@ -80,7 +80,10 @@ def test_a_try_is_stored_next_to_the_runs(busy: Client) -> None:
     job = busy.ended(busy.post("/api/jobs", order).json["id"])
     assert job["state"] == "done", busy.get(f"/api/jobs/{job['id']}/log").json
     assert job["message"].startswith("verdict: ")
-    assert busy.get(job["result"]).headers["content-type"] == "image/svg+xml"
+    trial = job["result"].removeprefix("/trial/")
+    data = busy.get(f"/api/trials/{trial}").json
+    assert (data["id"], data["request"]["value"], data["range"]["high"]) == (trial, 2.4, 2.5)
+    assert data["series"]["of"] == {trial: [0, 1]}
     assert [run["key"] for run in busy.get("/api/runs").json["runs"]] == ["first"]
 
 

@@ -9,12 +9,23 @@ from pathlib import Path
 
 import pytest
 
-from mutator.serve.page_tokens import HOME_PAGE, TOKEN_HEADER, PageTokens, review_page_name, run_page_name
+from mutator.serve.page_tokens import (
+    HOME_PAGE,
+    TOKEN_HEADER,
+    TRIAL_PAGE,
+    PageTokens,
+    live_page_name,
+    review_page_name,
+    run_page_name,
+)
 from mutator.serve.security import MOST_BODY_BYTES
 
 from .conftest import TOKEN, Answer, Client
 
-ASKED = ("/", "/api/jobs", "/runs/night/report/index.html", "/assets/shared/base.css", "/nowhere")
+ASKED = (
+    *("/", "/api/jobs", "/runs/night/report/index.html", "/assets/shared/base.css", "/nowhere"),
+    *("/live/night", "/api/runs/night/live", "/trial/0123456789abcdef", "/api/trials/0123456789abcdef"),
+)
 
 
 @pytest.mark.parametrize(
@@ -126,7 +137,9 @@ def headers_of(client: Client, path: str) -> Mapping[str, str]:
 
 
 @pytest.mark.parametrize("use", ["iframe", "frame", "object", "embed", "empty"])
-@pytest.mark.parametrize("path", ["/", "/runs/night/report/index.html", "/review/toycar"])
+@pytest.mark.parametrize(
+    "path", ["/", "/runs/night/report/index.html", "/review/toycar", "/live/night", "/trial/0123456789abcdef"]
+)
 def test_a_page_is_neither_framed_nor_read_by_scripts(client: Client, path: str, use: str) -> None:
     """Its token would be readable, or its buttons could be disguised."""
     assert client.get(path, Sec_Fetch_Dest="document", Sec_Fetch_Site="none").status == 200
@@ -146,7 +159,14 @@ def test_only_a_script_can_post(client: Client, header: tuple[str, str]) -> None
     assert client.ask("POST", "/api/jobs", usual | {f"Sec-Fetch-{header[0]}": header[1]}, b"{}").status == 403
 
 
-PAGES = (HOME_PAGE, run_page_name(Path("/elsewhere")), review_page_name("toycar"), review_page_name("other"))
+PAGES = (
+    HOME_PAGE,
+    TRIAL_PAGE,
+    live_page_name(Path("/elsewhere")),
+    run_page_name(Path("/elsewhere")),
+    review_page_name("toycar"),
+    review_page_name("other"),
+)
 
 
 def strangers(client: Client, *allowed: str) -> list[str]:
@@ -184,7 +204,8 @@ def test_a_run_page_starts_and_cancels_only_jobs_of_its_run(
         {"kind": "campaign", "campaign": "small", "name": "night"},
     ]
     for order in orders:
-        for token in [*strangers(client, HOME_PAGE, night), *([own] if "run" not in order else [])]:
+        allowed = (HOME_PAGE, TRIAL_PAGE) if order["kind"] == "try" else (HOME_PAGE, night)
+        for token in [*strangers(client, *allowed), *([own] if "run" not in order else [])]:
             assert client.ask("POST", "/api/jobs", {TOKEN_HEADER: token}, order).status in (400, 403)
     assert not client.get("/api/jobs").json["jobs"]
     monkeypatch.setattr(client.site.jobs, "_start_process", lambda job, events: None)
@@ -197,6 +218,30 @@ def test_a_run_page_starts_and_cancels_only_jobs_of_its_run(
     assert states == dict.fromkeys([*ids, campaign], "queued")
     for job, token in ((ids[0], own), (ids[1], own), (campaign, client.token_for("/api/jobs"))):
         assert client.ask("POST", f"/api/jobs/{job}/cancel", {TOKEN_HEADER: token}, {}).status == 200
+
+
+def test_the_pages_of_a_trial_and_of_a_watched_run_start_and_cancel_only_their_own_jobs(
+    client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(client.site.jobs, "_start_process", lambda job, events: None)
+    orders = {
+        TRIAL_PAGE: {"kind": "try", "spec": "sensor/distance", "scenario": "A"},
+        live_page_name(client.place / "runs" / "watched"): {
+            "kind": "campaign",
+            "campaign": "small",
+            "name": "watched",
+        },
+    }
+    for page, order in orders.items():
+        headers = {TOKEN_HEADER: client.site.tokens.token_of(page)}
+        for other, its_order in orders.items():
+            if other != page:
+                assert client.ask("POST", "/api/jobs", headers, its_order).status == 403
+        assert client.ask("POST", "/api/jobs", headers, {"kind": "report", "run": "night"}).status == 403
+        job = client.ask("POST", "/api/jobs", headers, order).json["id"]
+        for token in strangers(client, HOME_PAGE, page):
+            assert client.ask("POST", f"/api/jobs/{job}/cancel", {TOKEN_HEADER: token}, {}).status == 403
+        assert client.ask("POST", f"/api/jobs/{job}/cancel", headers, {}).status == 200
 
 
 def blocks(page: str, tag: str) -> list[str]:
