@@ -11,7 +11,7 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.config.units import UNITS
 from mutator.errors import MutatorError, NotServed
 from mutator.faults.fault_specs import DrawSpec, FaultSpec
-from mutator.model import Experiment, Status
+from mutator.model import Experiment, Status, Trigger
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.outcomes.trace_loading import load_trace, trace_digest
 from mutator.report.lone_experiment_data import ViewedTarget, experiment_view_data
@@ -19,6 +19,7 @@ from mutator.results.table_columns import FinishedExperiment
 from mutator.store.series_format import encode_series
 from mutator.store.trial_file import StoredTrial
 from mutator.targets.manifest import TargetManifest
+from mutator.triggers.trigger_kinds import CONDITION_NAME, trigger_time_s
 from mutator.workspace import Workspace
 
 TRIALS_FOLDER = "try"  # folder of the results of `try`, next to the runs
@@ -103,13 +104,12 @@ def _request_of(trial: StoredTrial) -> dict[str, Any]:
     """Return the request for a job that repeats a trial, as `job_requests.TrialRequest` reads it."""
     experiment, fault = trial.experiment, trial.experiment.fault
     spec, _, variant = fault.spec.rpartition("/")
-    trigger = experiment.trigger
     return {
         "kind": "try",
         "spec": spec,
         "variant": variant,
         "scenario": experiment.scenario,
-        "trigger": trigger.name if trigger.name.isidentifier() else _trigger_text(trigger.condition),
+        "trigger": _trigger_text(experiment.trigger),
         "value": fault.value if isinstance(fault.value, int | float) else None,
         "seed": experiment.seed,
         "reading": fault.reading,
@@ -117,10 +117,12 @@ def _request_of(trial: StoredTrial) -> dict[str, Any]:
     }
 
 
-def _trigger_text(condition: str) -> str:
-    """Return the trigger that gives a condition; for a time alone, the time."""
-    time = re.fullmatch(r"t >= ([\d.]+)", condition)
-    return time[1] if time else condition
+def _trigger_text(trigger: Trigger) -> str:
+    """Return the text that `try` reads as this trigger: a time, a condition, or a name."""
+    time_s = trigger_time_s(trigger)
+    if time_s is not None:
+        return repr(time_s)
+    return trigger.condition if trigger.name == CONDITION_NAME else trigger.name
 
 
 def range_as_json(draw: DrawSpec | None) -> dict[str, Any] | None:

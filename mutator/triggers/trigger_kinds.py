@@ -12,6 +12,7 @@ from mutator.model import Hold, Trigger
 from mutator.triggers.conditions import canonical_condition
 
 ALWAYS_NAME = "always"  # the trigger of a permanent fault
+CONDITION_NAME = "condition"  # every trigger of a typed condition
 
 
 def always_trigger(*, armed_after_s: float = 0.0) -> Trigger:
@@ -65,7 +66,7 @@ def _parse_time(text: str, armed_after_s: float, variables: Collection[str]) -> 
 
 def _parse_condition(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger:
     condition = canonical_condition(text, variables=variables)
-    return Trigger(name="condition", condition=condition, armed_after_s=armed_after_s)
+    return Trigger(name=CONDITION_NAME, condition=condition, armed_after_s=armed_after_s)
 
 
 _TriggerParser = Callable[[str, float, Collection[str]], Trigger | None]

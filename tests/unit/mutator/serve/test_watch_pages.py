@@ -10,7 +10,9 @@ import pytest
 
 from mutator import try_fault
 from mutator._common.folder_locks import lock_run_folder
+from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.model import Outcome
+from mutator.serve.served_trials import _trigger_text
 from mutator.store.run_progress import Progress
 from mutator.store.session_progress import SessionProgress, write_session_progress
 from mutator.store.trial_file import StoredTrial
@@ -103,7 +105,7 @@ def test_a_trial_is_shown_as_long_as_its_target_is_the_same(watching: Client, tr
         "spec": "sensor/lane",
         "variant": "shifted",
         "scenario": "A",
-        "trigger": "2",
+        "trigger": "2.0",
         "value": 2.4,
         "seed": 0,
         "reading": "as_described",
@@ -114,6 +116,13 @@ def test_a_trial_is_shown_as_long_as_its_target_is_the_same(watching: Client, tr
         file.write("# changed\n")
     answer = watching.get(f"/api/trials/{trial}")
     assert (answer.status, answer.json["error"]["got"]) == (400, "changed since this trial: target")
+
+
+@pytest.mark.parametrize("text", ["always", "2.0", "near", "v_ego > 3"])
+def test_the_trigger_of_a_trial_is_read_as_the_same_again(toycar: Workspace, text: str) -> None:
+    """A time and a condition have names that `try` does not know."""
+    selected = SelectedTarget.of(toycar)
+    assert _trigger_text(selected.trigger(text)) == text
 
 
 @pytest.mark.slow

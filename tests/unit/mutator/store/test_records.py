@@ -115,7 +115,7 @@ def test_progress_counts_complete_lines_as_they_arrive(
     now_s = 100.0
     monkeypatch.setattr(run_progress.time, "monotonic", lambda: now_s)
     write(tmp_path, "0001-gw0.jsonl", record("a" * 16))
-    tail = RecordTail("experiments", tmp_path / "records", 4)
+    tail = RecordTail("experiments", tmp_path, "records", 4)
     assert (tail.poll().done, tail.poll().per_s, tail.poll().remaining_s) == (1, None, None)
     writer = LineWriter(tmp_path / "records" / "0002-gw0.jsonl", HEAD)
     writer.append(asdict(record("b" * 16, status=Status.HARNESS_ERROR, outcome=None)))

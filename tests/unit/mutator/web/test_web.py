@@ -8,7 +8,7 @@ import pytest
 
 from mutator import web
 
-PAGES = ("comparison", "golden", "report", "review", "serve")
+PAGES = ("comparison", "golden", "report", "review", "serve", "trial")
 
 
 def test_embedded_data_round_trip_and_are_reproducible() -> None:
@@ -41,9 +41,13 @@ def test_assets_stay_small_and_cannot_end_their_element(name: str) -> None:
 
 
 def test_load_orders_name_every_script_once() -> None:
-    """`home.html` loads start.js by its address. A report panel adds source.css."""
+    """Pages of the server load some files by their addresses. A report panel adds source.css."""
     orders = [web.load_order(page, ".js") for page in PAGES]
     assert all(len({*order}) == len(order) for order in orders)
-    assert {name for order in orders for name in order} == {*web.asset_names(".js")} - {"serve/start.js"}
+    assert {name for order in orders for name in order} == {*web.asset_names(".js")} - {
+        "serve/start.js",
+        "serve/runs.js",
+        "serve/live.js",
+    }
     styles = {name for page in PAGES for name in web.load_order(page, ".css")}
-    assert styles == {*web.asset_names(".css")} - {"report/source.css"}
+    assert styles == {*web.asset_names(".css")} - {"report/source.css", "serve/live.css"}
