@@ -129,7 +129,8 @@ def range_as_json(draw: DrawSpec | None) -> dict[str, Any] | None:
     """Return the range of values that a variant declares, with a step for a slider; None without a value."""
     if draw is None:
         return None
-    low, high = draw.least_and_greatest
+    # sweeps add steps, which leaves 2.5000000000000004
+    low, high = (float(f"{end:.12g}") for end in draw.least_and_greatest)
     is_whole = draw.kind == "integers" or all(float(value).is_integer() for value in draw.values or (0.5,))
     step = (
         1.0

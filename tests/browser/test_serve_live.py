@@ -57,6 +57,7 @@ def check_looks(page: Any, serious_faults: Callable[[Any], list[str]]) -> None:
         page.emulate_media(color_scheme=scheme)
         assert serious_faults(page) == []
     page.set_viewport_size({"width": 400, "height": 800})
+    page.wait_for_timeout(500)  # plots take their new width a moment later
     assert page.evaluate("document.documentElement.scrollWidth") == 400
     page.set_viewport_size({"width": 1440, "height": 900})
 

@@ -118,7 +118,7 @@ def test_a_trial_is_shown_as_long_as_its_target_is_the_same(watching: Client, tr
     assert (answer.status, answer.json["error"]["got"]) == (400, "changed since this trial: target")
 
 
-@pytest.mark.parametrize("text", ["always", "2.0", "near", "v_ego > 3"])
+@pytest.mark.parametrize("text", ["always", "2.0", "near", "v_ego > 3.0"])
 def test_the_trigger_of_a_trial_is_read_as_the_same_again(toycar: Workspace, text: str) -> None:
     """A time and a condition have names that `try` does not know."""
     selected = SelectedTarget.of(toycar)
