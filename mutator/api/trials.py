@@ -1,7 +1,7 @@
 """Run one fault once, outside a campaign or as a rerun of a campaign's experiment."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
@@ -10,7 +10,7 @@ from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
 from mutator.api.target_and_fault_selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
-from mutator.campaigns.phrase_collection import phrases_of_fault, phrases_of_trigger
+from mutator.campaigns.phrase_collection import phrases_of_experiment
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.execution.single_run import SingleRun, run_single
@@ -160,10 +160,7 @@ def try_fault(
         record=single.record,
     ).write(folder)
     scale = selected_target.workspace.scale_of(selected_target.manifest)
-    phrases = replace(
-        phrases_of_fault(selected_target.workspace, selected_target.manifest, experiment.fault),
-        situations=phrases_of_trigger(selected_target.workspace, experiment.trigger),
-    )
+    phrases = phrases_of_experiment(selected_target.workspace, selected_target.manifest, experiment)
     return build_trial(single, selected_target.manifest, scale=scale, phrases=phrases, temporary=temporary)
 
 

@@ -1,12 +1,13 @@
 """Collects the phrases of a library that the sentences about a run's experiments need."""
 
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 
 from mutator.campaigns.campaign_files import Campaign
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec
-from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Trigger
+from mutator.model import OPERATOR_FAULTS_MODULE, Experiment, Fault, Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import PhraseByCase, Phrases
 from mutator.workspace import Workspace
@@ -50,6 +51,12 @@ def phrases_of_fault(workspace: Workspace, manifest: TargetManifest, fault: Faul
         models=phrases_of_models(workspace.fault_models(), used.models),
         **target_phrases(manifest),
     )
+
+
+def phrases_of_experiment(workspace: Workspace, manifest: TargetManifest, experiment: Experiment) -> Phrases:
+    """Return the phrases of one experiment and its target."""
+    phrases = phrases_of_fault(workspace, manifest, experiment.fault)
+    return replace(phrases, situations=phrases_of_trigger(workspace, experiment.trigger))
 
 
 def phrases_of_trigger(workspace: Workspace, trigger: Trigger) -> Mapping[str, PhraseByCase]:

@@ -12,15 +12,10 @@ from mutator.mutants.file_patches import patch_without_new_files
 from mutator.report.experiment_facts import RANK_COLUMN
 from mutator.report.experiment_list import details_data, results_table_data
 from mutator.results.experiment_sentence import ExperimentSentences
+from mutator.results.finished_experiment import FinishedExperiment, ResultColumn
 from mutator.results.plan_columns import PlanColumn
-from mutator.results.table_columns import (
-    FinishedExperiment,
-    ResultColumn,
-    deviation_column_by_channel,
-    result_columns,
-    result_columns_of,
-    severity_and_time_columns,
-)
+from mutator.results.severity_and_sentence_columns import severity_and_time_columns
+from mutator.results.table_columns import deviation_column_by_channel, result_columns, result_columns_of
 from mutator.results.table_reader import frame_of_finished
 from mutator.review.patch_shapes import shapes_of_patches
 from mutator.store.embedded_series import EmbeddedSeries

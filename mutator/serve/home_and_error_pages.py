@@ -16,12 +16,7 @@ from mutator.serve.served_trials import range_as_json
 from mutator.web import asset_text, json_script_element, load_order
 from mutator.workspace import Workspace
 
-_SCRIPTS_OF_WHOLE_RUNS = (
-    "report/first.js",
-    "report/path.js",
-    "report/path_counts.js",
-    "report/report.js",
-)
+_EXPERIMENT_SCRIPT, _PATH_SCRIPT = "report/experiment.js", "report/path.js"
 
 
 def home_page(workspace: Workspace, runs: Sequence[Mapping[str, Any]], token: str) -> str:
@@ -49,7 +44,9 @@ def live_page(key: str, token: str) -> str:
 def trial_page(data_address: str, back_address: str, back_text: str, *, token: str) -> str:
     """Return the page of one experiment, whose data its script gets from `data_address`."""
     styles = (*load_order("report", ".css"), *load_order("serve", ".css"), *load_order("trial", ".css"))
-    scripts = [name for name in load_order("report", ".js") if name not in _SCRIPTS_OF_WHOLE_RUNS]
+    of_report = load_order("report", ".js")
+    # later ones show a whole run, and the path needs the data of one
+    scripts = [name for name in of_report[: of_report.index(_EXPERIMENT_SCRIPT) + 1] if name != _PATH_SCRIPT]
     return _render_html_page(
         "trial/trial.html",
         data_address=data_address,

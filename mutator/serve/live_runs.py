@@ -18,8 +18,9 @@ from mutator.execution.progress_text import describe_duration, describe_rate
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.outcomes.verdict_rules import reaction_time
 from mutator.results.experiment_sentence import ExperimentSentences
+from mutator.results.finished_experiment import FinishedExperiment
 from mutator.results.result_rows import ResultRow, rows_of
-from mutator.results.table_columns import FinishedExperiment, result_columns_of
+from mutator.results.table_columns import result_columns_of
 from mutator.results.table_reader import frame_of_finished
 from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.serve.run_states import RunState

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.confined_files import check_only_plain_files, read_below
-from mutator.campaigns.phrase_collection import phrases_of_fault
+from mutator.campaigns.phrase_collection import phrases_of_experiment
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.config.units import UNITS
 from mutator.errors import MutatorError, NotServed
@@ -15,7 +15,7 @@ from mutator.model import Experiment, Status, Trigger
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.outcomes.trace_loading import load_trace, trace_digest
 from mutator.report.lone_experiment_data import ViewedTarget, experiment_view_data
-from mutator.results.table_columns import FinishedExperiment
+from mutator.results.finished_experiment import FinishedExperiment
 from mutator.store.series_format import encode_series
 from mutator.store.trial_file import StoredTrial
 from mutator.targets.manifest import TargetManifest
@@ -73,7 +73,7 @@ class ServedTrials:
 
     def _view(self, folder: Path, trial: StoredTrial, manifest: TargetManifest) -> dict[str, Any]:
         scale = self._workspace.scale_of(manifest)
-        phrases = phrases_of_fault(self._workspace, manifest, trial.experiment.fault)
+        phrases = phrases_of_experiment(self._workspace, manifest, trial.experiment)
         patch = read_below(folder, "mutant.patch") if (folder / "mutant.patch").is_file() else None
         return experiment_view_data(
             ViewedTarget.of_manifest(manifest, scale, phrases),

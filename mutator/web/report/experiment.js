@@ -166,6 +166,11 @@ class Experiment {
     return SeriesFile.load(id, expected);
   }
 
+  /** Show the replay, with a choice of another experiment to lay over it. */
+  showReplay(place, row, series) {
+    new ReplayBeside(place, { table: this.table, row, state: this.state, facts: this.facts }, series).show();
+  }
+
   /** Fill the parts that are unpacked on first use: diff, spec, stills and series. */
   async #fillLate(row) {
     const id = this.text("experiment_id");
@@ -178,7 +183,7 @@ class Experiment {
     this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "The plan of this run folder does not contain this experiment."));
     this.#pictures(id, [media?.[id]].find((pictures) => pictures?.stills.length || pictures?.films.length));
     const place = this.#content("replay");
-    if (series && !(series instanceof Error)) new ReplayBeside(place, { table: this.table, row, state: this.state, facts: this.facts }, series).show();
+    if (series && !(series instanceof Error)) this.showReplay(place, row, series);
     else this.#noSeries(id, expected, series);
   }
 

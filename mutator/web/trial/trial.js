@@ -33,6 +33,10 @@ class LoneExperiment extends Experiment {
   series(id, expected) {
     return SeriesFile.load(id, expected, { texts: this.data.series });
   }
+
+  showReplay(place, _, series) {
+    Replay.show(place, series, this.facts);
+  }
 }
 
 (() => {
