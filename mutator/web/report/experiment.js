@@ -154,17 +154,10 @@ class Experiment {
     return this.place.querySelector(`section.${name} .content`);
   }
 
-  details() {
-    return Details.read();
-  }
-
-  media() {
-    return Packed.read("media");
-  }
-
-  series(id, expected) {
-    return SeriesFile.load(id, expected);
-  }
+  // What an experiment is shown from; a page that shows one alone has other sources.
+  details = () => Details.read();
+  media = () => Packed.read("media");
+  series = (id, expected) => SeriesFile.load(id, expected);
 
   /** Show the replay, with a choice of another experiment to lay over it. */
   showReplay(place, row, series) {

@@ -22,17 +22,9 @@ class LoneExperiment extends Experiment {
     return el("div", {}, el("p", {}, "This command tries the fault in a terminal:"), this.command(this.tryCommand()));
   }
 
-  async details() {
-    return new Details(this.data.details);
-  }
-
-  async media() {
-    return null;
-  }
-
-  series(id, expected) {
-    return SeriesFile.load(id, expected, { texts: this.data.series });
-  }
+  details = async () => new Details(this.data.details);
+  media = async () => null;
+  series = (id, expected) => SeriesFile.load(id, expected, { texts: this.data.series });
 
   showReplay(place, _, series) {
     Replay.show(place, series, this.facts);
