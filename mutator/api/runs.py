@@ -11,8 +11,8 @@ from mutator._common.table_rendering import TextTable
 from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import trace_frame
 from mutator.api.notebook_html import facts_html, text_html
-from mutator.api.run_contents import RunContents
 from mutator.api.run_experiments import RunExperiment
+from mutator.api.run_figures import RunFigures
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
@@ -69,7 +69,7 @@ def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Run(RunContents):
+class Run(RunFigures):
     """A run folder, read on demand."""
 
     #: the summary, if `mutator.run` returned this object; None for a loaded run

@@ -7,7 +7,6 @@ import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
-from mutator.figures.style import shipped_style
+from mutator.figures.style import PNG_DPI, figure_type, shipped_style
 from mutator.model import Record
 from mutator.outcomes.trace_loading import Trace, times_of
 from mutator.targets.channels import Channel
@@ -30,7 +29,6 @@ FAULTY_COLOUR = "#d55e00"
 AFTER_END_COLOUR = "#999999"  # for data after the end of the drive
 PANEL_HEIGHT_INCHES = 1.1  # inches
 FIGURE_WIDTH_INCHES = 9.0
-PNG_DPI = 110
 
 
 class EventKind(StrEnum):
@@ -106,24 +104,11 @@ def draw_golden_and_faulty(
 
 
 def _new_figure(rows: int) -> tuple["Figure", list["Axes"]]:
-    figure = _figure_type()(
+    figure = figure_type()(
         figsize=(FIGURE_WIDTH_INCHES, 1.1 + PANEL_HEIGHT_INCHES * rows), layout="constrained"
     )
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     return figure, list(axes)
-
-
-@cache
-def _figure_type() -> type["Figure"]:
-    from matplotlib.figure import Figure
-
-    class RunFigure(Figure):
-        @shipped_style()
-        def _repr_png_(self) -> bytes:
-            self.savefig(png := io.BytesIO(), format="png", dpi=PNG_DPI)
-            return png.getvalue()
-
-    return RunFigure
 
 
 def _draw_channel(

@@ -4,10 +4,12 @@ The colours are those of Okabe and Ito, which colour-blind people can distinguis
 """
 
 import importlib
+import io
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIGURE_WIDTH_INCHES = 11.0  # inches
+PNG_DPI = 110
 TEXT_POINTS, SMALL_TEXT_POINTS = 9, 8  # points
 INK_COLOUR = "#222222"
 _MATPLOTLIB, _RC_FILE = "matplotlib", "matplotlibrc"
@@ -67,14 +70,27 @@ def colour_and_marker(method: str) -> tuple[str, str]:
     return _METHOD_COLOURS_AND_MARKERS[list(Method).index(Method(method)) % len(_METHOD_COLOURS_AND_MARKERS)]
 
 
+@cache
+def figure_type() -> type["Figure"]:
+    """Return the type of all figures, which notebooks show without pyplot."""
+    from matplotlib.figure import Figure
+
+    class RunFigure(Figure):
+        @shipped_style()
+        def _repr_png_(self) -> bytes:
+            self.savefig(png := io.BytesIO(), format="png", dpi=PNG_DPI)
+            return png.getvalue()
+
+    return RunFigure
+
+
 def blank_figure(
     height: float, rows: int, columns: int, *, sharey: bool = False
 ) -> tuple["Figure", list["Axes"]]:
     """Return an empty figure of `height` inches, with its axes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(FIGURE_WIDTH_INCHES, height), layout="constrained")
+    figure = figure_type()(figsize=(FIGURE_WIDTH_INCHES, height), layout="constrained")
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(rows, columns, squeeze=False, sharey=sharey).flat)
     for axis in axes:
