@@ -16,7 +16,6 @@ from mutator.operators.executed_lines import (
     measure_variable_types,
 )
 from mutator.operators.mutation_selection import SelectedMutations, sample_mutations, select_mutations
-from mutator.operators.mutations import Mutation
 from mutator.operators.operator_lookup import any_needs_types
 from mutator.operators.statement_facts import statement_facts_of
 from mutator.targets.manifest import TargetManifest
@@ -59,6 +58,11 @@ class OperatorFaultFinder:
                 expected="places with lines that a scenario of the campaign executes",
                 remedy="name other places, operators or scenarios",
             )
+        paths = {mutation.location.path for mutation in draw}
+        executed_statements = {
+            name: {path: self._lines_of_executed_statements(path, lines.get(path, ())) for path in paths}
+            for name, lines in executed.items()
+        }
         draws = f"{counted(len(draw), 'draw')} of " if len(draw) < len(mutations.mutations) else ""
         self.notes[f"{', '.join(selection.places)}: {draws}{mutations.summary}"] = None
         return [
@@ -66,7 +70,10 @@ class OperatorFaultFinder:
                 fault=mutation.to_fault(reading),
                 activities=selection.activities,
                 executing_scenarios=frozenset(
-                    name for name in executed if self._is_executed(mutation, executed[name])
+                    name
+                    for name, lines_by_path in executed_statements.items()
+                    # mutations count lines from 0, measured lines begin at 1
+                    if mutation.line + 1 in lines_by_path[mutation.location.path]
                 ),
             )
             for mutation in draw
@@ -91,9 +98,5 @@ class OperatorFaultFinder:
             )
         return self._mutations_by_selection[key]
 
-    def _is_executed(self, mutation: Mutation, lines: Mapping[str, Collection[int]]) -> bool:
-        path = mutation.location.path
-        # mutations count lines from 0, measured lines begin at 1
-        return mutation.line + 1 in statement_facts_of(self._manifest.tree, path).extend_to_statements(
-            lines.get(path, ())
-        )
+    def _lines_of_executed_statements(self, path: str, lines: Collection[int]) -> frozenset[int]:
+        return statement_facts_of(self._manifest.tree, path).extend_to_statements(lines)

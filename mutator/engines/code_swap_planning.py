@@ -173,7 +173,7 @@ def changed_functions(
 
     Raises MutantNotSwappable if anything except functions differs.
     """
-    old_functions, new_functions = _nested_code(old), _nested_code(new)
+    old_functions, new_functions = nested_code(old), nested_code(new)
     if [code.co_name for code in old_functions] != [code.co_name for code in new_functions]:
         raise MutantNotSwappable(f"{path} is changed outside its functions")
     for old_function, new_function in zip(old_functions, new_functions, strict=True):
@@ -201,10 +201,10 @@ def _check_swappable(old: CodeType, new: CodeType, described_function: str) -> N
         raise MutantNotSwappable(
             f"{described_function} has another signature, or other variables of an outer function"
         )
-    before = _nested_code(old)
+    before = nested_code(old)
     # injected lines may add functions, but each old one must still be there
     if len(before) > sum(
-        any(has_same_behaviour(nested, new_nested) for new_nested in _nested_code(new)) for nested in before
+        any(has_same_behaviour(nested, new_nested) for new_nested in nested_code(new)) for nested in before
     ):
         raise MutantNotSwappable(f"a function inside {described_function} is changed")
 
@@ -215,7 +215,7 @@ def _signature(code: CodeType) -> tuple[object, ...]:
     return (*counts, code.co_varnames[:count], code.co_flags, code.co_freevars)
 
 
-def _nested_code(code: CodeType) -> list[CodeType]:
+def nested_code(code: CodeType) -> list[CodeType]:
     return [const for const in code.co_consts if isinstance(const, CodeType)]
 
 
@@ -225,7 +225,7 @@ def has_same_behaviour(first: CodeType, second: CodeType) -> bool:
 
 def behaviour_key(code: CodeType) -> tuple[object, ...]:
     """Return a key for what the code does. Functions that do the same have equal keys."""
-    return (*_behaviour_key_without_nested(code), *map(behaviour_key, _nested_code(code)))
+    return (*_behaviour_key_without_nested(code), *map(behaviour_key, nested_code(code)))
 
 
 def _behaviour_key_without_nested(code: CodeType) -> tuple[object, ...]:

@@ -1,5 +1,6 @@
 """Resolves anchors, such as an assignment in a function, to lines of a source file."""
 
+import ast
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -64,6 +65,7 @@ class ParsedFile:
     constants_and_defaults: tuple[ConstantOrDefault, ...]
     outermost_function_lines: tuple[range, ...]  # the lines of each outermost function
     full_path: Path
+    tree: ast.Module = field(repr=False, compare=False)
     verified_edits: set[Hashable] = field(
         default_factory=set, repr=False, compare=False
     )  # edits that passed checks
@@ -138,11 +140,12 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
             indent_unit=module.default_indent.encode(),
             import_line=import_insertion_line(module, positions),
             functions_by_name=collect_functions(module, positions, used_names_by_function(data)),
-            expressions_by_function=list_expressions(data, module, positions),
+            expressions_by_function=list_expressions(data, tree, module, positions),
             constants_and_defaults=list_constants_and_defaults(data, tree),
             outermost_function_lines=tuple(list_outermost_function_lines(tree)),
             ast_positions=ast_node_positions(tree),
             full_path=where,
+            tree=tree,
         )
 
 
@@ -260,7 +263,7 @@ def _choose_statement(
     anchor = location.anchor
     verb = anchor.kind.partition("_")[2]
     name = normalized_anchor_name(anchor.name)
-    pairs = [(f, s) for f in functions for s in f.statements if name in s.names_for(verb)]
+    pairs = [(f, s) for f in functions for s in f.statements_by_name.get((verb, name), ())]
     # heads of blocks are numbered last, so that `nth` in older specs selects the same statements
     matches = sorted(
         (pair for pair in pairs if pair[1].unanchorable_reason is None),

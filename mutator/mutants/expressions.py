@@ -70,7 +70,7 @@ def _grouped_by_function(expressions: Iterable[Expression]) -> dict[str, tuple[E
 
 
 def list_expressions(
-    data: bytes, module: cst.Module, positions: RangeByNode
+    data: bytes, tree: ast.Module, module: cst.Module, positions: RangeByNode
 ) -> dict[str, tuple[Expression, ...]]:
     encoding = module.encoding.removesuffix("-sig")
     lines = [line.decode(encoding) for line in data.splitlines(keepends=True)]
@@ -81,7 +81,7 @@ def list_expressions(
         _closing_bracket_ends(tokens),
     )
     expressions = []
-    for function, node, roles in expressions_in_functions(ast.parse(data)):
+    for function, node, roles in expressions_in_functions(tree):
         start, end = _extent_of(lines, node)
         text, is_confirmed = (
             source_of(node),

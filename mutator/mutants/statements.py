@@ -1,8 +1,10 @@
 """Collects what each statement of a function assigns, calls and returns, and its lines."""
 
 import ast
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import libcst as cst
 
@@ -15,6 +17,8 @@ from mutator.mutants.positions_of_both_parsers import (
     line_after_statements,
     statement_position,
 )
+
+_VERBS = ("assign", "call", "return")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +56,7 @@ class Statement:
         return bool(self.returned_names)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Function:
     """A function. Its statements do not include those of nested functions and classes.
 
@@ -65,6 +69,16 @@ class Function:
     statements: tuple[Statement, ...]
     used_names: frozenset[str]
     entry_and_indent_lines: tuple[int, int] | None
+
+    @cached_property
+    def statements_by_name(self) -> Mapping[tuple[str, str], Sequence[Statement]]:
+        """The statements by verb ("assign", "call" or "return") and name, in source order."""
+        statements: dict[tuple[str, str], list[Statement]] = defaultdict(list)
+        for statement in self.statements:
+            for verb in _VERBS:
+                for name in dict.fromkeys(statement.names_for(verb)):
+                    statements[verb, name].append(statement)
+        return statements
 
 
 def collect_functions(

@@ -1,12 +1,14 @@
 """Drops mutations whose function compiles to the same code as the original or an earlier mutation."""
 
-from collections.abc import Iterable
+from collections import defaultdict
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 
 from mutator.engines.code_swap_planning import behaviour_key
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.expressions import Expression
 from mutator.mutants.standalone_compilation import compile_standalone
+from mutator.operators.changeable_parts import ChangeableParts
 from mutator.operators.mutations import Mutation
 
 
@@ -20,25 +22,21 @@ class DistinctAndEqualMutations:
     invalid_count: int  # does not compile
 
 
-def drop_equal_code(file: ParsedFile, mutations: Iterable[Mutation]) -> DistinctAndEqualMutations:
+def drop_equal_code(file: ParsedFile, mutations: Sequence[Mutation]) -> DistinctAndEqualMutations:
     """Keep a file's mutations whose active code differs from the original and from earlier mutations."""
-    codes_by_function: dict[range, list[object]] = {}  # by function, the original's code first
     distinct_mutations: list[Mutation] = []
     equals = duplicates = invalids = 0
-    for mutation in mutations:
-        function = file.outermost_function_at(mutation.line)
-        assert function is not None  # every place is in a function
-        if function not in codes_by_function:
-            codes_by_function[function] = [_comparable_code(file, file.lines[function.start : function.stop])]
-        code = _comparable_code(file, mutated_function_lines(file, function, mutation))
-        if code is None:
+    earlier: set[Hashable] = set()
+    for mutation, codes in zip(mutations, _compared_codes(file, mutations), strict=True):
+        key = (codes.place, codes.mutated)
+        if codes.mutated is None:
             invalids += 1
-        elif code == codes_by_function[function][0]:
+        elif codes.mutated == codes.original:
             equals += 1
-        elif code in codes_by_function[function]:
+        elif key in earlier:
             duplicates += 1
         else:
-            codes_by_function[function].append(code)
+            earlier.add(key)
             distinct_mutations.append(mutation)
     return DistinctAndEqualMutations(
         mutations=tuple(distinct_mutations),
@@ -46,6 +44,54 @@ def drop_equal_code(file: ParsedFile, mutations: Iterable[Mutation]) -> Distinct
         duplicate_count=duplicates,
         invalid_count=invalids,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _ComparedCode:
+    """The code of a place without and with a mutation; None if it does not compile."""
+
+    place: Hashable
+    original: Hashable
+    mutated: Hashable | None
+
+
+def _compared_codes(file: ParsedFile, mutations: Sequence[Mutation]) -> list[_ComparedCode]:
+    """Return what to compare for each mutation: the code of a part of its function, if that is enough."""
+    parts, functions = ChangeableParts(file), _Functions(file)
+    numbers_by_part: dict[Hashable, list[int]] = defaultdict(list)
+    changed_parts = [parts.part_of(mutation) for mutation in mutations]
+    for number, part in enumerate(changed_parts):
+        numbers_by_part[part.key].append(number)
+    result: dict[int, _ComparedCode] = {}
+    for key, numbers in numbers_by_part.items():
+        codes = parts.compared_codes([(changed_parts[number], mutations[number]) for number in numbers])
+        for i, number in enumerate(numbers, start=1):
+            result[number] = (
+                functions.compared_code(mutations[number])
+                if codes is None
+                else _ComparedCode(place=key, original=codes[0], mutated=codes[i])
+            )
+    return [result[number] for number in range(len(mutations))]
+
+
+class _Functions:
+    """The code of whole functions."""
+
+    def __init__(self, file: ParsedFile) -> None:
+        self._file = file
+        self._original_codes: dict[range, Hashable] = {}
+
+    def compared_code(self, mutation: Mutation) -> _ComparedCode:
+        file, function = self._file, self._file.outermost_function_at(mutation.line)
+        assert function is not None  # every place is in a function
+        if function not in self._original_codes:
+            lines = file.lines[function.start : function.stop]
+            self._original_codes[function] = _comparable_code(file, lines)
+        return _ComparedCode(
+            place=function,
+            original=self._original_codes[function],
+            mutated=_comparable_code(file, mutated_function_lines(file, function, mutation)),
+        )
 
 
 def mutated_function_lines(file: ParsedFile, function: range, mutation: Mutation) -> list[bytes]:
@@ -60,6 +106,6 @@ def mutated_function_lines(file: ParsedFile, function: range, mutation: Mutation
     return [*before, indent + b"pass\n", *file.lines[part.end_line : function.stop]]
 
 
-def _comparable_code(file: ParsedFile, lines: Iterable[bytes]) -> object:
+def _comparable_code(file: ParsedFile, lines: Iterable[bytes]) -> Hashable | None:
     code = compile_standalone(list(lines), file.encoding)
     return code and behaviour_key(code)

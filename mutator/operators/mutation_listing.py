@@ -86,6 +86,12 @@ def _omission_mutations(
         for line, s in every
         if s.unanchorable_reason is None and s.block_start_of_head_binding is None
     ]
+    totals = Counter(
+        (verb, name)
+        for _, statement in anchorable
+        for verb in ("assign", "call")
+        for name in set(statement.names_for(verb))
+    )
     numbers: Counter[tuple[str, str]] = Counter()
     for line, statement in anchorable:
         numbered_anchor = None
@@ -99,9 +105,8 @@ def _omission_mutations(
         if not omitting:
             continue
         verb, name, number = numbered_anchor
-        is_ambiguous = sum(name in s.names_for(verb) for _, s in anchorable) > 1
         kind = AnchorKind.BEFORE_ASSIGN if verb == "assign" else AnchorKind.BEFORE_CALL
-        anchor = Anchor(kind=kind, name=name, nth=number if is_ambiguous else None)
+        anchor = Anchor(kind=kind, name=name, nth=number if totals[verb, name] > 1 else None)
         location = FaultLocation(path=file.path, function=function, anchor=anchor)
         try:
             file.resolve_statement(location)
