@@ -2,6 +2,7 @@
 
 import csv
 import fnmatch
+import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -166,8 +167,9 @@ def write_mutants(
 ) -> list[dict[str, str]]:
     """Write `out`/patches, `out`/index.csv and, with `trees`, `out`/trees; return the index.
 
-    `out` must be new or empty. `step` is called after each pair.
+    `out` must be new or empty, and is so again after an error. `step` is called after each pair.
     """
+    is_new = not out.exists()
     make_folder(out)
     if any(out.iterdir()):  # older patches could be taken for these
         raise MutatorError(
@@ -177,6 +179,31 @@ def write_mutants(
             expected="a new or empty folder",
             remedy="choose another `out`",
         )
+    try:
+        return _write_into_empty_folder(selected_target, pairs, out, trees=trees, step=step)
+    except BaseException:
+        _empty_folder(out)
+        if is_new:
+            out.rmdir()
+        raise
+
+
+def _empty_folder(folder: Path) -> None:
+    for path in folder.iterdir():
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+
+
+def _write_into_empty_folder(
+    selected_target: SelectedTarget,
+    pairs: Sequence[FaultWithTrigger],
+    out: Path,
+    *,
+    trees: bool,
+    step: Callable[[], None],
+) -> list[dict[str, str]]:
     (out / "patches").mkdir()
     index: dict[str, dict[str, str]] = {}
     for fault, trigger in pairs:

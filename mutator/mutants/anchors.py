@@ -1,6 +1,7 @@
 """Resolves anchors, such as an assignment in a function, to lines of a source file."""
 
 import ast
+from codecs import BOM_UTF8
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +21,7 @@ from mutator.mutants.constants_and_defaults import (
     list_constants_and_defaults,
 )
 from mutator.mutants.expressions import Expression, list_expressions
+from mutator.mutants.logical_lines import LogicalLines
 from mutator.mutants.name_scopes import normalize_identifier, used_names_by_function
 from mutator.mutants.positions_of_both_parsers import NodePosition, ast_node_positions
 from mutator.mutants.source_parsing import (
@@ -54,7 +56,8 @@ class ResolvedAnchor:
 class ParsedFile:
     path: str
     data: bytes
-    lines: tuple[bytes, ...]
+    lines: tuple[bytes, ...]  # without the byte order mark
+    logical_lines: LogicalLines
     encoding: str
     newline: bytes
     indent_unit: bytes
@@ -131,17 +134,20 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
     tree = parse_with_python(data, where)
     with translate_libcst_errors(where):
         module, positions = parse_with_libcst(data, where)
+        logical_lines = LogicalLines.of(data)
         return ParsedFile(
             path=path,
             data=data,
-            lines=tuple(data.splitlines(keepends=True)),
+            lines=tuple(data.removeprefix(BOM_UTF8).splitlines(keepends=True)),
+            logical_lines=logical_lines,
             encoding=module.encoding.removesuffix("-sig"),
             newline=module.default_newline.encode(),
-            indent_unit=module.default_indent.encode(),
-            import_line=import_insertion_line(module, positions),
+            # a form feed would begin the line anew
+            indent_unit=module.default_indent.rpartition("\f")[2].encode() or b"    ",
+            import_line=import_insertion_line(module, positions, logical_lines),
             functions_by_name=collect_functions(module, positions, used_names_by_function(data)),
             expressions_by_function=list_expressions(data, tree, module, positions),
-            constants_and_defaults=list_constants_and_defaults(data, tree),
+            constants_and_defaults=list_constants_and_defaults(data, tree, logical_lines),
             outermost_function_lines=tuple(list_outermost_function_lines(tree)),
             ast_positions=ast_node_positions(tree),
             full_path=where,
@@ -185,13 +191,14 @@ def _resolve_statement(file: ParsedFile, location: FaultLocation) -> ResolvedAnc
         inserts_after=location.anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL),
         is_alone=statement.is_alone,
         indentable_count=1 if statement.has_multiline_string else statement.end_line - first,
-        indent=_indentation_of(file.lines[first]),
+        indent=_indentation_at(file, first),
         names_used_in_function=function.used_names,
     )
 
 
 def _resolve_block_start(file: ParsedFile, first_line: int, names: frozenset[str]) -> ResolvedAnchor:
-    indent = _indentation_of(file.lines[first_line])
+    indent = _indentation_at(file, first_line)
+    first_line = file.logical_lines.start_of(first_line)
     return ResolvedAnchor(
         first_line=first_line,
         end_line=first_line,
@@ -217,7 +224,9 @@ def _check_position_matches_ast(file: ParsedFile, position: NodePosition | None)
         )
 
 
-def _indentation_of(line: bytes) -> bytes:
+def _indentation_at(file: ParsedFile, first_line: int) -> bytes:
+    """Return the indentation of the statement that begins on this line, or further up with a backslash."""
+    line = file.lines[file.logical_lines.start_of(first_line)]
     return line[: len(line) - len(line.lstrip(b" \t\f"))]
 
 
@@ -246,13 +255,15 @@ def _resolve_function_entry(
         )
     _check_position_matches_ast(file, function.position)
     index, model_line = function.entry_and_indent_lines
+    if index == model_line:
+        index = model_line = file.logical_lines.start_of(index)
     return ResolvedAnchor(
         first_line=index,
         end_line=index,
         inserts_after=index != model_line,
         is_alone=True,
         indentable_count=0,
-        indent=_indentation_of(file.lines[model_line]),
+        indent=_indentation_at(file, model_line),
         names_used_in_function=function.used_names,
     )
 
@@ -348,6 +359,8 @@ def _check_anchor_fits_statement(file: ParsedFile, anchor: Anchor, statement: St
         reason = "shares its line with statements after it"
     elif not after and not statement.is_first_in_line:
         reason = "shares its line with statements before it"
+    elif not after and file.logical_lines.start_of(statement.first_line) != statement.first_line:
+        reason = "begins below a line with only a backslash"
     if reason:
         raise MutatorError(
             f"the anchored statement {reason}",

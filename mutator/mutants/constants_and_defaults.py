@@ -6,9 +6,7 @@ the values are.
 """
 
 import ast
-import io
-import tokenize
-from bisect import bisect_left
+from codecs import BOM_UTF8
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +15,7 @@ from mutator._common.message_text import spelling_suggestion
 from mutator.errors import MutatorError
 from mutator.model import AnchorKind, FaultLocation
 from mutator.mutants.expression_roles import blocks_of
+from mutator.mutants.logical_lines import LogicalLines
 from mutator.mutants.name_scopes import globals_set_in_functions, normalize_identifier
 
 _READ_ONLY_BASE_CLASS_ENDINGS = ("Enum", "Flag", "NamedTuple", "TypedDict")  # endings of base class names
@@ -40,13 +39,15 @@ class ConstantOrDefault:
     unsettable_reason: str | None = None  # why the value cannot be set
 
 
-def list_constants_and_defaults(data: bytes, tree: ast.Module) -> tuple[ConstantOrDefault, ...]:
+def list_constants_and_defaults(
+    data: bytes, tree: ast.Module, logical_lines: LogicalLines
+) -> tuple[ConstantOrDefault, ...]:
     """Return all fixed values of a file, in source order.
 
     If a constant is assigned several times, the last assignment is used.
     """
     owned_values: dict[tuple[AnchorKind, str, str], tuple[ConstantOrDefault, _OwningStatement]] = {}
-    for value, owner in _ConstantAndDefaultFinder(data).values_in_body(tree.body, ()):
+    for value, owner in _ConstantAndDefaultFinder(data, logical_lines).values_in_body(tree.body, ()):
         key = (value.kind, value.function, value.name)
         _, earlier_owner = owned_values.pop(key, (None, owner))
         if earlier_owner is not owner:
@@ -76,10 +77,9 @@ def parameters_with_default(arguments: ast.arguments) -> Iterator[tuple[str, ast
 class _ConstantAndDefaultFinder:
     """Walks the bodies of a module and its classes, and yields each value with its class or function."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: bytes, logical_lines: LogicalLines) -> None:
         self.lines = data.splitlines(keepends=True)
-        tokens = tokenize.tokenize(io.BytesIO(data).readline)
-        self.statement_end_lines = [token.start[0] for token in tokens if token.type == tokenize.NEWLINE]
+        self.logical_lines = logical_lines
 
     def values_in_body(
         self,
@@ -151,16 +151,11 @@ class _ConstantAndDefaultFinder:
             )
 
     def insertion_point(self, outermost_statement: ast.stmt) -> tuple[int, bytes]:
-        line = self.lines[
-            min(
-                node.lineno
-                for node in (outermost_statement, *getattr(outermost_statement, "decorator_list", ()))
-            )
-            - 1
-        ]
-        end = self.statement_end_lines[
-            bisect_left(self.statement_end_lines, outermost_statement.end_lineno or 0)
-        ]
+        first = min(
+            node.lineno for node in (outermost_statement, *getattr(outermost_statement, "decorator_list", ()))
+        )
+        line = self.lines[self.logical_lines.start_of(first - 1)].removeprefix(BOM_UTF8)
+        end = self.logical_lines.end_of((outermost_statement.end_lineno or first) - 1)
         return end, line[: len(line) - len(line.lstrip(b" \t\f"))]
 
 

@@ -7,6 +7,7 @@ begin or end on a line that cannot end in a tag, because it ends inside a string
 import ast
 import io
 import tokenize
+from codecs import BOM_UTF8
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -73,7 +74,7 @@ def list_expressions(
     data: bytes, tree: ast.Module, module: cst.Module, positions: RangeByNode
 ) -> dict[str, tuple[Expression, ...]]:
     encoding = module.encoding.removesuffix("-sig")
-    lines = [line.decode(encoding) for line in data.splitlines(keepends=True)]
+    lines = [line.decode(encoding) for line in data.removeprefix(BOM_UTF8).splitlines(keepends=True)]
     tokens = list(tokenize.tokenize(io.BytesIO(data).readline))
     libcst_extents, untaggable, brackets = (
         _libcst_extents(positions),

@@ -1,7 +1,14 @@
-"""Parses a source file with both Python and LibCST, and refuses it if they disagree."""
+"""Parses a source file with both Python and LibCST, and refuses it if they disagree.
+
+LibCST need not reproduce the file: mutants are made by inserting lines.
+"""
 
 import ast
+import io
+import keyword
 import re
+import tokenize
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import zip_longest
@@ -12,11 +19,14 @@ from libcst.metadata import MetadataWrapper, PositionProvider
 
 from mutator.errors import MutatorError
 from mutator.mutants.injected_lines import find_instrumented_line
+from mutator.mutants.logical_lines import LogicalLines
 from mutator.mutants.positions_of_both_parsers import RangeByNode, line_after_statements
+from mutator.mutants.realigned_positions import realigned_positions
 
 MOST_SYNTAX_NODES = 50_000  # of a file's syntax tree; LibCST takes about 0.1 ms and 4 kB for each
 MOST_CHAIN_LINKS = 500  # LibCST recurses once for each link, and thousands would end the process
 # `splitlines` ends a line at a lone CR, but `patch` does not
+_LIBCST_PLACE_PATTERN = re.compile(r"error at (\d+):\d+")
 _LONE_CR_PATTERN = re.compile(rb"\r(?!\n)")
 
 
@@ -87,37 +97,91 @@ def translate_libcst_errors(where: Path) -> Iterator[None]:
         if isinstance(error, cst.ParserSyntaxError):
             message = error.message.partition(": expected")[0]
             # the tokenizer counts lines from the start of a part of the file
-            line = None if message.startswith("tokenizer") else error.raw_line
-        raise MutatorError(
-            f"LibCST cannot parse this file: {message}",
-            where=where,
-            line=line,
-            expected="Python that LibCST can parse, not nested too deeply",
-            remedy="rewrite the code, or inject into another file",
-        ) from None
+            place = _LIBCST_PLACE_PATTERN.search(message)
+            line = int(place[1]) if place and not message.startswith("tokenizer") else None
+        raise _libcst_error(message, where, line) from None
+
+
+def _libcst_error(reason: str, where: Path, line: int | None) -> MutatorError:
+    return MutatorError(
+        f"LibCST cannot parse this file: {reason}",
+        where=where,
+        line=line,
+        expected="Python that LibCST can parse, not nested too deeply",
+        remedy="rewrite the code, or inject into another file",
+    )
 
 
 def parse_with_libcst(data: bytes, where: Path) -> tuple[cst.Module, RangeByNode]:
-    """Parse the file with LibCST; MutatorError unless LibCST reproduces the file's bytes."""
-    module = cst.parse_module(data)
+    """Parse the file with LibCST, and return where its nodes are in the file.
+
+    MutatorError if LibCST cannot parse it, or reads something else than Python does.
+    """
+    try:
+        module = cst.parse_module(data)
+    except TypeError as error:
+        raise _lambda_after_keyword_error(data, where) or _libcst_error(f"{error}", where, None) from None
+    positions = MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
     written = module.bytes
-    if written != data:
-        pairs = zip_longest(data.splitlines(keepends=True), written.splitlines(keepends=True))
-        line = next(
-            i for i, (original_line, written_line) in enumerate(pairs) if original_line != written_line
-        )
-        text = b"".join(data.splitlines()[line : line + 1]).decode(errors="replace").strip()
-        raise MutatorError(
-            f"LibCST does not reproduce the line `{text}`",
-            where=where,
-            line=line + 1,
-            expected="no line with only a backslash, no form feed before code",
-            remedy="rewrite the code, or inject into another file",
-        )
-    return module, MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
+    if written == data:
+        return module, positions
+    encoding = module.encoding.removesuffix("-sig")
+    texts = [text.removeprefix(BOM_UTF8).decode(encoding) for text in (written, data)]
+    positions_in_file = realigned_positions(positions, *texts)
+    if positions_in_file is None or ast.dump(ast.parse(written)) != ast.dump(ast.parse(data)):
+        raise _changed_line_error(data, written, where)
+    return module, positions_in_file
 
 
-def import_insertion_line(module: cst.Module, positions: RangeByNode) -> int:
+def _lambda_after_keyword_error(data: bytes, where: Path) -> MutatorError | None:
+    """Return the error about a `lambda` right after a keyword, if that is what LibCST cannot parse."""
+    lines = data.decode(tokenize.detect_encoding(io.BytesIO(data).readline)[0]).splitlines(keepends=True)
+    brackets = _brackets_between_keyword_and_lambda(data)
+    for line, column in reversed(brackets):
+        lines[line - 1] = f"{lines[line - 1][:column]} {lines[line - 1][column:]}"
+    try:
+        cst.parse_module("".join(lines))
+    except Exception:
+        return None
+    if not brackets:
+        return None
+    return MutatorError(
+        "LibCST cannot parse a `lambda` in parentheses right after a keyword",
+        where=where,
+        line=brackets[0][0],
+        expected="a blank between keyword and parenthesis",
+        remedy="insert it, or inject into another file",
+    )
+
+
+def _brackets_between_keyword_and_lambda(data: bytes) -> list[tuple[int, int]]:
+    """Return line (from 1) and column of each `(` right after a keyword with only `(` before a `lambda`."""
+    tokens = list(tokenize.tokenize(io.BytesIO(data).readline))
+    brackets = []
+    for i, token in enumerate(tokens):
+        if token.type == tokenize.NAME and token.string == "lambda":
+            while tokens[i - 1].string == "(":
+                i -= 1
+            before = tokens[i - 1]
+            if tokens[i] is not token and keyword.iskeyword(before.string) and before.end == tokens[i].start:
+                brackets.append(tokens[i].start)
+    return brackets
+
+
+def _changed_line_error(data: bytes, written: bytes, where: Path) -> MutatorError:
+    pairs = zip_longest(data.splitlines(keepends=True), written.splitlines(keepends=True))
+    line = next(i for i, (original_line, written_line) in enumerate(pairs) if original_line != written_line)
+    text = b"".join(data.splitlines()[line : line + 1]).decode(errors="replace").strip()
+    return MutatorError(
+        f"LibCST reads the line `{text}` in another way than Python",
+        where=where,
+        line=line + 1,
+        expected="a line that both read in the same way",
+        remedy="rewrite the code, or inject into another file",
+    )
+
+
+def import_insertion_line(module: cst.Module, positions: RangeByNode, logical_lines: LogicalLines) -> int:
     """Return the index of the line before which to insert imports: after docstring and `__future__`."""
     after = None
     for i, node in enumerate(module.body):
@@ -139,7 +203,9 @@ def import_insertion_line(module: cst.Module, positions: RangeByNode) -> int:
         after = line_after_statements(node, positions)
     if after is not None:
         return after
-    return _first_line_with_decorators(module.body[0], positions) if module.body else len(module.header)
+    if not module.body:
+        return len(module.header)
+    return logical_lines.start_of(_first_line_with_decorators(module.body[0], positions))
 
 
 def _first_line_with_decorators(node: cst.CSTNode, positions: RangeByNode) -> int:

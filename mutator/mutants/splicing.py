@@ -8,7 +8,7 @@ expression is replaced by one that keeps the old line in its tag.
 from codecs import BOM_UTF8
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import pairwise
 
@@ -167,14 +167,6 @@ def _line_replacement_edit(
 
 
 def probe_import_edit(file: ParsedFile, package: str | None) -> LineEdit:
-    if file.import_line == 0 and file.data.startswith(BOM_UTF8):
-        raise MutatorError(
-            "a byte order mark right before the first statement",
-            where=file.full_path,
-            line=1,
-            expected="a comment or docstring after the mark, or no mark",
-            remedy="save the file without a byte order mark",
-        )
     line = probe_import_line(package).encode(file.encoding)
     return LineEdit(line_index=file.import_line, rank=EditRank.BEFORE, lines=(line + file.newline,))
 
@@ -249,7 +241,23 @@ def apply_edits(file: ParsedFile, edits: Iterable[LineEdit]) -> tuple[PatchPiece
             added += _indent_lines(wrapped, edit.indent_unit)
         pieces.append(PatchPiece(sign="+", lines=tuple(added)))
     _append_unchanged(pieces, file.lines[next_line:])
+    if file.data.startswith(BOM_UTF8):
+        _add_byte_order_mark(pieces)
     return tuple(pieces)
+
+
+def _add_byte_order_mark(pieces: list[PatchPiece]) -> None:
+    """Begin both the original and the new file with a byte order mark, even if their first lines differ."""
+    original = next((i for i, piece in enumerate(pieces) if piece.sign != "+"), None)
+    if original and pieces[original].sign == " ":  # inserted lines come first
+        line, *others = pieces[original].lines
+        split = [PatchPiece(sign=sign, lines=(line,)) for sign in "-+"]
+        pieces[original : original + 1] = [*split, PatchPiece(sign=" ", lines=tuple(others))]
+    for sides in (" -", " +"):
+        first = next((i for i, piece in enumerate(pieces) if piece.sign in sides), None)
+        if first is not None and not pieces[first].lines[0].startswith(BOM_UTF8):
+            line, *others = pieces[first].lines
+            pieces[first] = replace(pieces[first], lines=(BOM_UTF8 + line, *others))
 
 
 def _append_unchanged(pieces: list[PatchPiece], lines: tuple[bytes, ...]) -> None:
@@ -289,6 +297,8 @@ def mutated_bytes(pieces: Iterable[PatchPiece]) -> bytes:
 
 def unsplice(data: bytes) -> bytes:
     """Return the original bytes of a mutated file."""
+    if data.startswith(BOM_UTF8):
+        return BOM_UTF8 + unsplice(data.removeprefix(BOM_UTF8))
     lines = data.splitlines(keepends=True)
     result: list[bytes] = []
     remaining = 0  # lines still indented by a guard

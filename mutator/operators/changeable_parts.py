@@ -56,7 +56,7 @@ class _Step:
 class ChangeablePart:
     """The smallest part of a function whose code a mutation changes: a statement, or an element in it.
 
-    `steps` lead from the statement to the changed expression, through the elements of long nodes at
+    `steps` go from the statement to the changed expression, through the elements of long nodes at
     `long_steps`. Mutations of different parts give equal code only if they give the original's.
     """
 

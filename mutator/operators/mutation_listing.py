@@ -52,6 +52,11 @@ def _expression_mutations(
         for name, rule in _rules_for(operators, expression, facts):
             parts = template_parts(expression) if parts is None else parts
             model = models.get(rule.model)
+            source_after = render_changed_value(
+                model, dict(rule.params), _PLACEHOLDER_ID, expression.one_line_source, parts
+            )
+            if not _is_encodable(source_after, file.encoding):
+                continue  # an escaped character that the file's encoding lacks
             yield Mutation(
                 operator=name,
                 location=location,
@@ -59,10 +64,16 @@ def _expression_mutations(
                 params=rule.params,
                 mutated_part=expression,
                 source_before=text,
-                source_after=render_changed_value(
-                    model, dict(rule.params), _PLACEHOLDER_ID, expression.one_line_source, parts
-                ),
+                source_after=source_after,
             )
+
+
+def _is_encodable(text: str, encoding: str) -> bool:
+    try:
+        text.encode(encoding)
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _rules_for(

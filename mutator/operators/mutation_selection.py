@@ -9,7 +9,7 @@ from mutator._common.message_text import counted, spelling_suggestion
 from mutator._common.random_streams import random_generator
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.mutants.anchors import parsed_file
+from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.mutants.refused_places import refusal_reason_of_function
 from mutator.operators.equal_code_filter import drop_equal_code
 from mutator.operators.executed_lines import TypesByFile
@@ -21,6 +21,7 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches_any_glob
 
 LinesByFile = Mapping[str, Collection[int]]  # by file, from 1
+_MOST_NAMED_FILES = 20
 _WILDCARDS = "*?["  # of `fnmatch`; a path without one must be a file of the target
 
 
@@ -34,6 +35,7 @@ class SelectedMutations:
     equal_to_original_count: int = 0  # same code as the original
     duplicate_count: int = 0  # same code as an earlier mutation
     invalid_count: int = 0  # does not compile
+    refused_files: tuple[str, ...] = ()  # that wildcards match: `PATH:LINE: REASON`
 
     @property
     def summary(self) -> str:
@@ -46,8 +48,19 @@ class SelectedMutations:
             "that do not compile": self.invalid_count,
         }
         parts = [f"{number} {what}" for what, number in left_out.items() if number]
+        if self.refused_files:
+            parts.append(f"all in {self._description_of_refused_files}")
         rest = f"; left out: {', '.join(parts)}" if parts else ""
         return counted(len(self.mutations), "mutant of operators", "mutants of operators") + rest
+
+    @property
+    def _description_of_refused_files(self) -> str:
+        named, rest = self.refused_files[:_MOST_NAMED_FILES], len(self.refused_files) - _MOST_NAMED_FILES
+        more = (f"{rest} more",) if rest > 0 else ()
+        count = counted(
+            len(self.refused_files), "file that cannot be changed", "files that cannot be changed"
+        )
+        return f"{count} ({'; '.join(named + more)})"
 
 
 def select_mutations(
@@ -65,10 +78,13 @@ def select_mutations(
     place matches nothing.
     """
     functions_by_path: dict[str, dict[str, None]] = {}
+    refusal_by_path: dict[str, MutatorError] = {}
     for place in places:
-        for path, function in _functions_at(manifest, place):
+        for path, function in _functions_at(manifest, place, refusal_by_path):
             functions_by_path.setdefault(path, {})[function] = None
-    selected = SelectedMutations()
+    selected = SelectedMutations(
+        refused_files=tuple(_short_refusal(path, refusal_by_path[path]) for path in sorted(refusal_by_path))
+    )
     for path in sorted(functions_by_path):
         selected = _merge(
             selected,
@@ -115,21 +131,29 @@ def _merge(first: SelectedMutations, second: SelectedMutations) -> SelectedMutat
         equal_to_original_count=first.equal_to_original_count + second.equal_to_original_count,
         duplicate_count=first.duplicate_count + second.duplicate_count,
         invalid_count=first.invalid_count + second.invalid_count,
+        refused_files=first.refused_files + second.refused_files,
     )
 
 
-def _functions_at(manifest: TargetManifest, place: str) -> Iterator[tuple[str, str]]:
-    """Yield path and qualified name of each function that a place names; MutatorError if there is none."""
+def _functions_at(
+    manifest: TargetManifest, place: str, refusal_by_path: dict[str, MutatorError]
+) -> Iterator[tuple[str, str]]:
+    """Yield path and qualified name of each function that a place names; MutatorError if there is none.
+
+    A file that a wildcard matches and that cannot be parsed is only noted in `refusal_by_path`.
+    """
     path, _, function = place.partition("::")
-    paths = _paths_at(manifest, path)
+    files = list(_parsed_files_at(manifest, path, refusal_by_path))
     matching = [
-        (path, name)
-        for path in paths
-        for name in parsed_file(manifest.tree, path).functions_by_name
+        (file.path, name)
+        for file in files
+        for name in file.functions_by_name
         if fnmatchcase(name, function.replace(".<locals>", "") or "*")
     ]
     if not matching:
-        names = [name for path in paths[:1] for name in parsed_file(manifest.tree, path).functions_by_name]
+        if not files:
+            raise next(iter(refusal_by_path.values()))
+        names = list(files[0].functions_by_name)
         raise MutatorError(
             f"no function '{function}' in {path}" if function else f"no function in {path}",
             argument="in",
@@ -139,8 +163,28 @@ def _functions_at(manifest: TargetManifest, place: str) -> Iterator[tuple[str, s
     yield from matching
 
 
+def _parsed_files_at(
+    manifest: TargetManifest, path: str, refusal_by_path: dict[str, MutatorError]
+) -> Iterator[ParsedFile]:
+    for file_path in _paths_at(manifest, path):
+        try:
+            yield parsed_file(manifest.tree, file_path)
+        except MutatorError as refusal:
+            if not _has_wildcard(path):
+                raise
+            refusal_by_path[file_path] = refusal
+
+
+def _short_refusal(path: str, refusal: MutatorError) -> str:
+    return f"{path}:{refusal.line}: {refusal.got}" if refusal.line else f"{path}: {refusal.got}"
+
+
+def _has_wildcard(path: str) -> bool:
+    return any(character in path for character in _WILDCARDS)
+
+
 def _paths_at(manifest: TargetManifest, path: str) -> list[str]:
-    if not any(c in path for c in _WILDCARDS):
+    if not _has_wildcard(path):
         check_file_allowed(manifest, path)
         return [path]
     matching = [

@@ -40,6 +40,40 @@ def proved(sources: Iterable[tuple[object, bytes]], run: Run | None, variables: 
     return figures
 
 
+# LibCST does not reproduce most of these
+ODD_SOURCES = {
+    "blank before a colon": (
+        "def f(x):\n    try:\n        y = g(x)\n    except OSError :\n        y = 1\n    return y\n"
+    ),
+    "blanks around a colon": "def f(x) :\n    if x : y = 1\n    else :\n        y = g(x)\n    return y\n",
+    "form feed before def": "def f(x):\n    return x\n\x0cdef g(x):\n    y = f(x)\n    return y\n",
+    "form feed in the indentation": "def f(x):\n\x0c    y = g(x)\n    \x0c\n    z = y\n    return z\n",
+    "form feed inside": "def f(x):\n    y =\x0cg(x)\n    g(\x0cx)\x0c\n    return\x0cy\n",
+    "form feed before a class": (
+        "class A:\n    def f(self):\n        x = 1\n\x0c    def g(self):\n        x = h(2)\n\x0cy = 3\n"
+    ),
+    "only a backslash": "\\\ndef f(x):\n    y = g(x)\n    \\\n    g(y)\n    \\\n    return y\n",
+    "backslashes and other indentation": (
+        "def f(x):\n    if x:\n        a = 1; \\\n    b = 2\n        \\\n  c = 3\n    return b\n"
+    ),
+    "backslash below the docstring": (
+        "'Doc.'\n\\\nfrom __future__ import annotations\n\\\nx = 1\ndef f(x):\n    y = x\n"
+    ),
+    "backslash at the end": "def f(x):\n    y = x \\\n\n    g(y) \\\n\n",
+    "blanks at the end": "def f(x):\n    y = x\n    return y\n\n  \n",
+    "no end of line": "def f(x):\n    try:\n        return x\n    except E :\n        y = 1",
+    "tabs": "def f(x):\n\ttry:\n\t\ty = g(x)\n\texcept E :\n\t  y = 1\n\treturn y\n",
+    "CRLF and LF": (
+        "def f(x):\r\n    try:\n        y = g(x)\r\n    except E :\r\n        y = 1\n    return y\r\n"
+    ),
+    "byte order mark": "\ufeffdef f(x):\n    y = g(x)\n    return y\n",
+    "byte order mark and backslash": "\ufeff\\\ndef f(x): return x\ndef g(x):\n    y = f(x)\n    return y",
+    "byte order mark, form feed": "\ufeff\x0cimport a\nx = 1\n\x0cdef f(x):\n    y = g(x)\n",
+    "byte order mark and CRLF": "\ufeffclass A:\r\n    def f(self):\r\n        y = g(x)\r\n",
+    "letters outside ASCII": (
+        "def f(ä):\n    try:\n        ö = 'ü', g(ä)\n    except Ä :\n        ö = g('ß'); g(ä)\n    return ö\n"
+    ),
+}
 PARTS = 8  # of a slow test, so that eight workers can share it
 
 
@@ -53,6 +87,13 @@ def test_mutants_of_generated_modules_are_correct(first: int, count: int) -> Non
     assert not figures.wrong
     assert figures.modules["spliced"] > 0.8 * count
     assert all(figures.anchors[kind] > count / 2 for kind in KINDS)
+
+
+@pytest.mark.parametrize("name", ODD_SOURCES)
+def test_mutants_of_files_with_odd_blanks_are_correct(name: str) -> None:
+    figures = proved([(name, ODD_SOURCES[name].encode())], None)
+    assert not figures.wrong
+    assert figures.modules == {"spliced": 1} and figures.anchors.total()
 
 
 @pytest.mark.parametrize("part", [None, *(pytest.param(n, marks=pytest.mark.slow) for n in range(PARTS))])

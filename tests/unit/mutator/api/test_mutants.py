@@ -49,6 +49,25 @@ def test_mutants_of_a_campaign_are_written(toycar: Workspace, tmp_path: Path) ->
     assert all((tmp_path / "m" / line["patch"]).is_file() for line in index)
 
 
+@pytest.mark.parametrize("exists", [False, True])
+@pytest.mark.parametrize("error", [MutatorError("no"), KeyboardInterrupt()])
+def test_nothing_stays_of_mutants_that_are_written_in_part(
+    toycar: Workspace, tmp_path: Path, exists: bool, error: BaseException
+) -> None:
+    bench, pairs = pairs_of_campaign(toycar, "small", Choices(limit=4))
+    out, steps = tmp_path / "m", [None, error]
+    if exists:
+        out.mkdir()
+
+    def step() -> None:
+        if problem := steps.pop(0):
+            raise problem
+
+    with pytest.raises(type(error)):
+        write_mutants(bench, pairs, out, trees=True, step=step)
+    assert [*out.iterdir()] == [] if exists else not out.exists()
+
+
 def test_specs_are_paired_with_every_context(toycar: Workspace) -> None:
     bench = SelectedTarget.of(toycar)
     pairs = pairs_of_specs(bench, ["sensor/lane"])

@@ -187,5 +187,22 @@ def test_a_byte_order_mark_stays_first() -> None:
     result = splicing.mutated_bytes(splicing.apply_edits(file, [splicing.probe_import_edit(file, "pack")]))
     compile(result, "m.py", "exec")
     assert result.startswith(b"\xef\xbb\xbf'Doc.'\nfrom pack")
-    with pytest.raises(MutatorError, match="a byte order mark right before"):
-        splicing.probe_import_edit(parsed(b"\xef\xbb\xbfx = 1\n"), "pack")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import a\n\ndef f(x):\n    x = 1\n",
+        "def f(x): return x\ndef g(x):\n    x = 1",
+        "import a",
+        "\x0cx = 1\n",
+    ],
+)
+def test_an_import_before_the_first_statement_comes_after_the_byte_order_mark(text: str) -> None:
+    file = parsed(b"\xef\xbb\xbf" + text.encode())
+    pieces = splicing.apply_edits(file, [splicing.probe_import_edit(file, "pack")])
+    result = splicing.mutated_bytes(pieces)
+    compile(result, "m.py", "exec")
+    assert result == b"\xef\xbb\xbffrom pack import _fi  # fi:probe\n" + text.encode()
+    assert b"".join(line for piece in pieces if piece.sign != "+" for line in piece.lines) == file.data
+    assert splicing.unsplice(result) == file.data

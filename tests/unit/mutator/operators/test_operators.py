@@ -155,6 +155,38 @@ def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
         unique_operator_names(["arith"])
 
 
+def test_a_file_that_cannot_be_changed_costs_only_its_own_mutants(toycar: Workspace) -> None:
+    folder, models = toycar.library.parent / "tree/toycar/odd", toycar.fault_models()
+    folder.mkdir()
+    for name, source in {
+        "a.py": "def f(a):\n    return a + 1\n",
+        "b.py": "def f(a):\n    x = a\n    return(lambda: a + 1)()\n",
+        "c.py": "def f(a):\n    (b): int = a\n    return b + 1\n",
+        "d.py": "print 'Python 2'\n",
+    }.items():
+        (folder / name).write_text(source)
+    manifest, odd = toycar.manifest("toycar"), "toycar/odd"
+    both = select_mutations(manifest, models, ["arithmetic"], [f"{odd}/*.py", f"{odd}/*.py::f"])
+    alone = select_mutations(manifest, models, ["arithmetic"], [f"{odd}/a.py"])
+    assert both.mutations == alone.mutations and not alone.refused_files
+    places = [text.partition(": ")[0] for text in both.refused_files]
+    assert places == [f"{odd}/b.py:3", f"{odd}/c.py:2", f"{odd}/d.py:1"]
+    assert f"all in 3 files that cannot be changed ({odd}/b.py:3: LibCST cannot parse" in both.summary
+    for place in (f"{odd}/b.py", f"{odd}/b*.py::f"):
+        with pytest.raises(MutatorError, match=r"b\.py:3: .*right after a keyword"):
+            select_mutations(manifest, models, ["arithmetic"], [place])
+
+
+def test_text_that_the_encoding_of_the_file_lacks_is_no_mutation(tmp_path: Path, clone: Workspace) -> None:
+    source = "# coding: latin-1\ndef f(a):\n    return a('\\u20ac', 1), '\xe9'\n"
+    (tmp_path / "m.py").write_bytes(source.encode("latin-1"))
+    tree = read_tree(tmp_path, ["m.py"])
+    file, facts = parsed_file(tree, "m.py"), statement_facts_of(tree, "m.py")
+    mutations = mutations_of(file, facts, "f", clone.fault_models(), OPERATORS.shipped_names())
+    assert {one.operator for one in mutations} == {"constant", "return"}
+    assert drop_equal_code(file, mutations).mutations == tuple(mutations)
+
+
 def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = select_mutations(manifest, models, OPERATORS.shipped_names(), ["toycar/**"])
