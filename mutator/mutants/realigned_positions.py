@@ -35,7 +35,7 @@ class _Text:
         return CodePosition(line, offset - self.line_starts[line - 1])
 
 
-def realigned_positions(positions: RangeByNode, written: str, original: str) -> RangeByNode | None:
+def align_positions(positions: RangeByNode, written: str, original: str) -> RangeByNode | None:
     """Return the positions in the original text; None if LibCST changes more than it may.
 
     `written` is the text that LibCST writes.

@@ -21,7 +21,7 @@ from mutator.errors import MutatorError
 from mutator.mutants.injected_lines import find_instrumented_line
 from mutator.mutants.logical_lines import LogicalLines
 from mutator.mutants.positions_of_both_parsers import RangeByNode, line_after_statements
-from mutator.mutants.realigned_positions import realigned_positions
+from mutator.mutants.realigned_positions import align_positions
 
 MOST_SYNTAX_NODES = 50_000  # of a file's syntax tree; LibCST takes about 0.1 ms and 4 kB for each
 MOST_CHAIN_LINKS = 500  # LibCST recurses once for each link, and thousands would end the process
@@ -127,7 +127,7 @@ def parse_with_libcst(data: bytes, where: Path) -> tuple[cst.Module, RangeByNode
         return module, positions
     encoding = module.encoding.removesuffix("-sig")
     texts = [text.removeprefix(BOM_UTF8).decode(encoding) for text in (written, data)]
-    positions_in_file = realigned_positions(positions, *texts)
+    positions_in_file = align_positions(positions, *texts)
     if positions_in_file is None or ast.dump(ast.parse(written)) != ast.dump(ast.parse(data)):
         raise _changed_line_error(data, written, where)
     return module, positions_in_file
