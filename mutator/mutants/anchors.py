@@ -25,7 +25,7 @@ from mutator.mutants.logical_lines import LogicalLines
 from mutator.mutants.name_scopes import normalize_identifier, used_names_by_function
 from mutator.mutants.positions_of_both_parsers import NodePosition, ast_node_positions
 from mutator.mutants.source_parsing import (
-    check_line_ends_and_uninstrumented,
+    check_line_ends_and_tags,
     import_insertion_line,
     parse_with_libcst,
     parse_with_python,
@@ -130,7 +130,7 @@ def parsed_file(tree: SourceTree, path: str) -> ParsedFile:
 def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
     """Parse a file of the target; MutatorError if it is not Python, or already has injected lines."""
     where = root / path
-    check_line_ends_and_uninstrumented(data, where)
+    check_line_ends_and_tags(data, where)
     tree = parse_with_python(data, where)
     with translate_libcst_errors(where):
         module, positions = parse_with_libcst(data, where)

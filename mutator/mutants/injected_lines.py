@@ -27,7 +27,6 @@ _TAG_START_BYTES = _TAG_START.encode()
 _TAG_PATTERN = rf"{_TAG_START}([0-9a-z]+(?:\+[0-9a-z]+)*)(?: guard:(\d+)| was:([^\r\n]*))?"
 # only at the end of a line, because a string of the target can contain the text of a tag
 _TAG_AT_LINE_END_PATTERN = re.compile(rf"[ \t]*{_TAG_PATTERN}(?=\r?\n?\Z)".encode())
-_PROBE_NAME_PATTERN = re.compile(rf"\b{PROBE_MODULE_NAME}\b".encode())
 _ACTIVE_CHECK_PATTERN = (  # checks of the instance or execution come first
     rf"(?:{PROBE_MODULE_NAME}\.on\(\) and \(.*?\) and )?"
     rf'(?:{PROBE_MODULE_NAME}\.(?:call|every)\("[0-9a-z]+", \d+\) and )?'
@@ -219,14 +218,13 @@ def observe_call(expressions: Sequence[tuple[str, str]]) -> str:
     return f"{PROBE_MODULE_NAME}.observe({', '.join(f'{name}={text}' for name, text in expressions)})"
 
 
-def find_instrumented_line(data: bytes) -> int | None:
-    """Return the index of a line with a tag, or else with the probe's name; None if there is neither."""
-    if _TAG_START.encode() in data:
+def find_tagged_line(data: bytes) -> int | None:
+    """Return the index of the first line with a tag, None if there is none."""
+    if _TAG_START_BYTES in data:
         for index, line in enumerate(data.splitlines(keepends=True)):
             if tag_of(line):
                 return index
-    match = _PROBE_NAME_PATTERN.search(data)
-    return data[: match.start()].count(b"\n") if match else None
+    return None
 
 
 # Injected lines in patches

@@ -9,7 +9,7 @@ import keyword
 import re
 import tokenize
 from codecs import BOM_UTF8
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import zip_longest
 from pathlib import Path
@@ -17,8 +17,9 @@ from pathlib import Path
 import libcst as cst
 from libcst.metadata import MetadataWrapper, PositionProvider
 
+from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.errors import MutatorError
-from mutator.mutants.injected_lines import find_instrumented_line
+from mutator.mutants.injected_lines import find_tagged_line
 from mutator.mutants.logical_lines import LogicalLines
 from mutator.mutants.positions_of_both_parsers import RangeByNode, line_after_statements
 from mutator.mutants.realigned_positions import align_positions
@@ -30,7 +31,7 @@ _LIBCST_PLACE_PATTERN = re.compile(r"error at (\d+):\d+")
 _LONE_CR_PATTERN = re.compile(rb"\r(?!\n)")
 
 
-def check_line_ends_and_uninstrumented(data: bytes, where: Path) -> None:
+def check_line_ends_and_tags(data: bytes, where: Path) -> None:
     if match := _LONE_CR_PATTERN.search(data):
         raise MutatorError(
             "a line ends in CR alone",
@@ -39,15 +40,49 @@ def check_line_ends_and_uninstrumented(data: bytes, where: Path) -> None:
             expected="LF or CRLF",
             remedy="convert the file's line ends",
         )
-    line = find_instrumented_line(data)
+    line = find_tagged_line(data)
     if line is not None:
         raise MutatorError(
-            "the target uses the name `_fi` or a `# fi:` tag",
+            "the line ends in a `# fi:` tag, as injected lines do",
             where=where,
             line=line + 1,
             expected="a tree without injected lines",
-            remedy="point the manifest at the original tree, or rename `_fi` in the target",
+            remedy="point the manifest at the original tree, or change the text",
         )
+
+
+def _check_probe_name_is_free(tree: ast.Module, where: Path) -> None:
+    """Refuse a file that has a variable with the probe's name. Attributes of that name are no variables."""
+    for node in ast.walk(tree):
+        if PROBE_MODULE_NAME in _variables_in(node):
+            raise MutatorError(
+                f"the target uses the name `{PROBE_MODULE_NAME}`",
+                where=where,
+                line=getattr(node, "lineno", None),
+                expected="no variable of this name, because injected lines use it",
+                remedy="point the manifest at the original tree, or rename the variable",
+            )
+
+
+def _variables_in(node: ast.AST) -> Sequence[str | None]:
+    """Return the names that a node itself reads or binds, spelled as the compiler does."""
+    match node:
+        case ast.Name(id=name) | ast.arg(arg=name) | ast.MatchMapping(rest=name):
+            return [name]
+        case (
+            ast.FunctionDef(name=name)
+            | ast.AsyncFunctionDef(name=name)
+            | ast.ClassDef(name=name)
+            | ast.ExceptHandler(name=name)
+            | ast.MatchAs(name=name)
+            | ast.MatchStar(name=name)
+        ):
+            return [name]
+        case ast.Global(names=names) | ast.Nonlocal(names=names):
+            return names
+        case ast.Import(names=aliases) | ast.ImportFrom(names=aliases):
+            return [alias.asname or alias.name.partition(".")[0] for alias in aliases]
+    return ()
 
 
 def parse_with_python(data: bytes, where: Path) -> ast.Module:
@@ -63,6 +98,7 @@ def parse_with_python(data: bytes, where: Path) -> ast.Module:
             remedy="correct the target's source, or use the Python that it is written for",
         ) from None
     _check_tree_size(tree, where)
+    _check_probe_name_is_free(tree, where)
     return tree
 
 

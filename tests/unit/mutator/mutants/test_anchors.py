@@ -196,10 +196,50 @@ def test_the_probe_is_imported_below_the_head_of_the_file(source: str, line: int
         (b"x = '\xff'\n", "not valid Python"),
         (b"x = 1\ry = 2\r", "a line ends in CR alone"),
         (b"import os\nfrom p import _fi\n", "m.py:2: the target uses the name `_fi`"),
-        (b"import os\n\nx = 1  # fi:ab12\n", "m.py:3: the target uses the name `_fi` or a `# fi:` tag"),
+        (b"import os\n\nx = 1  # fi:ab12\n", "m.py:3: the line ends in a `# fi:` tag"),
+        (b"x = '''\n# fi:ab12\n'''\n", "m.py:2: the line ends in a `# fi:` tag"),
     ],
 )
 def test_an_invalid_or_already_injected_file_is_refused(source: bytes, piece: str) -> None:
     with pytest.raises(MutatorError) as caught:
         parse_file("m.py", source, Path("root"))
     assert piece in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "_fi = 1",
+        "import _fi.a",
+        "import a as _fi",
+        "def f(a, *_fi): pass",
+        "def f():\n    global _fi",
+        "class A:\n    _fi = 1",
+        "def _fi(): pass",
+        "x = [_fi for _fi in a]",
+        "try: pass\nexcept E as _fi: pass",
+        "match a:\n    case {**_fi}: pass",
+        "del _fi",
+        "x = lambda: _fi",
+        "_\ufb01 = 1",
+    ],
+)
+def test_a_variable_with_the_name_of_the_probe_is_refused(source: str) -> None:
+    """The compiler spells the letter U+FB01 as `fi`."""
+    with pytest.raises(MutatorError, match=r"m\.py:\d: the target uses the name `_fi`;"):
+        parse_file("m.py", source.encode(), Path("root"))
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "a._fi = a._fi",
+        "x = '_fi'  # not _fi",
+        "import a._fi",
+        "f(_fi=1)",
+        "class _:\n    __fi = 1",
+        "_fir = 1",
+    ],
+)
+def test_a_name_that_is_no_variable_may_be_that_of_the_probe(source: str) -> None:
+    assert parse_file("m.py", source.encode(), Path("root"))

@@ -28,7 +28,7 @@ def test_injected_lines_are_recognized_by_their_tags(clone: Workspace) -> None:
             assert (tag.id, tag.guarded_line_count, tag.is_of_fault) == (name, guarded, of_fault)
             assert tag.is_guard == ("if " in line)
             assert tag.line_without_tag.decode() == line.partition("  #")[0]
-        assert injected_lines.find_instrumented_line(f"x = 1\n{line}\n".encode()) == 1
+        assert injected_lines.find_tagged_line(f"x = 1\n{line}\n".encode()) == 1
         assert injected_lines.adds_fault(f"+{line}") is of_fault
         assert list(injected_lines.tagged_addition_spans(f"+{line}\n", 0, 999)) == [(1, len(line) + 1)]
 
@@ -44,7 +44,7 @@ def test_a_similar_comment_is_not_a_tag(clone: Workspace) -> None:
         b"y  # fi:a guard:",
     ):
         assert injected_lines.tag_of(line) is None
-    assert injected_lines.find_instrumented_line(b"wi_fi = 1\nx_fi = 2  # fi:A\n") is None
+    assert injected_lines.find_tagged_line(b"wi_fi = 1\nx_fi = 2  # fi:A\n") is None
 
 
 def test_pages_use_the_tags_defined_in_python() -> None:
