@@ -21,11 +21,10 @@ from mutator.serve.json_api import JobApi, ReviewApi, selected_groups
 from mutator.serve.page_tokens import HOME_PAGE, PageTokens, review_page_name
 from mutator.serve.report_pages import RunPages
 from mutator.serve.responses import media_type_of, on_error
-from mutator.serve.run_states import RUNNING, state_of_run
+from mutator.serve.run_states import has_report
 from mutator.serve.served_reviews import ServedReviews
 from mutator.serve.served_runs import REPORT_PAGE, ServedRuns, live_address, report_address, summarize_run
 from mutator.serve.watch_pages import WatchPages
-from mutator.store.run_folder import RunFolder
 from mutator.web import asset_names, asset_text
 from mutator.workspace import Workspace
 
@@ -119,10 +118,7 @@ def _page_routes(site: ServedSite) -> list[Route]:
 
     def run_file(request: Request) -> Response:
         key, name = request.path_params["run"], request.path_params["path"]
-        if (
-            name == REPORT_PAGE
-            and state_of_run(RunFolder.open_unverified(site.runs.folder(key))).state == RUNNING
-        ):
+        if name == REPORT_PAGE and not has_report(site.runs.folder(key)):
             return RedirectResponse(live_address(key))
         return site.run_pages.run_file(key, name)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mutator._common.folder_locks import is_owner_alive
 from mutator.model import Status
+from mutator.results.table_reader import Results
 from mutator.serve.responses import without_absolute_folders
 from mutator.store.line_tail import LineTail
 from mutator.store.records import RECORDS_FOLDER, parse_ending
@@ -50,6 +51,13 @@ def state_of_run(folder: RunFolder) -> RunState:
     if stored and stored.problem:
         return RunState(state=FAILED, progress=progress, problem=without_absolute_folders(stored.problem))
     return RunState(state=UNFINISHED)
+
+
+def has_report(run: Path) -> bool:
+    """Whether a report can be made: no command works on the run, and it was not killed before its tables."""
+    folder = RunFolder.open_unverified(run)
+    state = state_of_run(folder).state
+    return state == FINISHED or (state != RUNNING and Results(folder.path).path.is_file())
 
 
 def count_records(run: Path) -> dict[str, int]:

@@ -63,6 +63,15 @@ def test_a_run_in_progress_leads_to_its_live_page(watching: Client) -> None:
     assert (listed["state"], listed["stage"]) == ("running", "experiments")
 
 
+def test_a_run_that_was_killed_before_it_had_tables_is_shown_from_its_records(watching: Client) -> None:
+    """Its report answered with an error, and its list said 0."""
+    assert watching.get("/runs/half/report/index.html").headers["location"] == "/live/half"
+    data = watching.get("/api/runs/half/live").json
+    [listed] = watching.get("/api/runs").json["runs"]
+    assert (data["state"], data["done"], data["planned"]) == ("unfinished", 12, 24)
+    assert (listed["state"], listed["done"]) == ("unfinished", 12)
+
+
 def test_an_experiment_of_an_unfinished_run_is_shown(watching: Client) -> None:
     row = watching.get("/api/runs/half/live").json["rows"][0]
     page = watching.get(f"/live/half/{row['id']}")
