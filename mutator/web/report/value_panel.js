@@ -16,6 +16,7 @@ class ValuePanel {
     const show = () => {
       if (this.observer) this.observer.disconnect();
       this.observer = null;
+      Chart.load();
       this.#build();
       this.show();
     };
