@@ -37,7 +37,7 @@ CLICKED = (
 )
 KEYS = ("j", "a", "r", "Shift+A", "Enter", "s", "Enter", "u", "f", " ", "Tab", "Enter")
 CAMPAIGN = {"kind": "campaign", "campaign": "small", "name": "new"}
-STARTED = [("campaign", "", "queued"), ("report", "other", "queued")]
+STARTED = [("campaign", "new", "queued"), ("report", "other", "queued")]
 
 
 @pytest.fixture(scope="module")

@@ -104,7 +104,7 @@ const Jobs = (() => {
       else progress.value = job.progress;
       message.textContent = job.message;
       cancel.hidden = !isActive(job) || !mayCancel(job);
-      const address = job.result || (job.kind === "campaign" && isActive(job) && `/live/${encodeURIComponent(job.run)}`);
+      const address = job.result || (job.kind === "campaign" && isActive(job) && mayCancel(job) && `/live/${encodeURIComponent(job.run)}`);
       result.hidden = !address || (!job.result && address === location.pathname);
       result.textContent = job.result ? "Show it" : "Watch it";
       result.setAttribute("aria-label", `${result.textContent}: ${job.title}`);
