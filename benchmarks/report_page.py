@@ -93,7 +93,7 @@ def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
     draw = np.random.default_rng(1)
     names = [metric.name for metric in workspace.manifest("openpilot").all_metrics]
     for number, experiment in enumerate(experiments):
-        metrics = tuple(zip(names, map(float, draw.normal(10.0, 5.0, len(names))), strict=True))
+        metrics = tuple(zip(names, map(float, np.abs(draw.normal(10.0, 5.0, len(names)))), strict=True))
         lines.append(asdict(replace(record(experiment, number), metrics=metrics)))
     lines.close()
     table_building.build_tables(out)

@@ -21,6 +21,8 @@ const Replay = (() => {
     constructor({ place, series, facts, isBrief = false, beside = null }, { clock, axes, toggle }) {
       this.place = place;
       this.isBrief = isBrief;
+      this.gauges = /** @type {any} */ (null);
+      this.plots = /** @type {any} */ (null);
       this.beside = beside;
       this.series = series;
       this.facts = facts;
@@ -30,7 +32,7 @@ const Replay = (() => {
       this.toggle = toggle;
       this.scene = this.#scene();
       this.#build();
-      if (this.#hasPlots) this.plots.begin();
+      this.plots?.begin();
       new ResizeObserver(() => this.clock.redraw()).observe(this.root);
     }
 
@@ -49,9 +51,9 @@ const Replay = (() => {
       const { el } = Dom, { clock, series } = this;
       this.bar = new ReplayBar(series, clock, (t) => this.describe(t));
       const plotting = { isPlotted: (name) => this.plots.isPlotted(name), toggle: this.toggle };
-      this.gauges = new ReplayGauges(this.channels, this.axes, plotting);
-      this.plots = new ReplayPlots(this.channels, this.axes, series, clock, (from, to) => this.bar.zoomed(from, to), this.beside);
-      this.gauges.pressed();
+      if (!this.isBrief) this.gauges = new ReplayGauges(this.channels, this.axes, plotting);
+      if (!this.isBrief || !this.scene) this.plots = new ReplayPlots(this.channels, this.axes, series, clock, (from, to) => this.bar.zoomed(from, to), this.beside);
+      this.gauges?.pressed();
       this.time = el("span.now");
       this.states = el("span.states");
       this.live = el("p.visually-hidden", { "aria-live": "polite" });
@@ -63,17 +65,9 @@ const Replay = (() => {
         } },
         el("div.stage", {}, this.#view(), el("div.state", {}, this.time, this.states)), this.#controls(), this.bar.element, this.bar.jumps,
         this.missing ? el("p.quiet", {}, `The scene cannot be drawn: ${this.missing}.`) : null,
-        this.#hasGauges ? this.gauges.element : null, this.#hasPlots ? this.plots.element : null, this.live);
-      if (this.isBrief) this.plots.choose(new Set([...this.plots.chosen].slice(0, 2)));
+        this.gauges?.element, this.plots?.element, this.live);
+      if (this.isBrief) this.plots?.choose(new Set([...this.plots.chosen].slice(0, 2)));
       this.place.replaceChildren(el("div.replay-box", {}, this.root));
-    }
-
-    get #hasGauges() {
-      return !this.isBrief;
-    }
-
-    get #hasPlots() {
-      return !this.isBrief || !this.scene;
     }
 
     #view() {
@@ -107,7 +101,7 @@ const Replay = (() => {
       const keys = {
         ArrowLeft: () => (by ? this.#go(clock.t - by) : clock.step(-1)), ArrowRight: () => (by ? this.#go(clock.t + by) : clock.step(1)),
         Home: () => this.#go(series.start), End: () => this.#go(ReplayData.until(series)),
-        ...(this.#hasPlots ? { "+": () => plots.zoom(1), "-": () => plots.zoom(-1), 0: () => plots.all(), e: () => plots.event() } : {}),
+        ...(plots ? { "+": () => plots.zoom(1), "-": () => plots.zoom(-1), 0: () => plots.all(), e: () => plots.event() } : {}),
         " ": event.target.matches("button") ? null : () => clock.toggle(),
       };
       if (!keys[event.key]) return;
@@ -154,11 +148,9 @@ const Replay = (() => {
       const isAfter = series.tEnd !== null && t > series.tEnd + ReplayData.TINY;
       this.root.classList.toggle("is-after", isAfter);
       if (this.scene) this.#drawScene(t, colours);
-      if (this.#hasPlots) {
-        this.plots.draw(colours);
-        this.plots.show(now, isPlaying);
-      }
-      if (this.#hasGauges) this.gauges.show(t, now, isPlaying);
+      this.plots?.draw(colours);
+      this.plots?.show(now, isPlaying);
+      this.gauges?.show(t, now, isPlaying);
       this.bar.show();
       this.#write(t, isPlaying);
       this.place.dispatchEvent(new CustomEvent("replay-time", { bubbles: true, detail: { t } }));

@@ -22,12 +22,17 @@ class FirstScreen {
   }
 
   async #fill() {
-    const { el } = Dom, { id, trace } = this.facts.worst, row = this.table.find(id);
+    const { el } = Dom, { id, trace } = this.facts.worst, row = this.#row(id);
     const series = await SeriesFile.load(id, { trace, largest: Experiment.largestDeviations(this.table, row, this.facts) }).catch((error) => error);
     if (series instanceof Error) this.place.replaceChildren(el("p", { role: "alert" }, series.message));
     else if (!series) this.place.replaceChildren(el("p.quiet", {}, this.#reason(row)));
     else this.player = Replay.show(this.place, series, { ...this.facts, title: "Replay of the worst experiment" }, { isBrief: true });
     if (this.player) new IntersectionObserver(([entry]) => this.#playIfVisible(entry.isIntersecting), { threshold: FirstScreen.VISIBLE }).observe(this.place);
+  }
+
+  /** The row of the worst experiment, without an index of all ids. */
+  #row(id) {
+    return this.table.columns.get("experiment_id").texts.indexOf(id);
   }
 
   /** Why there is no replay. */
