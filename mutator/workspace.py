@@ -39,6 +39,7 @@ from mutator.stpa.hazard_list import HazardList, load_hazard_list
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
+from mutator.targets.manifest_names import manifest_path_by_name
 from mutator.targets.severity_model import load_severity_scale, scale_for_target
 
 _SANDBOX_MODULE = "mutator.engines.sandbox"
@@ -100,7 +101,7 @@ class Workspace:
             raise MutatorError(
                 f"no folder {target_root}",
                 expected="the target folder",
-                remedy="correct MUTATOR_TARGET, or name another folder with the controller's source",
+                remedy="correct MUTATOR_TARGET, or give the controller's source with --target",
             )
         return cls(
             library=_checked_folder(library_folder(root, library), "fault_library", "library"),
@@ -111,7 +112,7 @@ class Workspace:
 
     def manifest(self, name: str) -> TargetManifest:
         """Return the manifest with this name or path."""
-        manifest = load_manifest(self._find_file("targets", name, "target"), self.target)
+        manifest = load_manifest(self._find_file("targets", name, "target", self.targets), self.target)
         manifest = replace(manifest, sandbox=self.sandbox)
         check_column_names(manifest)
         return manifest
@@ -137,8 +138,8 @@ class Workspace:
 
     @property
     def targets(self) -> Mapping[str, Path]:
-        """The manifests of the library by name."""
-        return self._path_by_name("targets")
+        """The manifests of the library by their `name`. MutatorError if two have the same."""
+        return manifest_path_by_name(self._path_by_name("targets"))
 
     def fault_models(self) -> FaultModels:
         """Return the fault models of the templates folder."""
@@ -281,8 +282,10 @@ class Workspace:
     def _path_by_name(self, folder: str) -> dict[str, Path]:
         return library_yaml_files(self.library, folder)
 
-    def _find_file(self, folder: str, name: str | Path, kind: str) -> Path:
-        path_by_name = self._path_by_name(folder)
+    def _find_file(
+        self, folder: str, name: str | Path, kind: str, named_paths: Mapping[str, Path] | None = None
+    ) -> Path:
+        path_by_name = self._path_by_name(folder) if named_paths is None else named_paths
         if str(name).endswith((".yaml", ".yml")):
             if not Path(name).is_file():
                 raise MutatorError(
@@ -294,11 +297,15 @@ class Workspace:
             return _checked_file(Path(name))
         if (path := path_by_name.get(str(name))) is not None:
             return _checked_file(path)
+        hint = spelling_suggestion(str(name), list(path_by_name))
+        if named_paths and (file := self._path_by_name(folder).get(str(name))) is not None:
+            names = [other for other, path in named_paths.items() if path == file]
+            hint = f": {file.name} describes '{names[0]}'"
         raise MutatorError(
             f"no {kind} '{name}'",
             where=self.library / folder,
             expected=f"{describe_choices(path_by_name)}, or the path of a YAML file",
-            remedy="correct the name" + spelling_suggestion(str(name), list(path_by_name)),
+            remedy=f"correct the name{hint}",
         )
 
 

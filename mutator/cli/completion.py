@@ -34,7 +34,17 @@ def build_completer(folder: str) -> Completer:
 campaigns = build_completer("campaigns")
 scenarios = build_completer("scenarios")
 specs = build_completer("faults")
-targets = build_completer("targets")
+
+
+def targets(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Complete the names in the manifests."""
+    from mutator.targets.manifest_names import manifest_path_by_name
+
+    try:
+        names = manifest_path_by_name(library_yaml_files(_library_folder(ctx), "targets"))
+    except MutatorError:  # a library that no command would use
+        return []
+    return _names_starting(names, incomplete)
 
 
 def runs(ctx: typer.Context, incomplete: str) -> list[str]:

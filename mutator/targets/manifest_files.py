@@ -35,7 +35,10 @@ SCHEMA = "target/2"
 class ManifestModel(StrictModel, title="The file"):
     """How to find, run and observe a target, and which files its runs write."""
 
-    name: str = Field(description="The name that campaigns use for the target.")
+    name: str = Field(
+        description="The name that campaigns and `--manifest` use for the target, whatever the file is called. "
+        "Each manifest has a name of its own."
+    )
     about: str = Field("", description="What the target is.")
     root: str = Field(
         description="The folder to put on `sys.path`, relative to this file. Or `shipped:target`, the "

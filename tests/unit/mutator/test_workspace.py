@@ -131,7 +131,8 @@ def test_faults_can_be_selected_by_pattern_or_file(toycar: Workspace) -> None:
 def test_the_only_target_is_the_default(toycar: Workspace) -> None:
     assert toycar.target_name() == "toycar"
     other = toycar.library / "targets" / "other.yaml"
-    other.write_bytes((toycar.library / "targets" / "toycar.yaml").read_bytes())
+    text = (toycar.library / "targets" / "toycar.yaml").read_text()
+    other.write_text(text.replace("name: toycar", "name: other", 1))
     with pytest.raises(MutatorError, match=r"2 targets in the library \(other, toycar\)"):
         toycar.target_name()
     assert toycar.target_name("other") == "other"
