@@ -3,7 +3,7 @@
 Declare new fields with `hashing.added_field`, so that existing ids do not change.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import Any
@@ -158,6 +158,10 @@ def fault_label(spec: str, value: Value, unit: str) -> str:
     return f"{spec} {value}" if unit in ("", "-") else f"{spec} {value} {unit}"
 
 
+# what ids contain for a reading without a name: published ids have it
+_READING_IN_IDS = "as_described"
+
+
 @dataclass(frozen=True)
 class Fault:
     """A fault with a fixed value: what it injects, where, and the hazard that it aims at."""
@@ -165,10 +169,10 @@ class Fault:
     spec: str  #: name of the variant: `<module>/<fault_type>/<variant>`
     module: str  #: module of the controller, as the spec names it
     fault_type: str  #: type of the fault, as the spec names it
-    reading: str  #: reading of the spec that it follows
+    reading: str  #: reading of the spec that it follows; empty in a library that declares no readings
     value: Value  #: the drawn value, in `unit`; None: the fault has no value
     unit: str  #: unit of `value`, as the spec states it
-    aim: str  #: the hazard that it aims at
+    aim: str  #: the hazard that it aims at; empty if the spec names none
     #: where the source changes, and how; numbers in the unit of the changed variable
     injections: tuple[Injection, ...]
     hold: Hold | None = None  #: how long it stays active; None: as long as its trigger specifies
@@ -177,7 +181,7 @@ class Fault:
     @cached_property
     def id(self) -> str:
         """Digest of its content."""
-        return content_id(self)
+        return content_id(self if self.reading else replace(self, reading=_READING_IN_IDS))
 
     @property
     def label(self) -> str:
@@ -225,9 +229,18 @@ class Experiment:
 
     @property
     def drive_label(self) -> str:
-        """The label of the drive without its fault: `S1, guided C1`."""
-        method = self.method.value
-        return f"{self.scenario}, {method} {self.trigger.name.removeprefix(f'{method}/')}"
+        """The label of the drive without its fault: `S1, guided C1`; `S1, at 2 s` if no method chose the
+        trigger.
+        """
+        name = self.trigger.name.removeprefix(f"{self.method.value}/")
+        return f"{self.scenario}, {f'{self.method_text} {name}'.lstrip()}"
+
+    @property
+    def method_text(self) -> str:
+        """How the trigger was chosen; empty if it is neither a context nor a random time."""
+        name = self.trigger.name
+        is_listed = name in ("always", self.trigger.condition) or name.startswith("at ")
+        return "" if is_listed and self.method is Method.GUIDED else self.method.value
 
     @cached_property
     def changes(self) -> tuple[str, ...]:

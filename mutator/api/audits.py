@@ -242,9 +242,10 @@ def _seals_if_undamaged(folder: RunFolder, checks: list[AuditCheck]) -> Seals:
 def _run_facts(folder: RunFolder) -> dict[str, str]:
     head = folder.head
     packages = version_texts_by_package(folder.session_environments)
+    campaign = f"{head.campaign} of {head.target}"
     return {
         "run": folder.path.name,
-        "campaign": f"{head.campaign} of {head.target}, {head.reading}, seed {head.seed}",
+        "campaign": ", ".join(filter(None, (campaign, head.reading, f"seed {head.seed}"))),
         "experiments": f"{folder.planned_experiment_count}"
         + (f" of shard {folder.shard}" if folder.shard else ""),
         "plan": head.plan,

@@ -80,7 +80,8 @@ class Run(RunFigures):
         progress = f"{sum(self.endings.values())} of {self.folder.planned_experiment_count} experiments"
         failed = len(self.harness_errors)
         errors = f", {failed} with a HARNESS ERROR" if failed else ""
-        return f"<Run {self.path.name}: {progress} of {head.campaign}, {head.reading}{errors}>"
+        campaign = ", ".join(filter(None, (head.campaign, head.reading)))
+        return f"<Run {self.path.name}: {progress} of {campaign}{errors}>"
 
     def _repr_html_(self) -> str:
         note = alerts_note_if_any(self)

@@ -19,7 +19,7 @@ from mutator.config.yaml_files import load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_measuring
 from mutator.errors import MutatorError
-from mutator.faults.library_readings import READINGS_FILE, SpecReadings
+from mutator.faults.library_readings import SpecReadings
 from mutator.model import AfterHazard, Limits, Method
 
 SCHEMA = "campaign/1"
@@ -207,10 +207,10 @@ def load_campaign_study(campaign: Campaign) -> CheckableStudy | None:
 def check_readings(campaign: Campaign, readings: SpecReadings) -> None:
     """Raise MutatorError for an undeclared reading, or if `armed_after_s` or `setting` omits a reading."""
     readings_text = ", ".join(readings.names)
-    remedy = f"correct the name, or declare the reading in the library's {READINGS_FILE}"
+    expected, remedy = readings.expected_text, readings.remedy
     if campaign.reading is not None and campaign.reading not in readings.names:
         raise campaign.error(
-            ("reading",), f"reading '{campaign.reading}'", expected=f"one of {readings_text}", remedy=remedy
+            ("reading",), f"reading '{campaign.reading}'", expected=expected, remedy=remedy
         )
     places: dict[KeyPath, tuple[str, Mapping[str, object]]] = {
         ("triggers", "armed_after_s"): ("time", campaign.armed_after_s_by_reading),
@@ -222,7 +222,7 @@ def check_readings(campaign: Campaign, readings: SpecReadings) -> None:
         for name in value_by_reading:
             if name not in readings.names:
                 raise campaign.error(
-                    (*keys, name), f"reading '{name}'", expected=f"one of {readings_text}", remedy=remedy
+                    (*keys, name), f"reading '{name}'", expected=expected, remedy=remedy
                 )
         for name in readings.names:
             if name not in value_by_reading:

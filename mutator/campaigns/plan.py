@@ -75,7 +75,8 @@ class Plan:
 
     def __repr__(self) -> str:
         count = counted(len(self.experiments), "experiment")
-        return f"<Plan of {self.campaign.name}, {self.reading}: {count}, {describe_seeds(self.seeds)}>"
+        name = ", ".join(filter(None, (self.campaign.name, self.reading)))
+        return f"<Plan of {name}: {count}, {describe_seeds(self.seeds)}>"
 
     @property
     def seeds(self) -> range:

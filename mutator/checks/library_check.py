@@ -151,8 +151,9 @@ def _unbuildable_fault_problems(
     try:
         build(manifest, models, fault, always_trigger())
     except MutatorError as error:
-        keys = (*variant.keys, fault.reading, *_keys_of_failing_injection(fault, models, manifest))
-        got = f"{fault.spec} ({fault.reading}): {error.got}{_describe_target_place(error, manifest)}"
+        keys = (*variant.keys_by_reading[fault.reading], *_keys_of_failing_injection(fault, models, manifest))
+        name = f"{fault.spec} ({fault.reading})" if fault.reading else fault.spec
+        got = f"{name}: {error.got}{_describe_target_place(error, manifest)}"
         remedy = error.remedy or "correct the spec or the target"
         yield spec.source.error(keys, got, expected=error.expected, remedy=remedy)
 

@@ -35,7 +35,8 @@ def _unused_draw_places(specs: tuple[FaultSpec, ...], models: FaultModels) -> It
             draw = variant.draw
             for reading, injections in variant.injections_by_reading.items():
                 if draw and not any(_uses_draw(injection, draw.name, models) for injection in injections):
-                    what = f"{spec.name}/{variant.name} draws '{draw.name}', unused in reading {reading}"
+                    where = f" in reading {reading}" if reading else ""
+                    what = f"{spec.name}/{variant.name} draws '{draw.name}', unused{where}"
                     yield FindingPlace(file=str(spec.path), line=spec.source.line_of(draw.keys), what=what)
 
 

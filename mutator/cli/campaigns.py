@@ -135,11 +135,14 @@ def _print_plan(
     terminal: Terminal, new_plan: "mutator.Plan", cost: "PlanCost", reason_by_variant: dict[str, str]
 ) -> None:
     groups = sorted(new_plan.groups().items())
-    rows = [(f"{module}/{kind}", method, n) for (module, kind, method), n in groups]
+    has_methods = len({method for _, _, method in groups}) > 1
+    rows = [
+        (f"{module}/{kind}", *([method] if has_methods else []), n) for (module, kind, method), n in groups
+    ]
     terminal.print_table(
-        ["fault type", "method", "experiments"],
-        [*rows, ("total", "", len(new_plan.experiments))],
-        right_aligned=(2,),
+        ["fault type", *(["method"] if has_methods else []), "experiments"],
+        [*rows, ("total", *([""] if has_methods else []), len(new_plan.experiments))],
+        right_aligned=(2 if has_methods else 1,),
         last_is_total=True,
     )
     for text in new_plan.operator_notes:

@@ -102,9 +102,8 @@ def print_experiment(
     terminal: Terminal, experiment: "Experiment", patch: str, *, is_trial: bool = False
 ) -> None:
     """Print what was injected, and the diff. An experiment run by `try` has no method."""
-    facts = experiment_facts(experiment)
-    if is_trial:
-        del facts["method"]
+    facts = experiment_facts(experiment) | {"method": "" if is_trial else experiment.method_text}
+    facts = {name: value for name, value in facts.items() if value != ""}
     width = max(len(name) for name in facts)
     for name, value in facts.items():
         terminal.print_text(f"{name.ljust(width)}  {value}", style="bold" if name == "fault" else None)

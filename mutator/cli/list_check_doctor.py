@@ -184,7 +184,7 @@ def check(
     if scenario and not drive:
         raise MutatorError("scenarios without --drive", argument="scenario", remedy="add --drive")
     workspace = workspace_options.workspace()
-    with terminal.show_spinner("checking every spec in every reading"):
+    with terminal.show_spinner("checking every spec"):
         problems = mutator.check_library(workspace, target=manifest)
     findings: list[Finding] = []
     if not problems:

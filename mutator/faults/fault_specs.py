@@ -15,7 +15,7 @@ from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.faults.injection_model import InjectionModel
 from mutator.faults.injection_specs import InjectionSpec
-from mutator.faults.library_readings import SpecReadings
+from mutator.faults.library_readings import KEY_WITHOUT_NAME, SpecReadings
 from mutator.model import Hold
 from mutator.targets.stored_phrases import PhraseByCase
 
@@ -59,7 +59,7 @@ class Variant:
     """One row of the library: for each reading, injections that share a trigger and a draw.
 
     `injections_by_reading` starts with the default reading. `hold_by_reading` overrides how long the fault
-    stays active; `phrase_by_reading` says what the fault does, in words.
+    stays active; `phrase_by_reading` says what the fault does, in words. An empty `aimed_hazard`: none.
     """
 
     name: str
@@ -71,6 +71,7 @@ class Variant:
     hold_by_reading: Mapping[str, Hold | None]
     phrase_by_reading: Mapping[str, PhraseByCase]
     keys: KeyPath
+    keys_by_reading: Mapping[str, KeyPath]  # the mappings that have the injections
 
     def injections_in_reading(self, reading: str) -> tuple[InjectionSpec, ...]:
         return self.injections_by_reading[self._reading_or_default(reading)]
@@ -178,6 +179,10 @@ _PHRASE_DESCRIPTION = (
     "`abs_value` (without its sign), and the injections' numbers in the unit of the source, such as `by_kph` "
     "and `abs_by_kph`"
 )
+_DIRECT_INJECTIONS_DESCRIPTION = (
+    "In a library with one [reading](#readings), or without readings: what the fault injects, without the key of "
+    "a reading. At least one injection."
+)
 _HOLD_DESCRIPTION = (
     "How long the fault stays active, if the trigger does not determine it: `to_end` for a fault that latches"
 )
@@ -196,9 +201,11 @@ class _VariantReadingModel(StrictModel, title="A reading"):
 
 
 class _VariantModelBase(StrictModel, title="A variant"):
-    """A variant is one row of the library: its injections share one trigger, one draw and one aim."""
+    """A variant is one row of the library: its injections share one trigger and one draw."""
 
-    aim: str = Field(description="The hazard that the fault is meant to cause, one of the target's hazards.")
+    aim: str | None = Field(
+        None, description="The hazard that the fault is meant to cause, one of the target's hazards."
+    )
     about: str = Field(description="What this variant does.")
     changes: list[str] = Field(
         default_factory=list,
@@ -211,6 +218,7 @@ class _VariantModelBase(StrictModel, title="A variant"):
         None,
         description="Exactly one draw: name and unit -> draw. Without a draw, the variant is a single fault.",
     )
+    # `build_spec_model` adds the readings and `injections`
 
 
 class SpecModel(StrictModel, title="The file"):
@@ -227,12 +235,15 @@ class SpecModel(StrictModel, title="The file"):
 
 @cache
 def build_spec_model(readings: SpecReadings) -> type[SpecModel]:
-    """Make the schema of a library's spec files. A variant has one key for each reading."""
+    """Make the schema of a library's spec files. A variant has one key for each reading, or its injections
+    directly if there is one reading.
+    """
     keys: dict[str, Any] = {}
     for name, about in zip(readings.names, readings.descriptions, strict=True):
-        required = name == readings.default_name
+        required = name == readings.default_name and len(readings.names) > 1
         kind = _VariantReadingModel if required else _VariantReadingModel | None
-        keys[name] = (kind, Field(... if required else None, description=about))
+        keys[name or KEY_WITHOUT_NAME] = (kind, Field(... if required else None, description=about))
+    keys["injections"] = (list[InjectionModel] | None, Field(None, description=_DIRECT_INJECTIONS_DESCRIPTION))
     variant = create_model(
         "_VariantModel", __base__=_VariantModelBase, __doc__=_VariantModelBase.__doc__, **keys
     )
@@ -275,35 +286,62 @@ def _build_variant(
 ) -> Variant:
     keys: KeyPath = ("variants", name)
     _check_name(name, source, keys)
-    models_by_reading: dict[str, _VariantReadingModel | None] = {
-        name: getattr(model, name) for name in readings.names
-    }
-    holds = {
-        reading: reading_model.hold or model.hold
-        for reading, reading_model in models_by_reading.items()
-        if reading_model
-    }
+    model_by_reading, keys_by_reading = _reading_models(model, readings, source, keys)
     return Variant(
         name=name,
-        aimed_hazard=model.aim,
+        aimed_hazard=model.aim or "",
         about=model.about,
         draw=_build_draw(f"{spec}/{name}", model.draw, source, (*keys, "draw"))
         if model.draw is not None
         else None,
         changes=tuple(model.changes),
         injections_by_reading={
-            reading: _build_injections(reading_model, source, (*keys, reading))
-            for reading, reading_model in models_by_reading.items()
-            if reading_model
+            reading: _build_injections(reading_model, source, keys_by_reading[reading])
+            for reading, reading_model in model_by_reading.items()
         },
-        hold_by_reading={reading: hold and Hold(hold) for reading, hold in holds.items()},
+        hold_by_reading={
+            reading: (hold := reading_model.hold or model.hold) and Hold(hold)
+            for reading, reading_model in model_by_reading.items()
+        },
         phrase_by_reading={
             reading: build_phrase(reading_model.phrase or model.phrase, None, source, keys)
-            for reading, reading_model in models_by_reading.items()
-            if reading_model
+            for reading, reading_model in model_by_reading.items()
         },
         keys=keys,
+        keys_by_reading=keys_by_reading,
     )
+
+
+def _reading_models(
+    model: _VariantModelBase, readings: SpecReadings, source: YamlSource, keys: KeyPath
+) -> tuple[dict[str, _VariantReadingModel], dict[str, KeyPath]]:
+    """Return what a variant has in each reading, and where."""
+    key_by_reading = {name: name or KEY_WITHOUT_NAME for name in readings.names}
+    model_by_reading = {
+        name: reading_model
+        for name, key in key_by_reading.items()
+        if (reading_model := getattr(model, key)) is not None
+    }
+    keys_by_reading = {name: (*keys, key_by_reading[name]) for name in model_by_reading}
+    injections: list[InjectionModel] | None = model.injections  # type: ignore[attr-defined]
+    if injections is None and model_by_reading:
+        return model_by_reading, keys_by_reading
+    if injections is None:
+        raise source.error(
+            keys, "no injections", expected="the key `injections`", remedy="say what the fault injects"
+        )
+    if model_by_reading or len(readings.names) > 1:
+        named = ", ".join(f"`{key}`" for key in key_by_reading.values())
+        raise source.error(
+            (*keys, "injections"),
+            "injections outside a reading" if len(readings.names) > 1 else "injections twice",
+            expected=f"the key {named}, with `injections` below it"
+            if len(readings.names) > 1
+            else f"`injections` directly under the variant, or under {named}",
+            remedy="move them there" if len(readings.names) > 1 else "delete one of the two",
+        )
+    name = readings.default_name
+    return {name: _VariantReadingModel(hold=None, phrase=None, injections=injections)}, {name: keys}
 
 
 def _build_injections(

@@ -122,7 +122,7 @@ class _SpecExpander:
         )
 
     def _check_variant(self, variant: Variant) -> None:
-        if variant.aimed_hazard not in self.manifest.hazard_names:
+        if variant.aimed_hazard and variant.aimed_hazard not in self.manifest.hazard_names:
             raise self._unknown_name_error(
                 (*variant.keys, "aim"), f"aim '{variant.aimed_hazard}'", self.manifest.hazard_names
             )
@@ -143,7 +143,7 @@ class _SpecExpander:
             )
 
     def _phrase_keys(self, variant: Variant) -> KeyPath:
-        in_reading: KeyPath = (*variant.keys, self.reading, "phrase")
+        in_reading: KeyPath = (*variant.keys_by_reading.get(self.reading, variant.keys), "phrase")
         return in_reading if in_reading in self.spec.source.lines else (*variant.keys, "phrase")
 
     def _check_injection(self, injection: InjectionSpec) -> None:

@@ -137,6 +137,7 @@ def build_editor_schema(file_format: YamlFormat, fault_models: FaultModels) -> d
         _add_fault_models(schemas["Injection"], fault_models)
     if "Variant" in schemas:  # another library can declare other readings
         schemas["Variant"]["additionalProperties"] = {"$ref": "#/definitions/Reading"}
+        schemas["Variant"]["required"] = ["about"]
     for part in schemas.values():
         part.pop("title", None)
         part.pop("description", None)

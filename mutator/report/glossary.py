@@ -110,9 +110,9 @@ def _scenario_title(run: ReportedRun, name: str) -> str:
 
 
 def _trigger_meanings(run: ReportedRun) -> dict[str, str]:
-    """Return the trigger methods, then the condition of each guided trigger."""
+    """Return the trigger methods if there are several, then the condition of each guided trigger."""
     methods = set(run.results["method"].unique())
-    meanings = {name: about for name, about in _METHOD_MEANINGS.items() if name in methods}
+    meanings = {name: about for name, about in _METHOD_MEANINGS.items() if len(methods) > 1}
     context_meanings = _context_meanings(run)
     guided = run.frame[run.frame["method"] == Method.GUIDED.value] if "condition" in run.frame else None
     if guided is None:

@@ -38,6 +38,7 @@ def _with_unit(text: str, symbol: str) -> str:
 def fault_value_table(group: Group) -> tuple[list[str], list[list[str]]]:
     """Return the headings, and a row for each fault with the values of its holes, except ids."""
     faults = {fault.id: fault for fault in group.faults}
+    has_readings = any(fault.reading for fault in group.faults)
     names = list(dict.fromkeys(name for shape in group.shapes for name in _hole_names_without_ids(shape)))
     rows = []
     for shape in group.shapes:
@@ -45,8 +46,9 @@ def fault_value_table(group: Group) -> tuple[list[str], list[list[str]]]:
             fault = faults.get(member)
             if fault is not None:
                 text_by_hole = dict(zip(shape.hole_names, filled, strict=True))
-                rows.append([fault.label, fault.reading, *(text_by_hole.get(name, "") for name in names)])
-    return ["fault", "reading", *names], rows
+                reading = [fault.reading] if has_readings else []
+                rows.append([fault.label, *reading, *(text_by_hole.get(name, "") for name in names)])
+    return ["fault", *(["reading"] if has_readings else []), *names], rows
 
 
 def _hole_names_without_ids(shape: PatchShape) -> list[str]:

@@ -259,7 +259,7 @@ def _wrong_aims(
     hazards = {hazard for action in factor.leads_to for hazard in analysis.unsafe_actions[action].hazards}
     for i, fault in enumerate(factor.faults):
         for variant in specs[fault]:
-            if variant.aimed_hazard not in hazards:
+            if variant.aimed_hazard and variant.aimed_hazard not in hazards:
                 yield analysis.factors_source.error(
                     (*keys, "faults", i),
                     f"{fault}/{variant.name} aims at {variant.aimed_hazard}",

@@ -16,7 +16,7 @@ from mutator.campaigns.row_filters import compile_filter
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import load_spec
-from mutator.faults.library_readings import DEFAULT_READINGS
+from mutator.faults.library_readings import NO_READINGS
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.template_rendering import python_literal, signed_term
 from mutator.triggers.conditions import canonical_condition, evaluate_condition
@@ -77,7 +77,7 @@ def test_a_damaged_spec_is_read_or_refused(tmp_path: Path, data: st.DataObject) 
     path = tmp_path / "x.yaml"
     path.write_text("\n".join(lines), encoding="utf-8", errors="surrogatepass")
     try:
-        spec = load_spec(path, DEFAULT_READINGS)
+        spec = load_spec(path, NO_READINGS)
     except MutatorError as error:
         assert str(error).startswith(str(path)) and error.got
     else:

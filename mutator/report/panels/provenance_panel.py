@@ -72,7 +72,7 @@ def _provenance_facts(run: ReportedRun) -> list[tuple[str, str]]:
         **(
             {"seed": seeds[0]} if len(seeds := folder.seeds) == 1 else {"seeds": f"{seeds[0]} to {seeds[-1]}"}
         ),
-        "reading": head.reading,
+        **({"reading": head.reading} if head.reading else {}),
         **{f"chosen: {name}": value for name, value in chosen.items() if value is not None},
         **{f"digest of {name}": value for name, value in head.sources.items()},
         "mutator": head.provenance.mutator,

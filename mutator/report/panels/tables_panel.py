@@ -134,6 +134,8 @@ def _count_tables(run: ReportedRun) -> list[tuple[str, TextTable]]:
     hazards = checked_hazard_names(run.results)
     tables = []
     for title, head, groups in _GROUPINGS:
+        if head == "method" and run.results["method"].nunique() == 1:
+            continue  # as many columns of numbers as the table above, and no comparison
         counts = count_outcomes_by_group(run.results, groups(run.results))
         heads, lines = count_table(counts, head, hazards, alerts=run.folder.has_alerts)
         tables.append((title, TextTable(heads=heads, rows=lines, right_aligned=range(1, len(heads)))))

@@ -58,6 +58,8 @@ class Grid {
     this.current = 0; // index in `rows` of the focused row
     this.isOnPaper = false;
     this.usual = Grid.COLUMNS.filter((column) => !table.count || table.columns.has(column.name)); // some targets have no alerts
+    const methods = table.columns.get("method")?.words ?? [];
+    if (methods.length === 1) this.usual = this.usual.filter((column) => column.name !== "method"); // says nothing
     this.more = Grid.#more(table, metrics);
     this.#choose();
     this.#build();

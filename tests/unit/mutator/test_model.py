@@ -1,6 +1,7 @@
 """Labels of faults and experiments in tables, messages and reports."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -52,6 +53,22 @@ def test_the_label_of_an_experiment_names_its_fault_scenario_and_trigger(
     experiment: Callable[..., Experiment],
 ) -> None:
     assert experiment(value=35).label == "radar/chaff/distance 35 m, S1, guided C1"
+
+
+@pytest.mark.parametrize(
+    ("method", "name", "expected"),
+    [
+        (Method.GUIDED, "C1", "S1, guided C1"),
+        (Method.RANDOM, "random/C1", "S1, random C1"),
+        (Method.GUIDED, "always", "S1, always"),
+        (Method.GUIDED, "at 2 s", "S1, at 2 s"),
+        (Method.GUIDED, "gap < 3", "S1, gap < 3"),
+    ],
+)
+def test_only_a_context_is_called_guided(method: Method, name: str, expected: str) -> None:
+    """A campaign that lists its triggers does not use the word."""
+    trigger = replace(experiment().trigger, name=name, condition="gap < 3")
+    assert replace(experiment(), method=method, trigger=trigger).drive_label == expected
     assert experiment(method=Method.RANDOM, trigger="random/C2").drive_label == "S1, random C2"
 
 

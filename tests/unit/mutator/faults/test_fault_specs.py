@@ -285,7 +285,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "as_coded:",
             "as_built:",
             "43: unknown key 'as_built'; expected one of aim, about, changes, hold, phrase, draw, "
-            "as_described, as_coded",
+            "as_described, as_coded, injections",
         ),
         ("integers_from", "integers_form", "11: unknown key 'integers_form'; expected one of integers_"),
         ("first: [10, 19], step: 10", "first: [10.5, 19.5], step: 0.5", "a range with fractions"),
