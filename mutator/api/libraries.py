@@ -26,20 +26,29 @@ from mutator.targets.allowed_locations import check_file_allowed
 from mutator.workspace import Workspace
 
 
-def init_library(folder: str | Path, *, target: str | PathLike[str] | None = None) -> Path:
+def init_library(
+    folder: str | Path, *, target: str | PathLike[str] | None = None, files: Sequence[str] = ()
+) -> Path:
     """Write an editable fault library into a new or empty folder, and return the folder.
 
     `target` is a controller's source folder or `installed:NAME`. With `target`, write a first library for
     that controller: manifest, entry, scenario, fault and campaign, with places to fill in. The source is
-    read, never imported. Without `target`, copy the library and templates that ship with mutator.
+    read, never imported; with `files`, only files that match one of these globs, relative to the target's
+    root, are searched for the controller. Without `target`, copy the library and templates that ship with
+    mutator.
 
-    MutatorError for a folder that is not empty and for a missing target; MutatorWarning if nothing in the
+    MutatorError for a folder that is not empty, for a missing target, and for `files` without a target or a
+    match; MutatorWarning if nothing in the
     target looks like a controller.
     """
+    if target is None and files:
+        raise MutatorError(
+            f"files {', '.join(files)} without a target", argument="files", remedy="name a `target`, too"
+        )
     if target is None:
         write_new_library(Path(folder))
     else:
-        write_first_library(survey_source(os.fspath(target)), Path(folder))
+        write_first_library(survey_source(os.fspath(target), files), Path(folder))
     return Path(folder)
 
 

@@ -209,9 +209,7 @@ def check_readings(campaign: Campaign, readings: SpecReadings) -> None:
     readings_text = ", ".join(readings.names)
     expected, remedy = readings.expected_text, readings.remedy
     if campaign.reading is not None and campaign.reading not in readings.names:
-        raise campaign.error(
-            ("reading",), f"reading '{campaign.reading}'", expected=expected, remedy=remedy
-        )
+        raise campaign.error(("reading",), f"reading '{campaign.reading}'", expected=expected, remedy=remedy)
     places: dict[KeyPath, tuple[str, Mapping[str, object]]] = {
         ("triggers", "armed_after_s"): ("time", campaign.armed_after_s_by_reading),
         ("setting",): ("setting", campaign.changes_by_reading),
@@ -221,9 +219,7 @@ def check_readings(campaign: Campaign, readings: SpecReadings) -> None:
             continue
         for name in value_by_reading:
             if name not in readings.names:
-                raise campaign.error(
-                    (*keys, name), f"reading '{name}'", expected=expected, remedy=remedy
-                )
+                raise campaign.error((*keys, name), f"reading '{name}'", expected=expected, remedy=remedy)
         for name in readings.names:
             if name not in value_by_reading:
                 raise campaign.error(

@@ -135,7 +135,7 @@ def _print_plan(
     terminal: Terminal, new_plan: "mutator.Plan", cost: "PlanCost", reason_by_variant: dict[str, str]
 ) -> None:
     groups = sorted(new_plan.groups().items())
-    has_methods = len({method for _, _, method in groups}) > 1
+    has_methods = len({method for (_, _, method), _ in groups}) > 1
     rows = [
         (f"{module}/{kind}", *([method] if has_methods else []), n) for (module, kind, method), n in groups
     ]

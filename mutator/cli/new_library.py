@@ -16,6 +16,8 @@ Examples:
   mutator init faults                           a copy to edit; its README has the first commands
   mutator init faults --target ../controller    a first library for the controller in that folder
   mutator init faults --target installed:NAME   a first library for an installed package
+  mutator init faults --target ../repo --in 'pkg/control/**'
+                                                for a controller in a large repository
 """
 
 
@@ -29,6 +31,14 @@ def init(
         str | None,
         typer.Option("--target", metavar="TREE", help="A controller's source: a folder, or installed:NAME."),
     ] = None,
+    globs: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--in",
+            metavar="GLOB",
+            help="With --target: search only these files for the controller. `**` spans folders. Repeatable.",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Write an editable fault library.
@@ -41,9 +51,10 @@ def init(
 
     terminal = Terminal(as_json)
     try:
-        mutator.init_library(folder, target=tree)
+        mutator.init_library(folder, target=tree, files=globs or ())
     except MutatorError as error:
-        raise with_option_names(error, {"target": "--target"}) from None  # elsewhere, `target` is --manifest
+        # elsewhere, `target` is --manifest
+        raise with_option_names(error, {"target": "--target", "files": "--in"}) from None
     facts: dict[str, Any] = {"folder": str(folder)}
     content = "fault_library/, templates/"
     if tree is not None:

@@ -180,8 +180,8 @@ _PHRASE_DESCRIPTION = (
     "and `abs_by_kph`"
 )
 _DIRECT_INJECTIONS_DESCRIPTION = (
-    "In a library with one [reading](#readings), or without readings: what the fault injects, without the key of "
-    "a reading. At least one injection."
+    "In a library with one [reading](#readings), or without readings: what the fault injects, without the key "
+    "of a reading. At least one injection."
 )
 _HOLD_DESCRIPTION = (
     "How long the fault stays active, if the trigger does not determine it: `to_end` for a fault that latches"
@@ -243,7 +243,10 @@ def build_spec_model(readings: SpecReadings) -> type[SpecModel]:
         required = name == readings.default_name and len(readings.names) > 1
         kind = _VariantReadingModel if required else _VariantReadingModel | None
         keys[name or KEY_WITHOUT_NAME] = (kind, Field(... if required else None, description=about))
-    keys["injections"] = (list[InjectionModel] | None, Field(None, description=_DIRECT_INJECTIONS_DESCRIPTION))
+    keys["injections"] = (
+        list[InjectionModel] | None,
+        Field(None, description=_DIRECT_INJECTIONS_DESCRIPTION),
+    )
     variant = create_model(
         "_VariantModel", __base__=_VariantModelBase, __doc__=_VariantModelBase.__doc__, **keys
     )

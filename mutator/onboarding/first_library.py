@@ -14,10 +14,15 @@ from mutator._common.message_text import counted
 from mutator._common.shipped_files import make_empty_folder
 from mutator.errors import MutatorWarning
 from mutator.onboarding.source_survey import SourceSurvey
-from mutator.onboarding.step_candidates import StepCandidate, list_step_candidates
+from mutator.onboarding.step_candidates import (
+    StepCandidate,
+    group_by_function_name,
+    list_step_candidates,
+)
 from mutator.onboarding.todo_marks import TODO_MARK
 
-MOST_LISTED_CANDIDATES = 5  # maximum number of candidates for the step, and of values of each
+MOST_LISTED_ROWS = 15  # of candidates for the step
+MOST_LISTED_PLACES = 5  # of values of a candidate, candidates of one name, and unreadable files
 # parameters that get the step length instead of `...`
 _TIME_STEP_PARAMETERS = ("dt", "delta_t", "time_step", "timestep")
 _PATH_BY_TEMPLATE = {
@@ -52,14 +57,14 @@ def write_first_library(survey: SourceSurvey, folder: Path) -> None:
         text = templates.get_template(f"{template}.j2").render(variables)
         # parts that a template leaves out leave their blank lines behind
         path.write_text(re.sub(r"\n{4,}", "\n\n\n", text), encoding="utf-8")
-    if not variables["candidates"]:
+    if not variables["rows"]:
         warnings.warn(_describe_no_controller(survey), MutatorWarning, stacklevel=3)
 
 
 def _describe_no_controller(survey: SourceSurvey) -> str:
     problems = [
         f"{place} cannot be read: {problem}"
-        for place, problem in survey.unreadable_files[:MOST_LISTED_CANDIDATES]
+        for place, problem in survey.unreadable_files[:MOST_LISTED_PLACES]
     ]
     if survey.modules:
         problems.insert(0, f"no function in {counted(len(survey.modules), 'file')} looks like a step")
@@ -74,7 +79,8 @@ def _yaml_scalar(text: str) -> str:
 
 
 def _template_variables(survey: SourceSurvey, folder: Path) -> dict[str, Any]:
-    candidates = list_step_candidates(survey)[:MOST_LISTED_CANDIDATES]
+    candidates = list_step_candidates(survey)
+    groups = group_by_function_name(candidates)
     title = survey.installed_package or (
         survey.packages[0] if len(survey.packages) == 1 else survey.root.name
     )
@@ -99,11 +105,23 @@ def _template_variables(survey: SourceSurvey, folder: Path) -> dict[str, Any]:
         "package": only_package if not only_package.endswith(".py") else "",
         "packages": survey.packages,
         "count": counted(len(survey.modules), "Python file"),
-        "unread": survey.unreadable_files[:MOST_LISTED_CANDIDATES],
+        "unread": survey.unreadable_files[:MOST_LISTED_PLACES],
         "mark": TODO_MARK,
-        "candidates": candidates,
+        "candidate_count": len(candidates),
+        "rows": [(first, _describe_others(others)) for first, *others in groups[:MOST_LISTED_ROWS]],
+        "equally_likely": sum(each.likelihood == candidates[0].likelihood for each in candidates),
+        "shadowing": survey.shadowing_modules,
         **_step_variables(candidates[0] if candidates else None),
     }
+
+
+def _describe_others(others: list[StepCandidate]) -> str:
+    """Say where functions of the same name are."""
+    if not others:
+        return ""
+    places = [f"`{other.name}` ({other.path}:{other.line})" for other in others[:MOST_LISTED_PLACES]]
+    more = len(others) - len(places)
+    return f"; also {', '.join(places)}" + (f" and {more} more" if more else "")
 
 
 def _step_variables(best: StepCandidate | None) -> dict[str, Any]:
@@ -113,6 +131,7 @@ def _step_variables(best: StepCandidate | None) -> dict[str, Any]:
             ("module", "imported", "builder", "call", "path", "function", "value", "others"), ""
         ) | {
             "run": "Drive",
+            "is_async": False,
             "thing": "the controller",
             "builds": (),
             "build_arguments": "",
@@ -120,8 +139,9 @@ def _step_variables(best: StepCandidate | None) -> dict[str, Any]:
     called = "self.controller" if best.class_name else best.function
     if best.class_name and best.function != "__call__":
         called += f".{best.function}"
+    call = f"{called}({_render_call_arguments(best)})"
     first, *rest = best.values or (None,)
-    places = ", ".join(f"{value.name} (line {value.line})" for value in rest[:MOST_LISTED_CANDIDATES])
+    places = ", ".join(f"{value.name} (line {value.line})" for value in rest[:MOST_LISTED_PLACES])
     return {
         "module": best.module,
         "imported": best.class_name or best.function,
@@ -130,7 +150,8 @@ def _step_variables(best: StepCandidate | None) -> dict[str, Any]:
         "builder": best.class_name or "",
         "builds": best.constructor_arguments,
         "build_arguments": ", ".join(f"{argument}=..." for argument in best.constructor_arguments),
-        "call": f"{called}({_render_call_arguments(best)})",
+        "call": f"asyncio.run({call})" if best.is_async else call,
+        "is_async": best.is_async,
         "path": best.path,
         "function": best.name,
         "value": first,

@@ -3,8 +3,9 @@
 import ast
 import keyword
 import os
+import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
@@ -12,7 +13,7 @@ from pathlib import Path
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import checked_path_inside
 from mutator.errors import MutatorError, UnsafePath
-from mutator.targets.source_tree import MOST_SOURCE_BYTES
+from mutator.targets.source_tree import MOST_SOURCE_BYTES, matches_any_glob
 from mutator.targets.target_roots import INSTALLED_PREFIX, find_installed_package
 
 _MOST_FILES = 5000  # a controller has hundreds; more are a home folder or an environment, passed by mistake
@@ -20,6 +21,7 @@ _SKIPPED_FOLDERS_AND_MODULES = {
     *("test", "tests", "testing", "doc", "docs", "example", "examples", "benchmark", "benchmarks", "scripts"),
     *("build", "dist", "node_modules", "site-packages", "venv", "env", "__pycache__"),
 }
+_PROJECT_FILES = ("pyproject.toml", "setup.py", "setup.cfg")
 _SKIPPED_FILES = {"setup.py", "conftest.py", "noxfile.py", "__init__.py", "__main__.py"}
 
 
@@ -45,14 +47,30 @@ class SourceSurvey:
     unreadable_files: tuple[
         tuple[str, str], ...
     ] = ()  # `path:line` and reason of each file that cannot be read
+    shadowing_modules: tuple[str, ...] = ()  # flat modules left out: they have names of the standard library
     installed_package: str | None = None
     requirement: str | None = None  # requirement for the installed distribution
 
 
-def survey_source(target: str) -> SourceSurvey:
-    """Survey a folder, or the package `installed:NAME`. MutatorError if it does not exist."""
+def survey_source(target: str, globs: Sequence[str] = ()) -> SourceSurvey:
+    """Survey a folder, or the package `installed:NAME`; with `globs`, read only the files that match one.
+
+    MutatorError if the target does not exist or no file matches.
+    """
+    survey = _survey_all(target, globs)
+    if globs and not (survey.modules or survey.unreadable_files):
+        raise MutatorError(
+            f"no Python file of {', '.join(survey.packages) or target} matches {', '.join(globs)}",
+            argument="files",
+            expected=f"globs relative to {survey.root}, such as `pkg/control/**`",
+            remedy="correct the glob",
+        )
+    return survey
+
+
+def _survey_all(target: str, globs: Sequence[str]) -> SourceSurvey:
     if target.startswith(INSTALLED_PREFIX):
-        return _survey_installed(target.removeprefix(INSTALLED_PREFIX))
+        return _survey_installed(target.removeprefix(INSTALLED_PREFIX), globs)
     folder = Path(target).resolve()
     if not folder.is_dir():
         raise MutatorError(
@@ -62,13 +80,24 @@ def survey_source(target: str) -> SourceSurvey:
             remedy="correct `target`",
         )
     if (folder / "__init__.py").exists():
-        return _survey_packages(folder.parent, (folder.name,))
-    if [*_packages_in(folder)] == ["src"] and not (folder / "src" / "__init__.py").exists():
+        return _survey_packages(folder.parent, (folder.name,), globs)
+    packages = [*_packages_in(folder)]
+    if "src" in packages and _is_source_folder(folder, packages):
         folder /= "src"
-    return _survey_packages(folder, tuple(_packages_in(folder)))
+        packages = [*_packages_in(folder)]
+    shadowing = tuple(name for name in packages if name.removesuffix(".py") in sys.stdlib_module_names)
+    survey = _survey_packages(folder, tuple(name for name in packages if name not in shadowing), globs)
+    return replace(survey, shadowing_modules=shadowing)
 
 
-def _survey_installed(name: str) -> SourceSurvey:
+def _is_source_folder(folder: Path, packages: Sequence[str]) -> bool:
+    """Return whether `src` is not a package, but holds those of the project."""
+    source = folder / "src"
+    is_project = [*packages] == ["src"] or any((folder / name).exists() for name in _PROJECT_FILES)
+    return is_project and not (source / "__init__.py").exists() and any(_packages_in(source))
+
+
+def _survey_installed(name: str, globs: Sequence[str]) -> SourceSurvey:
     package_path = find_installed_package(name) if name.isidentifier() else None
     if package_path is None:
         raise MutatorError(
@@ -77,7 +106,7 @@ def _survey_installed(name: str) -> SourceSurvey:
             expected="the import name of a package",
             remedy="install it in mutator's environment, or correct the name",
         )
-    survey = _survey_packages(package_path.parent, (package_path.name,), any_links=True)
+    survey = _survey_packages(package_path.parent, (package_path.name,), globs, any_links=True)
     return replace(survey, installed_package=name, requirement=_distribution_requirement(name))
 
 
@@ -87,14 +116,20 @@ def _distribution_requirement(name: str) -> str | None:
 
 
 def _packages_in(folder: Path) -> Iterator[str]:
-    """Yield packages (with or without `__init__.py`) and flat modules, except tests, docs and scripts."""
+    """Yield packages (with or without `__init__.py`) and flat modules, except tests, docs and scripts.
+
+    Of the links to a package that is there, too, none is yielded.
+    """
     try:
         entries = sorted(folder.iterdir())
     except OSError as err:
         raise MutatorError(
             f"cannot be read ({err.strerror})", where=folder, remedy="check its permissions"
         ) from None
+    real_paths = {path for path in entries if not path.is_symlink()}
     for path in entries:
+        if path.is_symlink() and path.resolve() in real_paths:
+            continue
         stem = path.name.removesuffix(".py")
         if not _is_importable(stem) or stem in _SKIPPED_FOLDERS_AND_MODULES:
             continue
@@ -129,18 +164,28 @@ def _parse(path: Path) -> ast.Module:
         return ast.parse(read_bounded(path, MOST_SOURCE_BYTES))
 
 
-def _survey_packages(root: Path, packages: tuple[str, ...], *, any_links: bool = False) -> SourceSurvey:
-    """Read the modules of packages; with `any_links`, links may point out of the root."""
+def _survey_packages(
+    root: Path, packages: tuple[str, ...], globs: Sequence[str], *, any_links: bool = False
+) -> SourceSurvey:
+    """Read the modules of packages, each file once; with `any_links`, links may point out of the root."""
     modules: list[SourceModule] = []
     unread: list[tuple[str, str]] = []
-    for name in packages:
+    real_paths = set[Path]()
+    # links last, so that a file has the name under which it is stored
+    for name in sorted(packages, key=lambda name: (root / name).is_symlink()):
         for path in [root / name] if name.endswith(".py") else _python_files(root / name):
+            if globs and not matches_any_glob(path.relative_to(root).as_posix(), globs):
+                continue
+            if path.resolve() in real_paths:
+                continue
+            real_paths.add(path.resolve())
             if len(modules) + len(unread) == _MOST_FILES:
                 raise MutatorError(
                     f"more than {_MOST_FILES} Python files",
+                    argument="target",
                     where=root,
                     expected="the source of one controller",
-                    remedy="pass a subfolder",
+                    remedy="pass a subfolder, or choose files with `files`",
                 )
             relative = path.relative_to(root).as_posix()
             try:

@@ -48,10 +48,18 @@ class StepCandidate:
     line: int
     class_name: str | None  # the class of a method
     function: str
+    is_async: bool
     required_arguments: tuple[str, ...]  # required arguments
     constructor_arguments: tuple[str, ...]  # required arguments of the class's constructor
     score: int
+    loop_call_count: int  # how many loops of the tree call a function of this name
     values: tuple[ValueCandidate, ...]
+
+    @property
+    def likelihood(self) -> tuple[int, int, int, int]:
+        """Higher is likelier: the score, then what distinguishes functions of equal scores."""
+        value_scores = [value.score for value in self.values]
+        return self.score, self.loop_call_count, sum(value_scores), len(value_scores)
 
     @property
     def name(self) -> str:
@@ -60,7 +68,10 @@ class StepCandidate:
 
 
 def list_step_candidates(survey: SourceSurvey) -> tuple[StepCandidate, ...]:
-    """Return public functions that might be the step of a loop, likeliest first."""
+    """Return public functions that might be the step of a loop, likeliest first.
+
+    The order of files decides only between functions that nothing distinguishes.
+    """
     loop_call_counts = Counter(
         name for module in survey.modules for name in _names_called_in_loops(module.tree)
     )
@@ -69,7 +80,16 @@ def list_step_candidates(survey: SourceSurvey) -> tuple[StepCandidate, ...]:
         for module in survey.modules
         for candidate in _candidates_in_module(module, loop_call_counts)
     ]
-    return tuple(sorted(candidates, key=lambda candidate: (-candidate.score, candidate.path, candidate.line)))
+    candidates.sort(key=lambda candidate: (candidate.path, candidate.line))
+    return tuple(sorted(candidates, key=lambda candidate: candidate.likelihood, reverse=True))
+
+
+def group_by_function_name(candidates: Iterable[StepCandidate]) -> list[list[StepCandidate]]:
+    """Group functions and methods of one name, such as the `update` of many controllers, in their order."""
+    groups: dict[str, list[StepCandidate]] = {}
+    for candidate in candidates:
+        groups.setdefault(candidate.function, []).append(candidate)
+    return list(groups.values())
 
 
 def _candidates_in_module(module: SourceModule, loop_call_counts: Counter[str]) -> Iterator[StepCandidate]:
@@ -83,7 +103,7 @@ def _candidates_in_module(module: SourceModule, loop_call_counts: Counter[str]) 
 
 
 def _can_be_step(function: Function) -> bool:
-    if isinstance(function, ast.AsyncFunctionDef):
+    if isinstance(function, ast.AsyncFunctionDef) and _is_generator(function):
         return False
     if function.name.startswith("_") and function.name not in _SCORE_BY_STEP_WORD:
         return False
@@ -95,6 +115,10 @@ def _can_be_step(function: Function) -> bool:
         return False
     body = [node for node in function.body if not isinstance(node, ast.Expr | ast.Pass | ast.Raise)]
     return bool(body)
+
+
+def _is_generator(function: Function) -> bool:
+    return any(isinstance(node, ast.Yield | ast.YieldFrom) for node in ast.walk(function))
 
 
 def _build_candidate(
@@ -118,6 +142,8 @@ def _build_candidate(
         line=function.lineno,
         class_name=class_node.name if class_node else None,
         function=function.name,
+        is_async=isinstance(function, ast.AsyncFunctionDef),
+        loop_call_count=loop_call_counts[function.name],
         required_arguments=_required_arguments(function, is_method=class_node is not None),
         constructor_arguments=_required_arguments(init, is_method=True) if init else (),
         score=score,

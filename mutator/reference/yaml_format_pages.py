@@ -7,8 +7,8 @@ from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
 from mutator.execution.cluster import cluster_files
 from mutator.faults import fault_specs
-from mutator.faults.library_readings import ReadingsModel
 from mutator.faults.library_readings import SCHEMA as READINGS_SCHEMA
+from mutator.faults.library_readings import ReadingsModel
 from mutator.reference.yaml_key_tables import generated_page_head, model_sections
 from mutator.stpa import analysis_files, context_tables, hazard_list
 from mutator.targets import manifest_files, severity_model
@@ -122,8 +122,8 @@ def _readings_section() -> Iterator[str]:
     yield (
         "The [readings](../explanation/concepts.md#readings) of a library are the keys under which its "
         "variants have injections.\n`fault_library/readings.yaml` declares them. Most libraries need none: "
-        "`injections` is then a key of the variant itself.\nThe first reading is the default: every variant must have it, and it "
-        "replaces readings that a variant does not have. The first key of the file is\n"
+        "`injections` is then a key of the variant itself.\nThe first reading is the default: every variant "
+        "must have it, and it replaces readings that a variant does not have. The first key of the file is\n"
         f"`schema: {READINGS_SCHEMA}`.\n"
     )
     yield from model_sections("fault-spec.md", ReadingsModel, parent_level=2)

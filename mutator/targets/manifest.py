@@ -132,7 +132,7 @@ class TargetManifest:
                     if name.endswith(".py")
                     else f"no file of package '{name}' under {self.root}",
                     where=self.path,
-                    remedy="correct `root`, `package`, `packages` or `files`, or give the target with --target",
+                    remedy="correct `root`, `package`, `packages` or `files`, or give the root with --target",
                 )
         return tree
 

@@ -36,8 +36,8 @@ class ManifestModel(StrictModel, title="The file"):
     """How to find, run and observe a target, and which files its runs write."""
 
     name: str = Field(
-        description="The name that campaigns and `--manifest` use for the target, whatever the file is called. "
-        "Each manifest has a name of its own."
+        description="The name that campaigns and `--manifest` use for the target, whatever the file is "
+        "called. Each manifest has a name of its own."
     )
     about: str = Field("", description="What the target is.")
     root: str = Field(
@@ -51,7 +51,6 @@ class ManifestModel(StrictModel, title="The file"):
     )
     packages: list[str] | None = Field(
         None,
-        min_length=1,
         description="Instead of `package`: several import packages, or modules outside packages "
         "(`drive.py`). The probe is then a module next to them, `_fi.py`.",
     )

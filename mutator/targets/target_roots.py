@@ -82,6 +82,13 @@ def checked_package_names(
             )
         return (package,)
     names = tuple(packages or ())
+    if not names:
+        raise source.error(
+            ("packages",),
+            "[]: the target has no package and no module, so nothing of it could be imported or changed",
+            expected="the import packages (`pilot`) and modules (`pilot.py`) of the controller in `root`",
+            remedy="name them, or correct `root`",
+        )
     used_names = {PROBE_MODULE_NAME}
     for i, name in enumerate(names):
         stem = name.removesuffix(".py")

@@ -221,3 +221,32 @@ def test_init_refuses_a_missing_target_and_writes_nothing(
     assert f"error: --target: {told}" in answer.err
     assert "--manifest" not in answer.err
     assert not (nowhere / "faults").exists()
+
+
+def test_a_first_library_lists_fifteen_rows_and_names_the_way_to_fewer_files(cli: Cli, nowhere: Path) -> None:
+    """Of a monorepo, the likeliest candidates are enough."""
+    tree = nowhere / "repo"
+    for i in range(20):
+        (tree / f"p{i}").mkdir(parents=True)
+        law = CONTROLLER.replace("update", f"update_{i}")
+        (tree / f"p{i}" / "law.py").write_text(law + law.replace("Controller", "Other"))
+    cli("init", "faults", "--target", "repo")
+    readme = (nowhere / "faults" / "README.md").read_text()
+    rows = [line for line in readme.splitlines() if line.startswith("| `")]
+    assert len(rows) == 20  # five are files of the library
+    assert "(40 in all; `mutator init DIR --target TREE --in 'GLOB'`" in readme
+    cli("init", "fewer", "--target", "repo", "--in", "p3/**")
+    rows = [line for line in (nowhere / "fewer" / "README.md").read_text().splitlines() if "update_" in line]
+    assert len(rows) == 1
+    assert "also `Other.update_3` (p3/law.py:" in rows[0]
+    refused = cli("init", "none", "--in", "p3/**")
+    assert refused.code == 2 and "--in: files p3/** without a target" in refused.err
+
+
+def test_an_async_step_is_run_to_its_end(cli: Cli, nowhere: Path) -> None:
+    """The loop is not asynchronous."""
+    (nowhere / "law.py").write_text(CONTROLLER.replace("def update", "async def update"))
+    cli("init", "faults", "--target", ".")
+    [drive] = (nowhere / "faults").rglob("drive.py")
+    assert "command = asyncio.run(self.controller.update(state))" in drive.read_text()
+    assert "\nimport asyncio\n" in drive.read_text()

@@ -53,6 +53,7 @@ def test_the_label_of_an_experiment_names_its_fault_scenario_and_trigger(
     experiment: Callable[..., Experiment],
 ) -> None:
     assert experiment(value=35).label == "radar/chaff/distance 35 m, S1, guided C1"
+    assert experiment(method=Method.RANDOM, trigger="random/C2").drive_label == "S1, random C2"
 
 
 @pytest.mark.parametrize(
@@ -65,11 +66,12 @@ def test_the_label_of_an_experiment_names_its_fault_scenario_and_trigger(
         (Method.GUIDED, "gap < 3", "S1, gap < 3"),
     ],
 )
-def test_only_a_context_is_called_guided(method: Method, name: str, expected: str) -> None:
+def test_only_a_context_is_called_guided(
+    experiment: Callable[..., Experiment], method: Method, name: str, expected: str
+) -> None:
     """A campaign that lists its triggers does not use the word."""
     trigger = replace(experiment().trigger, name=name, condition="gap < 3")
     assert replace(experiment(), method=method, trigger=trigger).drive_label == expected
-    assert experiment(method=Method.RANDOM, trigger="random/C2").drive_label == "S1, random C2"
 
 
 def test_no_module_strips_a_placeholder_unit() -> None:

@@ -108,8 +108,12 @@ def test_a_library_with_one_reading_does_not_need_its_name(toy: Workspace) -> No
 def test_injections_outside_a_reading_are_refused_if_there_are_several(toy: Workspace) -> None:
     """It would not be clear which reading they belong to."""
     [path] = toy.spec_files()
-    path.write_text(path.read_text().replace("    as_described:\n", "    injections: []\n    as_described:\n", 1))
-    with pytest.raises(MutatorError, match=r"\d: injections outside a reading; expected the key `as_described`"):
+    path.write_text(
+        path.read_text().replace("    as_described:\n", "    injections: []\n    as_described:\n", 1)
+    )
+    with pytest.raises(
+        MutatorError, match=r"\d: injections outside a reading; expected the key `as_described`"
+    ):
         toy.specs()
 
 

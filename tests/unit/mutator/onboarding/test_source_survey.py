@@ -130,3 +130,49 @@ def test_a_link_out_of_the_tree_is_not_read(tree: Tree, tmp_path: Path) -> None:
     found = survey_source(str(folder))
     assert [module.path for module in found.modules] == ["own.py"]
     assert found.unreadable_files == (("linked.py:1", "a link that leads out of its folder"),)
+
+
+def write(root: Path, *paths: str) -> None:
+    for path in paths:
+        (root / path).parent.mkdir(parents=True, exist_ok=True)
+        (root / path).write_text("x = 1\n")
+
+
+def test_a_linked_package_is_read_once(tmp_path: Path) -> None:
+    """Monorepos give a package a second name; its functions must not be listed twice."""
+    write(tmp_path, "z/control.py")
+    (tmp_path / "a").symlink_to("z")
+    write(tmp_path, "whole/other.py")
+    (tmp_path / "whole" / "control.py").symlink_to("../z/control.py")
+    survey = survey_source(str(tmp_path))
+    assert survey.packages == ("whole", "z")
+    paths = [module.path for module in survey.modules]
+    assert len(paths) == 2 and "whole/other.py" in paths
+
+
+def test_globs_choose_the_files_that_are_searched(tmp_path: Path) -> None:
+    """The packages stay the target's, because the chosen files import the others."""
+    write(tmp_path, "a/control/law.py", "a/view.py", "b/law.py")
+    survey = survey_source(str(tmp_path), ("a/control/**",))
+    assert [module.path for module in survey.modules] == ["a/control/law.py"]
+    assert survey.packages == ("a", "b")
+    with pytest.raises(
+        MutatorError, match=r"no Python file of a, b matches nowhere/\*\*; expected globs relative"
+    ):
+        survey_source(str(tmp_path), ("nowhere/**",))
+
+
+def test_a_module_of_the_target_shadows_none_of_the_standard_library(tmp_path: Path) -> None:
+    """With `random.py` in the root, numpy would import the target's."""
+    write(tmp_path, "law.py", "types.py", "random.py")
+    survey = survey_source(str(tmp_path))
+    assert survey.packages == ("law.py",)
+    assert survey.shadowing_modules == ("random.py", "types.py")
+
+
+def test_src_is_the_root_of_a_project_with_other_folders(tmp_path: Path) -> None:
+    """`src.pkg` is not the name under which the package is imported."""
+    write(tmp_path, "src/pkg/law.py", "utils/release.py")
+    assert survey_source(str(tmp_path)).packages == ("src", "utils")
+    (tmp_path / "pyproject.toml").touch()
+    assert survey_source(str(tmp_path)).packages == ("pkg",)

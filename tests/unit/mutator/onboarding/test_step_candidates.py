@@ -5,7 +5,11 @@ import ast
 import pytest
 
 from mutator.onboarding.source_survey import SourceModule, SourceSurvey
-from mutator.onboarding.step_candidates import StepCandidate, list_step_candidates
+from mutator.onboarding.step_candidates import (
+    StepCandidate,
+    group_by_function_name,
+    list_step_candidates,
+)
 
 CAR = '''
 class World:
@@ -102,9 +106,43 @@ def test_a_function_in_a_file_named_like_a_controller_ranks_first() -> None:
         "x = 1\n",
         "def step(x):\n    '''Only words.'''\n",
         "class A:\n    pass\n",
-        "async def step(x):\n    y = x + 1\n    return y\n",
     ],
 )
 def test_modules_without_a_step_have_no_candidate(source: str) -> None:
-    """A coroutine is not a candidate, because calling it runs nothing."""
     assert candidates(a=source) == ()
+
+
+LAW = """
+class {name}:
+    {kind}def update(self, x):
+        {body}
+"""
+
+
+def test_async_steps_are_candidates_but_async_generators_are_not() -> None:
+    """`asyncio.run` can run the former only."""
+    body = "u = 2.0 * x\n        return u"
+    awaited = candidates(a=LAW.format(name="Control", kind="async ", body=body))
+    assert [(candidate.name, candidate.is_async) for candidate in awaited] == [("Control.update", True)]
+    assert candidates(a=LAW.format(name="Control", kind="async ", body="u = 2.0 * x\n        yield u")) == ()
+
+
+def test_a_tie_is_decided_by_what_a_function_computes_not_by_its_file() -> None:
+    """A monorepo has many equal scores; the alphabet says nothing."""
+    plain = LAW.format(name="Control", kind="", body="u = x[0]\n        return u")
+    computed = LAW.format(name="Control", kind="", body="u = 2.0 * x\n        return u")
+    first, second = candidates(a=plain, z=computed)
+    assert first.score == second.score
+    assert first.path == "z.py"
+
+
+def test_candidates_of_one_name_are_one_group() -> None:
+    """Otherwise the `update` of each of thirty controllers would fill the list."""
+    body = "u = 2.0 * x\n        return u"
+    several = candidates(
+        a=LAW.format(name="A", kind="", body=body),
+        b=LAW.format(name="B", kind="", body=body),
+        c="def drive(x):\n    u = 2.0 * x\n    return u\n",
+    )
+    groups = [[each.name for each in group] for group in group_by_function_name(several)]
+    assert sorted(groups) == [["A.update", "B.update"], ["drive"]]

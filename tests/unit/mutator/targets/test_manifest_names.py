@@ -21,7 +21,9 @@ def test_a_target_is_found_by_its_name_whatever_its_file_is_called(toycar: Works
     path = rename(toycar, "file", "mass")
     assert toycar.targets["mass"] == path
     assert toycar.manifest("mass").name == "mass"
-    with pytest.raises(MutatorError, match=r"no target 'file'.*one of mass, toycar.*file.yaml describes 'mass'"):
+    with pytest.raises(
+        MutatorError, match=r"no target 'file'.*one of mass, toycar.*file.yaml describes 'mass'"
+    ):
         toycar.manifest("file")
 
 
