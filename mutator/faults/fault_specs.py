@@ -180,8 +180,8 @@ _PHRASE_DESCRIPTION = (
     "and `abs_by_kph`"
 )
 _DIRECT_INJECTIONS_DESCRIPTION = (
-    "In a library with one [reading](#readings), or without readings: what the fault injects, without the key "
-    "of a reading. At least one injection."
+    "In a library with one [reading](#readings), or without readings: what the fault injects, without the "
+    "key of a reading. At least one injection."
 )
 _HOLD_DESCRIPTION = (
     "How long the fault stays active, if the trigger does not determine it: `to_end` for a fault that latches"
