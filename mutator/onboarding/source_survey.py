@@ -93,7 +93,7 @@ def _survey_all(target: str, globs: Sequence[str]) -> SourceSurvey:
 def _is_source_folder(folder: Path, packages: Sequence[str]) -> bool:
     """Return whether `src` is not a package, but holds those of the project."""
     source = folder / "src"
-    is_project = [*packages] == ["src"] or any((folder / name).exists() for name in _PROJECT_FILES)
+    is_project = [*packages] == ["src"] or any((folder / file).exists() for file in _PROJECT_FILES)
     return is_project and not (source / "__init__.py").exists() and any(_packages_in(source))
 
 
