@@ -10,6 +10,7 @@ import argparse
 import json
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
@@ -41,11 +42,14 @@ from mutator.results import table_building
 from mutator.results.outcome_counting import count_by_outcome_or_status
 from mutator.review.patch_shapes import shapes_of_patches
 from mutator.store.checksummed_lines import LineWriter
+from mutator.store.embedded_series import EMBEDDED_SERIES_ELEMENT, EmbeddedSeries
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series
-from mutator.web import packed_script_element
+from mutator.store.time_series_folder import TimeSeriesFolder
+from mutator.targets.scene_json import scene_as_json
+from mutator.web import json_script_element, packed_script_element
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -138,6 +142,16 @@ def write_series(workspace: Workspace, records: Sequence[Record], out: Path) -> 
     return (out / "series" / "index.js").stat().st_size / 1000
 
 
+def worst_series(out: Path, experiment_id: str) -> Markup:
+    """Return the element with the series of the worst experiment. A report would leave it out, because it
+    does not deviate as the synthetic record says.
+    """
+    encoded, embedded = TimeSeriesFolder(out).read_encoded(experiment_id), EmbeddedSeries(sys.maxsize)
+    assert encoded is not None
+    embedded.add({experiment_id: encoded})
+    return Markup(json_script_element(embedded.as_json(), EMBEDDED_SERIES_ELEMENT))
+
+
 def write(size: int, out: Path) -> dict[str, float]:
     """Write the page of that many experiments. Return its time and the size of its parts in KB."""
     workspace = Workspace.find(root=ROOT)
@@ -162,15 +176,20 @@ def write(size: int, out: Path) -> dict[str, float]:
     detail = packed_script_element(details, "details")
     index_kb = write_series(workspace, records, out)
     # no column of deviations: the synthetic records do not state those of the series
-    facts = {"filmed": True, "series": {"packed": True, "kept": [], "deviations": {}}}
+    facts = {
+        "filmed": True,
+        "scene": scene_as_json(workspace.manifest("openpilot")),
+        "series": {"packed": True, "kept": [], "deviations": {}},
+    }
     scripts = {
         "table": Markup(table),
         "details": Markup(detail),
         "paths": Markup(paths),
         "media": Markup(packed_script_element({}, "media")),
     }
-    worst_facts, worst_scripts = report_browse.first_replay_data(run)
-    browse = ExperimentListData(facts=facts | worst_facts, script_by_id=scripts | worst_scripts)
+    worst_facts, _ = report_browse.first_replay_data(run)
+    scripts[EMBEDDED_SERIES_ELEMENT] = worst_series(out, worst_facts["worst"]["id"])
+    browse = ExperimentListData(facts=facts | worst_facts, script_by_id=scripts)
     content = ReportContent(
         title=f"{size} experiments",
         alarm="",

@@ -128,6 +128,15 @@ def test_an_address_with_an_open_experiment_loads_no_other_replay(
     page.wait_for_selector("#worst-replay .replay-player")
 
 
+def test_the_replay_is_built_only_in_view(replayed: Path, opened: Callable[..., Any]) -> None:
+    """A page whose first screen is out of view builds no replay before its reader comes to it."""
+    page = opened(replayed, viewport={"width": 1440, "height": 60})
+    page.evaluate("new Promise((done) => setTimeout(done, 1500))")  # longer than a replay waits for idle time
+    assert page.locator("#worst-replay > *").count() == 0
+    page.locator("#worst-replay").scroll_into_view_if_needed()
+    page.wait_for_selector("#worst-replay .replay-player")
+
+
 def test_without_a_series_the_page_says_why(run: Path, opened: Callable[..., Any]) -> None:
     page = opened(run)
     page.wait_for_selector("#worst-replay p:text('series')")

@@ -57,7 +57,7 @@ SCENE = {
     ],
 }
 FACTS = {"scene": SCENE, "hazards": [{"name": "H1", "about": "the car hits the one ahead", "terminal": True}]}
-SHOW = """([series, facts]) => {
+SHOW = """([series, facts, options]) => {
     for (const channel of series.channels) {
         channel.t = Float64Array.from(channel.t);
         for (const run of ["golden", "faulty"]) channel[run] = Float32Array.from(channel[run]);
@@ -66,7 +66,7 @@ SHOW = """([series, facts]) => {
     document.body.replaceChildren(place);
     window.told = [];
     document.body.addEventListener("replay-time", (event) => window.told.push(event.detail.t));
-    window.player = Replay.show(place, series, facts);
+    window.player = Replay.show(place, series, facts, options);
 }"""
 T = "Number(document.querySelector('.replay-player').dataset.t)"
 
@@ -75,8 +75,8 @@ class Replayed:
     def __init__(self, page: Any) -> None:
         self.page = page
 
-    def show(self, facts: dict[str, Any], series: dict[str, Any] = SERIES) -> None:
-        self.page.evaluate(SHOW, [series, facts])
+    def show(self, facts: dict[str, Any], series: dict[str, Any] = SERIES, *, brief: bool = False) -> None:
+        self.page.evaluate(SHOW, [series, facts, {"isBrief": brief}])
         self.page.wait_for_function(f"{T} >= 0")
 
     @property
@@ -204,12 +204,21 @@ def test_a_moment_of_huge_values_does_not_flatten_the_plot(
     values["faulty"][50] = high
     channel = SERIES["channels"][0] | {"name": "hwt"} | values
     replayed.show(FACTS | {"scene": None}, SERIES | {"channels": [channel]})
-    low, top = replayed.page.evaluate("[player.axes[0].low, player.axes[0].high]")
+    low, top = replayed.page.evaluate("(({ low, high }) => [low, high])(player.axisOf(player.channels[0]))")
     assert (top < 7) == (note is not None)
     assert -10 < low < 2
     assert replayed.texts(".plot-of .note") == ([note] if note else [])
     label = replayed.page.get_attribute(".plot-of canvas", "aria-label")
     assert f"largest difference {high - 2}" in label.replace(".0", "")
+
+
+def test_a_brief_replay_computes_only_what_it_shows(replayed: Replayed) -> None:
+    """Without a scene it builds two plots at most; with one, no plot and no instrument."""
+    for scene, count in ((None, 2), (SCENE, 0)):
+        replayed.show(FACTS | {"scene": scene}, brief=True)
+        assert replayed.page.locator(".plot-of").count() == count
+        assert replayed.page.evaluate("player.plots?.plots.size ?? 0") == count
+        assert replayed.page.locator(".gauge").count() == 0
 
 
 def test_marks_close_together_have_separate_buttons(replayed: Replayed) -> None:

@@ -7,11 +7,11 @@ class ReplayGauges {
   static TEXTS = 100; // ms between text updates while playing, so that texts stay readable
 
   /** `isPlotted(name)` returns whether a channel is plotted; `toggle(name)` changes it. */
-  constructor(channels, axes, { isPlotted, toggle }) {
+  constructor(channels, axisOf, { isPlotted, toggle }) {
     const { el } = Dom;
     this.isPlotted = isPlotted;
     this.written = -Infinity;
-    this.gauges = channels.map((channel, i) => this.#gauge(channel, axes[i], toggle));
+    this.gauges = channels.map((channel) => this.#gauge(channel, axisOf(channel), toggle));
     const all = el("button.more", { type: "button", onclick: () => {
       this.element.classList.add("has-all");
       all.remove();

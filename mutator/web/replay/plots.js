@@ -5,11 +5,13 @@
 class ReplayPlots {
   static NARROWEST = 0.2; // duration (s) of the narrowest view
   static CHOSEN = { actuator: 2, truth: 3, internal: 1 }; // maximum number of initial plots by role
+  static BRIEF = 2; // maximum number of initial plots of a brief replay
   static SMALLEST_VISIBLE = 0.002; // the smallest visible difference, as a share of the axis
   static FACTOR = 1.6; // ratio of a zoom step
 
-  /** `beside` is another experiment over the same time: {name, series}, or null. */
-  constructor(channels, axes, series, clock, zoomed, beside = null) {
+  /** `axisOf(channel)` returns its axis. `beside` is another experiment over the same time: {name, series}, or null.
+   *  `isBrief`: begin with two plots at most. */
+  constructor(channels, axisOf, series, clock, zoomed, { beside = null, isBrief = false } = {}) {
     const { el } = Dom;
     this.series = series;
     this.beside = beside;
@@ -18,7 +20,9 @@ class ReplayPlots {
     this.hovered = null;
     this.written = -Infinity;
     this.colours = null;
-    this.plots = channels.map((channel, i) => new ReplayPlot(channel, axes[i], series, beside));
+    this.channels = channels;
+    this.axisOf = axisOf;
+    this.plots = new Map(); // channel name -> its plot, once it was shown
     this.view = { from: series.start, to: series.end };
     this.axis = el("canvas.axis", { "aria-hidden": "true" });
     this.list = el("div.list", { onpointerdown: (event) => this.#press(event), onpointermove: (event) => this.#hover(event),
@@ -26,17 +30,26 @@ class ReplayPlots {
     this.list.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
     this.timeLabel = el("span.told");
     this.element = el("div.plots", {}, this.#tools(), this.list);
-    this.chosen = new Set(this.#interesting().map(({ name }) => name));
+    this.chosen = new Set(this.#interesting(isBrief ? ReplayPlots.BRIEF : Infinity).map(({ name }) => name));
     this.#fill();
   }
 
-  /** The initial channels: those of each role that differ most, or the first three if none differs. */
-  #interesting() {
-    const begin = this.series.active?.[0] ?? this.series.start, end = ReplayData.until(this.series);
-    const ranked = this.plots.map(({ channel, axis }) => ({ channel, apart: ReplayData.apart(channel, axis, begin, end) }))
-      .filter(({ apart }) => apart > ReplayPlots.SMALLEST_VISIBLE).sort((a, b) => b.apart - a.apart).map(({ channel }) => channel);
-    const differing = Object.entries(ReplayPlots.CHOSEN).flatMap(([role, most]) => ranked.filter((channel) => channel.role === role).slice(0, most));
-    return differing.length ? differing : this.plots.slice(0, 3).map(({ channel }) => channel);
+  /** The initial channels, `most` at most: those of each role that differ most, or the first three if none differs. Roles that
+   *  are not needed are not compared. */
+  #interesting(most) {
+    const begin = this.series.active?.[0] ?? this.series.start, end = ReplayData.until(this.series), differing = [];
+    for (const [role, count] of Object.entries(ReplayPlots.CHOSEN)) {
+      if (differing.length >= most) break;
+      const ranked = this.channels.filter((channel) => channel.role === role).map((channel) => ({ channel, apart: ReplayData.apart(channel, this.axisOf(channel), begin, end) }))
+        .filter(({ apart }) => apart > ReplayPlots.SMALLEST_VISIBLE).sort((a, b) => b.apart - a.apart);
+      differing.push(...ranked.slice(0, count).map(({ channel }) => channel));
+    }
+    return (differing.length ? differing : this.channels.slice(0, 3)).slice(0, most);
+  }
+
+  #plotOf(channel) {
+    if (!this.plots.has(channel.name)) this.plots.set(channel.name, new ReplayPlot(channel, this.axisOf(channel), this.series, this.beside));
+    return this.plots.get(channel.name);
   }
 
   #tools() {
@@ -54,7 +67,7 @@ class ReplayPlots {
   }
 
   #fill() {
-    const shownPlots = this.plots.filter(({ channel }) => this.chosen.has(channel.name));
+    const shownPlots = this.channels.filter(({ name }) => this.chosen.has(name)).map((channel) => this.#plotOf(channel));
     this.list.replaceChildren(...shownPlots.map(({ element }) => element), shownPlots.length ? this.axis : Dom.el("p.quiet", {}, "No channel is chosen. Press one above."));
     this.shownPlots = shownPlots;
     this.width = 0; // so that the new plots are drawn
@@ -70,7 +83,7 @@ class ReplayPlots {
 
   /** Plot those of the channels that this run has. */
   choose(names) {
-    this.chosen = new Set(this.plots.map(({ channel }) => channel.name).filter((name) => names.has(name)));
+    this.chosen = new Set(this.channels.map(({ name }) => name).filter((name) => names.has(name)));
     this.#fill();
   }
 

@@ -16,9 +16,9 @@ const Replay = (() => {
   const symbol = (name) => Dom.svg("svg", { viewBox: "0 0 16 16", width: 14, height: 14, fill: "currentColor", "aria-hidden": "true" }, Dom.svg("path", { d: SYMBOLS[name] }));
 
   class Player {
-    /** `clock`, `axes` by channel and `toggle(name)` of a channel's plot are those of all players that are shown together.
+    /** `clock`, `axisOf(channel)` and `toggle(name)` of a channel's plot are those of all players that are shown together.
      *  `isBrief`: the scene without instruments and plots; without a scene, two plots. */
-    constructor({ place, series, facts, isBrief = false, beside = null }, { clock, axes, toggle }) {
+    constructor({ place, series, facts, isBrief = false, beside = null }, { clock, axisOf, toggle }) {
       this.place = place;
       this.isBrief = isBrief;
       this.gauges = /** @type {any} */ (null);
@@ -27,7 +27,7 @@ const Replay = (() => {
       this.series = series;
       this.facts = facts;
       this.channels = [...series.channels].sort((a, b) => Number(b.role === "actuator") - Number(a.role === "actuator"));
-      this.axes = this.channels.map(({ name }) => axes.get(name));
+      this.axisOf = axisOf;
       this.clock = clock;
       this.toggle = toggle;
       this.scene = this.#scene();
@@ -51,8 +51,8 @@ const Replay = (() => {
       const { el } = Dom, { clock, series } = this;
       this.bar = new ReplayBar(series, clock, (t) => this.describe(t));
       const plotting = { isPlotted: (name) => this.plots.isPlotted(name), toggle: this.toggle };
-      if (!this.isBrief) this.gauges = new ReplayGauges(this.channels, this.axes, plotting);
-      if (!this.isBrief || !this.scene) this.plots = new ReplayPlots(this.channels, this.axes, series, clock, (from, to) => this.bar.zoomed(from, to), this.beside);
+      if (!this.isBrief) this.gauges = new ReplayGauges(this.channels, this.axisOf, plotting);
+      if (!this.isBrief || !this.scene) this.plots = new ReplayPlots(this.channels, this.axisOf, series, clock, (from, to) => this.bar.zoomed(from, to), { beside: this.beside, isBrief: this.isBrief });
       this.gauges?.pressed();
       this.time = el("span.now");
       this.states = el("span.states");
@@ -66,7 +66,6 @@ const Replay = (() => {
         el("div.stage", {}, this.#view(), el("div.state", {}, this.time, this.states)), this.#controls(), this.bar.element, this.bar.jumps,
         this.missing ? el("p.quiet", {}, `The scene cannot be drawn: ${this.missing}.`) : null,
         this.gauges?.element, this.plots?.element, this.live);
-      if (this.isBrief) this.plots?.choose(new Set([...this.plots.chosen].slice(0, 2)));
       this.place.replaceChildren(el("div.replay-box", {}, this.root));
     }
 
@@ -114,7 +113,7 @@ const Replay = (() => {
       const words = [`${t.toFixed(2)} s`, ...this.#stateAt(t).map(([, text]) => text)];
       const differ = this.channels.filter((c) => !ReplayData.same(ReplayData.valueAt(c, "faulty", t), ReplayData.valueAt(c, "golden", t)));
       for (const channel of (differ.length ? differ : this.channels).slice(0, SPOKEN)) {
-        const places = ReplayData.digits(this.axes[this.channels.indexOf(channel)]), of = (run) => ReplayData.text(ReplayData.valueAt(channel, run, t), places);
+        const places = ReplayData.digits(this.axisOf(channel)), of = (run) => ReplayData.text(ReplayData.valueAt(channel, run, t), places);
         words.push([channel.name, of("faulty"), ReplayData.unit(channel), differ.length ? `(golden ${of("golden")})` : "", this.#besideAt(channel.name, t, places)].filter(Boolean).join(" "));
       }
       return `${words.join(", ")}${differ.length ? "" : ", same as golden"}`;
@@ -207,16 +206,15 @@ const Replay = (() => {
     return new ReplayClock({ start, end: Math.max(...all.map(({ end }) => end)), stops, steps, at: Math.max(start, Math.min(...all.map(firstEvent)) - BEFORE) }, draw);
   }
 
-  /** The axis of each channel, which covers its values in all series. */
-  function axesOf(all) {
-    const axes = new Map();
-    for (const series of all) {
-      for (const channel of series.channels) {
-        const axis = ReplayData.range(channel, ReplayData.until(series)), other = axes.get(channel.name);
-        axes.set(channel.name, other ? ReplayData.joined(other, axis) : axis);
-      }
-    }
-    return axes;
+  /** Make the function that returns a channel's axis, which covers its values in all series. */
+  function axesOver(all) {
+    const axes = new Map(); // by name, those that were needed
+    const over = (name) => all.flatMap((series) => series.channels.filter((channel) => channel.name === name).map((channel) => ReplayData.range(channel, ReplayData.until(series))))
+      .reduce(ReplayData.joined);
+    return ({ name }) => {
+      if (!axes.has(name)) axes.set(name, over(name));
+      return axes.get(name);
+    };
   }
 
   let current = []; // the players on the page
@@ -235,7 +233,7 @@ const Replay = (() => {
       player.plots.toggle(name);
       player.gauges.pressed();
     });
-    const shared = { clock: clockOf(all, () => players.forEach((player) => player.draw())), axes: axesOf([...all, ...drawable.flatMap(({ beside }) => beside?.series ?? [])]), toggle };
+    const shared = { clock: clockOf(all, () => players.forEach((player) => player.draw())), axisOf: axesOver([...all, ...drawable.flatMap(({ beside }) => beside?.series ?? [])]), toggle };
     for (const side of drawable) players.push(new Player(side, shared));
     if (players.length > 1) align(players);
     current.push(...players);

@@ -47,26 +47,43 @@ const SeriesFile = (() => {
     return new Response(stream).arrayBuffer(); // this also verifies the checksum
   }
 
-  /** Each experiment's entry, and the entries' positions; null if the file is not there. */
+  /** The index, with the function `find(id)`: the places {name, at, size} of an experiment's entry and of its golden run, and the
+   *  golden run's number; null if there is no series of it. Null if the file is not there. */
   async function readIndex() {
     const bytes = await read("index", "index");
     if (!bytes) return null;
     const data = JSON.parse(new TextDecoder().decode(await inflated(bytes)));
     if (data.schema !== "series/1") throw new Error(`unknown series schema ${data.schema}`);
-    const places = [], of = new Map(), keys = Object.keys(data.goldens).sort(); // sorted, because numeric names would come first
-    for (const [name, count] of data.chunks) {
-      for (let at = 0, i = 0; i < count; i++) {
-        const size = data.sizes[places.length];
-        places.push({ name, at, size });
-        at += size;
-      }
+    const keys = Object.keys(data.goldens).sort(); // sorted, because numeric names would come first
+    return { find: (id) => {
+      const row = rowOf(data.ids, id);
+      if (row < 0) return null;
+      const reference = data.goldens[keys[data.golden_of[row]]];
+      return { entry: placeOf(data, sum(data.entries, 0, row + 1)), golden: placeOf(data, reference), reference };
+    } };
+  }
+
+  const sum = (numbers, from, to) => {
+    let total = 0;
+    for (let i = from; i < to; i++) total += numbers[i];
+    return total;
+  };
+
+  /** The position of an id of 16 characters in a text of ids; -1 if it is not there. */
+  function rowOf(ids, id) {
+    let at = id.length === 16 ? ids.indexOf(id) : -1;
+    while (at >= 0 && at % 16) at = ids.indexOf(id, at + 1); // the end of an id and the begin of the next
+    return at < 0 ? -1 : at / 16;
+  }
+
+  /** The place of an entry: the chunk's name, the entry's first byte in it and its size. */
+  function placeOf({ chunks: counts, sizes }, entry) {
+    let first = 0; // entry of the chunk
+    for (const [name, count] of counts) {
+      if (entry < first + count) return { name, at: sum(sizes, first, entry), size: sizes[entry] };
+      first += count;
     }
-    let entry = 0;
-    data.entries.forEach((more, i) => {
-      entry += more;
-      of.set(data.ids.slice(16 * i, 16 * i + 16), [entry, data.goldens[keys[data.golden_of[i]]]]);
-    });
-    return { places, of };
+    throw new Error(`the index has no entry ${entry}`);
   }
 
   async function bytesOf({ name, at, size }) {
@@ -219,12 +236,12 @@ const SeriesFile = (() => {
     }
     if (there.packed) index ??= readIndex();
     if (there.packed && !(await index)) throw missing("index");
-    const place = (await index)?.of.get(id);
-    if (!place) return null;
-    const { places } = await index, [entry, reference] = place;
-    if (!goldens.has(reference)) goldens.set(reference, bytesOf(places[reference]).then((bytes) => decoded(bytes, null)));
+    const located = (await index)?.find(id);
+    if (!located) return null;
+    const { reference } = located;
+    if (!goldens.has(reference)) goldens.set(reference, bytesOf(located.golden).then((bytes) => decoded(bytes, null)));
     const golden = await goldens.get(reference);
-    return buildSeries(id, expected, golden, await decoded(await bytesOf(places[entry]), golden));
+    return buildSeries(id, expected, golden, await decoded(await bytesOf(located.entry), golden));
   }
 
   /** The series of an experiment; null if there is none. Rejects with a message if it is damaged or does not match

@@ -1,10 +1,11 @@
 // @ts-check
 "use strict";
-// The replay of the worst experiment on the first screen. It starts by itself once it is visible, unless the reader wants
-// less motion, and pauses when it is no longer visible.
+// The replay of the worst experiment on the first screen. It is built once the page is usable, in idle time, and only if it is in
+// view. It starts by itself once it is visible, unless the reader wants less motion, and pauses when it is no longer visible.
 
 class FirstScreen {
   static VISIBLE = 0.6; // share of the replay that must be visible
+  static PATIENCE = 1000; // ms that a busy page can delay the replay
 
   constructor(place, table, facts) {
     this.place = place;
@@ -12,13 +13,19 @@ class FirstScreen {
     this.facts = facts;
     this.player = null; // null until it is shown, and without channels
     this.wasStarted = false;
-    this.filling = null; // promise of the replay, once it was needed
+    this.isFilled = false;
+    this.watch = new IntersectionObserver(([entry]) => entry.isIntersecting && this.#showWhenIdle());
+    this.watch.observe(place);
   }
 
-  /** Show the replay when it is first needed; later calls do nothing. */
-  show() {
-    this.filling ??= this.#fill();
-    return this.filling;
+  #showWhenIdle() {
+    const whenIdle = window.requestIdleCallback ?? ((todo) => setTimeout(todo)); // Safari has none
+    whenIdle(() => {
+      if (this.isFilled || !this.place.getClientRects().length) return; // an experiment was opened in the meantime
+      this.isFilled = true;
+      this.watch.disconnect();
+      this.#fill();
+    }, { timeout: FirstScreen.PATIENCE });
   }
 
   async #fill() {

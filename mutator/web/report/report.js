@@ -25,9 +25,8 @@ const Report = (() => {
     const columns = new Columns(search.parentElement, grid, state);
     const actions = { move: (by) => grid.move(by), close: () => view.close(), place: () => grid.placeOf(state.experiment) };
     const experiment = new Experiment(find("experiment"), table, state, { ...facts, run: facts.series.alone ? () => "DIR" : runFolder }, actions);
-    const first = facts.worst && new FirstScreen(find("worst-replay"), table, facts);
     const values = new ValuePanel(find("value-plots"), table, state, facts);
-    const view = viewOf({ table, state, search, heat, filters, grid, columns, experiment, first, values });
+    const view = viewOf({ table, state, search, heat, filters, grid, columns, experiment, values });
     searching(search, state);
     keyboard({ grid, experiment, search, close: view.close });
     links(grid, () => state.experiment && view.close());
@@ -36,6 +35,7 @@ const Report = (() => {
     addEventListener("afterprint", () => grid.print(false));
     view.update();
     document.documentElement.dataset.ready = "yes";
+    if (facts.worst) new FirstScreen(find("worst-replay"), table, facts);
   }
 
   function searching(search, state) {
@@ -63,7 +63,7 @@ const Report = (() => {
   }
 
   /** Make the function that shows the state in all components. */
-  function viewOf({ table, state, search, heat, filters, grid, columns, experiment, first, values }) {
+  function viewOf({ table, state, search, heat, filters, grid, columns, experiment, values }) {
     let drawn = null;
     let scrolled = 0; // scroll position before an experiment was opened
     let opener = null; // the plot from which it was opened
@@ -95,7 +95,6 @@ const Report = (() => {
       document.body.classList.toggle("has-experiment", isOpen);
       for (const beneath of document.querySelectorAll("main, .bar")) beneath.inert = isOpen && !matchMedia(WIDE).matches;
       experiment.show();
-      if (!isOpen) first?.show();
       if (isOpen && !wasOpen) grid.reveal();
       if (!isOpen && wasOpen) scrollTo({ top: scrolled, behavior: "instant" });
     }
