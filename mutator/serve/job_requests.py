@@ -211,6 +211,14 @@ class RequestChecker:
         if request.only is not None:
             compile_filter(request.only, PLAN_COLUMN_NAMES)
         folder = self._new_folder(request.name)
+        if self.runs.folders_by_key().get(request.name, folder) != folder:
+            # the new run would take the other one's addresses
+            raise MutatorError(
+                f"a run '{request.name}' in another folder",
+                where="name",
+                expected="a name that no served run has",
+                remedy="choose another name",
+            )
         options = {
             "--out": folder,
             "--limit": request.limit,

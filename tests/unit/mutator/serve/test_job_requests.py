@@ -163,6 +163,16 @@ def test_a_new_run_cannot_be_a_link(desk: RequestChecker, tmp_path: Path) -> Non
         work(desk, **TRY)
 
 
+def test_a_new_run_cannot_take_the_addresses_of_a_run_in_another_folder(
+    desk: RequestChecker, toycar: Workspace, tmp_path: Path
+) -> None:
+    """Open pages of the other run would read the new one's results."""
+    freeze_plan(build_plan(toycar, "small"), tmp_path / "old" / "new", toycar)
+    runs = ServedRuns((*desk.runs.roots, tmp_path / "old"))
+    with pytest.raises(MutatorError, match="a run 'new' in another folder"):
+        work(RequestChecker(toycar, runs), **CAMPAIGN)
+
+
 def test_an_infinite_number_is_refused(desk: RequestChecker) -> None:
     with pytest.raises(ValueError):
         work(desk, **TRY, value=math.inf)
