@@ -34,6 +34,7 @@ from mutator.report import report_builder
 from mutator.report.stills import take_stills
 from mutator.results import outcome_counting
 from mutator.results import table_building as results_table
+from mutator.results.hazards_without_canary import no_canary_note
 from mutator.statistics.mutation_score import mutation_score_sheet, totals_table
 from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet
@@ -135,6 +136,10 @@ class Run(RunFigures):
     def alerts_note(self) -> str:
         """Return a sentence on the alerts that golden runs also raise; empty if there are none."""
         return fault_free_alerts_note(self.fault_free())
+
+    def no_canary_note(self) -> str:
+        """Return a sentence on the first hazard of a campaign without a canary; empty if it has a canary."""
+        return no_canary_note(self.folder, self._results_frame)
 
     def experiment(self, id: str) -> RunExperiment:
         """Return the planned experiment whose id starts with `id`; MutatorError for none or several."""

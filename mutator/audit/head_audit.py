@@ -88,7 +88,7 @@ def check_result_problems(folder: RunFolder) -> Problems:
     keys = [golden_run.key for golden_run in folder.golden_runs]
     expected_names = [
         "anchors",
-        "canary",
+        *(["canary"] if folder.head.canary else []),
         *(f"{kind} {key}" for key in keys for kind in ("golden", "null mutant")),
     ]
     if missing := [name for name in expected_names if name not in check_names]:

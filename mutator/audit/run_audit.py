@@ -153,7 +153,9 @@ def _plan_problems(folder: RunFolder) -> Problems:
     campaign = plan.campaign
     expected_head = replace(
         head,
-        plan=plan_digest([e.id for e in plan.experiments], plan.chunks, plan.canary.id, campaign),
+        plan=plan_digest(
+            [e.id for e in plan.experiments], plan.chunks, plan.canary.id if plan.canary else "", campaign
+        ),
         experiments=len(plan.experiments),
         campaign=campaign.name,
         campaign_digest=digest(campaign.file_bytes),
@@ -162,7 +164,7 @@ def _plan_problems(folder: RunFolder) -> Problems:
         chunks=recomputed_chunks(folder),
         limits=campaign.limits,
         goldens=tuple(golden_run.to_stored() for golden_run in plan.goldens()),
-        canary_hazard=campaign.canary.hazard,
+        canary_hazard=campaign.canary.hazard if campaign.canary else None,
     )
     for key, stored, value in head.differences(expected_head):
         expected = (

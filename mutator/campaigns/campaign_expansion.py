@@ -76,8 +76,10 @@ class CampaignExpansion:
         ordered.sort(key=lambda item: (item[0], item[1].changes))
         return tuple(experiment for _, experiment in ordered)
 
-    def build_canary(self) -> Experiment:
+    def build_canary(self) -> Experiment | None:
         canary = self.campaign.canary
+        if canary is None:
+            return None
         if canary.hazard not in self.manifest.hazard_names:
             raise self.campaign.error(
                 ("canary", "hazard"),

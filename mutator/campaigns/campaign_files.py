@@ -63,7 +63,7 @@ class Campaign:
         bool  # whether to sample pairs, in proportion to the size of each fault type and scenario
     )
     seeds: range  # the campaign is repeated with each seed
-    canary: Canary
+    canary: Canary | None  # None: a campaign of operators that has none
     limits: Limits
     chunk_size: int
     after_hazard: AfterHazard

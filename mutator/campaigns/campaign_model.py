@@ -172,7 +172,12 @@ class CampaignModel(StrictModel, title="The file"):
         description="The seeds; the campaign, including its `sample`, is repeated with each. `--seed` runs "
         "one seed instead.",
     )
-    canary: YamlRecord[Canary] = Field(description="A check that a known fault causes a hazard.")
+    canary: YamlRecord[Canary] | None = Field(
+        None,
+        description="A check that a known fault causes a hazard. Only a campaign that selects nothing but "
+        "`operators` can leave it out. Its runs must then show that a hazard can be reached: results and "
+        "report begin with this, and the exit code is 1 if no experiment reaches one.",
+    )
     after_hazard: Annotated[AfterHazard, Field(strict=False)] = Field(
         AfterHazard.GO_ON,
         description="`stop` ends each faulty run at its first [terminal "
@@ -193,6 +198,8 @@ class CampaignModel(StrictModel, title="The file"):
             raise ValueError("`sample`, the number of experiments, together with `proportional`")
         if self.proportional and any(selection.operators for selection in self.faults):
             raise ValueError("no `proportional` with `operators`, which have their own `sample`")
+        if self.canary is None and any(selection.operators is None for selection in self.faults):
+            raise ValueError("a `canary`, because `faults` has a `spec`")
         if (self.seed is None) == (self.seeds is None):
             raise ValueError(
                 "either `seed` or `seeds`" if self.seed is None else "`seed` or `seeds`, not both"

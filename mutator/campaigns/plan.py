@@ -65,7 +65,8 @@ class Plan:
     reading: str  #: the reading of the fault specs
     experiments: Sequence[Experiment]  #: the experiments in run order
     chunks: tuple[int, ...]  #: the number of experiments in each chunk, in order
-    canary: Experiment  #: a fault that must cause its hazard; the checks before the campaign run it
+    #: a fault that must cause its hazard; the checks before the campaign run it. None: the campaign has none
+    canary: Experiment | None
     runs: int  #: the number of runs; a run that several scenarios share is counted once
     digest: str  #: the digest: equal on every machine for the same campaign, choices, library and scenarios
     run_cpu_s: float | None = None  #: the measured CPU time of one run in s; None: not measured
@@ -123,13 +124,13 @@ class Plan:
         return [plan_row(experiment) for experiment in self.experiments]
 
     def goldens(self) -> tuple[GoldenRun, ...]:
-        """Return every golden run that the plan needs, including the canary's."""
+        """Return every golden run that the plan needs, including that of a canary."""
         return self.tally.golden_runs()
 
     def cost(self, workers: int = 2) -> PlanCost:
         """Return the expected time and disk space."""
         goldens = len(self.goldens())
-        runs = self.runs + CHECK_RUNS_PER_GOLDEN * goldens + 1
+        runs = self.runs + CHECK_RUNS_PER_GOLDEN * goldens + bool(self.canary)
         cpu_s = runs * (self.run_cpu_s or _DEFAULT_RUN_CPU_S)
         return PlanCost(
             cpu_s=cpu_s,
@@ -254,7 +255,7 @@ def build_plan(workspace: Workspace, campaign: str | Path, choices: Choices | No
         experiments=experiments,
         chunks=chunks,
         canary=canary,
-        digest=plan_digest([e.id for e in experiments], chunks, canary.id, loaded),
+        digest=plan_digest([e.id for e in experiments], chunks, canary.id if canary else "", loaded),
         runs=sum(part.run_count for part in parts),
         cpu_limit_s=None if "cpu_s" in loaded.measured_limit_names else loaded.limits.cpu_s,
         operator_notes=planning.operator_notes,

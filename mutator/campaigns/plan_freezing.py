@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 from mutator._common.files import (
     is_half_written,
@@ -127,7 +128,7 @@ def _tally_and_digest(
     plan_digest = (
         plan.digest
         if isinstance(plan, Plan)
-        else digest_builder.finish(tally.chunk_lengths, plan.canary.id, plan.campaign)
+        else digest_builder.finish(tally.chunk_lengths, plan.canary.id if plan.canary else "", plan.campaign)
     )
     return tally, plan_digest
 
@@ -177,7 +178,9 @@ def _build_head(
     used: UsedPhraseSources,
 ) -> RunHead:
     manifest = workspace.manifest(plan.campaign.target)
-    canary = plan_file.experiment_as_json(plan.canary) | {"fault": as_json_types(plan.canary.fault)}
+    canary: dict[str, Any] | None = None
+    if plan.canary:
+        canary = plan_file.experiment_as_json(plan.canary) | {"fault": as_json_types(plan.canary.fault)}
     return RunHead(
         schema=RUN_SCHEMA,
         plan=plan_digest,
@@ -197,7 +200,7 @@ def _build_head(
         phrases=phrases_of_campaign(workspace, plan.campaign, manifest, plan.reading, used),
         goldens=tuple(golden.to_stored() for golden in tally.golden_runs()),
         canary=canary,
-        canary_hazard=plan.campaign.canary.hazard,
+        canary_hazard=plan.campaign.canary.hazard if plan.campaign.canary else None,
         sources=_source_digests(tally, plan, workspace),
         provenance=Provenance(mutator=VERSION),
         stretches=(),

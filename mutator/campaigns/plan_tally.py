@@ -31,7 +31,7 @@ class PlanPart:
 class PlanTally:
     """The totals of the plan parts added so far."""
 
-    canary: Experiment
+    canary: Experiment | None
     has_several_seeds: bool  # each seed has its own golden runs
     experiment_count: int = 0
     run_count: int = 0
@@ -53,12 +53,14 @@ class PlanTally:
             self.example_fault_by_variant[fault.spec] = fault
 
     def golden_runs(self) -> tuple[GoldenRun, ...]:
+        if self.canary is None:
+            return tuple(self.goldens_without_canary)
         canary_golden = GoldenRun.for_experiment(self.canary, several_seeds=self.has_several_seeds)
         return tuple(dict.fromkeys((*self.goldens_without_canary, canary_golden)))
 
 
 class PlanDigestBuilder:
-    """The digest of the ids and chunks of the experiments, the canary's id, and the campaign."""
+    """The digest of the ids and chunks of the experiments, the canary's id ('': none), and the campaign."""
 
     def __init__(self) -> None:
         # a JSON list, hashed as it grows, so that no plan has to be in memory as a whole

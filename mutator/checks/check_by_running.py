@@ -343,10 +343,13 @@ class _RunningCheck:
         canaries: dict[object, _CanaryToTry] = {}
         for campaign in sorted(self.campaigns, key=lambda c: len(_campaign_changes(self.workspace, c))):
             reading = _reading_of(self.workspace, campaign)
-            if campaign.canary not in canaries and campaign.canary.scenario in self.scenarios:
+            if campaign.canary is None or campaign.canary in canaries:
+                continue
+            if campaign.canary.scenario in self.scenarios:
                 experiment = CampaignExpansion(
                     self.workspace, campaign, self.manifest, campaign.seed, reading
                 ).build_canary()
+                assert experiment is not None  # the campaign has a canary
                 canaries[campaign.canary] = _CanaryToTry(
                     campaign=campaign.name,
                     experiment=experiment,
@@ -363,18 +366,16 @@ class _RunningCheck:
             job = canary.build_canary_job(self.workspace, self.manifest, tried)
             return self._check_run(engine.execute(job, self._new_run_folder(job)))
 
-        problem, success = canary.run_until_hazard(
+        verdict = canary.run_until_hazard(
             canary.canary_with_other_values(self.workspace, self.manifest, experiment),
             run,
             canary_to_try.hazard,
         )
         return Finding(
             name=f"canary {canary_to_try.campaign}",
-            level=CheckState.FAIL if problem else CheckState.OK,
-            found=f"{experiment.fault.spec} in {experiment.scenario} {problem or success}",
-            remedy="choose another fault, an earlier time or another scenario for `canary`"
-            if problem
-            else "",
+            level=CheckState.FAIL if verdict.problem else CheckState.OK,
+            found=f"{experiment.fault.spec} in {experiment.scenario} {verdict.problem or verdict.success}",
+            remedy=verdict.remedy,
         )
 
 

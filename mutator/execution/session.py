@@ -34,6 +34,7 @@ from mutator.engines.engine_choice import choose_engine, reason_not_to_fork
 from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import ensure_work_folder
 from mutator.errors import (
+    EXIT_CHECK_FAILED,
     EXIT_HARNESS_ERRORS,
     EXIT_OK,
     CheckFailed,
@@ -48,7 +49,7 @@ from mutator.execution.finished_outcome_cache import (
 )
 from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.written_files import WrittenFiles
-from mutator.model import Record
+from mutator.model import Outcome, Record
 from mutator.preflight import equivalence_check
 from mutator.preflight.golden_run_page import with_golden_run_pages
 from mutator.preflight.preflight_checks import (
@@ -99,6 +100,8 @@ class Summary:
         str  #: why no experiment was forked; empty if one was, or if the reference engine was requested
     )
     elapsed_s: float  #: duration of the session (s)
+    #: whether, without a canary, no experiment of the whole plan has reached a hazard
+    has_reached_nothing: bool = False
 
     @property
     def seal(self) -> str | None:
@@ -114,11 +117,15 @@ class Summary:
 
     @property
     def exit_code(self) -> int:
-        """0: success; 3: harness errors, or experiments left to run; 130: interrupted."""
+        """0: success; 1: no hazard was reached, and no canary shows that one can be; 3: harness errors, or
+        experiments left to run; 130: interrupted.
+        """
         if self.interrupted:
             return EXIT_INTERRUPTED
         whole = self.done == self.planned and (self.proof is None or self.proof.is_complete)
-        return EXIT_OK if whole and not self.problem else EXIT_HARNESS_ERRORS
+        if not whole or self.problem:
+            return EXIT_HARNESS_ERRORS
+        return EXIT_CHECK_FAILED if self.has_reached_nothing else EXIT_OK
 
 
 class Session:
@@ -293,6 +300,7 @@ class Session:
             seals=seals,
             not_forked=not_forked,
             elapsed_s=time.monotonic() - self._start_s,
+            has_reached_nothing=self._has_reached_nothing(outcomes),
         )
 
     def _undo_writes_of_mutants(self) -> None:
@@ -330,7 +338,12 @@ class Session:
             seals=outcome.seals,
             not_forked="" if outcome.proof else self._not_forked,
             elapsed_s=time.monotonic() - self._start_s,
+            has_reached_nothing=self._has_reached_nothing(outcome.outcomes),
         )
+
+    def _has_reached_nothing(self, outcomes: Counter[str]) -> bool:
+        """Whether the whole plan shows no hazard. A shard alone cannot tell."""
+        return self.folder.canary is None and not outcomes[Outcome.HAZARD] and self.folder.shard is None
 
     @contextmanager
     def _noting_full_disk(self) -> Iterator[None]:

@@ -3,7 +3,7 @@ harmless.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from mutator.engines.engine_jobs import Job
 from mutator.errors import MutatorError
@@ -13,6 +13,17 @@ from mutator.mutants.mutant_building import build
 from mutator.preflight.check_run_problems import CheckRun
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
+
+_OTHER_FAULT_REMEDY = "choose another fault, an earlier time or another scenario for `canary`"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CanaryVerdict:
+    """Whether a canary caused its hazard: either `success`, or a `problem` with what to do about it."""
+
+    success: str = ""
+    problem: str = ""
+    remedy: str = ""
 
 
 def canary_with_other_values(
@@ -46,9 +57,13 @@ def build_canary_job(workspace: Workspace, manifest: TargetManifest, experiment:
 
 def run_until_hazard(
     experiments: Iterable[Experiment], run: Callable[[Experiment], CheckRun], hazard: str
-) -> tuple[str, str]:
-    """Run experiments until one causes `hazard`; return the problem ('': none) and the success message."""
+) -> CanaryVerdict:
+    """Run experiments until one causes `hazard`.
+
+    A fault that cannot be injected has not been tried, so the reason is then the whole problem.
+    """
     harmless: list[str] = []
+    refusals: list[MutatorError] = []
     for experiment in experiments:
         value = fault_label("", experiment.fault.value, experiment.fault.unit).strip()
         try:
@@ -57,9 +72,17 @@ def run_until_hazard(
                 result = run(experiment)
         except MutatorError as error:  # no mutant can be built with this value
             result = CheckRun(problem=error.got)
+            refusals.append(error)
         if not result.problem and hazard in dict(result.hazards):
             others = f" with {value}, and not with {', '.join(harmless)}" if harmless else ""
-            return "", f"reached {hazard}{others}"
+            return CanaryVerdict(success=f"reached {hazard}{others}")
         harmless.append(" ".join(filter(None, (value, result.problem and f"({result.problem})"))))
+    if len(refusals) == len(harmless):
+        return CanaryVerdict(
+            problem=f"cannot be injected: {refusals[0]}", remedy="correct the fault spec of the `canary`"
+        )
     tried = ", ".join(filter(None, harmless))
-    return f"did not reach {hazard}" + (f" with any of its values: {tried}" if tried else ""), ""
+    return CanaryVerdict(
+        problem=f"did not reach {hazard}" + (f" with any of its values: {tried}" if tried else ""),
+        remedy=_OTHER_FAULT_REMEDY,
+    )

@@ -42,8 +42,8 @@ class CheckRunner:
     pending_folder: Path
     campaign: Campaign
 
-    def run_all(self, workers: int, notify: OnProgress) -> tuple[CheckRunByName, tuple[str, str]]:
-        """Do all runs of all checks, `workers` at a time. Return them with the result of the canary."""
+    def run_all(self, workers: int, notify: OnProgress) -> tuple[CheckRunByName, canary.CanaryVerdict | None]:
+        """Do all runs of all checks, `workers` at a time. Return them with the verdict on a canary."""
         with self._engine_and_pool(workers) as (engine, pool):
             futures = {
                 name: pool.submit(self._run_job, engine, name, job)
@@ -91,7 +91,10 @@ class CheckRunner:
 
     def _judge_canary(
         self, engine: ReferenceEngine, futures: Mapping[tuple[str, Any], Future[CheckRun]]
-    ) -> tuple[str, str]:
+    ) -> canary.CanaryVerdict | None:
+        experiment, hazard = self.folder.canary, self.folder.head.canary_hazard
+        if experiment is None or hazard is None:
+            return None
         goldens = [future.result() for name, future in futures.items() if name[0] == GOLDEN]
         canary_engine = ReferenceEngine(self.manifest, engine.work_folder, self.measure_limits(goldens))
 
@@ -102,9 +105,8 @@ class CheckRunner:
                 canary.build_canary_job(self.workspace, self.manifest, experiment),
             )
 
-        hazard = self.folder.head.canary_hazard
         return canary.run_until_hazard(
-            canary.canary_with_other_values(self.workspace, self.manifest, self.folder.canary), run, hazard
+            canary.canary_with_other_values(self.workspace, self.manifest, experiment), run, hazard
         )
 
     def _jobs_by_name(self) -> dict[tuple[str, Any], Job]:

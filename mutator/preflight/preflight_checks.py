@@ -119,7 +119,7 @@ class _PreflightChecks:
             run_environment.environment_affecting_results(),
             head.goldens,
             head.seed,
-            folder.canary.id,
+            folder.canary.id if folder.canary else "",
             head.canary_hazard,
             _limits_that_checks_depend_on(self.campaign),
         ]
@@ -170,7 +170,9 @@ class _PreflightChecks:
             return
         check_runner = self._build_check_runner(self.pending_folder)
         runs, canary_verdict = check_runner.run_all(workers, notify)
-        results = [anchors, *self._judge_goldens(runs), _build_check_result("canary", *canary_verdict)]
+        results = [anchors, *self._judge_goldens(runs)]
+        if canary_verdict:
+            results.append(_build_check_result("canary", canary_verdict.problem, canary_verdict.success))
         goldens = {golden_run.key: runs[GOLDEN, golden_run].output_digest for golden_run in self.golden_runs}
         self._check_goldens_same_as_before(goldens)
         golden_runs = [runs[GOLDEN, key] for key in self.golden_runs]

@@ -87,7 +87,7 @@ _FaultWithTrigger = tuple[Fault, Trigger]
 def groups_of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
     """Return the groups of all mutants that the plan runs, canary included; the probe's group is last."""
     manifest = workspace.manifest(plan.campaign.target)
-    members = [(e.fault, e.trigger) for e in (*plan.experiments, plan.canary)]
+    members = [(e.fault, e.trigger) for e in (*plan.experiments, *filter(None, [plan.canary]))]
     runs = Counter(patch_shapes.group_label(e.fault) for e in plan.experiments)
     files = [selection.spec_file for selection in plan.campaign.fault_selections if selection.spec_file]
     named = [

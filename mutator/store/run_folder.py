@@ -192,7 +192,8 @@ class RunFolder:
 
     @property
     def stop_at_hazard_note(self) -> str:
-        stops = self.head.canary.get("after_hazard") == AfterHazard.STOP
+        some = self.canary or next(plan_file.iterate_experiments(self.path))
+        stops = some.after_hazard is AfterHazard.STOP
         return STOP_AT_HAZARD_NOTE if stops else ""
 
     @property
@@ -245,8 +246,10 @@ class RunFolder:
         return load_timings(self.path)
 
     @property
-    def canary(self) -> Experiment:
-        """The experiment that must cause its hazard before the campaign starts."""
+    def canary(self) -> Experiment | None:
+        """The experiment that must cause its hazard before the campaign starts; None without a canary."""
+        if self.head.canary is None:
+            return None
         return plan_file.canary_from_json(self.path / HEAD, self.head.canary)
 
     def planned_positions(self) -> dict[str, int]:

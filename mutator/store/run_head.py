@@ -64,8 +64,8 @@ class RunHead(TargetFacts, PlanFacts):
 
     phrases: Phrases = added_field(Phrases())
     goldens: tuple[StoredGolden, ...]
-    canary: Mapping[str, Any]
-    canary_hazard: str
+    canary: Mapping[str, Any] | None
+    canary_hazard: str | None
     sources: Mapping[str, Sha256]
     provenance: Provenance
     stretches: tuple[SessionEnvironment, ...]

@@ -4,10 +4,14 @@ from mutator.report.answer_parts import warning_filter_values
 from mutator.report.first_screen import describe_change, key_numbers, sample_note, worst_row
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
+from mutator.results.hazards_without_canary import no_canary_note
 from mutator.results.result_rows import ResultRow
 
 _HTML_TEMPLATE = """\
 <section class="first-screen" aria-label="The worst experiment, and four numbers">
+{% if no_canary %}
+<p><b>{{ no_canary }}</b></p>
+{% endif %}
 {% if worst %}
 <div class="worst">
 <p class="kicker">{{ kicker }}</p>
@@ -62,13 +66,23 @@ def build_first_screen_panel(run: ReportedRun) -> Panel:
     kicker = _kicker(worst) if worst else ""
     change = describe_change(run)
     lines = [f"* **{number.value}** {number.meaning} ({number.evidence})" for number in numbers]
+    no_canary = no_canary_note(run.folder, run.results)
     parts = [
+        f"**{no_canary}**" if no_canary else "",
         _worst_markdown(kicker, worst) if worst else "",
         "\n".join(lines),
         note,
         change.markdown if change else "",
     ]
-    html = rendered(_HTML_TEMPLATE, worst=worst, kicker=kicker, numbers=numbers, note=note, change=change)
+    html = rendered(
+        _HTML_TEMPLATE,
+        no_canary=no_canary,
+        worst=worst,
+        kicker=kicker,
+        numbers=numbers,
+        note=note,
+        change=change,
+    )
     return Panel(anchor="first", link="Summary", markdown="\n\n".join(filter(None, parts)), html=html)
 
 

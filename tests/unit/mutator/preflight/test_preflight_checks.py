@@ -13,7 +13,7 @@ from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Limits, MeasuredLimits
-from mutator.preflight.canary import run_until_hazard
+from mutator.preflight.canary import CanaryVerdict, run_until_hazard
 from mutator.preflight.check_run_problems import CheckRun
 from mutator.preflight.preflight_checks import run_checks
 from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA
@@ -177,9 +177,9 @@ def test_a_canary_whose_run_was_killed_is_run_again_once(toycar: Workspace, tmp_
     canary = frozen(toycar, tmp_path).canary
     fine = CheckRun(problem="", hazards=(("H3", 1.0),))
     runs = iter([CheckRun(problem="crashed: killed by SIGHUP"), fine])
-    assert run_until_hazard([canary], lambda _: next(runs), "H3") == ("", "reached H3")
+    assert run_until_hazard([canary], lambda _: next(runs), "H3") == CanaryVerdict(success="reached H3")
     ended = iter([CheckRun(problem="crashed")] * 2)  # a third run is not allowed
-    assert "(crashed)" in run_until_hazard([canary], lambda _: next(ended), "H3")[0]
+    assert "(crashed)" in run_until_hazard([canary], lambda _: next(ended), "H3").problem
 
 
 def name_no_cpu_limit(toycar: Workspace) -> None:
