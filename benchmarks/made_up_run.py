@@ -131,7 +131,7 @@ def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Exper
         else:
             drives = (
                 e
-                for e in (*experiments, folder.canary)
+                for e in filter(None, (*experiments, folder.canary))
                 if GoldenRun.for_experiment(e, several_seeds=False) == like
             )
             with TemporaryDirectory(dir=run) as scratch:
