@@ -111,7 +111,7 @@ def _time_number(hazards: pd.DataFrame) -> KeyNumber:
     return KeyNumber(
         value=f"{times.median():.2f} s",
         meaning=meaning,
-        evidence=f"{times.min():.2f} s at the soonest; {interval}",
+        evidence=f"{interval}; {times.min():.2f} s at the soonest",
         fragment=filtered_list_fragment({"outcome": ["hazard"]}, "time_to_hazard"),
     )
 

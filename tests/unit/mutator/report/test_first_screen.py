@@ -51,7 +51,7 @@ def test_each_number_has_its_counts_its_interval_and_its_list(frame: pd.DataFram
     assert silent.fragment == "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
     assert silent.percents == pytest.approx((66.67, 20.77, 93.85), abs=0.01)
     assert time.value == "2.00 s"
-    assert time.evidence == "1.50 s at the soonest; 95 % interval 1.50 to 4.00 s"
+    assert time.evidence == "95 % interval 1.50 to 4.00 s; 1.50 s at the soonest"
     assert (time.percents, time.fragment) == (None, "outcome=hazard&sort=time_to_hazard")
 
 
