@@ -139,13 +139,13 @@ const SeriesFile = (() => {
     }
   }
 
-  /** A channel's golden and faulty values at the same times, with the points in between. */
-  function together(golden, run, channel) {
-    const longer = run.t.length > golden.t.length ? run : golden, t = longer.t.filter((_, i) => i % golden.every[channel] === 0);
-    const between = run.points.filter((p) => p.channel === channel), length = t.length + between.length;
-    const joined = { t: new Float64Array(length), golden: new Float32Array(length), faulty: new Float32Array(length) };
+  /** A channel's golden and faulty values at the same times, with the points in between. Channels without such points share
+   *  the array of their times; `timesEvery(step)` returns it. */
+  function together(golden, run, channel, timesEvery) {
+    const t = timesEvery(golden.every[channel]), between = run.points.filter((p) => p.channel === channel), length = t.length + between.length;
+    const joined = { t: between.length ? new Float64Array(length) : t, golden: new Float32Array(length), faulty: new Float32Array(length) };
     const setStep = (k, time, goldenValue, faultyValue) => {
-      joined.t[k] = time;
+      if (between.length) joined.t[k] = time;
       joined.golden[k] = goldenValue;
       joined.faulty[k] = faultyValue;
     };
@@ -193,9 +193,14 @@ const SeriesFile = (() => {
       && run.t.every((t, i) => i >= golden.t.length || t === golden.t[i])
       && Object.entries(expected.largest).every(([name, by]) => names.includes(name) && deviates(golden, run, names.indexOf(name), by));
     if (!matches) throw new Error("it belongs to another run than the record");
+    const { t } = run.t.length > golden.t.length ? run : golden, times = new Map();
+    const timesEvery = (step) => {
+      if (!times.has(step)) times.set(step, step === 1 ? t : t.filter((_, i) => i % step === 0));
+      return times.get(step);
+    };
     return {
       id, start: golden.about.start, end: about.end, tEnd: about.t_end, active: about.active, marks: marks(about),
-      channels: channels.map((channel, i) => ({ ...channel, ...together(golden, run, i) })),
+      channels: channels.map((channel, i) => ({ ...channel, ...together(golden, run, i, timesEvery) })),
     };
   }
 

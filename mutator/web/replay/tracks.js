@@ -9,16 +9,20 @@ class ReplayTracks {
   constructor(scene, series) {
     this.scene = scene;
     this.t = series.channels.length ? ReplayData.steps(series) : [0];
-    this.runs = { golden: this.#run("golden", series), faulty: this.#run("faulty", series) };
-    this.lines = scene.lines.map((line) => ({ ...line, across: line.y === null ? null : Formula.evaluate(line.y, this.#values("faulty", series)) }));
+    const values = { golden: this.#values("golden", series), faulty: this.#values("faulty", series) };
+    this.runs = { golden: this.#run(values.golden), faulty: this.#run(values.faulty) };
+    this.lines = scene.lines.map((line) => ({ ...line, across: line.y === null ? null : Formula.evaluate(line.y, values.faulty) }));
     this.follow = scene.actors.findIndex((actor) => actor.name === scene.follow);
     if (this.follow >= 0) this.reach = this.#reach();
   }
 
-  /** The channels of a run on one time axis. */
+  /** The channels of a run on one time axis, each computed once a formula needs it. */
   #values(run, series) {
     const values = { t: this.t };
-    for (const channel of series.channels) values[channel.name] = channel.t === this.t ? channel[run] : this.#spread(channel, run);
+    for (const channel of series.channels) {
+      let onAxis = channel.t === this.t ? channel[run] : null;
+      Object.defineProperty(values, channel.name, { get: () => (onAxis ??= this.#spread(channel, run)) });
+    }
     return values;
   }
 
@@ -31,8 +35,8 @@ class ReplayTracks {
     });
   }
 
-  #run(run, series) {
-    const values = this.#values(run, series), of = (tree) => Formula.evaluate(tree, values);
+  #run(values) {
+    const of = (tree) => Formula.evaluate(tree, values);
     const ground = this.#ground(of(this.scene.speed));
     const actors = this.scene.actors.map((actor) => ({
       x: Array.from(of(actor.x), (x, i) => x + ground[i]), y: of(actor.y), heading: of(actor.heading), visible: of(actor.visible),
