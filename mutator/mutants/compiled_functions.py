@@ -5,6 +5,7 @@ for good, so no place in it is offered.
 """
 
 import ast
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,6 +33,10 @@ _SWITCH_BY_COMPILER: Mapping[str, tuple[str, str] | None] = {
 # calls that run a function once, with symbols instead of numbers, to build a graph
 _TRACERS = frozenset({"casadi.Function", "jax.make_jaxpr", "torch.export.export", "torch.fx.symbolic_trace"})
 _ROOT_WORDS = tuple(sorted({name.partition(".")[0].encode() for name in (*_SWITCH_BY_COMPILER, *_TRACERS)}))
+# an import of one of them, in a line that can go on after a backslash
+_IMPORT_PATTERN = re.compile(
+    rb"\b(?:import|from)\b(?:\\\r?\n|[^\n#;])*?\b(?:" + b"|".join(_ROOT_WORDS) + rb")\b"
+)
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 _STATEMENT_PARTS = (ast.stmt, ast.excepthandler, ast.match_case)
 
@@ -92,17 +97,29 @@ def _is_within(function: str, outer: str) -> bool:
 def _compiled_elsewhere(tree: SourceTree, path: str) -> dict[str, str]:
     """Return the functions of this file that other files compile: `fast = njit(law)`, after an import."""
     prefix, functions = f"{module_name(path)}.", dict[str, str]()
-    for other, data in tree.files.items():
-        if other != path and other.endswith(".py") and any(word in data for word in _ROOT_WORDS):
-            for dotted, compiler in compiled_code(tree, other).compiler_by_foreign_function.items():
+    for other, compiler_by_function in tree.derive_once_from_all(_compiled_across_files).items():
+        if other != path:
+            for dotted, compiler in compiler_by_function.items():
                 # the root of the target need not be the folder on `sys.path`
                 if f".{prefix}".endswith(f".{dotted.rpartition('.')[0]}."):
                     functions[dotted.rpartition(".")[2]] = compiler
     return functions
 
 
+def _compiled_across_files(tree: SourceTree) -> dict[str, Mapping[str, str]]:
+    """Return, by file, the functions of other modules that it compiles; files without any are left out."""
+    paths = (path for path, data in tree.files.items() if path.endswith(".py") and _imports_compiler(data))
+    code = {path: compiled_code(tree, path).compiler_by_foreign_function for path in paths}
+    return {path: functions for path, functions in code.items() if functions}
+
+
+def _imports_compiler(data: bytes) -> bool:
+    """Whether a file may import a compiler. Most files need only the search for words, which is fast."""
+    return any(word in data for word in _ROOT_WORDS) and _IMPORT_PATTERN.search(data) is not None
+
+
 def _find_compiled_code(path: str, data: bytes, root: Path) -> CompiledCode:
-    if not any(word in data for word in _ROOT_WORDS):
+    if not _imports_compiler(data):
         return _NOTHING
     try:
         module = ast.parse(data)

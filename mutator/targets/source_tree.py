@@ -39,6 +39,13 @@ class SourceTree:
     _derived_by_file: dict[tuple[str, Callable[..., Any]], Any] = field(
         default_factory=dict, repr=False, compare=False
     )
+    _derived_from_all: dict[Callable[..., Any], Any] = field(default_factory=dict, repr=False, compare=False)
+
+    def derive_once_from_all(self, make: Callable[["SourceTree"], T]) -> T:
+        """Return `make(tree)`, called once; errors of `make` pass through."""
+        if make not in self._derived_from_all:
+            self._derived_from_all[make] = make(self)
+        return cast("T", self._derived_from_all[make])
 
     def derive_once(self, path: str, make: Callable[[str, bytes, Path], T]) -> T:
         """Return `make(path, data, root)` for a file of the target, called once per path; `root` is the
