@@ -75,7 +75,7 @@ def find_places(
     `find_place_notes` says what is left out. MutatorError for a file in which faults are not allowed, and for
     an unknown function.
     """
-    return _places_and_notes(where, workspace, target)[0]
+    return places_and_notes(where, workspace, target)[0]
 
 
 def find_place_notes(
@@ -87,12 +87,13 @@ def find_place_notes(
 
     MutatorError as `find_places`.
     """
-    return _places_and_notes(where, workspace, target)[1]
+    return places_and_notes(where, workspace, target)[1]
 
 
-def _places_and_notes(
+def places_and_notes(
     where: str, workspace: WorkspaceLike, target: str | None
 ) -> tuple[list[ListedPlace], list[PlaceNote]]:
+    """Return what `find_places` and `find_place_notes` return, with the target read once."""
     opened_workspace = open_workspace(workspace)
     manifest = opened_workspace.manifest(opened_workspace.target_name(target))
     path, _, function = where.partition("::")

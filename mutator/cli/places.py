@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-import mutator
 from mutator._common.message_text import counted
 from mutator.cli.console import Terminal
 from mutator.cli.options import Json, Manifest, Wide, WorkspaceOptions, with_workspace_options
@@ -42,15 +41,16 @@ def list_places(
     Each line shows an anchor as you write it under `at` in a spec: a statement, a value changed in place, a
     constant, or a default.
     """
+    from mutator.api.libraries import places_and_notes
+
     terminal = Terminal(as_json, wide)
-    places = mutator.find_places(where, workspace_options.workspace(), target=manifest)
+    places, notes = places_and_notes(where, workspace_options.workspace(), manifest)
     if as_json:
         terminal.print_json(
             [{"line": place.line, "at": place.at, "models": place.models} for place in places]
         )
         return
     _print_places(terminal, places)
-    notes = mutator.find_place_notes(where, workspace_options.workspace(), target=manifest)
     for note in notes:
         terminal.print_text(f"line {note.line}, {note.what}: {note.reason}")
 

@@ -9,6 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from mutator.mutants.constant_imports import module_name
@@ -32,11 +33,8 @@ _SWITCH_BY_COMPILER: Mapping[str, tuple[str, str] | None] = {
 }
 # calls that run a function once, with symbols instead of numbers, to build a graph
 _TRACERS = frozenset({"casadi.Function", "jax.make_jaxpr", "torch.export.export", "torch.fx.symbolic_trace"})
-_ROOT_WORDS = tuple(sorted({name.partition(".")[0].encode() for name in (*_SWITCH_BY_COMPILER, *_TRACERS)}))
-# an import of one of them, in a line that can go on after a backslash
-_IMPORT_PATTERN = re.compile(
-    rb"\b(?:import|from)\b(?:\\\r?\n|[^\n#;])*?\b(?:" + b"|".join(_ROOT_WORDS) + rb")\b"
-)
+_COMPILER_ROOTS = tuple(sorted({name.partition(".")[0].encode() for name in _SWITCH_BY_COMPILER}))
+_ROOTS = tuple(sorted({*_COMPILER_ROOTS, *(name.partition(".")[0].encode() for name in _TRACERS)}))
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 _STATEMENT_PARTS = (ast.stmt, ast.excepthandler, ast.match_case)
 
@@ -108,18 +106,27 @@ def _compiled_elsewhere(tree: SourceTree, path: str) -> dict[str, str]:
 
 def _compiled_across_files(tree: SourceTree) -> dict[str, Mapping[str, str]]:
     """Return, by file, the functions of other modules that it compiles; files without any are left out."""
-    paths = (path for path, data in tree.files.items() if path.endswith(".py") and _imports_compiler(data))
-    code = {path: compiled_code(tree, path).compiler_by_foreign_function for path in paths}
-    return {path: functions for path, functions in code.items() if functions}
+    paths = [p for p, data in tree.files.items() if p.endswith(".py") and _can_import(data, _COMPILER_ROOTS)]
+    functions = {path: compiled_code(tree, path).compiler_by_foreign_function for path in paths}
+    return {path: compilers for path, compilers in functions.items() if compilers}
 
 
-def _imports_compiler(data: bytes) -> bool:
-    """Whether a file may import a compiler. Most files need only the search for words, which is fast."""
-    return any(word in data for word in _ROOT_WORDS) and _IMPORT_PATTERN.search(data) is not None
+def _can_import(data: bytes, roots: tuple[bytes, ...]) -> bool:
+    """Whether a source text can import one of the packages; most need only the search for words."""
+    return any(root in data for root in roots) and _import_pattern(roots).search(data) is not None
+
+
+@cache
+def _import_pattern(roots: tuple[bytes, ...]) -> re.Pattern[bytes]:
+    line = rb"(?:\\\r?\n|[^\n#;])*?"  # the rest of a line, which goes on after a backslash
+    return re.compile(
+        rb"(?:(?:\A(?:\xef\xbb\xbf)?|[\r\n;:])[ \t\f]*import\b" + line + rb"|\bfrom[\s\\.]*)"
+        rb"\b(?:" + b"|".join(roots) + rb")\b"
+    )
 
 
 def _find_compiled_code(path: str, data: bytes, root: Path) -> CompiledCode:
-    if not _imports_compiler(data):
+    if not _can_import(data, _ROOTS):
         return _NOTHING
     try:
         module = ast.parse(data)
