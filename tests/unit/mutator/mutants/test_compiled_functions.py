@@ -1,5 +1,6 @@
 """Functions that numba, JAX and other compilers take over are recognised in the source."""
 
+import ast
 from pathlib import Path
 
 import pytest
@@ -112,3 +113,27 @@ def test_a_function_that_builds_a_graph_is_noted(tmp_path: Path) -> None:
     tree = tree_of(tmp_path, m=text)
     assert tracer_of_function(tree, "m.py", "law") == "casadi.Function"
     assert tracer_of_function(tree, "m.py", "free") is None
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "import os, numba",
+        "import os, \\\n  numba as numba",
+        "import os; import numba",
+        "if True: import numba",
+        "import \\\n  numba",
+        "\ufeffimport numba",
+    ],
+)
+def test_an_import_is_recognised_however_its_line_is_written(tmp_path: Path, line: str) -> None:
+    """The search that spares most files from being parsed misses no form of an import."""
+    tree = tree_of(tmp_path, m=f"{line}\n@numba.njit\ndef law(y):\n{BODY}")
+    assert compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
+
+
+def test_files_without_a_compiler_are_not_parsed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A word in a comment, or a module of the target with a compiler's name, costs no parsing."""
+    tree = tree_of(tmp_path, m="from sim import warp  # not numba\ndef law(y):\n" + BODY, other="jax = 1\n")
+    monkeypatch.setattr(ast, "parse", None)
+    assert compiler_of_function(tree, "m.py", "law", {}) is None
