@@ -73,7 +73,7 @@ def test_a_number_without_a_base_has_no_value_and_no_interval(frame: pd.DataFram
 
 def test_times_of_one_fault_have_no_interval(frame: pd.DataFrame) -> None:
     time = key_numbers(frame.assign(fault_id="f0"), has_alerts=True)[3]
-    assert time.evidence.endswith("no interval: too few different faults")
+    assert time.evidence == "no interval: too few different faults; 1.50 s at the soonest"
 
 
 @pytest.mark.parametrize(
