@@ -1,7 +1,12 @@
-"""Units of numbers in YAML. A key ends in the unit (`offset_m`, `speed_mph`)."""
+"""Units of numbers in YAML. A key ends in the unit's suffix (`offset_m`, `speed_mph`); the key `unit` has
+suffix or symbol (`mps`, `m/s`), in manifests and specs alike.
+"""
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import AfterValidator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +61,9 @@ UNITS = {
         ("percent", "%", "share", 1.0),
     )
 }
+DIMENSIONLESS = "1"
+_NO_UNIT = "-"
+_UNIT_BY_SYMBOL = {unit.symbol: unit for unit in UNITS.values()}
 UNIT_SUFFIXES_TEXT = ", ".join(UNITS)
 _MOST_SUFFIX_PARTS = 1 + max(suffix.count("_") for suffix in UNITS)  # number of parts of the longest suffix
 
@@ -70,6 +78,30 @@ def split_unit(key: str) -> tuple[str, Unit | None]:
         if stem and suffix in UNITS:
             return stem, UNITS[suffix]
     return key, None
+
+
+def suffix_of_unit(text: str) -> str | None:
+    """Return the suffix of a unit given as suffix or symbol (`mps`, `m/s`), or `1` for none; None for an
+    unknown unit.
+    """
+    if text in (DIMENSIONLESS, _NO_UNIT):
+        return DIMENSIONLESS
+    unit = UNITS.get(text) or _UNIT_BY_SYMBOL.get(text)
+    return unit.suffix if unit else None
+
+
+def symbol_of_unit(text: str) -> str:
+    """Return the symbol of a unit given as suffix or symbol, and `-` for none. Other units, such as those of
+    formulas, stay as they are.
+    """
+    suffix = suffix_of_unit(text)
+    if suffix == DIMENSIONLESS:
+        return _NO_UNIT
+    return UNITS[suffix].symbol if suffix else text
+
+
+UnitSymbol = Annotated[str, AfterValidator(symbol_of_unit)]
+"""A unit in a manifest."""
 
 
 def convert_unit(number: float, source: Unit, target: Unit) -> float:

@@ -12,7 +12,6 @@ from mutator.config.location_model import LocationModel
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.faults.injection_specs import (
-    DIMENSIONLESS,
     InjectionSpec,
     ParamSpec,
     ParamValue,
@@ -28,8 +27,8 @@ class InjectionModel(StrictModel, title="An injection"):
     model: str = Field(description="A [fault model](fault-models.md).")
     unit: str | None = Field(
         None,
-        description="The unit of the changed variable in the source: a suffix from the table of units, or "
-        "`'1'` for a plain number. Required if the model has parameters in that unit.",
+        description="The unit of the changed variable in the source: a suffix or symbol from the [table of "
+        "units](#units), or `'1'` for a plain number. Required if the model has parameters in that unit.",
     )
     params: dict[str, Any] = Field(
         default_factory=dict,
@@ -57,11 +56,12 @@ class InjectionModel(StrictModel, title="An injection"):
 
     def injection_spec(self, source: YamlSource, keys: KeyPath) -> InjectionSpec:
         """Check and convert the injection; errors point into `source` at `keys`."""
-        if self.unit is not None and self.unit != DIMENSIONLESS and self.unit not in units.UNITS:
+        unit_suffix = None if self.unit is None else units.suffix_of_unit(self.unit)
+        if self.unit is not None and unit_suffix is None:
             raise source.error(
                 (*keys, "unit"),
                 f"unit '{self.unit}'",
-                expected=f"one of {units.UNIT_SUFFIXES_TEXT}, or '1' for a plain number",
+                expected=f"one of {units.UNIT_SUFFIXES_TEXT}, its symbol (`m/s`), or '1' for a plain number",
                 remedy="name the unit that the variable has in the source",
             )
         params = []
@@ -83,7 +83,7 @@ class InjectionModel(StrictModel, title="An injection"):
             location=location,
             model=self.model,
             params=tuple(params),
-            unit=self.unit,
+            unit=unit_suffix,
             keys=keys,
             where=None if self.where is None else canonical_instance_condition(self.where),
             call=self.call,

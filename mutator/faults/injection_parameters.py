@@ -9,7 +9,6 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAME_PARAM_TYPES, UNIT_OF_CHANGED_VARIABLE, FaultModel, ParamSchema
 from mutator.faults.fault_specs import DrawSpec
 from mutator.faults.injection_specs import (
-    DIMENSIONLESS,
     DrawReference,
     InjectionSpec,
     ParamSpec,
@@ -151,7 +150,7 @@ class _ParameterResolver:
                 expected=f"the changed variable's unit, one of {units.UNIT_SUFFIXES_TEXT}, or '1'",
                 remedy="add `unit: m` (the variable's unit in the source) next to `model`",
             )
-        return None if self.spec.unit == DIMENSIONLESS else units.UNITS[self.spec.unit]
+        return None if self.spec.unit == units.DIMENSIONLESS else units.UNITS[self.spec.unit]
 
     def resolved_value(self, param: ParamSpec, schema: ParamSchema) -> Value:
         """Return the value in the template's unit, after checking its type and range."""

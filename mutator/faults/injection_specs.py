@@ -8,7 +8,6 @@ from mutator.config import units
 from mutator.config.yaml_sources import KeyPath
 from mutator.model import FaultLocation
 
-DIMENSIONLESS = "1"
 _DRAW_REFERENCE_PATTERN = re.compile(r"(-?)([a-z][a-z0-9_]*)\Z")
 
 

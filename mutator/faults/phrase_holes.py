@@ -3,9 +3,10 @@
 from collections.abc import Iterator
 
 from mutator._common.phrase_texts import ABSOLUTE_PREFIX, CHANGED_HOLE, FILE_HOLE, FUNCTION_HOLE, VALUE_HOLE
+from mutator.config import units
 from mutator.faults.fault_models import UNIT_OF_CHANGED_VARIABLE, FaultModels, ParamSchema
 from mutator.faults.fault_specs import Variant
-from mutator.faults.injection_specs import DIMENSIONLESS, InjectionSpec
+from mutator.faults.injection_specs import InjectionSpec
 
 _NUMBER_TYPES = ("number", "integer")
 
@@ -26,7 +27,7 @@ def _number_holes(injection: InjectionSpec, models: FaultModels) -> Iterator[str
         schema = model.param(param.name)
         if schema and schema.type in _NUMBER_TYPES:
             unit = injection.unit if schema.unit == UNIT_OF_CHANGED_VARIABLE else schema.unit
-            yield schema.name if unit in (None, DIMENSIONLESS) else f"{schema.name}_{unit}"
+            yield schema.name if unit in (None, units.DIMENSIONLESS) else f"{schema.name}_{unit}"
 
 
 def model_holes(params: tuple[ParamSchema, ...]) -> tuple[str, ...]:

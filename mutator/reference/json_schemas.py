@@ -18,7 +18,6 @@ from mutator.faults.fault_models import (
     FaultModels,
     ParamSchema,
 )
-from mutator.faults.injection_specs import DIMENSIONLESS
 from mutator.faults.library_readings import SpecReadings
 from mutator.stpa import analysis_files, context_tables, hazard_list
 from mutator.targets import manifest_files, severity_model
@@ -154,8 +153,13 @@ def build_editor_schema(file_format: YamlFormat, fault_models: FaultModels) -> d
 def _add_fault_models(injection: dict[str, Any], fault_models: FaultModels) -> None:
     properties = injection["properties"]
     properties["model"]["anyOf"] = [{"enum": [model.name for model in fault_models]}, {"type": "string"}]
-    properties["unit"]["anyOf"] = [{"enum": [*units.UNITS, DIMENSIONLESS]}, {"type": "null"}]
+    properties["unit"]["anyOf"] = [{"enum": _unit_names()}, {"type": "null"}]
     injection["allOf"] = [_parameters_rule(model) for model in fault_models]
+
+
+def _unit_names() -> list[str]:
+    symbols = (unit.symbol for unit in units.UNITS.values())
+    return list(dict.fromkeys([*units.UNITS, units.DIMENSIONLESS, *symbols, "-"]))
 
 
 def _parameters_rule(model: FaultModel) -> dict[str, Any]:

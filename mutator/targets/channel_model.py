@@ -6,6 +6,7 @@ from pydantic import Field
 
 from mutator._common.doors import IMPORTERS
 from mutator.config.phrases import ChangePhraseModel, build_phrase
+from mutator.config.units import UnitSymbol
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import YamlSource
 from mutator.targets.channels import ROUNDING_TOLERANCE, Channel, Role
@@ -16,7 +17,9 @@ from mutator.triggers.conditions import RESERVED_NAMES
 class ChannelModel(StrictModel, title="A channel"):
     """A channel. Conditions, tables and plots use its name."""
 
-    unit: str = Field(description="The unit, for tables and axes; `-` for none.")
+    unit: UnitSymbol = Field(
+        description="The unit, for tables and axes, as symbol or suffix (`m/s`, `mps`); `-` for none."
+    )
     role: Role = Field(
         Role.INTERNAL,
         strict=False,

@@ -7,6 +7,7 @@ from typing import get_args
 from pydantic import Field
 
 from mutator.config.phrases import build_phrase
+from mutator.config.units import UnitSymbol
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.targets.criteria import Aggregate, Hazard, Metric, WorseDirection
@@ -47,7 +48,7 @@ class HazardModel(StrictModel, title="A hazard"):
         description="The distance of a step from the hazard, in `unit`; negative if `when` holds. If `when` "
         "is a single comparison, the default is the difference of its two sides.",
     )
-    unit: str = Field("-", description="The unit of the margin.")
+    unit: UnitSymbol = Field("-", description="The unit of the margin.")
     phrase: str | list[str] | None = Field(
         None,
         description="The hazard as a clause, for the [sentence](../how-to/word-results.md) about an "
@@ -91,7 +92,7 @@ class MetricModel(StrictModel, title="A metric"):
         "of the hazard alone. For what means nothing at a contact, such as a time to collision. Default: the "
         "step of the hazard is the last.",
     )
-    unit: str = Field(description="The unit; `-` for none.")
+    unit: UnitSymbol = Field(description="The unit; `-` for none.")
     worse: WorseDirection = Field(description="Which values are worse: `higher` or `lower`.")
     about: str = Field(description="What the metric measures.")
     source: str = Field("", description="The source of the formula.")

@@ -8,6 +8,7 @@ from pydantic import Field
 from mutator._common.message_text import shortened_repr
 from mutator.config.location_model import LocationModel
 from mutator.config.location_syntax import PROBE_MODULE_NAME, is_dotted_name
+from mutator.config.units import UnitSymbol
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import YamlSource
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS
@@ -36,7 +37,9 @@ class _ValueModel(StrictModel, title="A value"):
         description="The derived value, as a formula over the values before it; or "
         "the observed value, as an expression at the place.",
     )
-    unit: str = Field(description="The unit, for tables; `-` for none.")
+    unit: UnitSymbol = Field(
+        description="The unit, for tables, as symbol or suffix (`m/s`, `mps`); `-` for none."
+    )
     about: str = Field(description="What the value means.")
 
 

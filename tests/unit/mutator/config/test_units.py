@@ -67,3 +67,20 @@ def test_the_shipped_library_uses_only_expected_units() -> None:
         for key in re.findall(r"[{ ]([a-z][a-z0-9_]*):", path.read_text()):
             unit = units.split_unit(key)[1]
             assert unit is None or unit.suffix in first, f"{path}: {key}"
+
+
+@pytest.mark.parametrize(
+    ("text", "suffix", "symbol"),
+    [
+        ("mps", "mps", "m/s"),
+        ("m/s", "mps", "m/s"),
+        ("%", "percent", "%"),
+        ("1", "1", "-"),
+        ("-", "1", "-"),
+        ("m/s^3", None, "m/s^3"),
+    ],
+)
+def test_manifests_and_specs_have_one_vocabulary_of_units(text: str, suffix: str | None, symbol: str) -> None:
+    """Suffix and symbol are the same unit; what has no suffix is a unit of tables only."""
+    assert units.suffix_of_unit(text) == suffix
+    assert units.symbol_of_unit(text) == symbol
