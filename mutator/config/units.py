@@ -4,9 +4,6 @@ suffix or symbol (`mps`, `m/s`), in manifests and specs alike.
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
-
-from pydantic import AfterValidator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,10 +95,6 @@ def symbol_of_unit(text: str) -> str:
     if suffix == DIMENSIONLESS:
         return _NO_UNIT
     return UNITS[suffix].symbol if suffix else text
-
-
-UnitSymbol = Annotated[str, AfterValidator(symbol_of_unit)]
-"""A unit in a manifest."""
 
 
 def convert_unit(number: float, source: Unit, target: Unit) -> float:

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from mutator._common.doors import IMPORTERS
 from mutator.config.phrases import ChangePhraseModel, build_phrase
-from mutator.config.units import UnitSymbol
+from mutator.config.unit_fields import UnitSymbol
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import YamlSource
 from mutator.targets.channels import ROUNDING_TOLERANCE, Channel, Role

@@ -7,7 +7,7 @@ from typing import get_args
 from pydantic import Field
 
 from mutator.config.phrases import build_phrase
-from mutator.config.units import UnitSymbol
+from mutator.config.unit_fields import UnitSymbol
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.targets.criteria import Aggregate, Hazard, Metric, WorseDirection

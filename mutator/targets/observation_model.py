@@ -8,7 +8,7 @@ from pydantic import Field
 from mutator._common.message_text import shortened_repr
 from mutator.config.location_model import LocationModel
 from mutator.config.location_syntax import PROBE_MODULE_NAME, is_dotted_name
-from mutator.config.units import UnitSymbol
+from mutator.config.unit_fields import UnitSymbol
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import YamlSource
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS

@@ -230,7 +230,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         (
             "          unit: m\n",
             "          unit: feet\n",
-            "16: unit 'feet'; expected one of {KNOWN}, or '1' "
+            "16: unit 'feet'; expected one of {KNOWN}, its symbol (`m/s`), or '1' "
             "for a plain number; name the unit that the variable has in the source",
         ),
         (
