@@ -13,6 +13,7 @@ from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, parsed_file
 from mutator.mutants.changed_file_reuse import reuse_key
 from mutator.mutants.constant_imports import dotted_names_importing_constant
 from mutator.mutants.expressions import NO_TEMPLATE_PARTS, Expression, template_parts
+from mutator.mutants.hidden_builtins import check_calls_builtins
 from mutator.mutants.injected_lines import (
     ORIGINAL_VALUE_NAME,
     activation_condition,
@@ -76,7 +77,8 @@ def injection_edit(
     """Return the edit of one injection in its file, tagged with `tag`.
 
     `tree` has the files that might import a constant. MutatorError for a missing anchor, a name unknown in
-    the function, and lines that would change what the target's names mean while the fault is inactive.
+    the function, and lines that would change what the target's names mean while the fault is inactive, or
+    that would call a function of the target instead of a built-in one.
     """
     model = models.get(injection.model)
     if injection.location.anchor.kind in VALUE_ANCHORS:
@@ -100,8 +102,10 @@ def injection_edit(
     edit = make_edit(file, anchor, code, tag)
     key = (variables, reuse_key(file, [edit], [tag]))
     if key not in file.verified_edits:
+        guarded = [*code, "    pass"] if model.kind is SnippetKind.GUARD else code
+        check_calls_builtins(file, anchor.first_line, model, "\n".join(guarded))
         _check_rebinds_no_used_name(
-            file, anchor, model, code, variables.union(*map(_bound_names, texts.values()))
+            file, anchor, model, guarded, variables.union(*map(_bound_names, texts.values()))
         )
         _check_keeps_name_scopes(file, anchor, edit)
         file.verified_edits.add(key)
@@ -118,6 +122,7 @@ def _expression_edit(file: ParsedFile, model: FaultModel, injection: Injection, 
     _checked_variable_params(file, names, expression.start[0], model, injection)
     _check_instance_condition(file, names, expression.start[0], injection)
     _check_binds_no_new_name(file, model, expression, changed)
+    check_calls_builtins(file, expression.start[0], model, changed)
     return expression_edit(file, expression, changed, tag, activation_condition(tag, injection))
 
 
@@ -182,6 +187,7 @@ def _constant_or_default_edit(
     else:
         function, _, parameter = value.dotted_path.rpartition(".")
         code = default_setting_line(tag, function, parameter, changed)
+    check_calls_builtins(file, value.first_line, model, code)
     return constant_or_default_edit(file, value, code, tag)
 
 
@@ -245,9 +251,8 @@ def _check_rebinds_no_used_name(
     code: Sequence[str],
     variables: frozenset[str],
 ) -> None:
-    block = [*code, "    pass"] if model.kind is SnippetKind.GUARD else code
     clashes = (
-        {normalize_identifier(name) for name in _bound_names("\n".join(block))} - variables
+        {normalize_identifier(name) for name in _bound_names("\n".join(code))} - variables
     ) & anchor.names_used_in_function
     if clashes:
         raise MutatorError(

@@ -56,6 +56,13 @@ def globals_set_in_functions(data: bytes) -> frozenset[str]:
     )
 
 
+def names_of_module(data: bytes) -> frozenset[str]:
+    """Return the names that a module has as globals: bound in it, or in functions that declare them."""
+    symbols = _cached_symbol_table(data).get_symbols()
+    bound = (s.get_name() for s in symbols if s.is_assigned() or s.is_imported() or s.is_namespace())
+    return globals_set_in_functions(data).union(bound)
+
+
 def _nested_tables(table: SymbolTable) -> Iterator[SymbolTable]:
     for child in table.get_children():
         yield child
