@@ -49,6 +49,8 @@ def print_outcome_counts(terminal: Terminal, run: "Run") -> None:
     score = run.mutation_totals()
     if score.rows:
         terminal.print_table(score.heads, score.rows, right_aligned=tuple(score.right_aligned))
+    for text in run.folder.head.operators:  # names files that could not be changed
+        terminal.print_text(text)
     with suppress(MutatorError):  # the note needs the library
         if note := run.alerts_note():
             terminal.print_text(note)

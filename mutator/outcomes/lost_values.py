@@ -34,19 +34,32 @@ def find_lost_value(
     """Return the observed value that is lost first in the drive, which ends at `t_end`, or None.
 
     It is NaN where the golden run's is not, or infinite where the golden run's is finite. A step that the
-    golden run does not have is compared with the golden run's newest one.
+    golden run does not have is compared with the golden run's newest one. A fault can move the time at which
+    there is something to observe, so NaN before the first number, and in a value that the golden run itself
+    loses, is legitimate.
     """
     steps, golden_steps = (np.asarray(trace[manifest.time_channel], float) for trace in (faulty, golden))
     lost: list[LostValue] = []
     for name in _recorded_names(manifest, golden, faulty):
         values = values_on_steps(faulty, name, steps).astype(float)
-        reference = newest_values(golden_steps, values_on_steps(golden, name, golden_steps), steps)
-        lost_now = np.isnan(values) & ~np.isnan(reference) | np.isinf(values) & np.isfinite(reference)
+        golden_values = values_on_steps(golden, name, golden_steps).astype(float)
+        reference = newest_values(golden_steps, golden_values, steps)
+        is_nan = np.isnan(values) & ~np.isnan(reference) & ~_may_be_nan(golden_values, values)
+        lost_now = is_nan | np.isinf(values) & np.isfinite(reference)
         at = np.flatnonzero(lost_now & _in_drive(steps, t_end))
         if at.size:
             instead = "NaN" if np.isnan(values[at[0]]) else "infinite"
             lost.append(LostValue(name=name, instead=instead, time_s=float(steps[at[0]])))
     return min(lost, key=lambda value: value.time_s, default=None)
+
+
+def _may_be_nan(golden_values: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the steps in which NaN can mean that there is nothing to observe, such as no vehicle ahead."""
+    is_absent = np.isnan(golden_values)
+    if np.any(is_absent[1:] & ~is_absent[:-1]):
+        return np.ones(values.size, bool)
+    not_yet = np.logical_and.accumulate(np.isnan(values))
+    return not_yet if is_absent[:1].any() else np.zeros(values.size, bool)
 
 
 def find_value_lost_for_good(manifest: TargetManifest, trace: Trace, t_end: float | None) -> LostValue | None:
