@@ -60,9 +60,13 @@ def _names_bound_around(file: ParsedFile, line: int) -> Iterator[str]:
     """Yield the names that the module and the functions around a line bind."""
     yield from names_of_module(file.data)
     for node in ast.walk(file.tree):
-        is_function = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-        if is_function and node.lineno <= line + 1 <= (node.end_lineno or 0):
-            yield from _names_bound_in(node)
+        match node:
+            case ast.FunctionDef() | ast.AsyncFunctionDef() if _has_line(node, line + 1):
+                yield from _names_bound_in(node)
+
+
+def _has_line(node: ast.stmt, line: int) -> bool:
+    return node.lineno <= line <= (node.end_lineno or 0)
 
 
 def _names_bound_in(function: ast.FunctionDef | ast.AsyncFunctionDef) -> Iterator[str]:
