@@ -21,6 +21,7 @@ from mutator.checks import fast_engine_check, nondeterminism_suspects
 from mutator.checks.findings import CheckState, Finding
 from mutator.checks.first_difference import describe_first_difference
 from mutator.checks.reachability import ReachTracker
+from mutator.checks.unloaded_files import unloaded_files_findings
 from mutator.engines import forkable
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.fork_engine import ForkEngine
@@ -129,6 +130,9 @@ class _RunningCheck:
             golden_cpu_s = [golden.first.cpu_s for golden in goldens.values()]
             canaries = pool.map(self._canary_finding, self._distinct_canaries(golden_cpu_s))
             self._run_with_further_changes()
+            tree = self.manifest.tree
+            loaded = {f for g in goldens.values() for f in g.watched_counting.reach_report.get("loaded", ())}
+            findings += unloaded_files_findings(tree.files.keys() - tree.overlaid_paths, loaded)
             return [*findings, *self.reach_tracker.findings(), *canaries]
 
     # Runs
