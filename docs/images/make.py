@@ -99,6 +99,7 @@ def report(page: Any, path: Path, name: str) -> None:
     """Save the report's first screen, the worst experiment, and a film of its replay."""
     page.goto(path.as_uri())
     page.wait_for_selector("html[data-ready]")
+    page.wait_for_selector("#worst-replay .replay-player")
     save(page.screenshot(), "report" + name)
     page.locator(WORST_CONTACT).first.click()
     page.wait_for_selector(".replay-player")
