@@ -62,9 +62,19 @@ def compiler_of_function(tree: SourceTree, path: str, function: str, env: Mappin
 
 
 def compiler_of_constant(tree: SourceTree, path: str, name: str, env: Mapping[str, str]) -> str | None:
-    """Return the compiler whose functions alone read a constant of the module: they keep its first value."""
+    """Return the compiler whose functions alone read a constant of the module: they keep its first value.
+
+    A constant that another file imports, or an attribute of its name, can be read there, too.
+    """
     compiler = compiled_code(tree, path).frozen_constants.get(name)
-    return None if compiler is None or _is_turned_off(compiler, env) else compiler
+    if compiler is None or _is_turned_off(compiler, env):
+        return None
+    others = (other for other in tree.files if other != path and other.endswith(".py"))
+    is_read_elsewhere = any(
+        name in names or "*" in names
+        for names in (tree.derive_once(other, _foreign_names) for other in others)
+    )
+    return None if is_read_elsewhere else compiler
 
 
 def switch_of_compiler(compiler: str) -> str:
@@ -90,6 +100,22 @@ def _is_turned_off(compiler: str, env: Mapping[str, str]) -> bool:
 
 def _is_within(function: str, outer: str) -> bool:
     return function == outer or function.startswith(f"{outer}.")
+
+
+def _foreign_names(path: str, data: bytes, root: Path) -> frozenset[str]:
+    """Return the names that a file imports from modules, or reads as attributes; `*` is all of a module."""
+    try:
+        module = ast.parse(data)
+    except (SyntaxError, ValueError, RecursionError):
+        return frozenset()
+    names = set[str]()
+    for node in ast.walk(module):
+        match node:
+            case ast.ImportFrom(names=aliases):
+                names.update(alias.name for alias in aliases)
+            case ast.Attribute(attr=name):
+                names.add(name)
+    return frozenset(names)
 
 
 def _compiled_elsewhere(tree: SourceTree, path: str) -> dict[str, str]:

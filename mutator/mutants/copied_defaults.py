@@ -4,6 +4,7 @@ Examples are pydantic's models, whose validator is compiled from the defaults, a
 """
 
 import ast
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +31,7 @@ _BASES_BY_PACKAGE: Mapping[str, frozenset[str]] = {
     "typing": frozenset({"NamedTuple", "TypedDict"}),
     "typing_extensions": frozenset({"NamedTuple", "TypedDict"}),
 }
+_CLASS_VARIABLE_PATTERN = re.compile(r"\bClassVar\b")
 _METACLASSES = frozenset({"enum.EnumMeta", "enum.EnumType"})
 _DECORATORS = frozenset({"pydantic.dataclasses.dataclass"})
 
@@ -41,13 +43,18 @@ class _ClassBases:
     bases: tuple[str, ...]
     metaclasses: tuple[str, ...]
     decorators: tuple[str, ...]
+    class_variables: frozenset[str]  # annotated as `ClassVar`: no fields
 
 
-def copying_ancestor(tree: SourceTree, path: str, name: str) -> str | None:
-    """Return why a class's fields cannot be set, such as `its class derives from BaseModel of pydantic`.
+def copying_ancestor(tree: SourceTree, path: str, name: str, field: str) -> str | None:
+    """Return why a class's field cannot be set, such as `its class derives from BaseModel of pydantic`.
 
-    The class is found by its qualified name. Bases are followed through the files of the target.
+    The class is found by its qualified name. Bases are followed through the files of the target. A `ClassVar`
+    is no field: the class keeps it as it is.
     """
+    facts = tree.derive_once(path, _classes_of).get(name)
+    if facts is None or field in facts.class_variables:
+        return None
     return _copying_ancestor(tree, path, name, frozenset())
 
 
@@ -111,9 +118,19 @@ def _classes_in_body(
                 bases=tuple(map(dotted, statement.bases)),
                 metaclasses=tuple(map(dotted, metaclasses)),
                 decorators=tuple(map(dotted, statement.decorator_list)),
+                class_variables=frozenset(_class_variables(statement.body)),
             )
             yield name, facts
             yield from _classes_in_body(statement.body, f"{name}.", imports)
         elif not isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef):
             for block in blocks_of(statement):
                 yield from _classes_in_body(block, prefix, imports)
+
+
+def _class_variables(body: Sequence[ast.stmt]) -> Iterator[str]:
+    for statement in body:
+        match statement:
+            case ast.AnnAssign(target=ast.Name(id=name), annotation=annotation):
+                # `ClassVar[float]`, `typing.ClassVar`, or either in quotes
+                if _CLASS_VARIABLE_PATTERN.search(ast.unparse(annotation)):
+                    yield name

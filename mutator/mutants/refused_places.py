@@ -56,8 +56,8 @@ def refusal_reason(manifest: TargetManifest, location: FaultLocation) -> str | N
         return reason
     if compiler := _compiler(manifest, location):
         return f"only functions compiled by {compiler} read it, and they keep its first value"
-    owner = location.anchor.name.rpartition(".")[0]
-    return copying_ancestor(manifest.tree, location.path, owner) if owner else None
+    owner, _, field = location.anchor.name.rpartition(".")
+    return copying_ancestor(manifest.tree, location.path, owner, field) if owner else None
 
 
 def refusal_reason_of_function(manifest: TargetManifest, path: str, function: str) -> str | None:

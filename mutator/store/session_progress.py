@@ -18,6 +18,7 @@ from mutator.errors import MutatorError, TypeMisfit
 from mutator.store.run_progress import Progress
 
 PROGRESS_SCHEMA, PROGRESS_FILE = "progress/1", "progress.json"
+_MOST = 1e12  # of steps, experiments and s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,9 +72,12 @@ def remove_session_progress(run: Path) -> None:
 
 
 def read_session_progress(run: Path) -> SessionProgress | None:
-    """Return what the file says; None without a file that can be read."""
+    """Return what the file says; None without a file that can be read, or with values that no session has."""
     try:
         stored = parse_json_object(read_below(run, PROGRESS_FILE), run / PROGRESS_FILE, PROGRESS_SCHEMA)
-        return from_json_types(SessionProgress, {key: stored[key] for key in stored if key != "schema"})
+        progress = from_json_types(SessionProgress, {key: stored[key] for key in stored if key != "schema"})
     except (OSError, MutatorError, TypeMisfit):
         return None
+    numbers = (progress.finished_steps, progress.total_steps, progress.per_s or 0, progress.remaining_s or 0)
+    # false for NaN, too
+    return progress if all(0 <= n <= _MOST for n in (*numbers, *progress.outcomes.values())) else None

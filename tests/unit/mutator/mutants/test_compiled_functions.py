@@ -106,6 +106,13 @@ def test_a_constant_that_only_compiled_functions_read_is_frozen(tmp_path: Path) 
     assert compiler_of_constant(tree, "m.py", "FREE", {}) is None
 
 
+@pytest.mark.parametrize("other", ["from m import GAIN\n", "from m import *\n", "import m\nprint(m.GAIN)\n"])
+def test_a_constant_that_another_file_reads_is_not_frozen(tmp_path: Path, other: str) -> None:
+    text = "from numba import njit\nGAIN = 2\n@njit\ndef law(y):\n" + BODY
+    assert compiler_of_constant(tree_of(tmp_path, m=text, n="import m\n"), "m.py", "GAIN", {}) == "numba.njit"
+    assert compiler_of_constant(tree_of(tmp_path, m=text, n=other), "m.py", "GAIN", {}) is None
+
+
 def test_a_function_that_builds_a_graph_is_noted(tmp_path: Path) -> None:
     """casadi runs the law once, inside the arguments of `casadi.Function` or as a function given to it."""
     text = "import casadi as ca\ndef law(y):\n    return y\ndef free(y):\n    return y\n"

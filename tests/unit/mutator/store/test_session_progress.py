@@ -1,5 +1,6 @@
 """`progress.json` says what a session does."""
 
+import json
 from collections import Counter
 from pathlib import Path
 
@@ -39,6 +40,26 @@ def test_progress_is_read_as_it_was_written(tmp_path: Path) -> None:
 )
 def test_a_file_of_another_form_is_no_progress(tmp_path: Path, text: str) -> None:
     (tmp_path / PROGRESS_FILE).write_text(text)
+    assert read_session_progress(tmp_path) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        ("remaining_s", float("nan")),
+        ("remaining_s", 1e308),
+        ("per_s", float("inf")),
+        ("per_s", -1.0),
+        ("finished_steps", -1),
+        ("total_steps", 10**300),
+        ("outcomes", {"sdc": -2}),
+    ],
+)
+def test_numbers_that_no_session_has_are_no_progress(tmp_path: Path, name: str, number: object) -> None:
+    """A page that shows them would fail, or be filled by one number."""
+    write_session_progress(tmp_path, SessionProgress.of(Progress(stage="checks")))
+    stored = json.loads((tmp_path / PROGRESS_FILE).read_text())
+    (tmp_path / PROGRESS_FILE).write_text(json.dumps(stored | {name: number}))
     assert read_session_progress(tmp_path) is None
 
 
