@@ -12,7 +12,7 @@ from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 FINDING_NAME = "fast engines"
-_FALLBACK_NOTE = "campaigns then run on the reference engine"
+_FALLBACK_NOTE = "without forks, campaigns run on the reference engine"
 _DRIVE_CHECK_NOTE = "`mutator check --drive` names the lines that start threads in Python"
 _MOST_LISTED = 3  # reasons
 

@@ -28,6 +28,9 @@ _TIME_LABELS = {
     "time_to_hazard_s": "time to hazard (first hazard - activation)",
     "reaction_time_s": "reaction time (first hazard - first alert)",
 }
+# Columns of the worst experiments that are left out if no row has a value: few targets have classes, alerts.
+_OPTIONAL_HEADS = ("severity", "delta-v [m/s]", "first alert", "more")
+_NUMBER_HEADS = ("delta-v [m/s]", "margin", "more")
 
 
 def find_stored_experiment(workspace: "Workspace", run: Path | None, id_start: str) -> StoredExperiment:
@@ -62,13 +65,12 @@ def print_worst_experiments(
         rows = [row | {"severity": scale.labels.get(str(row["severity"]), "")} for row in rows]
     sentences = [(row["experiment"], row.pop("sentence")) for row in rows]
     has_more = any(row.get("more") for row in rows)
-    if not has_more:
-        rows = [{head: cell for head, cell in row.items() if head != "more"} for row in rows]
+    rows = without_unused_columns(rows if has_more else [row | {"more": None} for row in rows])
     heads = tuple(rows[0]) if rows else ()
     terminal.print_table(
         heads,
         [tuple(row.values()) for row in rows],
-        right_aligned=(3, 5, 9),
+        right_aligned=tuple(i for i, head in enumerate(heads) if head in _NUMBER_HEADS),
         priorities=[i for i, head in enumerate(heads) if head not in ("margin", "first alert")],
     )
     for name, sentence in sentences:
@@ -81,6 +83,12 @@ def print_worst_experiments(
             "more: experiments with the same fault type and hazard; to list them:",
             "mutator show --only 'fault_type == \"...\"'",
         )
+
+
+def without_unused_columns(rows: list[dict[str, object]]) -> list[dict[str, object]]:
+    """Return the rows of a table without the optional columns in which no row has a value."""
+    unused = {head for head in _OPTIONAL_HEADS if all(row.get(head) in (None, "") for row in rows)}
+    return [{head: cell for head, cell in row.items() if head not in unused} for row in rows]
 
 
 def _row_facts(row: "ResultRow", id_length: int | None) -> dict[str, object]:

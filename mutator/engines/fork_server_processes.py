@@ -31,6 +31,7 @@ from mutator.targets.manifest import TargetManifest
 _SERVER_SCRIPT = Path(__file__).parent / "in_target" / "fork_server.py"
 _MOST_WAITING_PROCESSES = 8  # maximum number of waiting processes, because each takes about 20 MB
 # steps; a process at most this far behind is advanced, not copied: it is quickly remade
+_LOAD_REMEDY = "run `mutator check --drive`: if the golden run fails, too, no campaign can start"
 _MOST_STEPS_TO_ADVANCE = 100
 _PARENT_CHECK_INTERVAL_S = 0.5  # interval between two checks that the parent is alive
 _START_TIMEOUT_S = 120.0  # to load the target, whose libraries a busy machine imports slowly
@@ -188,7 +189,7 @@ class ForkServer:
     def _receive_welcome(self) -> None:
         welcome, _ = self.first_process.receive_reply(_START_TIMEOUT_S)
         if "failed" in welcome:
-            raise NotForkable(f"it cannot be loaded: {_describe_failure(welcome['failed'])}")
+            raise NotForkable(f"it cannot be loaded: {_describe_failure(welcome['failed'])}", _LOAD_REMEDY)
         if welcome["threads"]:
             others = welcome["threads"]
             raise NotForkable(

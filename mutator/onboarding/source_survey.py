@@ -72,6 +72,13 @@ def _survey_all(target: str, globs: Sequence[str]) -> SourceSurvey:
     if target.startswith(INSTALLED_PREFIX):
         return _survey_installed(target.removeprefix(INSTALLED_PREFIX), globs)
     folder = Path(target).resolve()
+    if folder.is_file():
+        raise MutatorError(
+            f"{target} is a file",
+            argument="target",
+            expected="the folder that holds a controller's source",
+            remedy=f"give its folder, and search only this file with `--in '**/{folder.name}'`",
+        )
     if not folder.is_dir():
         raise MutatorError(
             f"no folder {target}",

@@ -7,6 +7,7 @@ import pytest
 
 from mutator.checks import check_by_running
 from mutator.checks.check_by_running import findings_from_running
+from mutator.checks.fast_engine_check import import_and_fork_finding
 from mutator.checks.findings import CheckState, Finding
 from mutator.checks.reachability import ReachTracker
 from mutator.errors import MutatorError
@@ -106,6 +107,14 @@ def test_an_effect_of_the_hash_seed_is_reported_without_a_line(toy: Workspace, m
     found = findings(toy)["golden A"]
     assert "but only if their hash seeds differ; they first differ in channel " in found.found
     assert (found.places, "sorted(...)" in found.remedy) == ((), True)
+
+
+def test_a_module_that_is_missing_may_stop_every_engine(toy: Workspace) -> None:
+    """The check that runs nothing does not promise that campaigns go on without forks."""
+    change(toy, "sensing.py", "class Sensor", "import no_such_module\n\n\nclass Sensor")
+    fast = import_and_fork_finding(toy.manifest("toycar"))
+    assert "cannot be loaded: ModuleNotFoundError: No module named 'no_such_module'" in fast.found
+    assert "if the golden run fails, too, no campaign can start" in fast.remedy
 
 
 @pytest.mark.parametrize("long", [False, True], ids=["brief", "long"])

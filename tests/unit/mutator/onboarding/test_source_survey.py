@@ -112,12 +112,13 @@ def test_an_installed_package_is_found_without_importing_it() -> None:
     ("target", "words"),
     [
         ("/nowhere/at/all", "no folder"),
+        (__file__, "test_source_survey.py is a file"),
         ("installed:nowhere_at_all", "no installed package 'nowhere_at_all'"),
         ("installed:../x", "no installed package"),
         ("installed:math", "no installed package 'math'"),
     ],
 )
-def test_a_missing_folder_or_package_is_an_error_with_a_remedy(target: str, words: str) -> None:
+def test_what_is_no_folder_or_package_is_an_error_with_a_remedy(target: str, words: str) -> None:
     with pytest.raises(MutatorError, match=words) as told:
         survey_source(target)
     assert told.value.remedy
