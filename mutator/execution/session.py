@@ -173,6 +173,10 @@ class Session:
         if self._notify:
             self._notify(progress)
 
+    @property
+    def stage(self) -> str:
+        return self._latest_progress.stage
+
     def note_end(self, problem: str) -> None:
         """Leave the cause for those who watch the session if it failed, or nothing."""
         if problem:
@@ -413,7 +417,8 @@ def open_session(
         try:
             yield session
         except Exception as error:
-            session.note_end(str(error) or type(error).__name__)
+            is_refused = session.stage == "plan"  # before any work: the folder stays as it was
+            session.note_end("" if is_refused else str(error) or type(error).__name__)
             raise
         except BaseException:  # an interruption is no failure
             session.note_end("")

@@ -13,7 +13,7 @@ def no_canary_note(folder: RunFolder, results: pd.DataFrame) -> str:
     """Return the first line of results and report, with the first experiment of the plan that reached a
     hazard; '' if the campaign has a canary. `results` has a row for each experiment, in plan order.
     """
-    if folder.canary is not None:
+    if folder.head.canary is not None:
         return ""
     hazards = results[results["outcome"] == Outcome.HAZARD.value]
     if hazards.empty:

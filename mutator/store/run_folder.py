@@ -192,9 +192,12 @@ class RunFolder:
 
     @property
     def stop_at_hazard_note(self) -> str:
-        some = self.canary or next(plan_file.iterate_experiments(self.path))
-        stops = some.after_hazard is AfterHazard.STOP
-        return STOP_AT_HAZARD_NOTE if stops else ""
+        if self.head.canary is not None:
+            after_hazard = self.head.canary.get("after_hazard")
+        else:  # all experiments of a plan have the same
+            first = next(plan_file.iterate_experiments(self.path), None)
+            after_hazard = first and first.after_hazard
+        return STOP_AT_HAZARD_NOTE if after_hazard == AfterHazard.STOP else ""
 
     @property
     def seeds(self) -> range:

@@ -22,6 +22,7 @@ from mutator.execution.session import Session
 from mutator.execution.worker import Worker, WorkerAssignment
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
+from mutator.store.session_progress import PROGRESS_FILE
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
@@ -103,7 +104,9 @@ def other_digits(execute: Execute) -> Execute:
 
 
 def contents(folder: Path) -> dict[Path, bytes]:
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    """Return the bytes of all files but the one for those who watch a run, on which no result depends."""
+    files = (path for path in folder.rglob("*") if path.is_file() and path.name != PROGRESS_FILE)
+    return {path: path.read_bytes() for path in files}
 
 
 def test_another_python_is_refused(cli: Cli, half: Path) -> None:

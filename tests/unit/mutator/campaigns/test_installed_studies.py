@@ -51,9 +51,9 @@ def test_the_report_contains_a_study_from_another_package(installed: None, tmp_p
     for text in (written.markdown.with_name("STUDY.md").read_text(), page):
         assert "Crashed runs: 1 here, 12 in the published tests." in text
         assert "A. Author: Crash tests, 2026." in text
-    for text in (written.markdown.read_text(), written.page.read_text()):
+    for text in (written.markdown.read_text(), written.page.with_name("origin.html").read_text()):
         assert "crash_tests (A. Author: Crash tests, 2026)" in text
-    assert '<a href="#crash-tests">Crash tests</a>' in page
+    assert '<section class="part" id="crash-tests">' in page
     assert 'href="study.html"' in written.page.read_text()
     assert "(STUDY.md)" in written.markdown.read_text()
 

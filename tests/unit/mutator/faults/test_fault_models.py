@@ -38,7 +38,9 @@ NAMES = [
     "unit_mix_up",
     "wrong_branch",
 ]
-OF_OPERATORS = [f"operator_{name}" for name in ("constant", "drop", "empty", "infix", "prefix", "swap")]
+OF_OPERATORS = [
+    f"operator_{name}" for name in ("constant", "drop", "empty", "infix", "name", "prefix", "swap")
+]
 RAISING = ["exception", "reordering", "repetition", "slow_call", "swapped_arguments", *OF_OPERATORS]
 
 
