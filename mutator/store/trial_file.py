@@ -7,11 +7,12 @@ from pathlib import Path
 from mutator._common.confined_files import read_below, write_below
 from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.hashing import as_json_types
+from mutator._common.typed_json import from_json_types
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record
 from mutator.store import plan_file
 from mutator.store.plan_lines import experiment_from_json, fault_from_json
-from mutator.store.records import record_as_json, record_from_json
+from mutator.store.records import record_as_json
 
 TRIAL_SCHEMA, TRIAL_FILE = "trial/1", "trial.json"
 
@@ -47,7 +48,7 @@ class StoredTrial:
                 experiment=experiment_from_json(
                     stored["experiment"] | {"fault": fault.id}, {fault.id: fault}
                 ),
-                record=record_from_json(stored["record"]),
+                record=from_json_types(Record, stored["record"]),
             )
         except OSError:
             raise MutatorError(
