@@ -35,6 +35,10 @@ _SWITCH_BY_COMPILER: Mapping[str, tuple[str, str] | None] = {
 _TRACERS = frozenset({"casadi.Function", "jax.make_jaxpr", "torch.export.export", "torch.fx.symbolic_trace"})
 _COMPILER_ROOTS = tuple(sorted({name.partition(".")[0].encode() for name in _SWITCH_BY_COMPILER}))
 _ROOTS = tuple(sorted({*_COMPILER_ROOTS, *(name.partition(".")[0].encode() for name in _TRACERS)}))
+# names of the parameter by which the compilers take a function
+_FUNCTION_PARAMETERS = frozenset(
+    {"fun", "func", "function", "py_func", "signature_or_function", "model", "obj"}
+)
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 _STATEMENT_PARTS = (ast.stmt, ast.excepthandler, ast.match_case)
 
@@ -202,7 +206,7 @@ class _CompilerSearch:
     def _visit_calls(self, part: ast.AST, prefix: str) -> None:
         for call in (node for node in ast.walk(part) if isinstance(node, ast.Call)):
             if compiler := self._compiler(call.func):
-                for argument in call.args[:1]:
+                for argument in self._functions_given_to(call):
                     self._note_function(argument, prefix, compiler, self._compilers)
                     if dotted := self._imports.dotted(argument):
                         self._foreign[dotted] = compiler
@@ -210,6 +214,14 @@ class _CompilerSearch:
                 for node in (n for argument in (*call.args, *call.keywords) for n in ast.walk(argument)):
                     traced = node.func if isinstance(node, ast.Call) else node
                     self._note_function(traced, prefix, tracer, self._tracers)
+
+    def _functions_given_to(self, call: ast.Call) -> Iterator[ast.expr]:
+        """Yield what a compiler is given: `law`, also by keyword or inside another call (`vmap(law)`)."""
+        by_keyword = [keyword.value for keyword in call.keywords if keyword.arg in _FUNCTION_PARAMETERS]
+        for argument in call.args[:1] or by_keyword:
+            yield argument
+            if isinstance(argument, ast.Call) and self._imports.dotted(argument.func):
+                yield from self._functions_given_to(argument)
 
     def _note_function(self, node: ast.AST, prefix: str, what: str, functions: dict[str, str]) -> None:
         """Note the function of this file that an expression names: `law`, `self.law`, `Net()` of PyTorch."""

@@ -56,6 +56,8 @@ def test_a_decorator_is_recognised_under_any_name(tmp_path: Path, text: str, com
         "law = njit(law)\n",
         "fast = njit(cache=True)(law)\n",
         "class C:\n    def __init__(self):\n        self.law = njit(law)\n",
+        "fast = njit(py_func=law)\n",
+        "import jax\nfast = njit(jax.vmap(jax.grad(law)))\n",
     ],
 )
 def test_a_function_that_is_given_to_a_compiler_is_compiled(tmp_path: Path, after: str) -> None:
