@@ -176,6 +176,7 @@ def test_errors_name_the_options_of_the_command_line(
 def test_errors_about_the_target_name_the_option_manifest(cli: Cli, own: Path, root: Path) -> None:
     """The option --target gives the controller's source."""
     targets = root / "fault_library" / "targets"
-    (targets / "other.yaml").write_text((targets / "toycar.yaml").read_text())
+    text = (targets / "toycar.yaml").read_text()
+    (targets / "other.yaml").write_text(text.replace("name: toycar", "name: other", 1))
     answer = cli("diff", "own.yaml")
     assert answer.err.startswith("error: --manifest: 2 targets in the library (other, toycar)")
