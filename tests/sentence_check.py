@@ -199,10 +199,6 @@ def _is_time(said: float, seconds: float) -> bool:
 def _is_near(said: float, number: float) -> bool:
     """Whether a spoken number is the number, rounded as spoken numbers are."""
     size = abs(number)
-    if size >= 100.0:
-        half = 0.5
-    elif size >= 0.95:
-        half = 0.05
-    else:
-        half = 0.05 * 10.0 ** math.ceil(math.log10(size)) if size > 1e-9 else 1e-9
+    digits_half = 0.05 * 10.0 ** math.ceil(math.log10(size)) if size > 1e-9 else 1e-9
+    half = 0.005 if size >= 0.095 else digits_half
     return abs(said - number) <= half * (1.0 + 1e-9) + 1e-9

@@ -8,9 +8,9 @@ VALUE_HOLE, ABSOLUTE_PREFIX = "value", "abs_"
 CHANGED_HOLE, FUNCTION_HOLE, FILE_HOLE = "changed", "function", "file"  # in phrases of fault models
 
 _HOLE_PATTERN = re.compile(r"\{([^{}]*)\}")
-_WHOLE_FROM = 100.0  # from here on, measured numbers have no decimals
-_LEAST_WITH_HUNDREDTHS_S = 0.1
-_ROUNDING = 1e-9  # measured numbers below this are 0
+_WHOLE_FROM = 100.0  # from here on, converted numbers have no decimals
+_LEAST_WITH_HUNDREDTHS = 0.1
+_ROUNDING = 1e-9  # numbers below this are 0
 _LARGEST_EXACT = 1e15
 
 
@@ -31,7 +31,16 @@ def fill_phrase(texts: Sequence[str], values: Mapping[str, str]) -> str:
 
 
 def measured_number(number: float, unit: str = "") -> str:
-    """Return a measured number as one says it: `124 m`, `24.6 m/s`, `0.46 m`."""
+    """Return a measured number as sentences, lists and tables all show it: `24.60 m/s`; one below 0.1 with
+    two digits.
+    """
+    shown = number if abs(number) >= _ROUNDING else 0.0
+    text = f"{shown:.2f}" if abs(shown) >= _LEAST_WITH_HUNDREDTHS else f"{shown:.2g}"
+    return with_unit(text, unit)
+
+
+def converted_number(number: float, unit: str = "") -> str:
+    """Return a number in another unit than the plan's, as one says it: `124 m`, `24.6 kph`, `0.46 m`."""
     size = abs(number)
     if size >= _WHOLE_FROM:
         text = f"{number:.0f}"
@@ -44,7 +53,7 @@ def measured_number(number: float, unit: str = "") -> str:
 
 def measured_time(seconds: float) -> str:
     """Return a time in a drive as tables show it: `24.60 s`; a shorter one than 0.1 s with two digits."""
-    return f"{seconds:.2f} s" if abs(seconds) >= _LEAST_WITH_HUNDREDTHS_S else f"{seconds:.2g} s"
+    return measured_number(seconds, "s")
 
 
 def planned_number(number: float, unit: str = "") -> str:

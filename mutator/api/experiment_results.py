@@ -125,7 +125,7 @@ class ExperimentResult(ABC):
 
     @property
     def severity_label(self) -> str:
-        """The highest severity class of a hazard, in words: `S2 severe`; empty without a class."""
+        """The highest severity class of a hazard, in words: `severe (severity S2)`; empty without a class."""
         name = severity_class_of(self.record, self.scale) if self.record else None
         return self.scale.labels[name] if self.scale and name else ""
 

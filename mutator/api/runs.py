@@ -76,6 +76,15 @@ class Run(RunFigures):
     #: the summary, if `mutator.run` returned this object; None for a loaded run
     summary: Summary | None = None
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.folder, RunFolder):
+            raise MutatorError(
+                repr(self.folder),
+                argument="folder",
+                expected="a RunFolder",
+                remedy="open a run with mutator.load_run(path)",
+            )
+
     def __repr__(self) -> str:
         head = self.folder.head
         progress = f"{sum(self.endings.values())} of {self.folder.planned_experiment_count} experiments"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import mutator
 from mutator._common import progress_events
 from mutator._common.message_text import NO_BREAK_SPACE, counted
+from mutator._common.phrase_texts import measured_number
 from mutator.api.experiment_results import experiment_facts
 from mutator.api.results_worst_first import worst_causes, worst_results
 from mutator.api.stored_experiments import StoredExperiment, find_newest_run, open_stored_run
@@ -96,14 +97,19 @@ def _row_facts(row: "ResultRow", id_length: int | None) -> dict[str, object]:
         "experiment": row.experiment_id[:id_length],
         "ending": row.ending,
         "severity": row.severity,
-        "delta-v [m/s]": None if row.delta_v is None or not row.severity else round(row.delta_v, 2),
+        "delta-v [m/s]": _as_shown(row.delta_v if row.severity else None),
         "hazards": ", ".join(name for name, _ in row.hazards),
-        "margin": None if row.margin is None else round(row.margin, 3),
+        "margin": _as_shown(row.margin),
         "first alert": row.alerts[0] if row.alerts else "",
         "fault": row.fault,
         "drive": f"{row.scenario}, {row.trigger}",
         "sentence": row.sentence,
     }
+
+
+def _as_shown(number: float | None) -> float | None:
+    """Return a measured number with the digits that it has in sentences."""
+    return None if number is None else float(measured_number(number))
 
 
 def print_experiment(

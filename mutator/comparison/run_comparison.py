@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from mutator._common.phrase_texts import measured_number
 from mutator.comparison.compared_runs import ComparedRun, load_compared_run
 from mutator.comparison.input_differences import (
     DifferingTargetFiles,
@@ -264,7 +265,7 @@ def _describe_ending(row: ResultRow) -> str:
     if row.severity:
         details.append(row.severity_label)
         if row.delta_v is not None:
-            details[-1] += f", delta-v {row.delta_v:.1f} m/s"
+            details[-1] += f", delta-v {measured_number(row.delta_v, 'm/s')}"
     if row.alerts:
         is_late = bool(row.hazards) and row.reaction_time is None
         details.append(f"alert {', '.join(row.alerts)}" + (" only after the hazard" if is_late else ""))

@@ -52,7 +52,7 @@ def glossary_of(run: ReportedRun) -> Glossary:
         "What is counted": _COUNTING_TERMS,
         "Alerts": _ALERT_TERMS if run.folder.has_alerts else {},
         "Hazards": {hazard.name: hazard.about for hazard in head.about_hazards if hazard.about},
-        "Severity": _severity_meanings(head.severity, "severity "),
+        "Severity": _severity_meanings(head.severity, in_words=True),
         "Scenarios": _scenario_meanings(run),
         "Triggers": _trigger_meanings(run),
     }
@@ -82,11 +82,11 @@ def code_meanings_by_column(run: ReportedRun) -> Glossary:
     }
 
 
-def _severity_meanings(scale: SeverityScale | None, before: str = "") -> dict[str, str]:
+def _severity_meanings(scale: SeverityScale | None, *, in_words: bool = False) -> dict[str, str]:
     if not scale:
         return {}
     meanings = {
-        (f"{before}{scale.labels[name]}" if before else name): f"delta-v of {low:.2f} m/s or more: {about}"
+        (scale.labels[name] if in_words else name): f"delta-v of {low:.2f} m/s or more: {about}"
         for name, low, about in scale.classes
     }
     return meanings | {"no class": "no severity class; the column `no_severity` says why"}

@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from mutator._common.phrase_texts import measured_number
 from mutator.report.answer_parts import (
     AnswerCell,
     AnswerTable,
@@ -103,10 +104,10 @@ def find_contact_column(frame: pd.DataFrame) -> str:
 
 
 def _describe_severities(hazards: pd.DataFrame, labels: Mapping[str, str]) -> str:
-    """`2 of severity S3 possibly fatal, 4 of severity S1 light, 14 without a class`."""
+    """`2 possibly fatal (severity S3), 4 light (severity S1), 14 without a class`."""
     counts = hazards[SEVERITY_COLUMN].value_counts()
     parts = [
-        f"{counts[name]} of severity {labels.get(name, name)}"
+        f"{counts[name]} {labels.get(name, f'of severity {name}')}"
         for name in sorted(filter(None, counts.index), reverse=True)
     ]
     if unclassified := counts.get("", 0):
@@ -170,6 +171,6 @@ def _describe_danger(row: Mapping[Any, Any], contact_column: str, units: Mapping
     """
     if contact_column and row[contact_column] and not isnan(row[contact_column]):
         words = "delta-v" if contact_column == "delta_v" else "contact at"
-        return f"{words} {row[contact_column]:.2f} {units.get(contact_column, '')}"
+        return f"{words} {measured_number(row[contact_column], units.get(contact_column, ''))}"
     margins = [(margin, units[f"{MARGIN_PREFIX}{name.lower()}"]) for name, margin in row["margins"]]
-    return "margin {:.2f} {}".format(*min(margins)) if margins else "-"
+    return f"margin {measured_number(*min(margins))}" if margins else "-"

@@ -113,8 +113,8 @@ def _rule_paragraph(
     if classes[0]:
         of_class = counted_hazards[SEVERITY_COLUMN] == classes[0]
         part, all_ = int((is_first_type & of_class).sum()), int(of_class.sum())
-        paragraph += f", and {'the only one' if all_ == 1 else f'{part} of {all_}'} of severity "
-        paragraph += severity_labels.get(classes[0], classes[0])
+        paragraph += f", and {'the only one that is' if all_ == 1 else f'{part} of {all_} that are'} "
+        paragraph += severity_labels.get(classes[0], f"of severity {classes[0]}")
         paragraph += f", the highest among the {plural_noun}"
     paragraph += f". The rule: fault types with the most {plural_noun}"
     if len(classes) > 1:
@@ -139,7 +139,7 @@ def _fault_type_row(
     counts_by_class = [(name, len(_hazards_of_class(counted_hazards, name))) for name in classes]
     if SEVERITY_COLUMN in counted_hazards:
         named = [
-            f"{n} severity {severity_labels.get(name, name)}" if name else f"{n} without a class"
+            f"{n} {severity_labels.get(name, f'of severity {name}')}" if name else f"{n} without a class"
             for name, n in counts_by_class
             if n
         ]

@@ -125,13 +125,16 @@ class ExperimentSentences:
         hazards = self._hazard_times(row)
         if row["outcome"] == Outcome.MASKED:
             return _where_stopped(row)
-        clauses = [] if _is_after_hazard(row, hazards) else [self._actuator_clause(row)]
+        has_hazard = bool(hazards)
+        clauses = (
+            [] if _is_after_hazard(row, hazards) else [self._actuator_clause(row, has_hazard=has_hazard)]
+        )
         before = _number(row, "t_activation")
         for hazard, time in hazards:
             clauses.append(self._hazard_clause(hazard, time, before, row, is_first=hazard == hazards[0][0]))
             before = time
         text = _as_sentence(_joined(list(filter(None, clauses))))
-        if not hazards:
+        if not has_hazard:
             return f"{text} No hazard follows.".strip()
         severity_class = row.get("severity") or ""
         if not severity_class:
@@ -145,12 +148,13 @@ class ExperimentSentences:
         times = [(hazard, _number(row, f"t_{hazard.name.lower()}")) for hazard in self.hazards]
         return sorted(((h, t) for h, t in times if t is not None), key=lambda item: item[1])
 
-    def _actuator_clause(self, row: Row) -> str:
+    def _actuator_clause(self, row: Row, *, has_hazard: bool) -> str:
         name, change = row.get("first_actuator") or "", row.get("first_change") or ""
         if not (name and change):
             return ""
         phrase = self.phrases.actuators.get(name, {}).get(change, ())
-        return fill_phrase(phrase, _speed_texts(row)) or f"`{name}` is {change} than in the golden run"
+        text = fill_phrase(phrase, _speed_texts(row, has_hazard=has_hazard))
+        return text or f"`{name}` is {change} than in the golden run"
 
     def _hazard_clause(
         self, hazard: HazardFacts, time: float, before: float | None, row: Row, *, is_first: bool
@@ -217,8 +221,11 @@ def _is_after_hazard(row: Row, hazards: Sequence[tuple[HazardFacts, float]]) -> 
     return bool(hazards) and (manifested is None or manifested > hazards[0][1])
 
 
-def _speed_texts(row: Row) -> dict[str, str]:
-    """Return the highest speed if the fault made the car faster, the lowest if it made it slower."""
+def _speed_texts(row: Row, *, has_hazard: bool) -> dict[str, str]:
+    """Return the highest speed if the fault made the car faster, the lowest if it made it slower.
+
+    The lowest speed before a hazard is left out if the car then stands: `slows to 0.29 m/s and stops`.
+    """
     texts = {}
     start = _number(row, SPEED_AT_ACTIVATION)
     for name, golden_name, sign in (
@@ -231,6 +238,8 @@ def _speed_texts(row: Row) -> dict[str, str]:
             for other in (start, golden)
         ):
             texts[name] = measured_number(speed, "m/s")  # type: ignore[arg-type]
+    if has_hazard and (_number(row, LOWEST_SPEED) or 0.0) < _LEAST_SPEED_CHANGE_MPS:
+        texts.pop(LOWEST_SPEED, None)
     return texts
 
 

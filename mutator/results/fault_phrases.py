@@ -6,9 +6,9 @@ from mutator._common.phrase_texts import (
     FILE_HOLE,
     FUNCTION_HOLE,
     VALUE_HOLE,
+    converted_number,
     fill_phrase,
     holes_of,
-    measured_number,
     planned_number,
 )
 from mutator.config.units import split_unit
@@ -40,7 +40,7 @@ def _parameter_texts(fault: Fault, hole: str) -> dict[str, str]:
         params = dict(injection.params)
         for key, symbol in ((hole, ""), (name, unit.symbol if unit else "")):
             if isinstance(number := params.get(key), int | float):
-                text, absolute = (measured_number(value, symbol) for value in (number, abs(number)))
+                text, absolute = (converted_number(value, symbol) for value in (number, abs(number)))
                 return _number_texts(hole, text, absolute)
     return {}
 

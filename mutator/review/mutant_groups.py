@@ -114,7 +114,7 @@ def groups_of_library(
     models = workspace.fault_models()
     tables = map(workspace.context_table, workspace.context_tables)
     contexts = [t for table in tables for t in table.triggers(armed_after_s=manifest.armed_after_s)]
-    triggers = (*contexts, trigger_at_time(manifest.armed_after_s))
+    triggers = (*contexts, trigger_at_time(manifest.armed_after_s, name="random"))
     chosen = tuple(_selected_specs(workspace, specs))
     faults = [
         fault

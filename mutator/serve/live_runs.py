@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.hashing import parse_json
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, NotServed
 from mutator.execution.progress_text import describe_duration, describe_rate
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.outcomes.verdict_rules import reaction_time
@@ -170,7 +170,7 @@ class WatchedRuns:
         self._lock = threading.Lock()
 
     def poll(self, folder: RunFolder, seen_version: int) -> dict[str, Any]:
-        """Return counts and rows of a run up to now."""
+        """Return counts and rows of a run up to now; NotServed if it has just been deleted."""
         with self._lock:
             watched = self._watched(folder)
             watched.poll()
@@ -185,7 +185,14 @@ class WatchedRuns:
 
     def _watched(self, folder: RunFolder) -> WatchedRun:
         # a new run can have the name of a deleted one
-        key = folder.path, (folder.path / "run.json").stat().st_ino
+        try:
+            key = folder.path, (folder.path / "run.json").stat().st_ino
+        except OSError:
+            raise NotServed(
+                f"the run '{folder.path.name}' was deleted",
+                expected="one of the served runs",
+                remedy="see the first page",
+            ) from None
         watched = self._runs.pop(key, None) or WatchedRun(folder)
         self._runs[key] = watched
         for old in list(self._runs)[:-_MOST_WATCHED_RUNS]:

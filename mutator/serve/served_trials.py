@@ -38,16 +38,20 @@ class ServedTrials:
         self._workspace = workspace
         self._lock = threading.Lock()
 
+    def folder(self, trials: Path, trial_id: str) -> Path:
+        """Return the folder of a trial; NotServed if there is none."""
+        if not _TRIAL_ID_PATTERN.fullmatch(trial_id) or not (trials / trial_id).is_dir():
+            raise NotServed(
+                "no such trial", expected="a trial next to the runs", remedy="try the fault again"
+            )
+        return trials / trial_id
+
     def view_data(self, trials: Path, trial_id: str) -> dict[str, Any]:
         """Return the view of a trial, the request that repeats it, and the range of its value.
 
         NotServed if there is none; MutatorError if it is damaged, or if the target has changed since.
         """
-        if not _TRIAL_ID_PATTERN.fullmatch(trial_id) or not (trials / trial_id).is_dir():
-            raise NotServed(
-                "no such trial", expected="a trial next to the runs", remedy="try the fault again"
-            )
-        folder = trials / trial_id
+        folder = self.folder(trials, trial_id)
         check_only_plain_files(folder)
         with self._lock:
             trial = StoredTrial.read(folder)

@@ -11,6 +11,7 @@ from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Re
 
 from mutator.errors import MutatorError, NotServed
 from mutator.report.lone_experiment_data import ViewedTarget, experiment_view_data
+from mutator.results.finished_experiment import FinishedExperiment
 from mutator.serve.home_and_error_pages import live_page, trial_page
 from mutator.serve.jobs import ServeJob, ServeJobs
 from mutator.serve.live_runs import WatchedRuns, state_as_json
@@ -63,7 +64,7 @@ class WatchPages:
 
     def live_experiment_html(self, request: Request) -> Response:
         key, name = request.path_params["run"], request.path_params["experiment"]
-        self._runs.folder(key)
+        self._listed_experiment(RunFolder.open_unverified(self._runs.folder(key)), name)
         address = f"/api/runs/{quote(key, safe='')}/experiments/{quote(name, safe='')}"
         return HTMLResponse(trial_page(address, live_address(key), key, token=""))
 
@@ -71,13 +72,7 @@ class WatchPages:
         """Send the view of one of the worst experiments of a run so far."""
         key, name = request.path_params["run"], request.path_params["experiment"]
         folder = RunFolder.open_unverified(self._runs.folder(key))
-        finished = self._watched.experiment(folder, name)
-        if finished is None:
-            raise NotServed(
-                f"no experiment '{name}' among the worst so far",
-                expected="an id in the list",
-                remedy="wait for the report",
-            )
+        finished = self._listed_experiment(folder, name)
         patch = folder.patches.read_patch(name) if finished.record.patch else None
         series = unpacked_series(folder.path, name)
         reason = "The channels of this experiment can be read when the run is finished."
@@ -85,16 +80,31 @@ class WatchPages:
         facts = {"finished": folder.is_finished, "report": f"{report_address(key)}#e={name}"}
         return JSONResponse(facts | experiment_view_data(target, finished, patch, series, reason))
 
+    def _listed_experiment(self, folder: RunFolder, name: str) -> FinishedExperiment:
+        """Return one of the worst experiments of a run so far; NotServed if it is not among them."""
+        finished = self._watched.experiment(folder, name)
+        if finished is None:
+            raise NotServed(
+                f"no experiment '{name}' among the worst so far",
+                expected="an id in the list",
+                remedy="wait for the report",
+            )
+        return finished
+
     def trial_html(self, request: Request) -> Response:
         name = request.path_params["trial"]
+        self._trials.folder(self._trials_folder, name)
         address = f"/api/trials/{quote(name, safe='')}"
         return HTMLResponse(
             trial_page(address, "/", "Runs and reviews", token=self._tokens.token_of(TRIAL_PAGE))
         )
 
     def trial_data(self, request: Request) -> Response:
-        trials = self._runs.folder_for_new_runs / TRIALS_FOLDER
-        return JSONResponse(self._trials.view_data(trials, request.path_params["trial"]))
+        return JSONResponse(self._trials.view_data(self._trials_folder, request.path_params["trial"]))
+
+    @property
+    def _trials_folder(self) -> Path:
+        return self._runs.folder_for_new_runs / TRIALS_FOLDER
 
     def _manifest(self, name: str) -> Any:
         try:

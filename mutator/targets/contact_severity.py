@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from mutator._common.hashing import added_field
+from mutator._common.phrase_texts import measured_number
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 
 SEVERITY_CLASSES = ("S0", "S1", "S2", "S3")  # from ISO 26262-3, the mildest first
@@ -109,9 +110,11 @@ class SeverityScale:
 
     @property
     def labels(self) -> dict[str, str]:
-        """The classes as people read them, by name: `S2 severe`. S1 alone could also be a scenario."""
+        """The classes as people read them, by name: `severe (severity S2)`. S2 alone could be a scenario."""
         words = dict(self.words)
-        return {name: f"{name} {words.get(name) or about}".rstrip() for name, _, about in self.classes}
+        return {
+            name: f"{words.get(name) or about} (severity {name})".lstrip() for name, _, about in self.classes
+        }
 
     def class_of(self, delta_v_mps: float) -> str:
         """Return the class of a delta-v in m/s, 0 or more; a value on a bound is in the upper class."""
@@ -126,9 +129,12 @@ class SeverityScale:
         for rule in self.rules:
             if rule.hazard == hazard:
                 values = zip(rule.metrics, rule.units, strict=True)
-                texts = [f"{name.replace('_', ' ')} {metrics[name]:.2f} {unit}" for name, (_, unit) in values]
+                texts = [
+                    f"{name.replace('_', ' ')} {measured_number(metrics[name], unit)}"
+                    for name, (_, unit) in values
+                ]
                 return f"{hazard}: {', '.join(texts)} ({rule.name.replace('_', ' ')})"
-        return f"delta-v {metrics[DELTA_V_NAME]:.2f} m/s"
+        return f"delta-v {measured_number(metrics[DELTA_V_NAME], 'm/s')}"
 
     def worst_hazard(
         self, hazards: Iterable[tuple[str, float]], metrics: Mapping[str, float], t_end: float | None

@@ -6,6 +6,7 @@ A kind is a function that makes its triggers and, if users can type it, a parser
 import math
 from collections.abc import Callable, Collection
 
+from mutator._common.phrase_texts import planned_number
 from mutator._common.random_streams import random_generator
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
@@ -20,14 +21,15 @@ def always_trigger(*, armed_after_s: float = 0.0) -> Trigger:
     return Trigger(name=ALWAYS_NAME, condition="True", hold=Hold.TO_END, armed_after_s=armed_after_s)
 
 
-def trigger_at_time(time_s: float, *, name: str = "random", hold_s: float | None = None) -> Trigger:
+def trigger_at_time(time_s: float, *, name: str | None = None, hold_s: float | None = None) -> Trigger:
     """Return a trigger that fires at the first step that starts at `time_s` or later.
 
-    It stays active for `hold_s`, or to the end of the run.
+    It stays active for `hold_s`, or to the end of the run. Default name: the time, `at 10 s`.
     """
     if not math.isfinite(time_s):
         raise MutatorError(f"time {time_s}", expected="a finite number of seconds")
     hold = Hold.TO_END if hold_s is None else Hold.FOR
+    name = name or f"at {planned_number(time_s, 's')}"
     return Trigger(name=name, condition=f"t >= {float(time_s)!r}", hold=hold, hold_s=hold_s)
 
 

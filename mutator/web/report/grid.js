@@ -18,7 +18,7 @@ class Grid {
     { name: "method", title: "method", px: 66 },
     { name: "trigger", title: "trigger", px: 92, beside: true },
     { name: "ending", title: "outcome", px: 102, narrow: true, beside: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
-    { name: "severity", title: "severity", px: 124, narrow: true, cell: (t, r) => Grid.severity(t.called("severity", t.text(r, "severity"))) },
+    { name: "severity", title: "severity", px: 190, narrow: true, cell: (t, r) => Grid.severity(t.called("severity", t.text(r, "severity"))) },
     { name: "t_activation", title: "activated", px: 80, time: true },
     { name: "t_manifest", title: "manifested", px: 92, time: true },
     { name: "hazards", title: "hazards", px: 72 },
@@ -40,9 +40,10 @@ class Grid {
     return Dom.el(`span.ending.${text || "none"}`, {}, text.replaceAll("_", " "));
   }
 
-  /** A severity class with a label, because S1 alone is also a scenario. */
+  /** A severity class in words: S1 alone is also a scenario. */
   static severity(text) {
-    return text ? Dom.el("span.class", { title: `severity ${text}` }, Dom.el("span.word", {}, "severity "), text) : "";
+    const [words, code] = text.split(" (severity ");
+    return text ? Dom.el("span.class", { title: text }, words, code ? Dom.el("span.word", {}, ` (severity ${code}`) : "") : "";
   }
 
   /** A number with three significant digits, or '' if there is none. */

@@ -25,7 +25,7 @@ class Happened {
     const { el } = Dom;
     const withMeaning = (name) => [this.text(name), this.table.meaning(name, this.text(name))].filter(Boolean).join(": ");
     const condition = this.text("condition"), trigger = withMeaning("trigger");
-    const rows = [["scenario", withMeaning("scenario")], ["trigger", trigger.includes(condition) ? trigger : `${condition} (${trigger})`]];
+    const rows = [["scenario", withMeaning("scenario")], ["trigger", trigger.includes(condition) || trigger.startsWith("at ") ? trigger : `${condition} (${trigger})`]];
     if (this.text("status") === "ok" && this.table.columns.has("alerts")) rows.push(["alert", this.#alert()]);
     return el("table.plain.setting", {}, el("tbody", {}, rows.filter(([, about]) => about).map(([name, about]) =>
       el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, about)))));
@@ -77,11 +77,16 @@ class Happened {
     if (reason) return el("p", {}, `No severity class: ${reason}.`);
     if (!name || !scale) return "";
     const hazard = this.text("severity_hazard"), rule = (scale.rules || []).find((of) => of.hazard === hazard);
-    const metric = (of, unit) => `${of.replaceAll("_", " ")} ${this.table.number(this.row, of).toFixed(2)} ${unit}`;
+    const metric = (of, unit) => `${of.replaceAll("_", " ")} ${Happened.#measured(this.table.number(this.row, of))} ${unit}`;
     const values = rule ? rule.metrics.map((of, i) => metric(of, rule.units[i][1])).join(", ") : metric("delta_v", "m/s").replace("delta v", "delta-v");
-    const about = (rule || scale).classes.find(([of]) => of === name)?.[2];
-    return el("div", {}, el("b", {}, `Severity ${this.table.called("severity", name)}`), `${rule ? `, of ${hazard}` : ""}: ${values}`,
+    const called = this.table.called("severity", name), about = (rule || scale).classes.find(([of]) => of === name)?.[2];
+    return el("div", {}, el("b", {}, called[0].toUpperCase() + called.slice(1)), `${rule ? `, of ${hazard}` : ""}: ${values}`,
       about ? `, ${about}` : "", el("details.quiet", {}, el("summary", {}, "Source of the classes"), Happened.#source(rule, scale)));
+  }
+
+  /** A measured number as in the sentence: with hundredths; one below 0.1 with two digits. */
+  static #measured(number) {
+    return Math.abs(number) >= 0.1 ? number.toFixed(2) : String(Number(number.toPrecision(2)));
   }
 
   /** The source of a rule's bounds, or of those of delta-v; a judgement is called one. */

@@ -29,7 +29,7 @@ class HeatMap {
     const facet = table.facets.find((f) => f.name === "severity");
     const classes = facet ? facet.values.filter((value) => value !== facet.none).sort() : [];
     return classes.map((name) => ({
-      name: `severity-${name}`, title: `severity ${table.called("severity", name)} or worse / activated`,
+      name: `severity-${name}`, title: `${table.called("severity", name)} or worse / activated`,
       part: (row) => table.text(row, "severity") >= name, of: (row) => table.text(row, "t_activation") !== "",
     }));
   }

@@ -120,7 +120,7 @@ const Rows = (() => {
       if (name === "warning") return token === word || (token === "silent" && SILENT.includes(word));
       if (name === "severity") {
         const label = this.called(name, word).toLowerCase();
-        return token === label || label.slice(word.length).includes(token);
+        return token === label || label.replace(` (severity ${word.toLowerCase()})`, "").includes(token);
       }
       return [word, word.replaceAll("_", " ")].some((text) => text.toLowerCase().includes(token));
     }

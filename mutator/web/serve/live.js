@@ -107,7 +107,7 @@
   }
 
   function rowOf({ id, ending, severity, hazards, fault, scenario, trigger, sentence }) {
-    const about = [severity && `severity ${severity}`, hazards.join(", ")].filter(Boolean).join(", ");
+    const about = [severity, hazards.join(", ")].filter(Boolean).join(", ");
     return el("tr", {}, el("td.number", {}), el("td", {}, el(`span.ending.${ending}`, {}, ending.replaceAll("_", " ")), about ? el("div.quiet", {}, about) : null),
       el("td", {}, el("a", { href: `/live/${base}/${id}` }, sentence || fault)), el("td", {}, fault), el("td", {}, `${scenario}, ${trigger}`));
   }

@@ -2,15 +2,30 @@
 
 import pytest
 
-from mutator._common.phrase_texts import fill_phrase, measured_number, measured_time, planned_number
+from mutator._common.phrase_texts import (
+    converted_number,
+    fill_phrase,
+    measured_number,
+    measured_time,
+    planned_number,
+)
 
 
 @pytest.mark.parametrize(
     ("number", "text"),
     [(123.7, "124 s"), (24.63, "24.6 s"), (37.02, "37 s"), (0.4567, "0.46 s"), (1e-12, "0 s")],
 )  # fmt: skip
-def test_a_measured_number_is_rounded_as_one_says_it(number: float, text: str) -> None:
-    assert measured_number(number, "s") == text
+def test_a_converted_number_is_rounded_as_one_says_it(number: float, text: str) -> None:
+    assert converted_number(number, "s") == text
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [(123.7, "123.70 m"), (1.4452, "1.45 m"), (-1.4452, "-1.45 m"), (0.0467, "0.047 m"), (1e-12, "0 m")],
+)
+def test_a_measured_number_has_the_hundredths_of_tables(number: float, text: str) -> None:
+    """A margin of -1.445 m in a list and an excursion of 1.445 m in a sentence are one number."""
+    assert measured_number(number, "m") == text
 
 
 @pytest.mark.parametrize(
@@ -22,7 +37,7 @@ def test_a_planned_number_has_all_its_digits(number: float, text: str) -> None:
 
 def test_a_number_without_a_unit_stands_alone() -> None:
     """`-` is a unit that means none."""
-    assert (measured_number(2.0), planned_number(2.0, "-")) == ("2", "2")
+    assert (measured_number(2.0), planned_number(2.0, "-")) == ("2.00", "2")
 
 
 def test_the_first_text_whose_holes_have_values_is_used() -> None:

@@ -58,6 +58,13 @@ def test_the_error_for_a_wrong_argument_uses_its_python_name(
     assert not (out / "results.csv").exists()
 
 
+def test_a_run_is_opened_with_load_run() -> None:
+    """`Run` takes no path: the error says at once what does."""
+    unsuitable: Any = mutator.Run
+    with pytest.raises(MutatorError, match=r"mutator\.load_run\(path\)"):
+        unsuitable("/path")
+
+
 def test_an_experiment_id_must_be_text(toycar: Workspace, tmp_path: Path) -> None:
     mutator.plan("toy", tmp_path / "p", workspace=toycar)
     wrong: Any = 3

@@ -154,16 +154,18 @@ def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
 def test_severity_and_then_time_decide_what_to_fix_first() -> None:
     many = [("a/many", "S1", 1.0)] * 5
     some = [("b/slow", "S3", 9.0), ("c/fast", "S3", 8.0), ("d/both", "S3", 9.5), ("d/both", "", 9.0)]
-    labels = {"S1": "S1 light", "S3": "S3 fatal"}
+    labels = {"S1": "light (severity S1)", "S3": "fatal (severity S3)"}
     answer = fix_first_answer(hazards(*some, *many), None, labels, has_alerts=True)
     lines = answer.tables[0].rows
     kinds = [line[0].text for line in lines if isinstance(line[0], PageLink)]
     assert kinds == ["d/both", "c/fast", "b/slow", "a/many"]
     assert lines[0][1] == PageLink(
-        "1 severity S3 fatal, 1 without a class",
+        "1 fatal (severity S3), 1 without a class",
         "kind=d%2Fboth&warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard&severity=S3&sort=rank",
     )
-    assert "and 1 of 3 of severity S3 fatal, the highest among the silent hazards." in answer.paragraph
+    assert (
+        "and 1 of 3 that are fatal (severity S3), the highest among the silent hazards." in answer.paragraph
+    )
 
 
 def untimed_path(by: str = "", stopped_at: tuple[str, ...] = ()) -> UntimedPath:
@@ -203,11 +205,11 @@ def test_a_cause_shows_its_worst_experiment_and_how_many_more() -> None:
     frame = frame.assign(status="ok", t_h1=3.0, t_h2=4.0, h1=1.0, h2=1.0, sentence="It hits.")
     frame.attrs["hazards"] = ("H1", "H2")
     metrics = [MetricFacts("margin_h1", "m", "", "lower"), MetricFacts("margin_h2", "s", "", "lower")]
-    answer = most_dangerous_answer(frame, metrics, {"S1": "S1 light"}, has_alerts=True)
-    assert "12 of severity S1 light, 12 without a class" in answer.paragraph
+    answer = most_dangerous_answer(frame, metrics, {"S1": "light (severity S1)"}, has_alerts=True)
+    assert "12 light (severity S1), 12 without a class" in answer.paragraph
     hit, missed = answer.tables[0].rows
     assert hit[:4] == (
-        ExplainedCodes(("S1",), "", "S1 light"),
+        ExplainedCodes(("S1",), "", "light (severity S1)"),
         PageLink("It hits.", "e=e0&outcome=hazard&sort=rank", "a/hit in S1, trigger C1"),
         ExplainedCodes(("H1", "H2")),
         "margin -2.00 s",

@@ -63,54 +63,54 @@ HAZARD = {
 NO_HAZARD = HAZARD | {"outcome": "sdc", "t_h1": None, "t_end": None, "contact_speed": None, "severity": ""}
 NEVER = {"status": "ok", "outcome": "not_activated", "t_activation": None}
 START = "The speed sensor reads 50 mph too low from 24.60 s."
-DRIVE = "The car accelerates to 37 m/s and touches the lead 4.46 s later"
+DRIVE = "The car accelerates to 37.02 m/s and touches the lead 4.46 s later"
 CASES: dict[str, tuple[dict[str, Any], str]] = {
-    "a hazard": (HAZARD, f"{START} {DRIVE} at 19.6 m/s (severe). No alert."),
+    "a hazard": (HAZARD, f"{START} {DRIVE} at 19.60 m/s (severe). No alert."),
     "an alert before": (
         HAZARD | {"alerts": "fcw;late", "t_alert": 27.0},
-        f"{START} {DRIVE} at 19.6 m/s (severe). Alert fcw 2.06 s before the hazard.",
+        f"{START} {DRIVE} at 19.60 m/s (severe). Alert fcw 2.06 s before the hazard.",
     ),
     "an alert after": (
         HAZARD | {"alerts": "fcw", "t_alert": 29.5},
-        f"{START} {DRIVE} at 19.6 m/s (severe). Alert fcw only 0.44 s after the hazard.",
+        f"{START} {DRIVE} at 19.60 m/s (severe). Alert fcw only 0.44 s after the hazard.",
     ),
     "an alert in the same step": (
         HAZARD | {"alerts": "fcw", "t_alert": 29.06},
-        f"{START} {DRIVE} at 19.6 m/s (severe). Alert fcw only in the moment of the hazard.",
+        f"{START} {DRIVE} at 19.60 m/s (severe). Alert fcw only in the moment of the hazard.",
     ),
     "a class without words": (
-        HAZARD | {"severity": "S1"}, f"{START} {DRIVE} at 19.6 m/s (severity S1). No alert.",
+        HAZARD | {"severity": "S1"}, f"{START} {DRIVE} at 19.60 m/s (severity S1). No alert.",
     ),
-    "no class of severity": (HAZARD | {"severity": ""}, f"{START} {DRIVE} at 19.6 m/s. No alert."),
+    "no class of severity": (HAZARD | {"severity": ""}, f"{START} {DRIVE} at 19.60 m/s. No alert."),
     "a metric of another end of the drive": (
         HAZARD | {"t_end": 30.0, "severity": ""}, f"{START} {DRIVE}. No alert.",
     ),
     "two hazards": (
         HAZARD | {"t_h3": 30.5},
-        f"{START} The car accelerates to 37 m/s, touches the lead 4.46 s later at 19.6 m/s and leaves its "
-        "lane 1.44 s after that. Severity: severe. No alert.",
+        f"{START} The car accelerates to 37.02 m/s, touches the lead 4.46 s later at 19.60 m/s and leaves "
+        "its lane 1.44 s after that. Severity: severe. No alert.",
     ),
     "two hazards in one step": (
         HAZARD | {"t_h3": 29.06},
-        f"{START} The car accelerates to 37 m/s, touches the lead 4.46 s later at 19.6 m/s and leaves its "
-        "lane at the same time. Severity: severe. No alert.",
+        f"{START} The car accelerates to 37.02 m/s, touches the lead 4.46 s later at 19.60 m/s and leaves "
+        "its lane at the same time. Severity: severe. No alert.",
     ),
     "a hazard without a phrase": (
         NO_HAZARD | {"outcome": "hazard", "t_h2": 30.0},
-        f"{START} The car accelerates to 37 m/s and hazard H2 (the car has stopped) occurs 5.40 s later. "
+        f"{START} The car accelerates to 37.02 m/s and hazard H2 (the car has stopped) occurs 5.40 s later. "
         "No alert.",
     ),
     "a hazard before any actuator differs": (
         HAZARD | {"t_manifest": 29.5, "severity": ""},
-        f"{START} The car touches the lead 4.46 s later at 19.6 m/s. No alert.",
+        f"{START} The car touches the lead 4.46 s later at 19.60 m/s. No alert.",
     ),
     "columns that an older run lacks": (
         {name: cell for name, cell in HAZARD.items() if name not in (*SPEEDS, "first_actuator")},
-        f"{START} The car touches the lead 4.46 s later at 19.6 m/s (severe). No alert.",
+        f"{START} The car touches the lead 4.46 s later at 19.60 m/s (severe). No alert.",
     ),
     "a drive without a speed": (
         {name: cell for name, cell in HAZARD.items() if name not in SPEEDS},
-        f"{START} The car gives more gas and touches the lead 4.46 s later at 19.6 m/s (severe). No alert.",
+        f"{START} The car gives more gas and touches the lead 4.46 s later at 19.60 m/s (severe). No alert.",
     ),
     "a golden run that is as fast": (
         NO_HAZARD | {"golden_highest_speed": 37.0},
@@ -118,7 +118,15 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "a car that slows": (
         NO_HAZARD | {"first_change": "lower", "lowest_speed": 11.73},
-        f"{START} The car slows to 11.7 m/s. No hazard follows. No alert.",
+        f"{START} The car slows to 11.73 m/s. No hazard follows. No alert.",
+    ),
+    "a car that slows until it stands": (
+        NO_HAZARD | {"first_change": "lower", "lowest_speed": 0.29},
+        f"{START} The car slows to 0.29 m/s. No hazard follows. No alert.",
+    ),
+    "a hazard of a car that stands has one speed": (
+        HAZARD | {"first_change": "lower", "lowest_speed": 0.29},
+        f"{START} The car gives less gas and touches the lead 4.46 s later at 19.60 m/s (severe). No alert.",
     ),
     "an actuator without a phrase": (
         NO_HAZARD | {"first_actuator": "horn", "first_change": "lower"},
@@ -126,7 +134,7 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "an alert without a hazard": (
         NO_HAZARD | {"alerts": "fcw", "t_alert": 25.3},
-        f"{START} The car accelerates to 37 m/s. No hazard follows. Alert fcw at 25.30 s.",
+        f"{START} The car accelerates to 37.02 m/s. No hazard follows. Alert fcw at 25.30 s.",
     ),
     "masked": (
         NO_HAZARD | {"outcome": "masked", "stopped_at": "radard;lkas"},

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from mutator._common.folder_locks import lock_run_folder
+from mutator.errors import NotServed
 from mutator.model import Outcome, Status
 from mutator.results import table_building
 from mutator.results.table_reader import Results
@@ -107,6 +108,13 @@ def test_a_line_that_no_worker_wrote_is_not_counted(planned: RunFolder, append: 
     watched = WatchedRun(planned)
     watched.poll()
     assert watched.as_json(0)["done"] == 1
+
+
+def test_a_run_that_is_deleted_while_somebody_asks_is_not_served(planned: RunFolder) -> None:
+    """Its folder can go between two reads."""
+    (planned.path / "run.json").unlink()
+    with pytest.raises(NotServed, match="was deleted"):
+        WatchedRuns().poll(planned, 0)
 
 
 def test_no_file_stays_open_and_old_runs_are_forgotten(

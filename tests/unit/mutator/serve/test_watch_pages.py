@@ -83,6 +83,16 @@ def test_an_experiment_of_an_unfinished_run_is_shown(watching: Client) -> None:
     assert watching.get("/api/runs/half/experiments/0123456789abcdef").status == 404
 
 
+@pytest.mark.parametrize(
+    ("page", "reason"),
+    [("/live/half", "no experiment &#39;0000000000000000&#39;"), ("/trial", "no such trial")],
+)
+def test_a_page_of_nothing_is_not_found(watching: Client, page: str, reason: str) -> None:
+    """It says why, and is no empty page."""
+    answer = watching.get(f"{page}/0000000000000000")
+    assert (answer.status, reason in answer.text) == (404, True)
+
+
 @pytest.mark.parametrize("version", ["-1", "x", "9" * 40, "1.5", "%C2%B2"])
 def test_a_version_is_a_number(watching: Client, version: str) -> None:
     answer = watching.get(f"/api/runs/half/live?version={version}")

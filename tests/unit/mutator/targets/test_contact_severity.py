@@ -37,10 +37,16 @@ def test_a_class_is_shown_with_the_words_of_its_scale(tmp_path: Path) -> None:
     """A class alone could also be a scenario; its words are those of the library, or its `about`."""
     path = tmp_path / "hard.yaml"
     path.write_text(SCALE.replace("about: c", "words: hard, about: c"))
-    assert load_severity_scale(path).labels == {"S0": "S0 a", "S1": "S1 b", "S2": "S2 hard", "S3": "S3 d"}
+    words = {"S0": "a", "S1": "b", "S2": "hard", "S3": "d"}
+    assert load_severity_scale(path).labels == {name: f"{of} (severity {name})" for name, of in words.items()}
     shipped = Workspace.find().scale_of(Workspace.find().manifest("openpilot"))
     assert shipped is not None
-    assert list(shipped.labels.values()) == ["S0 no injuries", "S1 light", "S2 severe", "S3 possibly fatal"]
+    assert list(shipped.labels.values()) == [
+        "no injuries (severity S0)",
+        "light (severity S1)",
+        "severe (severity S2)",
+        "possibly fatal (severity S3)",
+    ]
 
 
 def test_the_shipped_contact_is_with_an_equal_car() -> None:

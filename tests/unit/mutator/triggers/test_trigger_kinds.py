@@ -26,9 +26,11 @@ def test_invalid_text_is_refused(text: str) -> None:
 
 
 def test_always_and_a_time_last_to_the_end_of_the_run() -> None:
+    """A time that somebody chose has its own name: nothing was drawn at random."""
     assert always_trigger().hold is Hold.TO_END
     assert trigger_at_time(3).condition == "t >= 3.0"
     assert trigger_at_time(3).hold is Hold.TO_END
+    assert (trigger_at_time(3).name, parse_trigger("2.5", 0.0, ()).name) == ("at 3 s", "at 2.5 s")
     assert (trigger_at_time(3, hold_s=2.0).hold, trigger_at_time(3, hold_s=2.0).hold_s) == (Hold.FOR, 2.0)
     with pytest.raises(MutatorError, match="time nan"):
         trigger_at_time(math.nan)

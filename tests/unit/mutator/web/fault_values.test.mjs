@@ -12,7 +12,7 @@ const TABLE = new Rows.Table({
   count: 6,
   checked: ["X1"],
   labels: {},
-  severities: { S2: "S2 severe" },
+  severities: { S2: "severe (severity S2)" },
   columns: [
     dictionary("kind", "gap/bias", "gap/bias", "gap/bias", "gap/noise", "gap/bias", "gap/bias"),
     dictionary("variant", "far", "far", "far", "", "far", "far"),
@@ -42,7 +42,7 @@ test("faults are apart by name and unit, and those without a number are only cou
 });
 
 test("measures are margins with their limit, then delta-v with the classes, and the time to hazard", () => {
-  assert.deepEqual(measures.map(({ name, limits }) => [name, limits]), [["margin_x1", [[0, "limit of X1"]]], ["delta_v", [[5, "S2 severe"]]], ["time_to_hazard", []]]);
+  assert.deepEqual(measures.map(({ name, limits }) => [name, limits]), [["margin_x1", [[0, "limit of X1"]]], ["delta_v", [[5, "severe (severity S2)"]]], ["time_to_hazard", []]]);
   assert.equal(measures[0].about, "X1: too near");
 });
 

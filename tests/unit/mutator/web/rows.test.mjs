@@ -95,7 +95,7 @@ const DRIVES = new Rows.Table({
   count: 4,
   checked: [],
   labels: {},
-  severities: { S1: "S1 light", S2: "S2 severe" },
+  severities: { S1: "light (severity S1)", S2: "severe (severity S2)" },
   columns: [
     { name: "experiment_id", texts: ["aaaa11", "aaaa22", "bbbb33", "cccc44"] },
     { name: "fault", texts: ["radar/chaff/distance 40 m", "radar/chaff/distance 40 m", "a/noise/x", "a/noise/x"] },
@@ -126,7 +126,7 @@ test("a search finds the words that the page shows", () => {
 test("a scenario and a severity class are not confused", () => {
   assert.deepEqual(drives("s1"), [0, 3]);
   assert.deepEqual(drives("severe"), [0]);
-  assert.deepEqual(drives("s2 severe"), [0]);
+  assert.deepEqual(drives("severe (severity s2)"), [0]);
   assert.deepEqual(drives("severity>=s2"), [0]);
 });
 
