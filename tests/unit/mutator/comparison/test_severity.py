@@ -99,7 +99,8 @@ def test_a_gate_finds_new_and_more_severe_contacts(found: Comparison) -> None:
     harder = sum(p.b.fault.fault_type == "lane" and p.b.method is Method.GUIDED for p in found.pairs)
     assert 0 < harder < distance + harder
     assert list(counts.values()) == [distance, distance, distance + harder, harder]
-    assert any("c (severity S2), delta-v 5.00 m/s" in f.description for f in findings_of_gates(found, [Gate.SEVERITY_S2]))
+    severe = findings_of_gates(found, [Gate.SEVERITY_S2])
+    assert any("c (severity S2), delta-v 5.00 m/s" in finding.description for finding in severe)
     assert len(findings_of_gates(found, [Gate.HIGHER_SEVERITY])) == distance + harder
 
 
