@@ -34,8 +34,8 @@ def measured_number(number: float, unit: str = "") -> str:
     """Return a measured number as sentences, lists and tables all show it: `24.60 m/s`; one below 0.1 with
     two digits.
     """
-    shown = number if abs(number) >= _ROUNDING else 0.0
-    text = f"{shown:.2f}" if abs(shown) >= _LEAST_WITH_HUNDREDTHS else f"{shown:.2g}"
+    size = number if abs(number) >= _ROUNDING else 0.0
+    text = f"{size:.2f}" if abs(size) >= _LEAST_WITH_HUNDREDTHS else f"{size:.2g}"
     return with_unit(text, unit)
 
 
