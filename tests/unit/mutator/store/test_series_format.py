@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -30,6 +30,7 @@ def bits(one: Series) -> list[list[int]]:
     return [row.view("<u4").tolist() for row in one.channel_values]
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])  # no test measures time
 @given(WORDS, WORDS, st.integers(1, 6))
 def test_all_values_round_trip_bit_for_bit(one: np.ndarray, other: np.ndarray, count: int) -> None:
     golden = series(one.view("<f4"))
