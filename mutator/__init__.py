@@ -17,6 +17,7 @@ NAMES_BY_MODULE = {
     "mutator.api.caches": ("cache_entries", "cache_folder", "clear_caches", "prune_caches"),
     "mutator.api.campaigns": ("run",),
     "mutator.api.comparisons": ("RunComparison", "compare", "write_history"),
+    "mutator.api.experiments": ("build_experiment",),
     "mutator.api.experiment_results": ("TraceFrames",),
     "mutator.api.libraries": (
         "check_hazard_analysis",

@@ -11,6 +11,7 @@ from mutator.api.comparisons import RunComparison as RunComparison
 from mutator.api.comparisons import compare as compare
 from mutator.api.comparisons import write_history as write_history
 from mutator.api.experiment_results import TraceFrames as TraceFrames
+from mutator.api.experiments import build_experiment as build_experiment
 from mutator.api.libraries import check_hazard_analysis as check_hazard_analysis
 from mutator.api.libraries import check_library as check_library
 from mutator.api.libraries import check_target as check_target
@@ -88,6 +89,7 @@ __all__ = [
     "Trigger",
     "Workspace",
     "__version__",
+    "build_experiment",
     "build_mutant",
     "cache_entries",
     "cache_folder",

@@ -239,7 +239,8 @@ class Experiment:
     def method_text(self) -> str:
         """How the trigger was chosen; empty if it is neither a context nor a random time."""
         name = self.trigger.name
-        is_listed = name in ("always", self.trigger.condition) or name.startswith("at ")
+        listed_names = ("always", self.trigger.condition)
+        is_listed = name.startswith(("at ", "always for ")) or name.partition(" for ")[0] in listed_names
         return "" if is_listed and self.method is Method.GUIDED else self.method.value
 
     @cached_property

@@ -47,6 +47,7 @@ class FaultChoice:
     value: float | None = None
     seed: int | None = None
     reading: str | None = None
+    beyond: bool | None = None  # whether `value` may be outside the declared range; None: with a warning
 
     def narrow(self, spec: FaultSpec) -> FaultSpec:
         variants = tuple(v for v in spec if self.variant in (None, v.name))
@@ -90,13 +91,23 @@ class SelectedTarget:
             spec, choice.seed or 0, choice.reading, models=self.models, manifest=self.manifest
         )
         if choice.value is not None:
-            _warn_of_value(choice.value, declared, faults, self.models)
+            _warn_of_ineffective(faults, self.models)
+            _check_range(choice, choice.value, declared, faults)
         return faults
 
     def fault(
-        self, fault_like: FaultLike, *, value: float | None = None, seed: int = 0, reading: str | None = None
+        self,
+        fault_like: FaultLike,
+        *,
+        value: float | None = None,
+        seed: int = 0,
+        reading: str | None = None,
+        beyond: bool | None = None,
     ) -> Fault:
-        """Return the given fault, or the middle one of the first matching variant."""
+        """Return the given fault, or the middle one of the first matching variant.
+
+        `beyond`: whether `value` may be outside the declared range; None: with a warning.
+        """
         if isinstance(fault_like, Fault):
             if value is not None or reading is not None:
                 raise MutatorError(
@@ -106,7 +117,9 @@ class SelectedTarget:
                 )
             return fault_like
         spec, variant = _split_variant(str(fault_like))
-        choice = FaultChoice(spec=spec, variant=variant, value=value, seed=seed, reading=reading)
+        choice = FaultChoice(
+            spec=spec, variant=variant, value=value, seed=seed, reading=reading, beyond=beyond
+        )
         return middle_of_each_variant(self.faults(choice))[0][0]
 
     def trigger(self, trigger_like: TriggerLike, armed_after_s: float | None = None) -> Trigger:
@@ -181,12 +194,16 @@ def _split_variant(name: str) -> tuple[str, str | None]:
     return name, None
 
 
-def _warn_of_value(
-    value: float, declared_spec: FaultSpec, faults: Collection[Fault], models: FaultModels
-) -> None:
+def _warn_of_ineffective(faults: Collection[Fault], models: FaultModels) -> None:
     ineffective = [fault.label for fault in faults if is_neutral_fault(fault, models)]
     if ineffective:
         warnings.warn(f"the value changes nothing: {', '.join(ineffective)}", MutatorWarning, stacklevel=4)
+
+
+def _check_range(
+    choice: FaultChoice, value: float, declared_spec: FaultSpec, faults: Collection[Fault]
+) -> None:
+    """Refuse a value outside the range that the spec declares, or warn of it, as `choice.beyond` says."""
     outside = []
     for variant in declared_spec:
         if variant.draw and f"{declared_spec.name}/{variant.name}" in {fault.spec for fault in faults}:
@@ -194,12 +211,18 @@ def _warn_of_value(
             unit = f" {units.UNITS[variant.draw.unit].symbol}" if variant.draw.unit else ""
             if not low <= value <= high:
                 outside.append(f"{declared_spec.name}/{variant.name}, {low:g} to {high:g}{unit}")
-    if outside:
-        warnings.warn(
-            f"value {value:g} is outside the range that the spec declares: {'; '.join(outside)}",
-            MutatorWarning,
-            stacklevel=4,
-        )
+    if not outside or choice.beyond:
+        return
+    text = f"value {value:g} is outside the range that the spec declares: {'; '.join(outside)}"
+    if choice.beyond is None:
+        warnings.warn(text, MutatorWarning, stacklevel=4)
+        return
+    raise MutatorError(
+        text,
+        where=declared_spec.path,
+        argument="value",
+        remedy="choose a value in the range, or allow others with `beyond`",
+    )
 
 
 def _with_value(spec: FaultSpec, variant: Variant, value: float) -> Variant:

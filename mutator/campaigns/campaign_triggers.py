@@ -1,5 +1,6 @@
 """The triggers of a campaign file: contexts of a table, or a list."""
 
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal
@@ -9,10 +10,10 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.config.yaml_files import StrictModel, YamlRecord
 from mutator.config.yaml_sources import KeyPath, YamlSource
-from mutator.model import MOST_LIMIT_OR_TIME, Hold, Trigger
+from mutator.model import MOST_LIMIT_OR_TIME, Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import canonical_condition
-from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
+from mutator.triggers.trigger_kinds import always_trigger, held_for, named_with_hold, trigger_at_time
 
 EVERY_READING = "*"  # key of a value that applies to all readings
 _LIST_KEYS: KeyPath = ("triggers", "list")
@@ -162,18 +163,28 @@ def build_listed_triggers(
 ) -> tuple[Trigger, ...]:
     """Return the triggers of a campaign's list in `source`; `hold_s` is their default hold.
 
-    MutatorError with the line for a condition on unobserved values, and for a duplicate trigger.
+    Triggers that differ only in the hold have it in their names. MutatorError with the line for a condition
+    on unobserved values, and for a duplicate trigger.
     """
-    trigger_by_name: dict[str, Trigger] = {}
+    triggers = []
     for i, item in enumerate(listed):
         with source.locating_errors((*_LIST_KEYS, i, "when")):
-            trigger = _build_trigger(
-                item, manifest.observation.variables, armed_after_s, item.hold_s or hold_s
+            triggers.append(
+                _build_trigger(item, manifest.observation.variables, armed_after_s, item.hold_s or hold_s)
             )
-        if trigger.name in trigger_by_name:
-            got = f"'{trigger.name}' is listed twice"
+    return _with_unique_names(triggers, source)
+
+
+def _with_unique_names(triggers: Sequence[Trigger], source: YamlSource) -> tuple[Trigger, ...]:
+    """Add the hold to names that several triggers have; MutatorError at the line of a duplicate."""
+    counts = Counter(trigger.name for trigger in triggers)
+    trigger_by_name: dict[str, Trigger] = {}
+    for i, trigger in enumerate(triggers):
+        named = named_with_hold(trigger) if counts[trigger.name] > 1 else trigger
+        if named.name in trigger_by_name:
+            got = f"'{named.name}' is listed twice"
             raise source.error((*_LIST_KEYS, i), got, expected="each trigger once", remedy="remove one")
-        trigger_by_name[trigger.name] = trigger
+        trigger_by_name[named.name] = named
     return tuple(trigger_by_name.values())
 
 
@@ -186,4 +197,4 @@ def _build_trigger(
     if listed.when is not None:
         text = canonical_condition(listed.when, variables=variables)
         trigger = Trigger(name=text, condition=text, armed_after_s=armed_after_s)
-    return replace(trigger, hold=Hold.FOR, hold_s=hold_s) if hold_s else trigger
+    return held_for(trigger, hold_s) if hold_s else trigger

@@ -19,6 +19,8 @@ from mutator.model import Fault, Injection
 from mutator.targets.allowed_locations import check_location_allowed
 from mutator.targets.manifest import TargetManifest
 
+# Published ids contain seeds of image effects, which differ from value to value.
+_MODELS_WITH_SEED_BY_VALUE = frozenset(("image_effect",))
 _MOST_REDRAWS_OF_VALUE = 100  # of one value
 _MOST_REDRAWS_OF_ALL_VALUES = 20_000  # of all values; more mean that the ranges have too few different values
 
@@ -116,10 +118,15 @@ class _SpecExpander:
                 draw=variant.draw,
                 value=value,
                 seed=self.seed,
-                key=f"{self.spec.name}/{variant.name}/{number}/{i}",
+                key=self._seed_key(variant, injection, number, i),
             )
             for i, injection in enumerate(variant.injections_in_reading(self.reading))
         )
+
+    def _seed_key(self, variant: Variant, injection: InjectionSpec, number: int, position: int) -> str:
+        """Return what determines an injection's random numbers: neighbouring values meet the same ones."""
+        by_value = f"/{number}" if injection.model in _MODELS_WITH_SEED_BY_VALUE else ""
+        return f"{self.spec.name}/{variant.name}{by_value}/{position}"
 
     def _check_variant(self, variant: Variant) -> None:
         if variant.aimed_hazard and variant.aimed_hazard not in self.manifest.hazard_names:

@@ -5,6 +5,7 @@ A kind is a function that makes its triggers and, if users can type it, a parser
 
 import math
 from collections.abc import Callable, Collection
+from dataclasses import replace
 
 from mutator._common.phrase_texts import planned_number
 from mutator._common.random_streams import random_generator
@@ -31,6 +32,18 @@ def trigger_at_time(time_s: float, *, name: str | None = None, hold_s: float | N
     hold = Hold.TO_END if hold_s is None else Hold.FOR
     name = name or f"at {planned_number(time_s, 's')}"
     return Trigger(name=name, condition=f"t >= {float(time_s)!r}", hold=hold, hold_s=hold_s)
+
+
+def held_for(trigger: Trigger, hold_s: float) -> Trigger:
+    """Return the trigger with a hold of `hold_s` seconds after it first fires, instead of its own."""
+    return replace(trigger, hold=Hold.FOR, hold_s=float(hold_s))
+
+
+def named_with_hold(trigger: Trigger) -> Trigger:
+    """Return the trigger with its hold in its name, `at 3 s for 2 s`; unchanged without the hold `for`."""
+    if trigger.hold is not Hold.FOR or trigger.hold_s is None:
+        return trigger
+    return replace(trigger, name=f"{trigger.name} for {planned_number(trigger.hold_s, 's')}")
 
 
 def trigger_time_s(trigger: Trigger) -> float | None:

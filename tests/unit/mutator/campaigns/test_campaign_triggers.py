@@ -65,11 +65,26 @@ def test_triggers_can_be_a_plain_list(pole: Workspace) -> None:
     assert build_plan(pole, "upright").digest == plan.digest
 
 
+def test_triggers_that_differ_only_in_the_hold_have_it_in_their_names(pole: Workspace) -> None:
+    """Such triggers are different experiments; a trigger whose name is unique keeps it, and so its ids."""
+    text = "triggers: [{at_s: 2}, {at_s: 2, hold_s: 1}, {at_s: 2, hold_s: 0.5}, {at_s: 3, hold_s: 1}]\n"
+    listed(pole, text)
+    plan = build_plan(pole, "upright")
+    names = {e.trigger.name for e in plan.experiments}
+    assert names == {"at 2 s", "at 2 s for 1 s", "at 2 s for 0.5 s", "at 3 s"}
+    assert len({e.id for e in plan.experiments}) == len(plan.experiments)
+
+
 @pytest.mark.parametrize(
     ("triggers", "methods", "said"),
     [
         ("triggers:\n  - always\n  - {when: angel > 0}\n", "[guided]", "11: unknown name 'angel' in"),
         ("triggers:\n  - always\n  - always\n", "[guided]", "11: 'always' is listed twice; expected each"),
+        (
+            "triggers:\n  - {at_s: 3, hold_s: 1}\n  - {at_s: 3, hold_s: 1}\n",
+            "[guided]",
+            "11: 'at 3 s for 1 s' is listed twice; expected each",
+        ),
         ("triggers:\n  - always\n  - {at: 3}\n", "[guided]", "11: unknown key 'at'; expected one of always"),
         ("triggers:\n  - {hold_s: 3}\n", "[guided]", "10: .*one of `always`, `at_s` and `when`"),
         ("triggers:\n  - {at_s: 1, when: t > 3}\n", "[guided]", "10: .*one of `always`, `at_s` and `when`"),

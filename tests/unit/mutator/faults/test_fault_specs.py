@@ -46,6 +46,21 @@ def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
     ]
 
 
+@pytest.mark.parametrize(("model", "seed_count"), [("noise", 1), ("image_effect", 3)])
+def test_neighbouring_values_meet_the_same_noise(toy: Workspace, model: str, seed_count: int) -> None:
+    """The seed of noise depends on the variant, not on a value's number; image effects keep theirs."""
+    effect = "{amount_m: error, effect: toycar.sensor.Sensor, camera: gap, scene: gap}"
+    params = "{std_m: error}" if model == "noise" else effect
+    path = toy.library / "faults" / "sensor" / "distance.yaml"
+    text = path.read_text().replace("model: offset\n", f"model: {model}\n", 1)
+    path.write_text(text.replace("params: {by_m: error}", f"params: {params}", 1))
+    found = of(faults(toy), "longer")
+    assert len(found) == 3
+    assert len({dict(f.injections[0].params)["seed"] for f in found}) == seed_count
+    both = (*found, *of(faults(toy, seed=4), "longer"))
+    assert len({dict(f.injections[0].params)["seed"] for f in both}) == 2 * seed_count
+
+
 def test_values_are_converted_to_the_variables_unit(toy: Workspace) -> None:
     for fault in of(faults(toy), "both"):
         by = dict(fault.injections[1].params)["by"]
