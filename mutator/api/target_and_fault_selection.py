@@ -235,5 +235,22 @@ def _with_value(spec: FaultSpec, variant: Variant, value: float) -> Variant:
         )
     # as YAML would give it: 40, not 40.0, in the id and in the injected line
     exact_value = int(value) if float(value).is_integer() else value
+    if variant.paired_draws:
+        return _with_listed_value(spec, variant, exact_value)
     draw = dataclasses.replace(variant.draw, kind="list", ranges=(), values=(exact_value,))
     return dataclasses.replace(variant, draw=draw)
+
+
+def _with_listed_value(spec: FaultSpec, variant: Variant, value: float) -> Variant:
+    """Keep the pair whose first value is `value`."""
+    first = variant.all_draws[0]
+    if value not in first.values:
+        raise MutatorError(
+            f"value {value:g}",
+            where=spec.path,
+            argument="value",
+            expected=f"one of {', '.join(map(str, first.values))}, because the values come in pairs",
+        )
+    number = first.values.index(value)
+    draw, *paired = (dataclasses.replace(each, values=(each.values[number],)) for each in variant.all_draws)
+    return dataclasses.replace(variant, draw=draw, paired_draws=tuple(paired))

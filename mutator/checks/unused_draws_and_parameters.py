@@ -3,6 +3,7 @@ uses.
 """
 
 from collections.abc import Iterator
+from itertools import product
 
 from jinja2 import TemplateError
 from jinja2.meta import find_undeclared_variables
@@ -32,9 +33,10 @@ def unused_draws_and_parameters_finding(specs: tuple[FaultSpec, ...], models: Fa
 def _unused_draw_places(specs: tuple[FaultSpec, ...], models: FaultModels) -> Iterator[FindingPlace]:
     for spec in specs:
         for variant in spec:
-            draw = variant.draw
-            for reading, injections in variant.injections_by_reading.items():
-                if draw and not any(_uses_draw(injection, draw.name, models) for injection in injections):
+            for draw, (reading, injections) in product(
+                variant.all_draws, variant.injections_by_reading.items()
+            ):
+                if not any(_uses_draw(injection, draw.name, models) for injection in injections):
                     where = f" in reading {reading}" if reading else ""
                     what = f"{spec.name}/{variant.name} draws '{draw.name}', unused{where}"
                     yield FindingPlace(file=str(spec.path), line=spec.source.line_of(draw.keys), what=what)

@@ -1,18 +1,17 @@
 """Fault specs: YAML files that each describe one fault type of a module, before values are drawn."""
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import Field, create_model, model_validator
+from pydantic import Field, create_model
 
-from mutator.config import units
 from mutator.config.phrases import SignedPhraseModel, build_phrase
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.faults.draw_specs import DrawModel, DrawSpec, build_draws, check_name
 from mutator.faults.injection_model import InjectionModel
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.faults.library_readings import KEY_WITHOUT_NAME, SpecReadings
@@ -20,38 +19,6 @@ from mutator.model import Hold
 from mutator.targets.stored_phrases import PhraseByCase
 
 SCHEMA = "fault_spec/1"
-_NAME_PATTERN = re.compile(r"[a-z][a-z0-9_]*\Z")
-_MOST_RANGES = 1000  # of a sweep; more mean a mistyped step, and each range is a fault
-_MOST_DRAWN_NUMBER = 1e15  # limit of a drawn number: whole numbers up to it are exact
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DrawSpec:
-    """How a variant's values are made: one draw from each range, or a list.
-
-    Values are in `unit`, the suffix of the YAML key (None for plain numbers). `key` and the campaign's seed
-    determine the draw: equal keys and ranges give equal values.
-    """
-
-    key: str
-    name: str
-    unit: str | None
-    kind: Literal["integers", "reals", "list"]
-    ranges: tuple[tuple[float, float], ...] = ()
-    values: tuple[float | int, ...] = ()
-    decimals: int | None = None
-    cap: float | None = None
-    keys: KeyPath = ()
-
-    @property
-    def value_count(self) -> int:
-        return len(self.values) if self.kind == "list" else len(self.ranges)
-
-    @property
-    def least_and_greatest(self) -> tuple[float, float]:
-        """The least and the greatest possible value."""
-        ends = self.values or [end for ends in self.ranges for end in ends]
-        return min(ends), max(ends) if self.cap is None else min(max(ends), self.cap)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +27,7 @@ class Variant:
 
     `injections_by_reading` starts with the default reading. `hold_by_reading` overrides how long the fault
     stays active; `phrase_by_reading` says what the fault does, in words. An empty `aimed_hazard`: none.
+    `paired_draws` are lists as long as `draw`'s: the n-th values of all belong to one fault.
     """
 
     name: str
@@ -72,6 +40,7 @@ class Variant:
     phrase_by_reading: Mapping[str, PhraseByCase]
     keys: KeyPath
     keys_by_reading: Mapping[str, KeyPath]  # the mappings that have the injections
+    paired_draws: tuple[DrawSpec, ...] = ()
 
     def injections_in_reading(self, reading: str) -> tuple[InjectionSpec, ...]:
         return self.injections_by_reading[self._reading_or_default(reading)]
@@ -89,6 +58,10 @@ class Variant:
     @property
     def fault_count(self) -> int:
         return self.draw.value_count if self.draw else 1
+
+    @property
+    def all_draws(self) -> tuple[DrawSpec, ...]:
+        return (self.draw, *self.paired_draws) if self.draw else ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,60 +90,6 @@ class FaultSpec:
 
     def __iter__(self) -> Iterator[Variant]:
         return iter(self.variants)
-
-
-_DrawnNumber = Annotated[float, Field(ge=-_MOST_DRAWN_NUMBER, le=_MOST_DRAWN_NUMBER, allow_inf_nan=False)]
-
-
-class SweepModel(StrictModel, title="A sweep"):
-    """Ranges of equal width at equal distances. `{first: [15, 24], step: 10, last: [245, 254]}` gives the
-    24 ranges [15, 24], [25, 34] ... [245, 254]. One value is drawn from each range, both ends included.
-    """
-
-    first: list[_DrawnNumber] = Field(description="The first range, [low, high].")
-    step: float = Field(gt=0.0, allow_inf_nan=False, description="The distance from one range to the next.")
-    last: list[_DrawnNumber] = Field(description="The last range, a whole number of steps above the first.")
-
-    @model_validator(mode="after")
-    def _check_ranges(self) -> "SweepModel":
-        self.ranges()
-        return self
-
-    def ranges(self) -> tuple[tuple[float, float], ...]:
-        """Return all ranges as (low, high); ValueError if the sweep is not valid."""
-        if len(self.first) != 2 or len(self.last) != 2 or not self.first[0] <= self.first[1]:
-            raise ValueError("first and last as [low, high]")
-        low, high = self.first
-        steps = (self.last[0] - low) / self.step
-        if steps >= _MOST_RANGES:
-            raise ValueError(f"at most {_MOST_RANGES} ranges")
-        ranges = tuple((low + i * self.step, high + i * self.step) for i in range(round(steps) + 1))
-        # the step times a number is not exact in binary: 3 * 0.1 is not 0.3
-        if not ranges or any(abs(a - b) > 1e-9 for a, b in zip(ranges[-1], self.last, strict=True)):
-            raise ValueError("a last range that is a whole number of steps above the first")
-        return ranges
-
-
-class _DrawModel(StrictModel, title="A draw"):
-    """The key of a draw is a name of your choice and a unit: `distance_m`. Parameters refer to the drawn
-    value by that name without the unit, optionally with a minus sign: `by_m: -distance`. Give exactly one of
-    `integers_from`, `reals_from` and `values`. The same seed and key give the same values.
-    """
-
-    integers_from: SweepModel | None = Field(None, description="One whole number from each range of a sweep.")
-    reals_from: SweepModel | None = Field(None, description="One number from each range of a sweep.")
-    decimals: int | None = Field(
-        None, ge=0, le=12, description="The number of decimals to which values of `reals_from` are rounded."
-    )
-    values: list[float | int] | None = Field(None, description="A list of values, used unchanged.")
-    cap: float | None = Field(
-        None, allow_inf_nan=False, description="The maximum: larger drawn values are reduced to it."
-    )
-    key: str | None = Field(
-        None,
-        description="A name that seeds the draw together with the campaign's seed. Variants can share it. "
-        "Default: the variant's full name.",
-    )
 
 
 _PHRASE_DESCRIPTION = (
@@ -214,9 +133,11 @@ class _VariantModelBase(StrictModel, title="A variant"):
     )
     hold: Literal["while", "to_end"] | None = Field(None, description=f"{_HOLD_DESCRIPTION}.")
     phrase: str | SignedPhraseModel | None = Field(None, description=f"{_PHRASE_DESCRIPTION}.")
-    draw: dict[str, _DrawModel] | None = Field(
+    draw: dict[str, DrawModel] | None = Field(
         None,
-        description="Exactly one draw: name and unit -> draw. Without a draw, the variant is a single fault.",
+        description="Name and unit -> draw: one draw, or several lists of `values` of equal length. The "
+        "n-th values of these lists make one fault. Those of the first list must differ, because tables name "
+        "the fault by them. Without a draw, the variant is a single fault.",
     )
     # `build_spec_model` adds the readings and `injections`
 
@@ -264,7 +185,7 @@ def load_spec(path: Path, readings: SpecReadings) -> FaultSpec:
     model, source = load_yaml_model(path, build_spec_model(readings), SCHEMA)
     models: dict[str, _VariantModelBase] = model.variants  # type: ignore[attr-defined]
     for key in ("module", "fault_type"):
-        _check_name(getattr(model, key), source, (key,))
+        check_name(getattr(model, key), source, (key,))
     if not models:
         raise source.error(("variants",), "no variant", expected="at least one", remedy="describe a fault")
     name = f"{model.module}/{model.fault_type}"
@@ -279,24 +200,19 @@ def load_spec(path: Path, readings: SpecReadings) -> FaultSpec:
     )
 
 
-def _check_name(name: str, source: YamlSource, keys: KeyPath) -> None:
-    if not _NAME_PATTERN.match(name):
-        raise source.error(keys, f"'{name}'", expected="lowercase letters, digits and _", remedy="rename it")
-
-
 def _build_variant(
     spec: str, name: str, model: _VariantModelBase, readings: SpecReadings, source: YamlSource
 ) -> Variant:
     keys: KeyPath = ("variants", name)
-    _check_name(name, source, keys)
+    check_name(name, source, keys)
     model_by_reading, keys_by_reading = _reading_models(model, readings, source, keys)
+    draws = () if model.draw is None else build_draws(f"{spec}/{name}", model.draw, source, (*keys, "draw"))
     return Variant(
         name=name,
         aimed_hazard=model.aim or "",
         about=model.about,
-        draw=_build_draw(f"{spec}/{name}", model.draw, source, (*keys, "draw"))
-        if model.draw is not None
-        else None,
+        draw=draws[0] if draws else None,
+        paired_draws=draws[1:],
         changes=tuple(model.changes),
         injections_by_reading={
             reading: _build_injections(reading_model, source, keys_by_reading[reading])
@@ -355,44 +271,4 @@ def _build_injections(
     return tuple(
         injection.injection_spec(source, (*keys, "injections", i))
         for i, injection in enumerate(model.injections)
-    )
-
-
-def _build_draw(
-    default_key: str, models: dict[str, _DrawModel], source: YamlSource, keys: KeyPath
-) -> DrawSpec:
-    if len(models) != 1:
-        raise source.error(
-            keys, f"{len(models)} draws", expected="one", remedy="use one draw for all injections"
-        )
-    key, model = next(iter(models.items()))
-    name, unit = units.split_unit(key)
-    _check_name(name, source, (*keys, key))
-    ways = {"integers": model.integers_from, "reals": model.reals_from, "list": model.values}
-    kinds = [kind for kind, way in ways.items() if way is not None]
-    draw_keys = (*keys, key)
-    if len(kinds) != 1:
-        raise source.error(
-            draw_keys, f"{len(kinds)} ways to draw", expected="integers_from, reals_from or values"
-        )
-    kind: Literal["integers", "reals", "list"] = kinds[0]  # type: ignore[assignment]
-    ranges = model.integers_from or model.reals_from
-    if model.integers_from and any(x != int(x) for pair in model.integers_from.ranges() for x in pair):
-        raise source.error((*draw_keys, "integers_from"), "a range with fractions", expected="whole numbers")
-    if model.decimals is not None and kind != "reals":
-        raise source.error(
-            (*draw_keys, "decimals"),
-            f"decimals: {model.decimals}",
-            expected="`decimals` only with reals_from",
-        )
-    return DrawSpec(
-        key=model.key or default_key,
-        name=name,
-        unit=unit.suffix if unit else None,
-        kind=kind,
-        ranges=ranges.ranges() if ranges else (),
-        values=tuple(model.values or ()),
-        decimals=model.decimals,
-        cap=model.cap,
-        keys=draw_keys,
     )

@@ -1,13 +1,16 @@
 """Check an injection's parameters and convert them from the spec's form to the template's."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
 from mutator._common.message_text import describe_choices, shortened_repr, spelling_suggestion
 from mutator._common.random_streams import random_generator
 from mutator.config import units
 from mutator.config.location_syntax import is_assignable, is_dotted_name
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
+from mutator.faults.draw_specs import DrawSpec
 from mutator.faults.fault_models import NAME_PARAM_TYPES, UNIT_OF_CHANGED_VARIABLE, FaultModel, ParamSchema
-from mutator.faults.fault_specs import DrawSpec
 from mutator.faults.injection_specs import (
     DrawReference,
     InjectionSpec,
@@ -25,23 +28,30 @@ _ANCHOR_KINDS_WITHOUT_TARGET = VALUE_ANCHORS | LOAD_TIME_ANCHORS
 _ANCHOR_KINDS_WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
 
+@dataclass(frozen=True, slots=True)
+class DrawnValue:
+    """A value, and the draw that it comes from."""
+
+    draw: DrawSpec
+    value: float | int
+
+
 def resolve_injection(
     spec: InjectionSpec,
     model: FaultModel,
     source: YamlSource,
     *,
-    draw: DrawSpec | None = None,
-    value: float | int | None = None,
+    drawn_values: Sequence[DrawnValue] = (),
     seed: int = 0,
     key: str = "",
 ) -> Injection:
-    """Insert `value`, which was drawn from `draw`, and return the injection.
+    """Insert the drawn values of one fault, and return the injection.
 
     Parameters are sorted by name, and numbers are in the unit that the template expects. A missing `target`
     defaults to the name that the anchor assigns. A `seed` parameter is drawn from (seed, key). MutatorError
     with file and line for anything that does not fit the model.
     """
-    resolver = _ParameterResolver(spec, model, source, draw, value)
+    resolver = _ParameterResolver(spec, model, source, {drawn.draw.name: drawn for drawn in drawn_values})
     params: dict[str, Value] = {}
     for param in spec.params:
         schema = resolver.checked_schema_of(param)
@@ -83,14 +93,12 @@ class _ParameterResolver:
         spec: InjectionSpec,
         model: FaultModel,
         source: YamlSource,
-        draw: DrawSpec | None,
-        value: float | int | None,
+        drawn_by_name: Mapping[str, DrawnValue],
     ) -> None:
         self.spec = spec
         self.model = model
         self.source = source
-        self.draw = draw
-        self.drawn_value = value
+        self.drawn_by_name = drawn_by_name
 
     def checked_schema_of(self, param: ParamSpec) -> ParamSchema:
         """Return the schema of a parameter, after checking the dimension of its unit suffix.
@@ -127,7 +135,7 @@ class _ParameterResolver:
         if not isinstance(param.value, str):
             return param.value is None or isinstance(param.value, bool)
         drawn = parse_draw_reference(param.value)
-        return drawn is None or self.draw is None or drawn.name != self.draw.name
+        return drawn is None or drawn.name not in self.drawn_by_name
 
     def valid_keys(self, schema: ParamSchema) -> list[str]:
         """Return the keys that a spec can use: one for each unit of the right dimension."""
@@ -189,8 +197,8 @@ class _ParameterResolver:
     def _constant_value(self, param: ParamSpec) -> Value:
         """Return the value; MutatorError for a text that resembles the draw's name, a likely typo."""
         assert not isinstance(param.value, DrawReference)
-        if isinstance(param.value, str) and self.draw and spelling_suggestion(param.value, [self.draw.name]):
-            raise self._value_error(param, f"'{self.draw.name}', the draw, or a text that is less similar")
+        if isinstance(param.value, str) and spelling_suggestion(param.value, list(self.drawn_by_name)):
+            raise self._value_error(param, f"{self._draw_names}, or a text that is less similar")
         return param.value
 
     def _number_in_unit(self, param: ParamSpec, schema: ParamSchema) -> float:
@@ -205,18 +213,23 @@ class _ParameterResolver:
                 else float(value)
             )
         drawn = value if isinstance(value, DrawReference) else parse_draw_reference(str(value))
-        if drawn is None or self.draw is None or self.drawn_value is None or drawn.name != self.draw.name:
-            expected = f"a number, or '{self.draw.name}', the draw" if self.draw else "a number"
+        if drawn is None or (reference := self.drawn_by_name.get(drawn.name)) is None:
+            expected = f"a number, or {self._draw_names}" if self.drawn_by_name else "a number"
             raise self._value_error(param, expected)
-        source = units.UNITS[self.draw.unit] if self.draw.unit else None
+        source = units.UNITS[reference.draw.unit] if reference.draw.unit else None
         if unit is None or source is None:
             if unit is not source:
                 raise self._value_error(param, "a draw with a unit" if unit else "a draw without a unit")
-            return float(drawn.sign * self.drawn_value)
+            return float(drawn.sign * reference.value)
         try:
-            return convert_drawn_value(drawn, self.drawn_value, source, unit)
+            return convert_drawn_value(drawn, reference.value, source, unit)
         except ValueError as error:
             raise self._value_error(param, f"the same dimension: {error}") from None
+
+    @property
+    def _draw_names(self) -> str:
+        names = " or ".join(f"'{name}'" for name in self.drawn_by_name)
+        return f"{names}, the draw" + "s" * (len(self.drawn_by_name) > 1)
 
     def _value_error(self, param: ParamSpec, expected: str, got: str | None = None) -> MutatorError:
         value = param.value.name if isinstance(param.value, DrawReference) else param.value

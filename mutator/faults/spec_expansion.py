@@ -9,10 +9,11 @@ from mutator.config import units
 from mutator.config.phrases import check_holes
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
+from mutator.faults.draw_specs import DrawSpec
 from mutator.faults.fault_models import FaultModels
-from mutator.faults.fault_specs import DrawSpec, FaultSpec, Variant
+from mutator.faults.fault_specs import FaultSpec, Variant
 from mutator.faults.import_checks import check_import_defined
-from mutator.faults.injection_parameters import resolve_injection
+from mutator.faults.injection_parameters import DrawnValue, resolve_injection
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.faults.phrase_holes import fault_holes
 from mutator.model import Fault, Injection
@@ -43,6 +44,18 @@ def expand_spec(
     spec.readings.check_name(reading)
     expander = _SpecExpander(spec, seed, reading, models, manifest)
     return tuple(fault for variant in spec for fault in expander.faults(variant))
+
+
+def drawn_values_of(variant: Variant, seed: int) -> Iterator[tuple[DrawnValue, ...]]:
+    """Yield the values of each of the variant's faults, one from each draw; none for a fault without a
+    draw.
+    """
+    if variant.draw is None:
+        yield ()
+        return
+    columns = [draw_values(draw, seed) for draw in variant.all_draws]
+    for values in zip(*columns, strict=True):
+        yield tuple(DrawnValue(draw, value) for draw, value in zip(variant.all_draws, values, strict=True))
 
 
 def draw_values(draw: DrawSpec, seed: int) -> tuple[int | float, ...]:
@@ -94,29 +107,29 @@ class _SpecExpander:
         self._check_variant(variant)
         draw = variant.draw
         unit = units.UNITS[draw.unit].symbol if draw and draw.unit else "-"
-        values: tuple[int | float | None, ...] = draw_values(draw, self.seed) if draw else (None,)
-        for number, value in enumerate(values):
+        for number, drawn in enumerate(drawn_values_of(variant, self.seed)):
             yield Fault(
                 spec=f"{self.spec.name}/{variant.name}",
                 module=self.spec.module,
                 fault_type=self.spec.fault_type,
                 reading=self.reading,
-                value=value,
+                value=drawn[0].value if drawn else None,
                 unit=unit,
                 aim=variant.aimed_hazard,
-                injections=self._injections(variant, value, number),
+                injections=self._injections(variant, drawn, number),
                 hold=variant.hold_in_reading(self.reading),
                 changes=variant.changes,
             )
 
-    def _injections(self, variant: Variant, value: int | float | None, number: int) -> tuple[Injection, ...]:
+    def _injections(
+        self, variant: Variant, drawn: tuple[DrawnValue, ...], number: int
+    ) -> tuple[Injection, ...]:
         return tuple(
             resolve_injection(
                 injection,
                 self.models.get(injection.model),
                 self.spec.source,
-                draw=variant.draw,
-                value=value,
+                drawn_values=drawn,
                 seed=self.seed,
                 key=self._seed_key(variant, injection, number, i),
             )

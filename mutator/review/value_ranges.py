@@ -6,10 +6,12 @@ from math import isfinite
 
 from mutator.config.units import UNITS
 from mutator.errors import MutatorError
+from mutator.faults.draw_specs import DrawSpec
 from mutator.faults.fault_models import UNIT_OF_CHANGED_VARIABLE, FaultModels
-from mutator.faults.fault_specs import DrawSpec, FaultSpec, Variant
-from mutator.faults.injection_parameters import resolve_injection
+from mutator.faults.fault_specs import FaultSpec, Variant
+from mutator.faults.injection_parameters import DrawnValue, resolve_injection
 from mutator.faults.injection_specs import InjectionSpec
+from mutator.faults.spec_expansion import drawn_values_of
 from mutator.model import Fault, Injection
 from mutator.review.review_entries import ValueRanges
 
@@ -78,16 +80,21 @@ def find_variant(name: str, specs: Mapping[str, FaultSpec]) -> tuple[FaultSpec, 
 def _injections_at_bounds(
     fault: Fault, specs: Mapping[str, FaultSpec], models: FaultModels
 ) -> Iterator[tuple[Injection, ...]]:
-    """Yield the injections with the least and the greatest value that the fault's spec can draw."""
+    """Yield the injections with the least and the greatest value that the fault's spec can draw; with all
+    values, if they come in pairs.
+    """
     spec, variant = find_variant(fault.spec, specs) or (None, None)
     if not (spec and variant and variant.draw):
         return
-    for value in _drawn_bounds(variant.draw):
+    ends = (
+        drawn_values_of(variant, seed=0)  # lists do not depend on the seed
+        if variant.paired_draws
+        else ((DrawnValue(variant.draw, value),) for value in _drawn_bounds(variant.draw))
+    )
+    for drawn in ends:
         with suppress(MutatorError):  # values out of range are never drawn
             yield tuple(
-                resolve_injection(
-                    injection, models.get(injection.model), spec.source, draw=variant.draw, value=value
-                )
+                resolve_injection(injection, models.get(injection.model), spec.source, drawn_values=drawn)
                 for injection in variant.injections_in_reading(fault.reading)
             )
 

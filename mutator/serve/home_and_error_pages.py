@@ -95,7 +95,7 @@ def form_choices(workspace: Workspace) -> dict[str, Any]:
                 "module": spec.module,
                 "about": spec.about,
                 "variants": [
-                    {"name": variant.name, "about": variant.about, "range": range_as_json(variant.draw)}
+                    {"name": variant.name, "about": variant.about, "range": range_as_json(variant)}
                     for variant in spec
                 ],
             }

@@ -10,7 +10,7 @@ from mutator.campaigns.phrase_collection import phrases_of_experiment
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.config.units import UNITS
 from mutator.errors import MutatorError, NotServed
-from mutator.faults.fault_specs import DrawSpec, FaultSpec
+from mutator.faults.fault_specs import FaultSpec, Variant
 from mutator.model import Experiment, Status, Trigger
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.outcomes.trace_loading import load_trace, trace_digest
@@ -90,7 +90,7 @@ class ServedTrials:
     def _range_of(self, experiment: Experiment) -> dict[str, Any] | None:
         spec_name, _, variant_name = experiment.fault.spec.rpartition("/")
         specs = [spec for spec in self._workspace.specs() if spec.name == spec_name]
-        return next((range_as_json(v.draw) for spec in specs for v in spec if v.name == variant_name), None)
+        return next((range_as_json(v) for spec in specs for v in spec if v.name == variant_name), None)
 
 
 def _encoded_series(folder: Path, trial: StoredTrial, manifest: TargetManifest) -> tuple[bytes, bytes] | None:
@@ -129,9 +129,12 @@ def _trigger_text(trigger: Trigger) -> str:
     return trigger.condition if trigger.name == CONDITION_NAME else trigger.name
 
 
-def range_as_json(draw: DrawSpec | None) -> dict[str, Any] | None:
-    """Return the range of values that a variant declares, with a step for a slider; None without a value."""
-    if draw is None:
+def range_as_json(variant: Variant) -> dict[str, Any] | None:
+    """Return the range of values that a variant declares, with a step for a slider; None without a value, and
+    for values in pairs, which cannot be chosen one by one.
+    """
+    draw = variant.draw
+    if draw is None or variant.paired_draws:
         return None
     # sweeps add steps, which leaves 2.5000000000000004
     low, high = (float(f"{end:.12g}") for end in draw.least_and_greatest)
@@ -151,7 +154,7 @@ def check_value_declared(spec: FaultSpec, variant_name: str | None, value: float
     first, which a trial takes).
     """
     variant = next(v for v in spec if variant_name in (None, v.name))
-    value_range = range_as_json(variant.draw)
+    value_range = range_as_json(variant)
     if value_range is None:
         raise MutatorError(f"the value {value:g}", where=f"{spec.name}/{variant.name}", expected="no value")
     if not value_range["low"] <= value <= value_range["high"]:

@@ -5,7 +5,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator.faults.fault_specs import DrawSpec
+from mutator.faults.draw_specs import DrawSpec
 from mutator.faults.spec_expansion import draw_values, expand_spec
 from mutator.model import Fault
 from mutator.workspace import Workspace

@@ -6,7 +6,8 @@ import pytest
 
 from mutator.config.units import UNIT_SUFFIXES_TEXT
 from mutator.errors import MutatorError
-from mutator.faults.fault_specs import DrawSpec, load_spec
+from mutator.faults.draw_specs import DrawSpec
+from mutator.faults.fault_specs import load_spec
 from mutator.faults.spec_expansion import draw_values, expand_spec
 from mutator.model import Fault, Hold
 from mutator.workspace import Workspace
@@ -306,7 +307,11 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         ("first: [10, 19], step: 10", "first: [10.5, 19.5], step: 0.5", "a range with fractions"),
         ("error_m:\n", "error_m:\n        decimals: 1\n", "11: decimals: 1; expected `decimals` only with"),
         ("error_m:\n", "error_m:\n        values: [1]\n", "10: 2 ways to draw"),
-        ("error_m:\n", "other_m: {values: [1]}\n      error_m:\n", "9: 2 draws; expected one"),
+        (
+            "error_m:\n",
+            "other_m: {values: [1]}\n      error_m:\n",
+            "11: 2 draws, one of them by chance; expected",
+        ),
         ("module: sensor", "module: Sensor", "2: 'Sensor'; expected lowercase letters"),
         ("hold: to_end", "hold: forever", "21: 'forever' for 'hold'; expected one of 'while' or 'to_"),
         (
@@ -323,6 +328,74 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
 )
 def test_a_mistake_is_reported_with_a_remedy(toy: Workspace, old: str, new: str, said: str) -> None:
     assert said.replace("{KNOWN}", UNIT_SUFFIXES_TEXT) in edited(toy, old, new)
+
+
+PAIRS = """\
+schema: fault_spec/1
+module: sensor
+fault_type: distance
+about: A wrong gap and a wrong speed.
+variants:
+  pair:
+    about: Two values that belong together.
+    draw:
+      error_m: {values: [3, 1, 2]}
+      haste_kph: {values: [36, 72, 18]}
+    as_described:
+      injections:
+        - at: {file: toycar/sensor.py, function: Sensor.measure, after_assign: gap}
+          model: offset
+          unit: m
+          params: {by_m: error}
+        - at: {file: toycar/sensor.py, function: Sensor.measure, after_assign: gap}
+          model: offset
+          unit: mps
+          params: {by_kph: -haste}
+"""
+
+SINGLE_IDS = ["61bb454f23101d6a", "73869449aab2bac0", "72598b972ca98ad3"]  # of the first list alone
+
+
+def paired(workspace: Workspace, old: str = "", new: str = "") -> Path:
+    path = workspace.library / "faults" / "sensor" / "distance.yaml"
+    path.write_text(PAIRS.replace(old, new))
+    return path
+
+
+def test_the_nth_values_of_several_lists_make_one_fault(toy: Workspace) -> None:
+    """The first value names the fault; each injection gets its own, in the unit of its variable."""
+    paired(toy)
+    found = faults(toy)
+    assert [(f.value, f.unit) for f in found] == [(3, "m"), (1, "m"), (2, "m")]
+    assert [[dict(i.params)["by"] for i in f.injections] for f in found] == [[3, -10], [1, -20], [2, -5]]
+    assert len({f.id for f in found}) == 3
+
+
+def test_a_list_alone_makes_the_faults_that_it_made_before_lists_could_be_paired(toy: Workspace) -> None:
+    path = paired(toy, "      haste_kph: {values: [36, 72, 18]}\n", "")
+    path.write_text(path.read_text().replace("by_kph: -haste", "by_mps: 1"))
+    assert [f.id for f in faults(toy)] == SINGLE_IDS
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[36, 72, 18]", "[36, 72]", "10: 2 values; expected 3, as many as in `error_m`"),
+        ("[3, 1, 2]", "[3, 1, 3]", "9: 3 twice; expected different values in the first of several lists"),
+        ("haste_kph: {values", "error_kph: {values", "'error' twice; expected draws with different names"),
+        ("-haste", "-hast", "'-hast' for 'by_kph'; expected a number, or 'error' or 'haste', the draws"),
+        (
+            "\n      error_m: {values: [3, 1, 2]}\n      haste_kph: {values: [36, 72, 18]}",
+            " {}",
+            "8: no draw; expected at least one",
+        ),
+    ],
+)
+def test_lists_that_are_no_pairs_are_refused(toy: Workspace, old: str, new: str, said: str) -> None:
+    path = paired(toy, old, new)
+    with pytest.raises(MutatorError) as caught:
+        faults(toy)
+    assert said in str(caught.value).replace(f"{path}:", "")
 
 
 def test_a_spec_outside_the_library_is_loaded_by_path(tmp_path: Path, toy: Workspace) -> None:
