@@ -20,6 +20,7 @@ from mutator.targets.source_tree import read_tree
 from mutator.workspace import Workspace
 
 SOURCE = '''"""How it is tuned."""
+import functools, types
 from dataclasses import dataclass, field
 
 import attrs
@@ -97,6 +98,109 @@ class Decorated:
     k: float = 1.0
 
 
+def copying(kind):
+    values = {key: getattr(kind, key) for key in kind.__annotations__}
+    first = next(iter(values.values()))
+
+    @functools.wraps(kind.__init__)
+    def init(self, **changes):
+        vars(self).update({**values, **changes})
+        self.first = first
+
+    kind.__init__ = init
+    return kind
+
+
+@copying
+class Closed:
+    l: float = 1.0
+
+
+def one_value(kind):
+    m = kind.m
+    kind.start = property(lambda self: m)
+    return kind
+
+
+@one_value
+class Single:
+    m: float = 1.0
+
+
+ALL_DEFAULTS = {}
+
+
+class Base:
+    by_class = {}
+
+    def __init_subclass__(cls):
+        cls.defaults = {key: getattr(cls, key) for key in vars(cls) if not key.startswith("_")}
+        ALL_DEFAULTS[cls.__name__] = dict(cls.defaults)
+        Base.by_class[cls] = dict(cls.defaults)
+
+
+class Listed(Base):
+    n = 1.0
+
+
+class Below(Listed):
+    o = 1.0
+
+
+class Beside(Base):
+    n = 1.0
+
+
+def generated(kind):
+    names = {}
+    exec(f"def init(self, p={kind.p}): self.p = p", names)
+    names["init"].__defaults__ = (kind.p,)
+    kind.__init__ = names["init"]
+    return kind
+
+
+@generated
+class Generated:
+    p: float = 1.0
+
+
+def derived(kind):
+    return type(kind.__name__, (kind,), {})
+
+
+@derived
+class Replaced:
+    q: float = 1.0
+
+
+def frozen(form):
+    def decorate(kind):
+        kind.defaults = form({key: getattr(kind, key) for key in kind.__annotations__})
+        return kind
+
+    return decorate
+
+
+@frozen(types.MappingProxyType)
+class Frozen:
+    r: float = 1.0
+
+
+@frozen(lambda defaults: tuple(defaults.items()))
+class Paired:
+    s: float = 1.0
+
+
+@lambda kind: kind()
+class Instance:
+    t: float = 1.0
+
+
+class Apart:
+    u = 1.0
+    MODES = {"u": 1.0, "fast": 2.0}
+
+
 class Hiding(type):
     def __new__(kind, name, bases, names):
         made = super().__new__(kind, name, bases, {"kept": (names.pop("w", None),), **names})
@@ -143,6 +247,13 @@ PLACES = {
     "an inherited field of attrs": (at("Defined.e"), lambda m: m.Derived().e),
     "a metaclass's copy": (at("Tabled.h"), lambda m: m.Tabled().h),
     "a decorator's copy": (at("Decorated.k"), lambda m: m.Decorated().k),
+    "a table in a closure": (at("Closed.l"), lambda m: m.Closed().l),
+    "a variable of a closure": (at("Single.m"), lambda m: m.Single().start),
+    "a public table": (at("Listed.n"), lambda m: m.Listed.defaults["n"]),
+    "a module's table by class": (at("Listed.n"), lambda m: m.ALL_DEFAULTS["Listed"]["n"]),
+    "a base's table by class": (at("Listed.n"), lambda m: m.Base.by_class[m.Listed]["n"]),
+    "a generated default": (at("Generated.p"), lambda m: m.Generated().p),
+    "a replaced class": (at("Replaced.q"), lambda m: m.Replaced.q),
 }
 
 
@@ -199,13 +310,37 @@ def test_a_fixed_value_changes_while_the_fault_is_active(
     assert fi.report()["injections"]["a"] == {"first": 1.0, "last": 1.0, "count": 1}
 
 
-def test_a_value_that_a_metaclass_hides_is_reported(load: Callable[..., tuple[Any, Any]]) -> None:
-    """The fault is never counted as active, and the report says why."""
-    _, fi = load(at("Hidden.w"))
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("Hidden.w", "Hiding, the metaclass of Hidden, keeps the value where it cannot be set"),
+        ("Frozen.r", "Frozen keeps a copy of r in a mappingproxy, where it cannot be set"),
+        ("Paired.s", "Paired keeps a copy of s in a tuple, where it cannot be set"),
+        ("Instance.t", "Instance is no class at run time, but of type Instance"),
+    ],
+)
+def test_a_value_that_cannot_be_set_is_reported(
+    load: Callable[..., tuple[Any, Any]], name: str, reason: str
+) -> None:
+    """The fault is never counted as active, no part of it is set, and the report says why."""
+    module, fi = load(at(name))
+    owner, _, key = name.partition(".")
+    original = getattr(getattr(module, owner), key, None)
     fi.observe(t=1.0)
     report = fi.report()
+    assert getattr(getattr(module, owner), key, None) == original
     assert report["injections"]["a"]["count"] == 0
-    assert report["unset"] == {"a": "Hiding, the metaclass of Hidden, keeps the value where it cannot be set"}
+    assert report["unset"] == {"a": reason}
+
+
+def test_tables_of_other_classes_and_other_dicts_stay(load: Callable[..., tuple[Any, Any]]) -> None:
+    """Only copies change: not an equal value of another class, nor a dict with other keys than the fields."""
+    module, fi = load(at("Listed.n"), at("Apart.u"))
+    fi.observe(t=1.0)
+    assert (module.Listed.n, module.Apart.u) == (11.0, 11.0)
+    assert module.Beside.defaults == module.ALL_DEFAULTS["Beside"] == {"n": 1.0}
+    assert module.Below.n == 11.0
+    assert module.Apart.MODES == {"u": 1.0, "fast": 2.0}
 
 
 def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace) -> None:
@@ -224,10 +359,15 @@ def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace)
         "_f: int = attrs.field(default=2, kw_only=True)",
         "h: float = 1.0",
         "k: float = 1.0",
+        "l: float = 1.0",
+        "m: float = 1.0",
+        "n = 1.0",
+        "p: float = 1.0",
+        "q: float = 1.0",
         "return q",
     ]
-    assert lines[6:8] == ["", "LIMIT = 5"]
-    assert lines[8] == '_fi.constant("a", globals(), "LIMIT", lambda original: original + 10)  # fi:a'
+    assert lines[7:9] == ["", "LIMIT = 5"]
+    assert lines[9] == '_fi.constant("a", globals(), "LIMIT", lambda original: original + 10)  # fi:a'
 
 
 @pytest.mark.parametrize(
@@ -237,7 +377,7 @@ def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace)
         (at("q", "Gains.f"), "no default 'q' in Gains.f; expected one of x, y"),
         (at("self", "Gains.h"), "there is none of this kind"),
         (at("x", "Gains.gone"), "no function 'Gains.gone'"),
-        (at("Field.b"), "m.py:31: the constant 'Field.b' cannot be set: the field has no default"),
+        (at("Field.b"), "m.py:32: the constant 'Field.b' cannot be set: the field has no default"),
         (at("Gear.DRIVE"), "its class derives from Enum"),
         (at("COUNT"), "a function also sets it"),
     ],
