@@ -356,13 +356,14 @@ class Record:
     #: the exception that ended the run: `kind`, `message`, `place`
     error: RunError | None = added_field(None)
     patch: str = ""  #: digest of the stored patch; empty without a mutant, and in old records
-    t_end: float | None = added_field(None)  #: when a terminal hazard ended the drive, in s
+    t_end: float | None = added_field(None)  #: when a terminal hazard or a lost value ended the drive, in s
     dev: tuple[tuple[str, float], ...] = added_field(())  #: `max_dev` up to `t_end`; empty without `t_end`
     #: metrics of the manifest and margins of its hazards, if they have a value
     metrics: tuple[tuple[str, float], ...] = added_field(())
     #: (channel, first time in s, largest deviation) of each channel that left its tolerance in the drive
     left: tuple[tuple[str, float, float], ...] = added_field(())
-    #: compared channel that first left its tolerance, and whether it was then `higher` or `lower` than golden
+    #: compared channel that first left its tolerance, and whether it was then `higher` or `lower` than
+    #: golden, or `no_number` (NaN)
     first_change: tuple[str, str] | None = added_field(None)
     #: speeds in m/s by their names in the results, from the activation to the first hazard
     speeds: tuple[tuple[str, float], ...] = added_field(())

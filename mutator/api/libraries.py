@@ -11,6 +11,7 @@ from mutator.checks import fast_engine_check, library_check
 from mutator.checks.check_by_running import findings_from_running
 from mutator.checks.doctor import examine_machine
 from mutator.checks.findings import Finding
+from mutator.checks.unrecorded_values import unrecorded_values_finding
 from mutator.checks.unused_draws_and_parameters import unused_draws_and_parameters_finding
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import parsed_file
@@ -111,7 +112,7 @@ def check_target(
     scenarios: Sequence[str] = (),
 ) -> list[Finding]:
     """Check a target and its faults before a campaign: report what prevents them from running on the fork
-    engines, and entries of `draw` that no injection uses.
+    engines, entries of `draw` that no injection uses, and observed values that no channel records.
 
     With `drive`, also make golden runs of `scenarios` (default: those of the library's campaigns, or all),
     and check whether the target is deterministic, whether the runs reach the statements and triggers of all
@@ -127,7 +128,12 @@ def check_target(
         else [fast_engine_check.import_and_fork_finding(manifest)]
     )
     unused = unused_draws_and_parameters_finding(opened_workspace.specs(), opened_workspace.fault_models())
-    return [*findings, fast_engine_check.unloadable_variants_finding(opened_workspace, manifest), unused]
+    return [
+        *findings,
+        fast_engine_check.unloadable_variants_finding(opened_workspace, manifest),
+        unused,
+        unrecorded_values_finding(manifest),
+    ]
 
 
 def check_hazard_analysis(

@@ -13,6 +13,7 @@ from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, ObservedActivation, Record, Status, Trigger
 from mutator.mutants.mutant_building import build
+from mutator.outcomes.lost_values import LOST_VALUE_PREFIX
 from mutator.outcomes.verdict_rules import EventTimes, outcome_of
 from mutator.preflight import equivalence_check
 from mutator.store import plan_file
@@ -160,7 +161,7 @@ def _failed_run_contradictions(record: Record) -> _Contradictions:
         "t_manifest": record.t_manifest,
         "max_dev": record.max_dev,
         "dev": record.dev,
-        "t_end": record.t_end,
+        "t_end": None if record.detail.startswith(LOST_VALUE_PREFIX) else record.t_end,
         "metrics": record.metrics,
         "left": record.left,
         "hazards": record.hazards,

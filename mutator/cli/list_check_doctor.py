@@ -177,8 +177,9 @@ def check(
     """Check the library, templates and anchors against the target.
 
     Prints each problem with its file and line. If there is none, lists what prevents the target or its faults
-    from running on the fork engines, and entries of `draw` that no injection uses. The exit code is 1 if
-    there is a problem, or if a golden run or canary would stop a campaign from starting.
+    from running on the fork engines, entries of `draw` that no injection uses, and observed values that no
+    channel records. The exit code is 1 if there is a problem, or if a golden run or canary would stop a
+    campaign from starting.
     """
     terminal = Terminal(as_json)
     if scenario and not drive:

@@ -292,7 +292,8 @@ class ExperimentRunner:
             status, detail = (
                 (Status.HARNESS_ERROR, f"{lost}: {problem}") if problem else (Status.CRASHED, str(lost))
             )
-            return _record_of_mutant_without_outcome(experiment, status, detail, mutant, activation)
+            bare = _record_of_mutant_without_outcome(experiment, status, detail, mutant, activation)
+            return bare if problem else replace(bare, t_end=lost.time_s)
         difference = golden_comparison.compare_traces(
             reference, faulty, self.manifest.compared_channels, time, judged.t_end
         )

@@ -68,17 +68,16 @@ def channel_deviation(golden: Trace, faulty: Trace, channel: Channel, time_chann
     return ChannelDeviation(at, differences, min(first, _first_unequal_time(*times)))
 
 
-def signed_difference(
+def values_at_common_time(
     golden: Trace, faulty: Trace, channel: Channel, time_channel: str, time: float
-) -> float | None:
-    """Return faulty - golden of a channel at this time of both runs; None if either has no number there."""
+) -> tuple[float, float] | None:
+    """Return the golden and the faulty value of a channel at this time; None if a run lacks this time."""
     times = [times_of(trace, channel.name, time_channel) for trace in (golden, faulty)]
     at, values = _values_at_common_times(times, [golden[channel.name], faulty[channel.name]])
     index = int(np.searchsorted(at, time))
     if index == len(at) or at[index] != time:
         return None
-    difference = float(values[1][index]) - float(values[0][index])
-    return None if np.isnan(difference) else difference
+    return float(values[0][index]), float(values[1][index])
 
 
 def _first_unequal_time(golden: np.ndarray, faulty: np.ndarray) -> float:

@@ -1,8 +1,8 @@
 """Finds observed values that a run lost: from some step on they are NaN, or infinite, instead of a number.
 
 A value is observed if the manifest's `observation.values` has it, and visible here if a channel of its name
-records it. Derived values are not judged, because they can be infinite by definition (a headway at
-standstill).
+records it (`check` lists the others). Derived values are not judged, because they can be infinite by
+definition (a headway at standstill).
 """
 
 from collections.abc import Iterator
@@ -13,6 +13,7 @@ import numpy as np
 from mutator.outcomes.trace_loading import Trace, newest_values, values_on_steps
 from mutator.targets.manifest import TargetManifest
 
+LOST_VALUE_PREFIX = "truth: "  # begins the detail of a crash by a lost value
 _TIME_SLACK_S = 1e-9  # times are sums of steps, which round
 
 
@@ -25,7 +26,7 @@ class LostValue:
     time_s: float
 
     def __str__(self) -> str:
-        return f"truth: {self.name} is {self.instead} at {self.time_s:.10g} s"
+        return f"{LOST_VALUE_PREFIX}{self.name} is {self.instead} at {self.time_s:.10g} s"
 
 
 def find_lost_value(
@@ -35,8 +36,9 @@ def find_lost_value(
 
     It is NaN where the golden run's is not, or infinite where the golden run's is finite. A step that the
     golden run does not have is compared with the golden run's newest one. A fault can move the time at which
-    there is something to observe, so NaN before the first number, and in a value that the golden run itself
-    loses, is legitimate.
+    there is something to observe. So NaN before the first number, and in a value that the golden run itself
+    loses, is legitimate, and so is the infinity by which the golden run says in another step that there is
+    nothing. NaN is also what broken arithmetic gives, so it is excused in fewer cases.
     """
     steps, golden_steps = (np.asarray(trace[manifest.time_channel], float) for trace in (faulty, golden))
     lost: list[LostValue] = []
@@ -45,7 +47,8 @@ def find_lost_value(
         golden_values = values_on_steps(golden, name, golden_steps).astype(float)
         reference = newest_values(golden_steps, golden_values, steps)
         is_nan = np.isnan(values) & ~np.isnan(reference) & ~_may_be_nan(golden_values, values)
-        lost_now = is_nan | np.isinf(values) & np.isfinite(reference)
+        is_unexpected = np.isinf(values) & ~np.isin(values, golden_values)
+        lost_now = is_nan | is_unexpected & np.isfinite(reference)
         at = np.flatnonzero(lost_now & _in_drive(steps, t_end))
         if at.size:
             instead = "NaN" if np.isnan(values[at[0]]) else "infinite"

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mutator.model import ObservedActivation
-from mutator.outcomes.golden_comparison import channel_deviation, signed_difference
+from mutator.outcomes.golden_comparison import channel_deviation, values_at_common_time
 from mutator.outcomes.hazards_and_metrics import formula_variables
 from mutator.outcomes.trace_loading import Trace
 from mutator.targets.channels import Channel
@@ -20,6 +20,7 @@ from mutator.targets.stored_phrases import (
     HIGHEST_SPEED,
     LOWER,
     LOWEST_SPEED,
+    NO_NUMBER,
     SPEED_AT_ACTIVATION,
 )
 from mutator.triggers import trace_formulas
@@ -31,19 +32,27 @@ _TIME_SLACK_S = 1e-9  # s; times are sums of steps
 def first_actuator_change(
     golden: Trace, faulty: Trace, channels: Sequence[Channel], time_channel: str, t_manifest: float | None
 ) -> tuple[str, str] | None:
-    """Return the compared channel that left golden at `t_manifest`, and `higher` or `lower`: where its faulty
-    value was. The first of `channels` if there are several.
+    """Return the compared channel that left golden at `t_manifest`, and where its faulty value was: `higher`,
+    `lower`, or `no_number` (NaN). The first of `channels` if there are several.
 
-    None without a manifestation, or if no channel has a direction: one of the runs ended, or has no number.
+    None without a manifestation, or if one of the runs ended, or if only the golden run has no number.
     """
     if t_manifest is None:
         return None
     for channel in channels:
         if channel_deviation(golden, faulty, channel, time_channel).t_first == t_manifest:
-            difference = signed_difference(golden, faulty, channel, time_channel, t_manifest)
-            if difference:
-                return channel.name, HIGHER if difference > 0.0 else LOWER
+            values = values_at_common_time(golden, faulty, channel, time_channel, t_manifest)
+            if values and (change := _change(*values)):
+                return channel.name, change
     return None
+
+
+def _change(golden: float, faulty: float) -> str | None:
+    if math.isnan(faulty):
+        return None if math.isnan(golden) else NO_NUMBER
+    if faulty == golden or math.isnan(golden):
+        return None
+    return HIGHER if faulty > golden else LOWER
 
 
 def speeds_after_activation(

@@ -22,6 +22,7 @@ from mutator.targets.stored_phrases import (
     HIGHEST_SPEED,
     LATER_HOLE,
     LOWEST_SPEED,
+    NO_NUMBER,
     SPEED_AT_ACTIVATION,
     Phrases,
 )
@@ -152,6 +153,8 @@ class ExperimentSentences:
         name, change = row.get("first_actuator") or "", row.get("first_change") or ""
         if not (name and change):
             return ""
+        if change == NO_NUMBER:
+            return f"`{name}` becomes NaN"
         phrase = self.phrases.actuators.get(name, {}).get(change, ())
         text = fill_phrase(phrase, _speed_texts(row, has_hazard=has_hazard))
         return text or f"`{name}` is {change} than in the golden run"

@@ -47,7 +47,7 @@ class ResultRow:
     severity: str = ""  # highest class of a hazard in the drive
     severity_label: str = ""  # the class in words, if a scale is known
     delta_v: float | None = None  # delta-v of that contact in m/s
-    t_end: float | None = None  # when a terminal hazard ended the drive
+    t_end: float | None = None  # when a terminal hazard or a lost value ended the drive
     margins: tuple[tuple[str, float], ...] = ()  # by hazard: those that occurred or, if none did, all
     sentence: str = ""  # what happened, in words; '' if the phrases are unknown
 

@@ -74,7 +74,7 @@ FIRST_CHANGE_COLUMNS = (
         "first_change",
         "text",
         "",
-        "whether it was then `higher` or `lower` than in the golden run",
+        "whether it was then `higher` or `lower` than in the golden run, or `no_number` (NaN)",
         lambda f: f.record.first_change[1] if f.record.first_change else None,
     ),
 )

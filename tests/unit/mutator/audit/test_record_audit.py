@@ -59,6 +59,7 @@ def test_deviations_must_fit_the_target_and_the_drive(
         {"outcome": Outcome.HAZARD, "hazards": (("H3", 2.5),), "alerts": (("fcw", 2.0), ("lane", 2.0))},
         BAD_END | {"status": Status.TIMEOUT, "detail": "stopped"},
         BAD_END | {"status": Status.CRASHED, "activation": ObservedActivation(first=2.0, last=3.0, count=5)},
+        BAD_END | {"status": Status.CRASHED, "detail": "truth: gap is NaN at 2.5 s", "t_end": 2.5},
     ],
 )
 def test_a_valid_record_is_not_reported(record: MakeRecord, fields: dict[str, Any]) -> None:
@@ -87,6 +88,10 @@ def test_a_valid_record_is_not_reported(record: MakeRecord, fields: dict[str, An
         ({"max_dev": (("gas", 0.1), ("brake", 0.0))}, "gas differs, but no manifestation is recorded"),
         (BAD_END | {"status": Status.CRASHED, "outcome": Outcome.SDC}, "outcome sdc; expected none, because"),
         (BAD_END | {"status": Status.TIMEOUT, "trace_digest": "f"}, "trace_digest f; expected none"),
+        (
+            BAD_END | {"status": Status.CRASHED, "detail": "ValueError", "t_end": 2.5},
+            "t_end 2.5; expected none",
+        ),
     ],
 )
 def test_contradictions_are_reported_with_their_line(

@@ -328,10 +328,12 @@ def test_an_observed_value_that_becomes_nan_ends_the_drive(
     record = judged(ran=RAN, trace={"gap": np.where(np.arange(20) < 7, 0.0, np.nan)})
     assert (record.status, record.outcome, record.metrics) == (Status.CRASHED, None, ())
     assert record.detail == "truth: d_rel is NaN at 0.35 s"
+    assert record.t_end == pytest.approx(0.35)
     assert record.activation == ObservedActivation(first=0.2, last=0.5, count=5)
     early = judged(ran=RAN, trace={"gap": np.where(np.arange(20) < 3, 0.0, np.nan)})
     assert early.status is Status.HARNESS_ERROR
     assert early.detail.startswith("truth: d_rel is NaN at 0.15 s: ")
+    assert early.t_end is None
 
 
 @pytest.mark.usefixtures("with_observed_channel")

@@ -49,13 +49,18 @@ def trace(d_rel: list[float], v_ego: list[float] | None = None, hwt: float = 1.0
         ([NAN, 8, 7], [9, NAN, 7], "truth: d_rel is NaN at 0.05 s"),
         ([9, NAN, 7], [9, INF, NAN], None),
         ([9, NAN, 7], [9, NAN, INF], "truth: d_rel is infinite at 0.1 s"),
+        ([9, 8, INF], [9, INF, INF], None),
+        ([INF, 8, 7], [INF, INF, 7], None),
+        ([INF, 8, 7], [INF, 8, INF], None),
+        ([9, 8, INF], [9, -INF, INF], "truth: d_rel is infinite at 0.05 s"),
+        ([INF, 8, 7], [INF, 8, NAN], "truth: d_rel is NaN at 0.1 s"),
     ],
 )
 def test_a_value_is_lost_where_the_golden_run_has_one(
     manifest: TargetManifest, golden: list[float], faulty: list[float], text: str | None
 ) -> None:
     """NaN counts unless golden has NaN in that step, or it can mean that there is nothing to observe (yet);
-    infinity counts only where golden is finite."""
+    infinity counts where golden is finite, unless golden is infinite in the same way in another step."""
     lost = find_lost_value(manifest, trace(golden), trace(faulty), None)
     assert (str(lost) if lost else None) == text
 

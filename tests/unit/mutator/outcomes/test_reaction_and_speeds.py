@@ -26,7 +26,8 @@ def changed(**values: list[float]) -> Trace:
         ({"gas": [0.2, 0.2, 0.3, 0.0, 0.0, 0.0]}, 0.2, ("gas", "higher")),
         ({"gas": [0.2, 0.2, 0.3, 0.2, 0.2, 0.2], "brake": [0.1, 0.0, *[0.1] * 4]}, 0.1, ("brake", "lower")),
         ({"gas": [0.2, 0.1, 0.2, 0.2, 0.2, 0.2], "brake": [0.1, 0.3, *[0.1] * 4]}, 0.1, ("gas", "lower")),
-        ({"gas": [0.2, np.nan, 0.2, 0.2, 0.2, 0.2]}, 0.1, None),
+        ({"gas": [0.2, np.nan, 0.2, 0.2, 0.2, 0.2]}, 0.1, ("gas", "no_number")),
+        ({"gas": [0.2, -np.inf, 0.2, 0.2, 0.2, 0.2]}, 0.1, ("gas", "lower")),
         ({}, None, None),
     ],
 )  # fmt: skip
@@ -42,6 +43,8 @@ def test_a_run_that_only_ended_early_has_no_direction() -> None:
     """Where one run has no value, nobody knows whether it was higher or lower."""
     short = {name: values[:3] for name, values in GOLDEN.items()}
     assert first_actuator_change(GOLDEN, short, (GAS, BRAKE), "t", 0.3) is None
+    golden = changed(gas=[np.nan, np.nan, 0.2, 0.2, 0.2, 0.2])
+    assert first_actuator_change(golden, GOLDEN, (GAS,), "t", 0.0) is None
 
 
 def test_speeds_cover_the_time_from_activation_to_the_end(clone: Workspace) -> None:

@@ -128,6 +128,10 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
         HAZARD | {"first_change": "lower", "lowest_speed": 0.29},
         f"{START} The car gives less gas and touches the lead 4.46 s later at 19.60 m/s (severe). No alert.",
     ),
+    "an actuator that becomes NaN": (
+        NO_HAZARD | {"first_change": "no_number"},
+        f"{START} `gas` becomes NaN. No hazard follows. No alert.",
+    ),
     "an actuator without a phrase": (
         NO_HAZARD | {"first_actuator": "horn", "first_change": "lower"},
         f"{START} `horn` is lower than in the golden run. No hazard follows. No alert.",
