@@ -143,7 +143,8 @@ def try_file(path: Path, models: FaultModels, figures: Figures) -> None:
 
 def python_files(folders: list[Path]) -> Iterator[Path]:
     for folder in folders:
-        yield from sorted(path for path in folder.rglob("*.py") if path.is_file())
+        # a link's file is tried where it is
+        yield from sorted(path for path in folder.rglob("*.py") if path.is_file() and not path.is_symlink())
 
 
 def print_figures(figures: Figures) -> None:

@@ -61,7 +61,7 @@ def main() -> int:
     null = build(manifest, workspace.fault_models(), None, always_trigger()).files
     (changed,) = null.keys() - {probe_path(manifest.probe_package)}
     with tempfile.TemporaryDirectory() as folder:
-        base = JobTreePool(manifest.tree, Path(folder))
+        base = JobTreePool(manifest.tree, Path(folder), manifest.entry_module)
         trees = {"pristine": Path(folder, "pristine"), "null mutant": Path(folder, "null")}
         base.lay_out_tree(trees["pristine"], {})
         base.lay_out_tree(trees["null mutant"], null)

@@ -1,6 +1,7 @@
 """The trees in which an engine runs its jobs, made of a target's pristine files.
 
-Nothing in a tree is shared: each engine compiles the bytecode itself, and writes trees of its own. Writing a
+Nothing in a tree is shared: each process compiles the bytecode itself, when its first tree is laid out, and
+writes trees of its own. No bytecode is kept for later commands: a mutant could exchange it. Writing a
 tree takes up to a fifth of a run's time, so a tree that its run left unchanged (`job_tree`) is used again. It
 is moved to the next run, not linked: a link would change the ctime of every file. All this, with the search
 for changes, takes a third of the time that an engine took before to link and delete a tree.
@@ -11,6 +12,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
+from threading import Lock
 
 from mutator._common.files import is_disk_full_error, remove_anything_at, remove_folder
 from mutator.engines import pyc_files
@@ -19,11 +21,16 @@ from mutator.targets.source_tree import SourceTree
 
 
 class JobTreePool:
-    """A target's files, with bytecode that this process compiled. Unused trees wait in `work_folder`."""
+    """A target's files, with bytecode that this process compiled of what the `entry_module` imports.
 
-    def __init__(self, tree: SourceTree, work_folder: Path) -> None:
-        self._source_files = tree.files
-        self._files_with_bytecode = pyc_files.files_with_bytecode(tree)
+    Unused trees wait in `work_folder`.
+    """
+
+    def __init__(self, tree: SourceTree, work_folder: Path, entry_module: str) -> None:
+        self._source_tree = tree
+        self._entry_module = entry_module
+        self._files_with_bytecode: Mapping[str, bytes] = {}  # empty until a tree needs it
+        self._compile_lock = Lock()
         self._work_folder = work_folder
         self._unused_trees: list[JobTree] = []  # threads share it, which `pop` and `append` allow
         self._tree_numbers = count()
@@ -36,7 +43,7 @@ class JobTreePool:
         With `fresh`, no earlier run has used it, and it has no bytecode that anybody could exchange.
         """
         folder.parent.mkdir(parents=True, exist_ok=True)
-        pristine = self._source_files if fresh else self._files_with_bytecode
+        pristine = self._source_tree.files if fresh else self._compiled_files()
         if fresh or not self._reuse_tree(folder, changed_files):
             pyc_files.write_files(pristine, folder)
             pyc_files.replace_dropping_bytecode(changed_files, folder)
@@ -65,6 +72,14 @@ class JobTreePool:
     def close(self) -> None:
         while self._unused_trees:
             remove_folder(self._unused_trees.pop().folder)
+
+    def _compiled_files(self) -> Mapping[str, bytes]:
+        with self._compile_lock:
+            if not self._files_with_bytecode:
+                self._files_with_bytecode = pyc_files.files_with_bytecode(
+                    self._source_tree, self._entry_module
+                )
+            return self._files_with_bytecode
 
     def _reuse_tree(self, folder: Path, changed_files: Mapping[str, bytes]) -> bool:
         while self._unused_trees:

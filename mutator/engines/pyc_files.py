@@ -9,19 +9,30 @@ import sys
 from collections.abc import Iterable, Mapping
 from importlib.util import MAGIC_NUMBER, source_hash
 from pathlib import Path
+from typing import NamedTuple
 
+from mutator.engines.imported_files import ModuleNames, files_imported_by, module_names_in
 from mutator.targets.source_tree import SourceTree
 
 # flags of a .pyc file (PEP 552): it has a hash of its source, and imports check it
 _CHECKED_HASH_FLAGS = (0b11).to_bytes(4, "little")
 
 
-def files_with_bytecode(tree: SourceTree) -> dict[str, bytes]:
-    """Return the files of a tree (relative path -> content) and the bytecode of its Python files."""
+class _CompiledFile(NamedTuple):
+    pyc: bytes  # empty if the file does not compile
+    names: ModuleNames
+
+
+def files_with_bytecode(tree: SourceTree, entry_module: str) -> dict[str, bytes]:
+    """Return the files of a tree (relative path -> content), and the bytecode of those that a run imports.
+
+    Compiling is most of the work for a large tree, of which a run loads few files.
+    """
+    python_files = (name for name in tree.files if name.endswith(".py"))
     files = dict(tree.files)
-    for name in tree.files:
-        if name.endswith(".py") and (code := tree.derive_once(name, _compile_to_pyc)):
-            files[bytecode_path(name)] = code
+    for name in files_imported_by(python_files, entry_module, lambda path: _compiled(tree, path).names):
+        if pyc := _compiled(tree, name).pyc:
+            files[bytecode_path(name)] = pyc
     return files
 
 
@@ -51,10 +62,15 @@ def remove_files(names: Iterable[str], tree: Path) -> None:
         (tree / name).unlink(missing_ok=True)
 
 
-def _compile_to_pyc(name: str, data: bytes, _: Path) -> bytes:
+def _compiled(tree: SourceTree, name: str) -> _CompiledFile:
+    return tree.derive_once(name, _compile_file)
+
+
+def _compile_file(name: str, data: bytes, _: Path) -> _CompiledFile:
     """Compile a file. Errors are ignored, because importing the file reports them."""
     try:
         code = compile(data, name, "exec", dont_inherit=True, optimize=0)
     except Exception:
-        return b""
-    return MAGIC_NUMBER + _CHECKED_HASH_FLAGS + source_hash(data) + marshal.dumps(code)
+        return _CompiledFile(b"", ModuleNames(frozenset(), frozenset()))
+    pyc = MAGIC_NUMBER + _CHECKED_HASH_FLAGS + source_hash(data) + marshal.dumps(code)
+    return _CompiledFile(pyc, module_names_in(code))

@@ -69,7 +69,7 @@ class ReferenceEngine:
         check_own_limits_suffice(limits)
         self.manifest = manifest
         self.work_folder = work_folder.resolve()
-        self._tree_pool = JobTreePool(manifest.tree, self.work_folder)
+        self._tree_pool = JobTreePool(manifest.tree, self.work_folder, manifest.entry_module)
         self.limits = limits
         self._pristine_digests = {path: digest(data) for path, data in manifest.tree.files.items()}
         self._parent_pid = parent_pid

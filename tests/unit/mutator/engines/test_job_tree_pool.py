@@ -2,10 +2,13 @@
 
 import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from mutator.engines import pyc_files
 from mutator.engines.job_tree import JobTree
 from mutator.engines.job_tree_pool import JobTreePool
 from mutator.targets.source_tree import read_tree
@@ -18,9 +21,9 @@ CHANGED = {"car/go.py": b"stop = 1", "car/_fi.py": b"probe = 1"}
 def base(tmp_path: Path) -> JobTreePool:
     (tmp_path / "root" / "car" / "parts").mkdir(parents=True)
     for name in ("go", "wheel", "parts/door"):
-        (tmp_path / "root" / "car" / f"{name}.py").write_bytes(b"go = 0")
+        (tmp_path / "root" / "car" / f"{name}.py").write_bytes(b"from car import wheel")
     (tmp_path / "root" / "car" / "data.npz").write_bytes(b"data")
-    return JobTreePool(read_tree(tmp_path / "root", ["**/*"]), tmp_path)
+    return JobTreePool(read_tree(tmp_path / "root", ["**/*"]), tmp_path, "car.go")
 
 
 def content(tree: JobTree) -> dict[str, bytes]:
@@ -131,3 +134,23 @@ def test_what_stands_in_the_place_of_an_unused_tree_is_not_used(
     assert not again.first_changed_path()
     assert content(again) == right
     assert before == {path: path.read_bytes() for path in (tmp_path / "aside").rglob("*.py")}
+
+
+def test_only_what_a_run_imports_is_compiled_once_and_when_the_first_tree_needs_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, base: JobTreePool
+) -> None:
+    compiled: list[str] = []
+
+    def compile_and_note(data: bytes, name: str, *rest: object, **flags: Any) -> object:
+        compiled.append(name)
+        return compile(data, name, *rest, **flags)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(pyc_files, "compile", compile_and_note, raising=False)
+    base.lay_out_tree(tmp_path / "fresh" / "tree", CHANGED, fresh=True)
+    assert not compiled
+    with ThreadPoolExecutor(4) as pool:
+        trees = list(pool.map(lambda i: base.lay_out_tree(tmp_path / f"{i}" / "tree", {}), range(4)))
+    assert sorted(compiled) == ["car/go.py", "car/wheel.py"]
+    pristine = content(trees[0])
+    assert {"car/parts/door.py", pyc_files.bytecode_path("car/wheel.py")} < pristine.keys()
+    assert pyc_files.bytecode_path("car/parts/door.py") not in pristine

@@ -250,7 +250,9 @@ def test_stale_bytecode_is_not_run(run: Run, manifest: TargetManifest) -> None:
     body = "from toycar.world import STEP\nraise ValueError(STEP)"
     execution = run({"toycar/world.py": changed, **entry(body)})
     assert execution.detail.startswith("ValueError: 0.06")
-    cached = pyc_files.files_with_bytecode(manifest.tree)[pyc_files.bytecode_path("toycar/world.py")]
+    cached = pyc_files.files_with_bytecode(manifest.tree, manifest.entry_module)[
+        pyc_files.bytecode_path("toycar/world.py")
+    ]
     assert int.from_bytes(cached[4:8], "little") == 0b11, "expected a check by hash"
 
 

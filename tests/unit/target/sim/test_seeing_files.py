@@ -131,7 +131,9 @@ def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
     If a header were missing, for example, the slow Python code would run.
     """
     manifest, target = Workspace.find(root=ROOT).manifest("openpilot"), ROOT / "target"
-    tree = JobTreePool(manifest.tree, tmp_path).lay_out_tree(tmp_path / "tree", {}).folder
+    tree = (
+        JobTreePool(manifest.tree, tmp_path, manifest.entry_module).lay_out_tree(tmp_path / "tree", {}).folder
+    )
     found = {
         source.name: (compiled.file_name(source), compiled.file_name(tree / source.relative_to(target)))
         for source in target.rglob("*.c")
