@@ -59,7 +59,7 @@ def get_params() -> CarParams:
         tire_stiffness_rear=90000.0,
         steer_kp=((0.0,), (0.8 * RAD_TO_DEG,)),
         steer_ki=((0.0,), (0.24 * RAD_TO_DEG,)),
-        steer_kf=0.00006 * RAD_TO_DEG,
+        steer_kf=0.0,  # as in the original, which leaves it for later
         steer_max=1.0,
         steer_actuator_delay=0.1,
         steer_rate_cost=0.5,

@@ -13,8 +13,9 @@ COUNT_ENOUGH = 10.0
 SEEN_STEP = 0.33  # COUNT_ENOUGH is reached after 31 cycles with a lead
 BLINKER_STEP = 10.0 / 60.0  # no blinker for 3 s
 MIN_INTERVAL = 5.0  # s between warnings
-PLAN_NODES = 9  # number of plan nodes (0..2.8 s) checked for braking
 A_HARD = -3.0  # m/s^2, a plan that brakes harder always qualifies
+HARD_NODES = slice(1, 20)  # of the plan: 0.2..9.4 s
+BRAKING_NODES = slice(1, 15)  # 0.2..6.4 s
 A_THRESHOLD = ((0.0, 30.0), (-3.0, -2.0))  # m/s^2 over the lead's speed in m/s
 
 
@@ -42,13 +43,13 @@ class FcwChecker:
         self._seen = self._no_blinker = 0.0
 
     def update(self, t: float, car: CarState, lead: LeadData, a_plan: Sequence[float]) -> bool:
-        """Return whether to warn the driver now; `a_plan` is the planned acceleration (m/s^2)."""
+        """Return whether to warn the driver now; `a_plan` is the planned acceleration at 21 nodes (m/s^2)."""
         self._v_lead_max = max(self._v_lead_max, lead.v_lead)
         if not lead.fcw:
             return False
         allowed = self._count(car, lead)
-        braking = min(a_plan[:PLAN_NODES]) - min(0.0, car.a_ego)
-        hard = min(a_plan) < A_HARD or braking < interp(lead.v_lead, *A_THRESHOLD)
+        braking = min(a_plan[BRAKING_NODES]) - min(0.0, car.a_ego)
+        hard = min(a_plan[HARD_NODES]) < A_HARD or braking < interp(lead.v_lead, *A_THRESHOLD)
         if allowed and hard and t - self._last_warning > MIN_INTERVAL:
             self._last_warning = t
             return True

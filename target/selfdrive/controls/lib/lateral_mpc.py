@@ -41,7 +41,7 @@ class LateralMpc:
     A non-finite solution (lanes hundreds of metres away, NaN in the input) gives NaN for both angles; the
     next update restarts from the measured angle. If the problem has no solution (a heading or wheel angle too
     far out of bounds for the steering rate) or is badly conditioned (lanes more than about 20 m from the
-    plan), the previous steering rates are kept, and `unsolved` is incremented.
+    plan), it is solved without the bounds of heading and wheel angle, and `unsolved` is incremented.
     """
 
     def __init__(self, params: CarParams) -> None:

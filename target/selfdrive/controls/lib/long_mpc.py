@@ -20,6 +20,7 @@ LEAD_STEADY_ACCEL = 0.5  # m/s^2; less is treated as zero
 LEAD_STOPPED_SPEED = 0.1  # m/s
 LEAD_JUMP = 2.5  # m between updates; more means a different car
 NO_LEAD_GAP, NO_LEAD_SPEED = 50.0, 10.0  # m, m/s faster than the host: a lead without influence
+CHECKED_NODES = slice(1, 20)  # nodes whose gap and speed are checked: 0.2..9.4 s, as in the original
 CRASH_GAP = -50.0  # m
 BACKWARDS_SPEED = -0.01  # m/s
 
@@ -34,7 +35,8 @@ class LongitudinalMpc:
     every 0.6 s), and `resets` (the number of discarded solutions).
 
     A solution is discarded if it is not finite or if, for a real lead, it passes 50 m through the lead or
-    drives backwards. Then `v_mpc` and `a_mpc` are the car's, and the next update restarts with a new lead.
+    drives backwards between 0.2 and 9.4 s. Then `v_mpc` and `a_mpc` are the car's, and the next update
+    restarts with a new lead.
 
     v >= 0 is required at all nodes except the first, where it can be slightly negative, as in the original at
     the end of a stop. Jerk has no limit, so the problem is always feasible. If the solver still fails, the
@@ -120,8 +122,8 @@ class LongitudinalMpc:
         self.v_mpc_future = self.v_plan[FUTURE_NODE]
 
     def _runs_into_lead(self) -> bool:
-        gap = min(map(sub, self.x_lead_plan, self.x_plan))
-        return gap < CRASH_GAP or min(self.v_plan) < BACKWARDS_SPEED
+        gap = min(map(sub, self.x_lead_plan[CHECKED_NODES], self.x_plan[CHECKED_NODES]))
+        return gap < CRASH_GAP or min(self.v_plan[CHECKED_NODES]) < BACKWARDS_SPEED
 
     def _discard(self, v_ego: float, a_ego: float) -> None:
         self.resets += 1

@@ -9,7 +9,7 @@
 #include <string.h>
 #include "mpc_generated.h"
 
-enum { N = 20, SHORT_INTERVALS = 5, STATES = 6, RESIDUALS = 5, ROWS = 2 * N };
+enum { N = 20, SHORT_INTERVALS = 5, STATES = 6, RESIDUALS = 5, ROWS = 2 * N, SWEEPS = 100 };
 
 static const double FEASIBILITY_TOL = 1e-3, STATIONARITY_TOL = 1e-6, LARGEST = 1e100, LARGEST_GRADIENT = 1e300;
 
@@ -272,7 +272,7 @@ INLINE void condense(
     }
 }
 
-/* `_solve_program`: the minimiser and 1, or zeros and 0 if there is none. */
+/* `_solve_program`: the minimiser and 1, or the fallback and 0 if none is found. */
 INLINE double solve(const Model model, Quadprog *quadprog, Condensed *of, const double *u, double *x)
 {
     const int rows = N * model.bounded;
@@ -317,6 +317,13 @@ INLINE double solve(const Model model, Quadprog *quadprog, Condensed *of, const 
     const int solved = slope <= STATIONARITY_TOL * (1.0 + largest) && excess <= FEASIBILITY_TOL && square < LARGEST;
     if (!solved)
         memset(x, 0, N * sizeof *x);
+    for (int sweep = 0; !solved && !isinf(model.control_bound) && sweep < SWEEPS; sweep++)
+        for (int i = 0; i < N; i++) {
+            slope = of->gradient[i];
+            for (int j = 0; j < N; j++)
+                slope += of->h[i][j] * x[j];
+            x[i] = fmin(fmax(x[i] - slope / of->h[i][i], lower[i]), upper[i]);
+        }
     return solved;
 }
 

@@ -30,8 +30,8 @@ class Iteration:
     """Runs a solver on its own buffers and keeps the trajectory between iterations.
 
     The next iteration linearises at the trajectory `guess`; `solution` is the last one computed: the states
-    node by node, then the controls. `unsolved` counts finite iterations without a solution, which keep the
-    controls.
+    node by node, then the controls. `unsolved` counts finite iterations without a solution, which use the
+    solver's fallback.
     """
 
     def __init__(self, solver: Solver) -> None:

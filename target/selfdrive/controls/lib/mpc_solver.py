@@ -13,6 +13,7 @@ import casadi as ca
 
 FEASIBILITY_TOL = 1e-3  # in the units of the bounds; DAQP's own tolerance is 1e-6 of its scaled rows
 STATIONARITY_TOL = 1e-6  # relative to the gradient
+SWEEPS = 100  # of the fallback; a problem with lanes 30 m away needs 73
 LARGEST = 1e100  # largest square sum of a meaningful trajectory
 LARGEST_GRADIENT = 1e300
 
@@ -159,16 +160,18 @@ def _shifted(ocp: Ocp, integrate: ca.Function, new: ca.MX, p: ca.MX) -> ca.MX:
 
 
 def _solve_program(
-    name: str, hessian: ca.MX, gradient: ca.MX, rows: ca.MX, bounds: tuple[ca.MX, ca.MX, ca.MX, ca.MX]
+    ocp: Ocp, hessian: ca.MX, gradient: ca.MX, rows: ca.MX, bounds: tuple[ca.MX, ca.MX, ca.MX, ca.MX]
 ) -> tuple[ca.MX, ca.MX]:
-    """The minimiser of the quadratic program and 1, or zeros and 0 if there is none.
+    """The minimiser of the quadratic program and 1, or a fallback and 0 if none is found.
+
+    The fallback changes bounded controls as if states had no bounds, and keeps unbounded ones.
 
     CasADi's plug-in does not report success inside a graph, so the optimality conditions are tested here. Its
     input checks are off, because they would raise on NaN; here, NaN is reported as not solved.
     """
     low, high, x_low, x_high = bounds
     options = {"error_on_fail": False, "inputs_check": False}
-    qp = ca.conic(name, "daqp", {"h": hessian.sparsity(), "a": rows.sparsity()}, options)
+    qp = ca.conic(ocp.name, "daqp", {"h": hessian.sparsity(), "a": rows.sparsity()}, options)
     sol = qp(h=hessian, g=gradient, a=rows, lba=low, uba=high, lbx=x_low, ubx=x_high)
     x = sol["x"]
     slope = ca.norm_inf(hessian @ x + gradient + rows.T @ sol["lam_a"] + sol["lam_x"])
@@ -176,15 +179,37 @@ def _solve_program(
     excess = ca.mmax(ca.vertcat(low - at, at - high, x_low - x, x - x_high))
     stationary = slope <= STATIONARITY_TOL * (1 + ca.norm_inf(gradient))
     solved = stationary * (excess <= FEASIBILITY_TOL) * (ca.sumsqr(x) < LARGEST)
-    return ca.if_else(solved, x, ca.MX.zeros(x.shape)), solved
+    kept = ca.MX.zeros(x.shape)
+    if math.isinf(ocp.control_bound):
+        return ca.if_else(solved, x, kept), solved
+    descend = _descent(ocp.n_control).fold(SWEEPS)
+    return ca.if_else(solved, x, descend(kept, hessian, gradient, x_low, x_high), True), solved
+
+
+def _descent(n: int) -> ca.Function:
+    """(x, Hessian, gradient, lowest, highest x) -> x after one sweep of projected coordinate descent.
+
+    Each element goes to its best value within its bounds. Unlike active-set methods, this works at any
+    condition of the Hessian.
+    """
+    x, h, g = ca.SX.sym("x", n), ca.SX.sym("h", n, n), ca.SX.sym("g", n)
+    low, high = ca.SX.sym("low", n), ca.SX.sym("high", n)
+    new = ca.vertsplit(x)
+    for i in range(n):
+        slope = g[i]
+        for j in range(n):
+            slope += h[i, j] * new[j]
+        new[i] = ca.fmin(ca.fmax(new[i] - slope / h[i, i], low[i]), high[i])
+    return ca.Function("descent", [x, h, g, low, high], [ca.vertcat(*new)])
 
 
 def build_solver(ocp: Ocp) -> ca.Function:
     """Return one iteration: (trajectory, first state, p) -> (new trajectory, next guess, (solved, finite)).
 
-    `solved` is 0 when the program has no solution (bounds that cannot be met) or is too badly conditioned;
-    the controls are then unchanged. `finite` is 0 for NaN or infinity in the input or the result; the
-    trajectories are then meaningless. Equal inputs give equal bytes in any order of calls.
+    `solved` is 0 when the program has no solution (bounds that cannot be met) or is too badly conditioned for
+    DAQP; then bounded controls are chosen as if states had no bounds, and unbounded ones are kept. `finite`
+    is 0 for NaN or infinity in the input or the result; the trajectories are then meaningless. Equal inputs
+    give equal bytes in any order of calls.
     """
     n, nx = ocp.n_control, ocp.n_state
     old, z0 = ca.MX.sym("old", ocp.n_trajectory), ca.MX.sym("z0", nx)
@@ -196,7 +221,7 @@ def build_solver(ocp: Ocp) -> ca.Function:
     index, low, high = (list(values) for values in zip(*bounded, strict=True))
     rows, now, u = derivative[index, :], states[index], old[nx * (n + 1) :]
     bounds = (low - now, high - now, -ocp.control_bound - u, ocp.control_bound - u)
-    du, solved = _solve_program(ocp.name, hessian, gradient, rows, bounds)
+    du, solved = _solve_program(ocp, hessian, gradient, rows, bounds)
 
     new = ca.vertcat(states + derivative @ du, u + du)
     following = _shifted(ocp, integrators[ocp.intervals[-1][0]], new, p) if ocp.shift else new

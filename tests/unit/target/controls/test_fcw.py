@@ -8,7 +8,7 @@ from selfdrive.messages import CarState, LeadData
 
 CAR = CarState(v_ego=20.0, a_ego=0.0)
 LEAD = LeadData(status=True, d_rel=20.0, v_rel=-10.0, v_lead=10.0, v_lead_k=10.0, fcw=True)
-BRAKING = (0.0, -1.0, -2.0, -3.1, -3.1, -3.1, -3.1, -3.1, -3.1, -1.0, 0.0)
+BRAKING = (0.0, -1.0, -2.0, -3.1, -3.1, -3.1, -3.1, -3.1, -3.1, -1.0, *(0.0,) * 11)
 
 
 def warnings(
@@ -79,9 +79,12 @@ def test_a_condition_must_hold_for_ten_cycles(
         ((-2.0,) * 21, 0.0, 0),  # the threshold at 10 m/s is -2.67
         ((-2.7,) * 21, 0.0, 1),
         ((-2.7,) * 21, -0.5, 0),  # the car's current braking is subtracted
-        ((0.0,) * 8 + (-2.7,) * 13, 0.0, 1),  # at 2.8 s
-        ((0.0,) * 9 + (-2.9,) * 12, 0.0, 0),  # late
-        ((0.0,) * 9 + (-3.1,) * 12, 0.0, 1),  # late but hard
+        ((-3.1,) + (0.0,) * 20, 0.0, 0),  # the first node is ignored
+        ((0.0, -2.7) + (0.0,) * 19, 0.0, 1),
+        ((0.0,) * 14 + (-2.7,) * 7, 0.0, 1),  # at 6.4 s
+        ((0.0,) * 15 + (-2.9,) * 6, 0.0, 0),  # late
+        ((0.0,) * 19 + (-3.1,) * 2, 0.0, 1),  # late but hard, at 9.4 s
+        ((0.0,) * 20 + (-3.1,), 0.0, 0),  # the last node is ignored
     ],
 )
 def test_a_warning_needs_a_plan_that_brakes_hard(

@@ -1,5 +1,6 @@
 """Lateral control steers towards the angle that the lateral MPC plans."""
 
+from dataclasses import replace
 from math import nan
 
 import pytest
@@ -47,10 +48,15 @@ def test_torque_follows_the_gains_per_degree(params: CarParams) -> None:
 
 
 def test_feedforward_grows_with_lateral_acceleration(params: CarParams) -> None:
+    """As in the original, this car has none."""
     for v_ego in (10.0, 30.0):
-        lateral, _ = control(params, -2.0)
-        car = CarState(v_ego=v_ego, steering_angle=lateral.angle_desired)
-        assert lateral.update(car, True) == pytest.approx(-2.0 * 0.00006 * v_ego**2)
+        for tuned, torque in (
+            (params, 0.0),
+            (replace(params, steer_kf=0.003), -0.006 * DEG_TO_RAD * v_ego**2),
+        ):
+            lateral, _ = control(tuned, -2.0)
+            car = CarState(v_ego=v_ego, steering_angle=lateral.angle_desired)
+            assert lateral.update(car, True) == pytest.approx(torque)
 
 
 def test_a_nan_angle_gives_full_torque_to_the_left(params: CarParams) -> None:

@@ -2,6 +2,7 @@
 
 import math
 import random
+from itertools import pairwise
 
 import pytest
 from selfdrive.car.honda.interface import get_params
@@ -131,15 +132,31 @@ def test_a_discarded_plan_has_no_later_effect(lateral_mpc, lanes):
     assert outcomes[0] == outcomes[1]
 
 
-def test_an_unsolvable_problem_keeps_the_planned_rates(lateral_mpc, lanes):
-    """A heading of more than 90 degrees has no solution."""
+def test_an_infeasible_problem_steers_back_as_fast_as_allowed(lateral_mpc, lanes):
+    """A heading of more than 90 degrees to the left has no solution."""
     drive(lateral_mpc, lanes(2.0), times=3)
-    planned = list(lateral_mpc._iteration.guess[84:])
     delta = lateral_mpc.delta_desired
     drive(lateral_mpc, lanes(2.0), angle=60.0)
     assert lateral_mpc.unsolved == 1
     assert not lateral_mpc.nans
-    assert lateral_mpc.delta_desired == pytest.approx(delta + 0.05 * planned[0], abs=1e-12)
+    assert lateral_mpc.delta_desired == pytest.approx(delta - 0.05 * 0.1, abs=1e-12)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_line_far_on_the_other_side_is_followed_as_fast_as_allowed(lateral_mpc, lanes, side):
+    """A line 30 m or more on the wrong side makes the problem ill-conditioned.
+
+    The original turns the wheels at its limit of 0.1 rad/s there, so the angle does not waver.
+    """
+    drive(lateral_mpc, lanes(), times=3)
+    angles = [lateral_mpc.delta_desired]
+    for k in range(1, 21):
+        line, other = (0.0, 0.0, 0.0, -side * (1.85 - 12.0 * k)), (0.0, 0.0, 0.0, side * 1.85)
+        lines, probs = ((line, other), (1.0, 0.0)) if side < 0 else ((other, line), (0.0, 1.0))
+        drive(lateral_mpc, Lanes(*lines, (0.0, 0.0, 0.0, 0.0), *probs, 3.7))
+        angles.append(lateral_mpc.delta_desired)
+    assert lateral_mpc.unsolved > 10
+    assert [b - a for a, b in pairwise(angles)] == pytest.approx([side * 0.005] * 20, abs=1e-6)
 
 
 def test_a_reset_instance_behaves_like_a_new_one(lateral_mpc, lanes):

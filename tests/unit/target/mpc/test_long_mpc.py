@@ -4,6 +4,7 @@ import csv
 import math
 import os
 import random
+from array import array
 from pathlib import Path
 
 import pytest
@@ -165,13 +166,34 @@ def test_a_plan_through_the_lead_is_discarded(long_mpc, lead):
     assert long_mpc.prev_lead_status
 
 
-def test_a_backward_plan_is_discarded_only_with_a_lead(long_mpc, lead):
-    drive(long_mpc, -0.02, 0.0, None, 1)
-    assert long_mpc.resets == 0
-    drive(long_mpc, -0.009, 0.0, lead(10.0, 0.0), 1)
-    assert long_mpc.resets == 0
-    drive(long_mpc, -0.02, 0.0, lead(10.0, 0.0), 1)
-    assert long_mpc.resets == 1
+class FixedSolution:
+    """An iteration whose solution drives 10 m/s behind a lead 20 m ahead, except at one node."""
+
+    unsolved = 0
+
+    def __init__(self, node, gap=20.0, speed=10.0):
+        z = [value for _ in range(21) for value in (0.0, 10.0, 0.0, 20.0, 10.0, 0.0)]
+        z[6 * node + 1], z[6 * node + 3] = speed, gap
+        self.guess = array("d", z + [0.0] * 20)
+        self.solution = self.guess
+
+    def run(self, start, param):
+        return True
+
+    def restart(self, nodes=None):
+        pass
+
+
+@pytest.mark.parametrize("node", range(21))
+def test_a_plan_is_checked_between_its_first_and_last_node(long_mpc, lead, node):
+    """The original checks nodes 1 to 19, each for a gap below -50 m and for a speed below -0.01 m/s."""
+    for change, bad in (({"gap": -50.1}, True), ({"gap": -49.9}, False), ({"speed": -0.011}, True)):
+        long_mpc.reset()
+        long_mpc._iteration = FixedSolution(node, **change)
+        drive(long_mpc, 10.0, 0.0, None, 1)
+        assert long_mpc.resets == 0
+        drive(long_mpc, 10.0, 0.0, lead(20.0, 10.0), 1)
+        assert long_mpc.resets == int(bad and 1 <= node <= 19)
 
 
 @pytest.mark.parametrize("v", [-0.009, 0.0, 0.05])
