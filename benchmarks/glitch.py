@@ -13,9 +13,15 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "target"))
 
+from selfdrive.car.honda.carstate import SPEED_KALMAN_GAINS  # noqa: E402
+from selfdrive.car.honda.interface import CarInterface  # noqa: E402
 from selfdrive.common.conversions import MPH_TO_MS  # noqa: E402
+from selfdrive.common.kalman import SteadyKalman  # noqa: E402
+from selfdrive.common.realtime import DT_CTRL  # noqa: E402
+from selfdrive.messages import CanFrame  # noqa: E402
 from selfdrive.sim.scenario import PLANTS, load_scenario, with_plant  # noqa: E402
 from selfdrive.sim.simulator import Simulator  # noqa: E402
+from selfdrive.sim.truth import GroundTruth  # noqa: E402
 
 JUMP = 2.0  # m/s; a larger jump resets the mended filter
 SLOWEST = 1e-9  # m/s; the sensor reads 0, but the wheels turn
@@ -52,6 +58,7 @@ def drive(glitch: Glitch, plant: str, *, reset_after_jump: bool = False, gap: fl
     scenario = with_plant(load_scenario(ROOT / "fault_library/scenarios" / f"{glitch.scenario}.yaml"), plant)
     simulator = Simulator()
     simulator.reset(scenario, 0)
+    assert simulator._lead is not None
     simulator._lead.position += gap
     _disturb(simulator, glitch)
     if reset_after_jump:
@@ -67,28 +74,27 @@ def drive(glitch: Glitch, plant: str, *, reset_after_jump: bool = False, gap: fl
 def _disturb(simulator: Simulator, glitch: Glitch) -> None:
     measure = simulator._sensors.measure
 
-    def disturbed(truth, button, frame):
+    def disturbed(truth: GroundTruth, button: int, frame: int) -> list[CanFrame]:
         if 0 <= frame - glitch.start < glitch.steps:
             truth = truth._replace(v_ego=max(truth.v_ego - glitch.mph * MPH_TO_MS, SLOWEST))
         return measure(truth, button, frame)
 
-    simulator._sensors.measure = disturbed
+    setattr(simulator._sensors, "measure", disturbed)  # noqa: B010
+
+
+class ResettingFilter(SteadyKalman):
+    """Starts again from a measurement that differs from the estimate by more than JUMP."""
+
+    def update(self, measured: float) -> None:
+        if abs(measured - self.value) > JUMP:
+            self.value, self.rate = measured, 0.0
+        super().update(measured)
 
 
 def _mend_filter(simulator: Simulator) -> None:
-    reader = simulator.manager.controlsd._car._reader
-    speed = reader._speed
-
-    class Resetting:
-        value = property(lambda self: speed.value)
-        rate = property(lambda self: speed.rate)
-
-        def update(self, measured: float) -> None:
-            if abs(measured - speed.value) > JUMP:
-                speed.value, speed.rate = measured, 0.0
-            speed.update(measured)
-
-    reader._speed = Resetting()
+    car = simulator.manager.controlsd._car
+    assert isinstance(car, CarInterface)
+    car._reader._speed = ResettingFilter(0.0, 0.0, dt=DT_CTRL, gains=SPEED_KALMAN_GAINS)
 
 
 def lines() -> Iterator[str]:
