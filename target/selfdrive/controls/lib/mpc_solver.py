@@ -179,11 +179,11 @@ def _solve_program(
     excess = ca.mmax(ca.vertcat(low - at, at - high, x_low - x, x - x_high))
     stationary = slope <= STATIONARITY_TOL * (1 + ca.norm_inf(gradient))
     solved = stationary * (excess <= FEASIBILITY_TOL) * (ca.sumsqr(x) < LARGEST)
-    kept = ca.MX.zeros(x.shape)
+    unchanged = ca.MX.zeros(x.shape)
     if math.isinf(ocp.control_bound):
-        return ca.if_else(solved, x, kept), solved
+        return ca.if_else(solved, x, unchanged), solved
     descend = _descent(ocp.n_control).fold(SWEEPS)
-    return ca.if_else(solved, x, descend(kept, hessian, gradient, x_low, x_high), True), solved
+    return ca.if_else(solved, x, descend(unchanged, hessian, gradient, x_low, x_high), True), solved
 
 
 def _descent(n: int) -> ca.Function:
