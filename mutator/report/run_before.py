@@ -65,7 +65,7 @@ def _find_run_before(folder: RunFolder, ended: datetime) -> tuple[RunFolder, dat
     for path in run_folders(folder.path.resolve().parent):
         if path.name == folder.path.resolve().name:
             continue
-        with suppress(MutatorError, ValueError):
+        with suppress(MutatorError, LookupError, TypeError, ValueError):  # the other run is damaged
             other = RunFolder.open_unverified(path)
             is_alike = (other.head.campaign, other.head.plan) == (folder.head.campaign, folder.head.plan)
             if is_alike and (date := last_ending(other)) and date < ended:

@@ -211,8 +211,9 @@ class RequestChecker:
         if request.only is not None:
             compile_filter(request.only, PLAN_COLUMN_NAMES)
         folder = self._new_folder(request.name)
-        if self.runs.folders_by_key().get(request.name, folder) != folder:
-            # the new run would take the other one's addresses
+        self.runs.folders_by_key()  # the runs that are there come first
+        if self.runs.reserved_key(folder) != request.name:
+            # open pages of the other run would read the new one
             raise MutatorError(
                 f"a run '{request.name}' in another folder",
                 where="name",

@@ -9,7 +9,7 @@ from starlette.responses import HTMLResponse, Response
 
 from mutator._common.bounded_reading import read_open_file
 from mutator._common.confined_files import check_only_plain_files
-from mutator._common.hashing import digest
+from mutator._common.hashing import as_json_types, digest
 from mutator.audit.table_audit import audit_tables
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
@@ -19,6 +19,7 @@ from mutator.outcomes.fault_free_runs import fault_free_alerts_note, load_fault_
 from mutator.report import report_builder
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.report_digests import inputs_digest
+from mutator.report.run_before import ChangeSinceRunBefore, find_change
 from mutator.results.table_reader import Results
 from mutator.serve.page_tokens import PageTokens, run_page_name
 from mutator.serve.report_cache import ReportCache
@@ -81,8 +82,11 @@ class RunPages:
         """Build the report if it is not cached, whatever report the run folder contains."""
         folder = RunFolder.open(run)
         with self._page_lock:
-            key = inputs_digest(folder, self._workspace)
-            data = self._reports.cached_or_built_file(key, name, lambda: self._build_report_files(folder))
+            change = find_change(folder, Results(run).frame())
+            key = digest([inputs_digest(folder, self._workspace), as_json_types(change)])
+            data = self._reports.cached_or_built_file(
+                key, name, lambda: self._build_report_files(folder, change)
+            )
         if data is None:
             raise NotServed("no such file", expected="a file of the report")
         if not name.endswith(".html"):
@@ -93,14 +97,16 @@ class RunPages:
             data = _ADDED_BODY_END.join(data.rsplit(b"</body>", 1))
         return HTMLResponse(data)
 
-    def _build_report_files(self, folder: RunFolder) -> Mapping[str, bytes]:
+    def _build_report_files(
+        self, folder: RunFolder, change: ChangeSinceRunBefore | None
+    ) -> Mapping[str, bytes]:
         """Build a report. Raise MutatorError if the tables of a finished run do not follow from its records:
         the report shows them beside the run's seal.
         """
         if folder.is_finished:
             for problem in audit_tables(folder)[1]:
                 raise problem
-        return report_builder.build_report(folder, self._workspace).files
+        return report_builder.build_report(folder, self._workspace, change=change).files
 
     def _build_comparison_files(self, a: Path, b: Path, addresses: ReportAddresses) -> dict[str, bytes]:
         notes = (self._golden_alerts_note(a), self._golden_alerts_note(b))

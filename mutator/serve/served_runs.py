@@ -1,8 +1,9 @@
 """Find the served run folders at each request, summarise them, and open their files."""
 
+import threading
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -29,20 +30,29 @@ SERVED_SUFFIXES_BY_FOLDER: Mapping[str, tuple[str, ...]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ServedRuns:
-    """Run folders below `roots`, by key: the folder's name, with `-2`, `-3` and so on for repeated names."""
+    """Run folders below `roots`, by key: the folder's name, with `-2`, `-3` and so on for repeated names.
+
+    A folder keeps its key while the server lives, even after it is deleted: an open page never reads another
+    run.
+    """
 
     roots: tuple[Path, ...]
+    _key_by_folder: dict[Path, str] = field(default_factory=dict, init=False)  # resolved folders
+    _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
 
     def folders_by_key(self) -> dict[str, Path]:
         """Return the run folders by key, without links to folders elsewhere."""
-        folder_by_key: dict[str, Path] = {}
-        for root in self.roots:
-            for path in _run_folders_in(root.resolve()):
-                if path not in folder_by_key.values():
-                    folder_by_key[_unused_key(path.name, folder_by_key)] = path
-        return folder_by_key
+        folders = [path for root in self.roots for path in _run_folders_in(root.resolve())]
+        return {self.reserved_key(path): path for path in folders}
+
+    def reserved_key(self, folder: Path) -> str:
+        """Return the key of a resolved folder, which no other folder then gets. It need not exist yet."""
+        with self._lock:
+            if folder not in self._key_by_folder:
+                self._key_by_folder[folder] = _unused_key(folder.name, self._key_by_folder.values())
+            return self._key_by_folder[folder]
 
     def folder(self, key: str) -> Path:
         with suppress(KeyError):
@@ -53,12 +63,14 @@ class ServedRuns:
         return next((key for key, path in self.folders_by_key().items() if path == folder.resolve()), None)
 
     def unplanned_folder(self, key: str) -> Path | None:
-        """Return a folder of this name in which a command is planning a run; None if there is none."""
+        """Return the folder with this key if a command is planning a run in it; None if there is none."""
         try:
-            folders = [path_below(root.resolve(), key) for root in self.roots]
+            named = [path_below(root.resolve(), key) for root in self.roots]
         except UnsafePath:
             return None
-        return next((folder for folder in folders if is_owner_alive(folder)), None)
+        keyed = [folder for folder, reserved in list(self._key_by_folder.items()) if reserved == key]
+        planning = filter(is_owner_alive, (*keyed, *named))
+        return next((folder for folder in planning if self.reserved_key(folder) == key), None)
 
     @property
     def folder_for_new_runs(self) -> Path:

@@ -120,7 +120,7 @@ class WatchPages:
                 for job in self._jobs.all()
                 if job.job_command.job_request.kind == "campaign"
                 and job.job_command.run_folder is not None
-                and job.job_command.run_folder.name == key
+                and self._runs.reserved_key(job.job_command.run_folder) == key
             ),
             None,
         )

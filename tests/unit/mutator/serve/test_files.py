@@ -23,7 +23,7 @@ from mutator.store.series_script import script_bytes
 from mutator.workspace import Workspace
 from tests.made_up_results import write_results
 
-from ..report.made_run import COLUMNS, LINES, make_run
+from ..report.made_run import COLUMNS, LINES, make_run, make_two_runs
 from .conftest import SECRET, Client
 
 STEPS = ("..", "%2e%2e", "..%2f..", "%252e%252e", "....//..", "..%5c..", "%00", ".", "")
@@ -238,6 +238,21 @@ def test_a_changed_run_gets_a_new_report(client: Client, linked: Path) -> None:
     before = client.get("/runs/linked/report/index.html").data
     write_results(linked, COLUMNS, [LINES[0] | {"t_h1": "18.26"}, *LINES[1:]])
     assert client.get("/runs/linked/report/index.html").data != before
+
+
+def test_a_report_shows_the_change_against_the_run_before(client: Client) -> None:
+    """As a stored report does, and anew when the run before changes."""
+    runs = client.place / "runs"
+    make_two_runs(runs)
+    try:
+        page = client.get("/runs/after/report/index.html").text
+        assert "<b>Since the run before:</b> 1 new hazard, 1 gone" in page
+        assert "Since the run before" not in client.get("/runs/before/report/index.html").text
+        shutil.rmtree(runs / "before")
+        assert "Since the run before" not in client.get("/runs/after/report/index.html").text
+    finally:
+        for name in ("before", "after"):
+            shutil.rmtree(runs / name, ignore_errors=True)
 
 
 def test_an_edited_table_is_not_shown_beside_the_seal_of_a_finished_run(

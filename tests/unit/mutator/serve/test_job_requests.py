@@ -10,7 +10,10 @@ from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
 from mutator.serve.job_requests import JobCommand, RequestChecker
+from mutator.serve.jobs import ServeJobs
+from mutator.serve.page_tokens import PageTokens
 from mutator.serve.served_runs import ServedRuns
+from mutator.serve.watch_pages import WatchPages
 from mutator.store import plan_file
 from mutator.workspace import Workspace
 
@@ -171,6 +174,20 @@ def test_a_new_run_cannot_take_the_addresses_of_a_run_in_another_folder(
     runs = ServedRuns((*desk.runs.roots, tmp_path / "old"))
     with pytest.raises(MutatorError, match="a run 'new' in another folder"):
         work(RequestChecker(toycar, runs), **CAMPAIGN)
+
+
+def test_a_job_is_shown_for_its_own_run_only(desk: RequestChecker, toycar: Workspace, tmp_path: Path) -> None:
+    """A run of the same name in another folder is another run."""
+    runs = ServedRuns((*desk.runs.roots, tmp_path / "old"))
+    jobs = ServeJobs(0, lambda _: None)  # none of them begins
+    command = work(RequestChecker(toycar, runs), **CAMPAIGN)
+    assert command.run_folder == tmp_path / "runs" / "new"
+    freeze_plan(build_plan(toycar, "small"), tmp_path / "old" / "new", toycar)
+    pages = WatchPages(toycar, runs, jobs, PageTokens(b"secret"))
+    job = jobs.submit(command)
+    assert pages._job_of("new") is job
+    assert runs.folders_by_key()["new-2"] == tmp_path / "old" / "new"
+    assert pages._job_of("new-2") is None
 
 
 def test_an_infinite_number_is_refused(desk: RequestChecker) -> None:
