@@ -365,5 +365,7 @@ class Record:
     #: compared channel that first left its tolerance, and whether it was then `higher` or `lower` than
     #: golden, or `no_number` (NaN)
     first_change: tuple[str, str] | None = added_field(None)
+    #: share of this channel's deviation, up to the first hazard, that had this direction
+    first_change_share: float | None = added_field(None)
     #: speeds in m/s by their names in the results, from the activation to the first hazard
     speeds: tuple[tuple[str, float], ...] = added_field(())

@@ -112,9 +112,12 @@ def _wrong_reaction(sentence: str, drive: Drive, start: float) -> Iterator[str]:
     change = _first_difference(drive, first_hazard)
     if ("changes no actuator" in sentence) != (change is None and not times):
         yield f"whether an actuator changes: {change}"
+    later = change and (change[0], -change[1])
     for words, expected in _DIRECTIONS.items():
-        if words in sentence and change != expected:
+        if words in sentence and expected != (later if f"then {words}" in sentence else change):
             yield f"{words}, but the first difference is {change}"
+    if change:
+        yield from _wrong_whole(sentence, drive, change, first_hazard)
     between = (drive.faulty["t"] >= start - _SLACK) & (drive.faulty["t"] <= first_hazard + _SLACK)
     speeds = drive.faulty["v_ego"][between]
     golden_between = (drive.golden["t"] >= start - _SLACK) & (drive.golden["t"] <= first_hazard + _SLACK)
@@ -122,12 +125,44 @@ def _wrong_reaction(sentence: str, drive: Drive, start: float) -> Iterator[str]:
     faster, slower = re.search(r"accelerates to", sentence), re.search(r"(?:slows|brakes) to", sentence)
     if faster:
         yield from _compare(rf"accelerates to {_NUMBER} m/s", sentence, float(speeds.max()))
-        if change not in (("gas", 1), ("brake", -1)) or speeds.max() <= max(speeds[0], golden_speeds.max()):
-            yield f"accelerates, but {change}"
+        named = later if "then accelerates" in sentence else change
+        if named not in (("gas", 1), ("brake", -1)) or speeds.max() <= max(speeds[0], golden_speeds.max()):
+            yield f"accelerates, but {named}"
     if slower:
         yield from _compare(rf"(?:slows|brakes) to {_NUMBER} m/s", sentence, float(speeds.min()))
-        if change not in (("gas", -1), ("brake", 1)) or speeds.min() >= min(speeds[0], golden_speeds.min()):
-            yield f"slows, but {change}"
+        named = later if re.search("then (?:slows|brakes) to", sentence) else change
+        if named not in (("gas", -1), ("brake", 1)) or speeds.min() >= min(speeds[0], golden_speeds.min()):
+            yield f"slows, but {named}"
+
+
+def _wrong_whole(sentence: str, drive: Drive, change: tuple[str, int], until: float) -> Iterator[str]:
+    """Check whether the first difference of an actuator is rightly said to be only the first one."""
+    run, golden = drive.faulty, drive.golden
+    rows = min(len(run["t"]), len(golden["t"]), int(np.searchsorted(run["t"], until + _SLACK)))
+    difference = (run[change[0]][:rows] - golden[change[0]][:rows])[:-1]  # the last one holds for no time
+    size = np.abs(difference).sum()
+    same = np.abs(difference[np.sign(difference) == change[1]]).sum() / size if size else 1.0
+    is_named = bool(re.search(r"(?<!then )(?:gives|brakes (?:harder|less)|steers further)", sentence))
+    if "at first, then" in sentence:
+        if same > 0.75 + _SLACK:
+            yield f"at first, but {same} of the difference is like the first"
+    elif "at first" not in sentence and is_named and same < 0.75 - _SLACK:
+        yield f"only {same} of the difference is like the first"
+    elif "at first" in sentence and not _is_contrary(drive, change, until):
+        yield "at first, but the speed is like the first difference"
+
+
+def _is_contrary(drive: Drive, change: tuple[str, int], until: float) -> bool:
+    """Whether the car became only slower although the first difference makes it faster, or the reverse."""
+    first = int(np.argmax(drive.faulty["t"] >= (drive.activation_s or 0.0) - _SLACK))
+    speeds, golden_speeds = (
+        run["v_ego"][first : int(np.searchsorted(run["t"], until + _SLACK))]
+        for run in (drive.faulty, drive.golden)
+    )
+    is_faster = change in (("gas", 1), ("brake", -1))
+    if is_faster:
+        return bool(speeds.min() < min(speeds[0], golden_speeds.min()))
+    return bool(speeds.max() > max(speeds[0], golden_speeds.max()))
 
 
 def _wrong_alert(sentence: str, drive: Drive, start: float) -> Iterator[str]:

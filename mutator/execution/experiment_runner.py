@@ -24,7 +24,7 @@ from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.failure_cause import judge_failure, run_error
 from mutator.outcomes.hazards_and_metrics import RunJudgement, load_judged_run, load_manifest_channels
 from mutator.outcomes.lost_values import find_lost_value
-from mutator.outcomes.reaction_and_speeds import first_actuator_change, speeds_after_activation
+from mutator.outcomes.reaction_and_speeds import change_share, first_actuator_change, speeds_after_activation
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.outcomes.trace_loading import Trace
 from mutator.outcomes.verdict_rules import first_events_after, outcome_of
@@ -300,6 +300,10 @@ class ExperimentRunner:
         if problem := _reason_not_by_fault(difference.t_first, activation):
             return _record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, problem, mutant)
         hazards = first_events_after(judged.hazards, activation)
+        end = hazards[0][1] if hazards else judged.t_end
+        change = first_actuator_change(
+            reference, faulty, self.manifest.compared_channels, time, difference.t_first
+        )
         return Record(
             experiment_id=experiment.id,
             status=Status.OK,
@@ -317,12 +321,9 @@ class ExperimentRunner:
             dev=() if judged.t_end is None else difference.max_dev_in_drive,
             metrics=judged.metrics,
             left=departures_from_golden(reference, faulty, self.manifest.channels, time, judged.t_end),
-            first_change=first_actuator_change(
-                reference, faulty, self.manifest.compared_channels, time, difference.t_first
-            ),
-            speeds=speeds_after_activation(
-                self.manifest, reference, faulty, activation, hazards[0][1] if hazards else judged.t_end
-            ),
+            first_change=change,
+            first_change_share=change_share(reference, faulty, time, change, end),
+            speeds=speeds_after_activation(self.manifest, reference, faulty, activation, end),
         )
 
     def _reason_inactive(self, experiment: Experiment, execution: JobResult) -> str:

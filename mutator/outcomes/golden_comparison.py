@@ -80,6 +80,16 @@ def values_at_common_time(
     return float(values[0][index]), float(values[1][index])
 
 
+def signed_differences(
+    golden: Trace, faulty: Trace, channel: str, time_channel: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the times of both runs, and faulty - golden of a channel there; NaN without a number."""
+    times = [times_of(trace, channel, time_channel) for trace in (golden, faulty)]
+    at, values = _values_at_common_times(times, [golden[channel], faulty[channel]])
+    with np.errstate(invalid="ignore", over="ignore"):
+        return at, values[1].astype(float) - values[0].astype(float)
+
+
 def _first_unequal_time(golden: np.ndarray, faulty: np.ndarray) -> float:
     """Return the time at which the times of two runs first differ or one run ends, or infinity."""
     if golden is faulty:

@@ -8,7 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from mutator.model import ObservedActivation
-from mutator.outcomes.golden_comparison import channel_deviation, values_at_common_time
+from mutator.outcomes.golden_comparison import (
+    channel_deviation,
+    signed_differences,
+    values_at_common_time,
+)
 from mutator.outcomes.hazards_and_metrics import formula_variables
 from mutator.outcomes.trace_loading import Trace
 from mutator.targets.channels import Channel
@@ -53,6 +57,23 @@ def _change(golden: float, faulty: float) -> str | None:
     if faulty == golden or math.isnan(golden):
         return None
     return HIGHER if faulty > golden else LOWER
+
+
+def change_share(
+    golden: Trace, faulty: Trace, time_channel: str, change: tuple[str, str] | None, end: float | None
+) -> float | None:
+    """Return which share, from 0 to 1, of a channel's deviation from golden has the direction of `change`: of
+    the areas between both runs up to `end` (s; None: the end of the run). None if they enclose no area.
+    """
+    if change is None or change[1] == NO_NUMBER:
+        return None
+    times, differences = signed_differences(golden, faulty, change[0], time_channel)
+    until = times <= (math.inf if end is None else end) + _TIME_SLACK_S
+    areas = (differences[:-1] * np.diff(times))[until[1:]]
+    areas = areas[np.isfinite(areas)]
+    whole = math.fsum(np.abs(areas))  # exact, so it is the same on every machine
+    same = math.fsum(np.abs(areas[areas > 0.0 if change[1] == HIGHER else areas < 0.0]))
+    return same / whole if whole > 0.0 else None
 
 
 def speeds_after_activation(

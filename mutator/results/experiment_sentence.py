@@ -17,10 +17,13 @@ from mutator.results.fault_phrases import describe_fault
 from mutator.targets.contact_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import (
+    FIRST_CHANGE_SHARE,
     GOLDEN_HIGHEST_SPEED,
     GOLDEN_LOWEST_SPEED,
+    HIGHER,
     HIGHEST_SPEED,
     LATER_HOLE,
+    LOWER,
     LOWEST_SPEED,
     NO_NUMBER,
     SPEED_AT_ACTIVATION,
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
 Row = Mapping[str, Any]  # cells by column; None, NaN or '': no value
 
 _LEAST_SPEED_CHANGE_MPS = 0.5  # a smaller one is not worth a word
+_LEAST_SHARE_OF_WHOLE = 0.75  # of a deviation: with less in one direction, a sentence names both
 _TIME_CONDITION_PATTERN = re.compile(r"t >= ([0-9.]+)\Z")
 _SUBJECT_PATTERN = re.compile(r"(the \w+) ")
 _FAILURES = {
@@ -150,14 +154,26 @@ class ExperimentSentences:
         return sorted(((h, t) for h, t in times if t is not None), key=lambda item: item[1])
 
     def _actuator_clause(self, row: Row, *, has_hazard: bool) -> str:
+        """Say what the first actuator did. A direction that does not hold for the whole is only the first."""
         name, change = row.get("first_actuator") or "", row.get("first_change") or ""
         if not (name and change):
             return ""
         if change == NO_NUMBER:
             return f"`{name}` becomes NaN"
+        opposite, speeds = LOWER if change == HIGHER else HIGHER, _speed_texts(row, has_hazard=has_hazard)
+        clause = self._change_clause(name, change, {})
+        if (with_speed := self._change_clause(name, change, speeds)) != clause:
+            return with_speed
+        then = self._change_clause(name, opposite, speeds)
+        share = _number(row, FIRST_CHANGE_SHARE)
+        if share is not None and share < _LEAST_SHARE_OF_WHOLE:
+            return f"{clause} at first, then {_without_subject(then, clause)}"
+        is_contrary = then != self._change_clause(name, opposite, {})  # the car's speed changed that way
+        return f"{clause} at first" if is_contrary else clause
+
+    def _change_clause(self, name: str, change: str, speeds: Mapping[str, str]) -> str:
         phrase = self.phrases.actuators.get(name, {}).get(change, ())
-        text = fill_phrase(phrase, _speed_texts(row, has_hazard=has_hazard))
-        return text or f"`{name}` is {change} than in the golden run"
+        return fill_phrase(phrase, speeds) or f"`{name}` is {change} than in the golden run"
 
     def _hazard_clause(
         self, hazard: HazardFacts, time: float, before: float | None, row: Row, *, is_first: bool
@@ -259,11 +275,15 @@ def _later(time: float, before: float | None, *, is_first: bool) -> str:
 def _joined(clauses: Sequence[str]) -> str:
     """Join clauses. One with the subject of the clause before loses it: `the car slows and stops`."""
     shortened = list(clauses[:1])
-    for before, clause in pairwise(clauses):
-        subject, earlier = _SUBJECT_PATTERN.match(clause), _SUBJECT_PATTERN.match(before)
-        is_same = subject and earlier and subject[1] == earlier[1]
-        shortened.append(clause[len(subject[0]) :] if subject and is_same else clause)
+    shortened += [_without_subject(clause, before) for before, clause in pairwise(clauses)]
     return " and ".join(filter(None, (", ".join(shortened[:-1]), *shortened[-1:])))
+
+
+def _without_subject(clause: str, before: str) -> str:
+    """Return a clause without its subject if that is the subject of the clause before."""
+    subject, earlier = _SUBJECT_PATTERN.match(clause), _SUBJECT_PATTERN.match(before)
+    is_same = subject and earlier and subject[1] == earlier[1]
+    return clause[len(subject[0]) :] if subject and is_same else clause
 
 
 def _alert(row: Row, hazards: Sequence[tuple[HazardFacts, float]]) -> str:

@@ -11,6 +11,7 @@ from mutator.outcomes.verdict_rules import (
 )
 from mutator.results.finished_experiment import FinishedExperiment, ResultColumn, rounded_time
 from mutator.targets.stored_phrases import (
+    FIRST_CHANGE_SHARE,
     GOLDEN_HIGHEST_SPEED,
     GOLDEN_LOWEST_SPEED,
     HIGHEST_SPEED,
@@ -76,6 +77,14 @@ FIRST_CHANGE_COLUMNS = (
         "",
         "whether it was then `higher` or `lower` than in the golden run, or `no_number` (NaN)",
         lambda f: f.record.first_change[1] if f.record.first_change else None,
+    ),
+    ResultColumn(
+        FIRST_CHANGE_SHARE,
+        "number",
+        "",
+        "how much of its deviation from golden had this direction, from 0 to 1: of the areas between both "
+        "runs up to the first hazard, or to the end of the drive",
+        lambda f: f.record.first_change_share,
     ),
 )
 SPEED_COLUMNS = tuple(

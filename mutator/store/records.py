@@ -51,6 +51,7 @@ def record_from_json(data: Mapping[str, Any]) -> Record:
         metrics=_name_value_pairs(data.get("metrics", [])),
         left=tuple([(name, first, largest) for name, first, largest in data.get("left", ())]),
         first_change=tuple(data["first_change"]) if data.get("first_change") else None,
+        first_change_share=data.get("first_change_share"),
         speeds=_name_value_pairs(data.get("speeds", [])),
     )
 

@@ -7,6 +7,7 @@ from mutator._common.phrase_texts import PhraseTexts
 
 HIGHER, LOWER = "higher", "lower"  # the direction of an actuator's first change
 NO_NUMBER = "no_number"  # that change, if the actuator becomes NaN; tables would read `nan` as an empty cell
+FIRST_CHANGE_SHARE = "first_change_share"  # name in records and results
 # names of the speeds in records and results
 SPEED_AT_ACTIVATION, HIGHEST_SPEED, LOWEST_SPEED = "speed_at_activation", "highest_speed", "lowest_speed"
 GOLDEN_HIGHEST_SPEED, GOLDEN_LOWEST_SPEED = "golden_highest_speed", "golden_lowest_speed"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mutator.model import ObservedActivation
-from mutator.outcomes.reaction_and_speeds import first_actuator_change, speeds_after_activation
+from mutator.outcomes.reaction_and_speeds import change_share, first_actuator_change, speeds_after_activation
 from mutator.outcomes.trace_loading import Trace
 from mutator.targets.channels import Channel, Role
 from mutator.workspace import Workspace
@@ -45,6 +45,33 @@ def test_a_run_that_only_ended_early_has_no_direction() -> None:
     assert first_actuator_change(GOLDEN, short, (GAS, BRAKE), "t", 0.3) is None
     golden = changed(gas=[np.nan, np.nan, 0.2, 0.2, 0.2, 0.2])
     assert first_actuator_change(golden, GOLDEN, (GAS,), "t", 0.0) is None
+
+
+@pytest.mark.parametrize(
+    ("gas", "end", "share"),
+    [
+        ([0.2, 0.2, 0.4, 0.4, 0.4, 0.4], None, 1.0),
+        ([0.2, 0.4, 0.4, 0.2, 0.1, 0.0], None, 0.8),  # the last value has no time after it
+        ([0.2, 0.4, 0.4, 0.1, 0.1, 0.1], 0.3, 1.0),
+        ([0.2, 0.4, np.nan, 0.0, 0.2, 0.2], None, 0.5),
+        ([0.2, 0.2, 0.2, 0.2, 0.2, 0.4], None, None),
+    ],
+)
+def test_the_share_of_a_direction_is_that_of_the_areas(
+    gas: list[float], end: float | None, share: float | None
+) -> None:
+    """It says whether the first change is what the fault did in the whole."""
+    assert change_share(GOLDEN, changed(gas=gas), "t", ("gas", "higher"), end) == pytest.approx(share)
+    lower = change_share(GOLDEN, changed(gas=gas), "t", ("gas", "lower"), end)
+    assert lower == (None if share is None else pytest.approx(1.0 - share))
+    assert change_share(GOLDEN, changed(gas=gas), "t", None, end) is None
+
+
+def test_a_value_counts_as_long_as_it_holds() -> None:
+    """Steps can have different lengths."""
+    times = {"t": np.array([0.0, 0.1, 0.4, 0.5])}
+    golden, faulty = (times | {"gas": np.array(gas)} for gas in ([0.0] * 4, [0.0, 1.0, -1.0, 0.0]))
+    assert change_share(golden, faulty, "t", ("gas", "higher"), None) == pytest.approx(0.75)
 
 
 def test_speeds_cover_the_time_from_activation_to_the_end(clone: Workspace) -> None:

@@ -125,12 +125,38 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
         f"{START} The car slows to 0.29 m/s. No hazard follows. No alert.",
     ),
     "a hazard of a car that stands has one speed": (
-        HAZARD | {"first_change": "lower", "lowest_speed": 0.29},
+        HAZARD | {"first_change": "lower", "lowest_speed": 0.29, "highest_speed": 26.8},
         f"{START} The car gives less gas and touches the lead 4.46 s later at 19.60 m/s (severe). No alert.",
     ),
     "an actuator that becomes NaN": (
         NO_HAZARD | {"first_change": "no_number"},
         f"{START} `gas` becomes NaN. No hazard follows. No alert.",
+    ),
+    "a first change that is the whole change": (
+        NO_HAZARD | {"first_change": "lower", "highest_speed": 27.0, "first_change_share": 0.75},
+        f"{START} The car gives less gas. No hazard follows. No alert.",
+    ),
+    "a first change, and then the opposite": (
+        NO_HAZARD | {"first_change": "lower", "highest_speed": 27.0, "first_change_share": 0.74},
+        f"{START} The car gives less gas at first, then gives more gas. No hazard follows. No alert.",
+    ),
+    "a first change, and then the opposite with a speed": (
+        HAZARD | {"first_change": "lower", "first_change_share": 0.01},
+        f"{START} The car gives less gas at first, then accelerates to 37.02 m/s and touches the lead "
+        "4.46 s later at 19.60 m/s (severe). No alert.",
+    ),
+    "a first change that the speed confirms": (
+        NO_HAZARD | {"first_change_share": 0.5},
+        f"{START} The car accelerates to 37.02 m/s. No hazard follows. No alert.",
+    ),
+    "a first change that the speed contradicts": (
+        NO_HAZARD | {"first_change": "lower", "first_change_share": 1.0},
+        f"{START} The car gives less gas at first. No hazard follows. No alert.",
+    ),
+    "two changes of an actuator without a phrase": (
+        NO_HAZARD | {"first_actuator": "horn", "first_change": "lower", "first_change_share": 0.5},
+        f"{START} `horn` is lower than in the golden run at first, then `horn` is higher than in the golden "
+        "run. No hazard follows. No alert.",
     ),
     "an actuator without a phrase": (
         NO_HAZARD | {"first_actuator": "horn", "first_change": "lower"},

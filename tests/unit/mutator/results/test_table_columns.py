@@ -12,7 +12,7 @@ OF_OPENPILOT = (
     "experiment_id, fault_id, module, fault_type, reading, value, unit, scenario, method, trigger, seed, "
     "status, outcome, activated, t_activation, activations, manifested, t_manifest, h1, t_h1, h2, t_h2, "
     "h3, t_h3, alerts, t_alert, reaction_time, max_dev_gas, max_dev_brake, max_dev_steer, "
-    "variant, aim, condition, hold, hold_s, first_actuator, first_change, detail"
+    "variant, aim, condition, hold, hold_s, first_actuator, first_change, first_change_share, detail"
 )
 
 
@@ -30,7 +30,7 @@ def test_another_target_has_its_own_columns() -> None:
     made = names(["CRUSHED"], ["gripper_force"])
     at = made.index("t_manifest")
     assert made[at + 1 : at + 4] == ["crushed", "t_crushed", "alerts"]
-    assert made[-9:-5] == ["max_dev_gripper", "variant", "aim", "condition"]
+    assert made[-10:-6] == ["max_dev_gripper", "variant", "aim", "condition"]
     assert not {"h1", "t_h1", "max_dev_gas", "max_dev_brake", "max_dev_steer"} & {*made}
 
 
