@@ -62,17 +62,24 @@ def operator_hint(text: str) -> str:
     return ", ".join(f"write '{_PYTHON_OPERATORS[operator]}' for '{operator}'" for operator in operators)
 
 
-NO_BREAK_SPACE = "\u00a0"  # printed as a space at which text is not folded
-_UNIT_PATTERN = re.compile(r"(?<=\d) (?!and |or )(?=[A-Za-z%°][\w/^²]{0,4}(?![\w/]))")
+NO_BREAK_SPACE = "\u00a0"  # in a terminal, printed as a space at which text is not folded
+_UNIT_PATTERN = re.compile(r"(?<=\d) (?!(?:and|in|of|or|to) )(?=[A-Za-z%°][\w/^²]{0,4}(?![\w/]))")
 
 _COMPARISON_PATTERN = re.compile(r" ([<>]=?|[=!]=) ")  # `hwt <= 2.0`
+
+
+def bind_numbers(text: str) -> str:
+    """Return the text with spaces that no line may be folded at between a number and a short word, which can
+    be its unit. For texts of pages: what users copy into files or a shell keeps its spaces.
+    """
+    return _UNIT_PATTERN.sub(NO_BREAK_SPACE, text)
 
 
 def bind_units(text: str) -> str:
     """Return the text with spaces that no line may be folded at: between a number and a short word, which can
     be its unit, around the sign of a comparison, and in commands in backticks.
     """
-    text = _UNIT_PATTERN.sub(NO_BREAK_SPACE, text)
+    text = bind_numbers(text)
     text = _COMPARISON_PATTERN.sub(NO_BREAK_SPACE + r"\1" + NO_BREAK_SPACE, text)
     return _COMMAND_PATTERN.sub(lambda command: command[0].replace(" ", NO_BREAK_SPACE), text)
 

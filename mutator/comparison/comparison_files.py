@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
-from mutator._common.message_text import counted
+from mutator._common.message_text import bind_numbers, counted
 from mutator._common.table_rendering import TextTable, markdown_line
 from mutator.comparison.comparison_replays import ReportAddresses, addresses_from, replay_elements
 from mutator.comparison.input_differences import InputFact
@@ -179,7 +179,11 @@ def render_html_page(comparison: Comparison, addresses: ReportAddresses) -> str:
     from markupsafe import Markup
 
     environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: bind_numbers(value) if type(value) is str else value,  # not in HTML
     )
     counts = Counter(change for pair in comparison.pairs for change in pair.change_kinds)
     return environment.from_string(asset_text("comparison/comparison.html")).render(
@@ -255,7 +259,8 @@ def _ending_html(row: ResultRow) -> str:
     if row.detail:
         details.append(row.detail)
     ending = Markup('<span class="ending {0}">{0}</span> {1}').format(row.ending, ", ".join(details))
-    return ending + Markup('<p class="sentence">{}</p>').format(row.sentence) if row.sentence else ending
+    sentence = Markup('<p class="sentence">{}</p>').format(bind_numbers(row.sentence))
+    return ending + sentence if row.sentence else ending
 
 
 def _hazard_time_text(row: ResultRow) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from mutator._common.message_text import bind_numbers
 from mutator._common.table_rendering import TextTable
 
 if TYPE_CHECKING:
@@ -45,7 +46,11 @@ def rendered(template: str, **values: Any) -> "Markup":
     from markupsafe import Markup
 
     environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: bind_numbers(value) if type(value) is str else value,  # not in HTML
     )
     environment.filters["marked"] = render_note
     return Markup(environment.from_string(template).render(**values))

@@ -93,11 +93,11 @@ class Experiment {
     const section = (title, name) => el(`section.${name}`, {}, el("h3", {}, title), el("div.content", {}, el("p.quiet", {}, "…")));
     this.place.replaceChildren(
       el("header", {},
-        el("div", {}, el("h2", { tabindex: -1, id: "experiment-title" }, this.text("sentence") || this.text("fault")),
+        el("div", {}, el("h2", { tabindex: -1, id: "experiment-title" }, Dom.bound(this.text("sentence") || this.text("fault"))),
           el("p.under", {}, el("span.fault", {}, this.text("fault")), ": ", Grid.ending(this.text("ending")), Happened.ALERTED[this.text("warning")] ?? "", " in ", code("scenario"), ", trigger ", code("trigger"))),
         this.buttons()),
       el("p.id", {}, "experiment ", el("code", {}, id), " ", Dom.copyButton(() => id, "Copy id"), " ", Dom.copyButton(() => this.#link(), "Copy link")),
-      this.text("detail") ? el("p.detail", {}, this.text("detail")) : "",
+      this.text("detail") ? el("p.detail", {}, Dom.bound(this.text("detail"))) : "",
       el("section.happened", {}, el("h3", {}, "What happened"), new Happened(this.table, this.row, this.facts).parts),
       typeof Path === "undefined" ? "" : section("Path of the fault", "path"),
       section("Replay", "replay"),

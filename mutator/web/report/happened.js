@@ -28,7 +28,7 @@ class Happened {
     const rows = [["scenario", withMeaning("scenario")], ["trigger", trigger.includes(condition) || trigger.startsWith("at ") ? trigger : `${condition} (${trigger})`]];
     if (this.text("status") === "ok" && this.table.columns.has("alerts")) rows.push(["alert", this.#alert()]);
     return el("table.plain.setting", {}, el("tbody", {}, rows.filter(([, about]) => about).map(([name, about]) =>
-      el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, about)))));
+      el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, Dom.bound(about))))));
   }
 
   /** Whether there was an alert, and whether it came before the hazard. */
@@ -52,7 +52,7 @@ class Happened {
     return el("div", {}, el("table.events", {}, el("thead", {}, el("tr", {}, ["time [s]", "from activation [s]", "what"].map((t) => el("th", { scope: "col" }, t)))),
       el("tbody", {}, happened.map(([t, what]) => el("tr", {}, el("td.time", {}, t.toFixed(2)),
         el("td.time", {}, Number.isNaN(begin) ? "" : `${t < begin ? "−" : "+"}${Math.abs(t - begin).toFixed(2)}`), el("td", {}, what))))),
-      Number.isNaN(reaction) ? "" : el("p", {}, `Reaction time (first alert to first hazard): ${reaction.toFixed(2)} s.`),
+      Number.isNaN(reaction) ? "" : el("p", {}, Dom.bound(`Reaction time (first alert to first hazard): ${reaction.toFixed(2)} s.`)),
       this.#severity(), this.#metrics());
   }
 
@@ -80,8 +80,8 @@ class Happened {
     const metric = (of, unit) => `${of.replaceAll("_", " ")} ${Happened.#measured(this.table.number(this.row, of))} ${unit}`;
     const values = rule ? rule.metrics.map((of, i) => metric(of, rule.units[i][1])).join(", ") : metric("delta_v", "m/s").replace("delta v", "delta-v");
     const called = this.table.called("severity", name), about = (rule || scale).classes.find(([of]) => of === name)?.[2];
-    return el("div", {}, el("b", {}, called[0].toUpperCase() + called.slice(1)), `${rule ? `, of ${hazard}` : ""}: ${values}`,
-      about ? `, ${about}` : "", el("details.quiet", {}, el("summary", {}, "Source of the classes"), Happened.#source(rule, scale)));
+    return el("div", {}, el("b", {}, called[0].toUpperCase() + called.slice(1)), Dom.bound(`${rule ? `, of ${hazard}` : ""}: ${values}`),
+      about ? Dom.bound(`, ${about}`) : "", el("details.quiet", {}, el("summary", {}, "Source of the classes"), Happened.#source(rule, scale)));
   }
 
   /** A measured number as in the sentence: with hundredths; one below 0.1 with two digits. */

@@ -35,7 +35,7 @@ class Card {
         el("span.state"), el("span.flagged", { hidden: true }, "flagged"), el("span.kept.quiet", { role: "status" }), this.#buttons()),
       el("p.decision.quiet", { hidden: true }),
       el("div.conflict", { role: "alert", hidden: true }),
-      group.titles.length ? el("ul.about", {}, group.titles.map((text) => el("li", {}, text))) : null,
+      group.titles.length ? el("ul.about", {}, group.titles.map((text) => el("li", {}, Dom.bound(text)))) : null,
       el("ul.what", {}, group.injections.map((text) => el("li", {}, Card.#injection(text)))),
       Card.#words(group.words ?? []),
       el("p.facts.quiet", {}, this.#facts()),

@@ -109,7 +109,7 @@
   function rowOf({ id, ending, severity, hazards, fault, scenario, trigger, sentence }) {
     const about = [severity, hazards.join(", ")].filter(Boolean).join(", ");
     return el("tr", {}, el("td.number", {}), el("td", {}, el(`span.ending.${ending}`, {}, ending.replaceAll("_", " ")), about ? el("div.quiet", {}, about) : null),
-      el("td", {}, el("a", { href: `/live/${base}/${id}` }, sentence || fault)), el("td", {}, fault), el("td", {}, `${scenario}, ${trigger}`));
+      el("td", {}, el("a", { href: `/live/${base}/${id}` }, Dom.bound(sentence || fault))), el("td", {}, Dom.bound(fault)), el("td", {}, `${scenario}, ${trigger}`));
   }
 
   find("stages").append(...stages.values());

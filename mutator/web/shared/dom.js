@@ -47,5 +47,10 @@ const Dom = (() => {
     if (element) getSelection().selectAllChildren(element);
   }
 
-  return { el, svg, copyButton };
+  /** A text in which no line is broken between a number and its unit; what users copy into a shell keeps its spaces. */
+  function bound(text) {
+    return text.replace(/(?<=\d) (?!(?:and|in|of|or|to) )(?=[a-z%°][\w/^²]{0,4}(?![\w/]))/gi, "\u00a0");
+  }
+
+  return { el, svg, copyButton, bound };
 })();

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mutator._common.message_text import operator_hint, shortened_ids, unbreakable_parts
+from mutator._common.message_text import bind_numbers, operator_hint, shortened_ids, unbreakable_parts
 from mutator.campaigns.row_filters import compile_filter
 from mutator.errors import MutatorError
 from mutator.triggers.conditions import canonical_condition
@@ -43,6 +43,13 @@ def test_units_comparisons_and_commands_are_not_folded() -> None:
         "run",
         "`pip\u00a0install\u00a0x`",
     ]
+
+
+def test_a_number_in_a_page_stays_with_its_unit() -> None:
+    """Commands and lists of a page are copied, so they keep their spaces."""
+    text = "from 24.60 s at 3.35 m/s by 12 deg, 95 % of 3 faults: `run -n 2 --out x`"
+    bound = "from 24.60_s at 3.35_m/s by 12_deg, 95_% of 3 faults: `run -n 2 --out x`"
+    assert bind_numbers(text) == bound.replace("_", "\u00a0")
 
 
 def test_ids_have_eight_characters_where_that_is_unique() -> None:

@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from mutator._common.hashing import as_json_types
+from mutator._common.message_text import bind_numbers
 from mutator.model import Status
 from mutator.report.first_screen import key_numbers, sample_note, worst_record, worst_row
 from mutator.report.panels.first_screen_panel import build_first_screen_panel
@@ -99,7 +100,10 @@ def test_the_worst_usable_experiment_is_the_first(tmp_path: Path) -> None:
     worst = worst_row(run)
     assert worst is not None and worst.experiment_id == "0" * 16
     panel = build_first_screen_panel(run)
-    assert "radar/chaff/distance 35.0 m" in panel.html and 'href="#e=0000000000000000"' in panel.html
+    assert (
+        bind_numbers("radar/chaff/distance 35.0 m") in panel.html
+        and 'href="#e=0000000000000000"' in panel.html
+    )
     assert panel.markdown.startswith(
         "**The worst experiment:** radar/chaff/distance 35.0 m in S1, trigger C2"
     )

@@ -246,7 +246,7 @@ def test_a_report_shows_the_change_against_the_run_before(client: Client) -> Non
     make_two_runs(runs)
     try:
         page = client.get("/runs/after/report/index.html").text
-        assert "<b>Since the run before:</b> 1 new hazard, 1 gone" in page
+        assert "<b>Since the run before:</b> 1\u00a0new hazard, 1\u00a0gone" in page
         assert "Since the run before" not in client.get("/runs/before/report/index.html").text
         shutil.rmtree(runs / "before")
         assert "Since the run before" not in client.get("/runs/after/report/index.html").text
