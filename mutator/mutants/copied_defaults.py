@@ -100,7 +100,7 @@ def _classes_of(path: str, data: bytes, root: Path) -> Mapping[str, _ClassBases]
         module = ast.parse(data)
     except (SyntaxError, ValueError, RecursionError):
         return {}
-    return dict(_classes_in_body(module.body, "", ImportedNames(module, path)))
+    return dict(_classes_in_body(module.body, "", ImportedNames(module, path, _BASES_BY_PACKAGE)))
 
 
 def _classes_in_body(

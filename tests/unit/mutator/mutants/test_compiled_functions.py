@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator.mutants import imported_names
 from mutator.mutants.compiled_functions import (
     compiler_of_constant,
     compiler_of_function,
@@ -33,10 +34,12 @@ def tree_of(folder: Path, **texts: str) -> SourceTree:
             "jax.jit",
         ),
         ("import torch\n@torch.compile\ndef law(y):\n", "torch.compile"),
+        ("from numba import *\n@njit\ndef law(y):\n", "numba.njit"),
         (
-            "try:\n    from numba import njit\nexcept ImportError:\n    njit = print\n@njit\ndef law(y):\n",
+            "from math import *\nfrom numba import *\nfast = njit(cache=True)\n@fast\ndef law(y):\n",
             "numba.njit",
         ),
+        ("import numba\nif numba:\n    fast = numba.njit\n@fast\ndef law(y):\n", "numba.njit"),
         ("import cython\n@cython.compile\ndef law(y):\n", "cython.compile"),
         (
             "import numba\n@numba.extending.register_jitable\ndef law(y):\n",
@@ -122,6 +125,81 @@ def test_a_function_that_builds_a_graph_is_noted(tmp_path: Path) -> None:
     tree = tree_of(tmp_path, m=text)
     assert tracer_of_function(tree, "m.py", "law") == "casadi.Function"
     assert tracer_of_function(tree, "m.py", "free") is None
+
+
+GUARDED = (
+    "try:\n    from numba import njit\nexcept ImportError:\n    njit = print\n@njit\ndef law(y):\n",
+    "try:\n    import numba\n    fast = numba.njit\nexcept (OSError, ImportError):\n    fast = print\n"
+    "@fast\ndef law(y):\n",
+    "try:\n    from numba import njit\nexcept Exception:\n    from tools import njit\n@njit\ndef law(y):\n",
+    "try:\n    from numba import *\nexcept:\n    njit = print\n@njit\ndef law(y):\n",
+)
+
+
+@pytest.mark.parametrize("is_installed", [True, False])
+@pytest.mark.parametrize("text", GUARDED)
+def test_a_package_that_the_file_can_do_without_counts_if_it_is_installed(
+    tmp_path: Path, text: str, is_installed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without numba, the file's own `njit` leaves the function to Python."""
+    monkeypatch.setattr(imported_names, "find_spec", lambda name: object() if is_installed else None)
+    compiler = compiler_of_function(tree_of(tmp_path, m=text + BODY), "m.py", "law", {})
+    # a name that the file also defines is its own, so a star import is then no evidence
+    expected = "numba.njit" if is_installed and "*" not in text else None
+    assert compiler == expected
+
+
+def test_a_name_of_the_file_is_not_from_a_star_import(tmp_path: Path) -> None:
+    text = "from numba import *\ndef njit(law):\n    return law\n@njit\ndef law(y):\n" + BODY
+    assert compiler_of_function(tree_of(tmp_path, m=text), "m.py", "law", {}) is None
+
+
+CALLER = "from numba import njit\n@njit\ndef law(y):\n    return inner(y)\n"
+INNER = "def inner(y):\n    return deep(y) + BIAS\n"
+DEEP = "BIAS = 1\ndef deep(y):\n    return y\n"
+
+
+def test_what_only_compiled_functions_call_is_compiled(tmp_path: Path) -> None:
+    """A function counts if nothing else reads its name, in this file or another; so do its constants."""
+    tree = tree_of(tmp_path, m=CALLER + INNER + DEEP)
+    assert compiler_of_function(tree, "m.py", "inner", {}) == "numba.njit"
+    assert compiler_of_function(tree, "m.py", "deep", {}) == "numba.njit"
+    assert compiler_of_function(tree, "m.py", "deep", {"NUMBA_DISABLE_JIT": "1"}) is None
+    assert compiler_of_constant(tree, "m.py", "BIAS", {}) == "numba.njit"
+
+
+@pytest.mark.parametrize(
+    ("more", "other"),
+    [("def f():\n    return inner(1)\n", ""), ("", "from m import inner\n"), ("", "import m\nm.inner(2)\n")],
+)
+def test_what_python_calls_too_is_not_compiled(tmp_path: Path, more: str, other: str) -> None:
+    """Neither it, nor what it calls, nor the constants of both."""
+    tree = tree_of(tmp_path, m=CALLER + INNER + DEEP + more, n=other)
+    assert compiler_of_function(tree, "m.py", "inner", {}) is None
+    assert compiler_of_function(tree, "m.py", "deep", {}) is None
+    assert compiler_of_constant(tree, "m.py", "BIAS", {}) is None
+    assert compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
+
+
+@pytest.mark.parametrize("call", ["import m\n", "from m import inner\n"])
+def test_a_function_of_another_file_that_only_compiled_functions_call_is_compiled(
+    tmp_path: Path, call: str
+) -> None:
+    name = "inner" if "from" in call else "m.inner"
+    use = f"import jax\n{call}@jax.jit\ndef law(y):\n    return {name}(y)\n"
+    assert compiler_of_function(tree_of(tmp_path, m=INNER, n=use), "m.py", "inner", {}) == "jax.jit"
+    use += f"def slow(y):\n    return {name}(y)\n"
+    assert compiler_of_function(tree_of(tmp_path, m=INNER, n=use), "m.py", "inner", {}) is None
+
+
+def test_methods_and_lambdas_are_followed(tmp_path: Path) -> None:
+    """A compiled method calls `self.inner`; a compiler can be given a lambda."""
+    text = "import jax\nclass A:\n    @jax.jit\n    def law(self, y):\n        return self.inner(y)\n"
+    text += "    def inner(self, y):\n        return y\n"
+    text += "def deep(y):\n    return y\nfast = jax.jit(lambda y: deep(y))\n"
+    tree = tree_of(tmp_path, m=text)
+    assert compiler_of_function(tree, "m.py", "A.inner", {}) == "jax.jit"
+    assert compiler_of_function(tree, "m.py", "deep", {}) == "jax.jit"
 
 
 @pytest.mark.parametrize(

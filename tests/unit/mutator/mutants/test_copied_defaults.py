@@ -23,6 +23,7 @@ FIELD = "    gain: float = -2.0\n"
             "BaseSettings of pydantic_settings",
         ),
         ("import msgspec\nclass S(msgspec.Struct, frozen=True):\n", "derives from Struct of msgspec"),
+        ("from pydantic import *\nclass S(BaseModel):\n", "derives from BaseModel of pydantic"),
         (
             "from traitlets.config import Configurable\nclass S(Configurable):\n",
             "Configurable of traitlets.config",
@@ -60,6 +61,7 @@ def test_a_copying_ancestor_is_found(tmp_path: Path, text: str, words: str) -> N
         "from abc import ABCMeta\nclass S(metaclass=ABCMeta):\n",
         "class BaseModel:\n    pass\nclass S(BaseModel):\n",
         "class S(S):\n",
+        "try:\n    from msgspec import Struct\nexcept ImportError:\n    Struct = object\nclass S(Struct):\n",
     ],
 )
 def test_other_classes_keep_their_values(tmp_path: Path, text: str) -> None:
