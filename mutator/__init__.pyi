@@ -19,6 +19,7 @@ from mutator.api.libraries import doctor as doctor
 from mutator.api.libraries import draw_control_structure as draw_control_structure
 from mutator.api.libraries import find_place_notes as find_place_notes
 from mutator.api.libraries import find_places as find_places
+from mutator.api.libraries import import_library as import_library
 from mutator.api.libraries import init_library as init_library
 from mutator.api.mutant_files import MutantSet as MutantSet
 from mutator.api.mutants import BuiltMutant as BuiltMutant
@@ -48,6 +49,9 @@ from mutator.model import Outcome as Outcome
 from mutator.model import Record as Record
 from mutator.model import Status as Status
 from mutator.model import Trigger as Trigger
+from mutator.onboarding.library_import import EntryOutcome as EntryOutcome
+from mutator.onboarding.library_import import ImportedEntry as ImportedEntry
+from mutator.onboarding.library_import import ImportedLibrary as ImportedLibrary
 from mutator.report.film import Shot as Shot
 from mutator.report.run_history import History as History
 from mutator.store.plan_choices import Choices as Choices
@@ -62,11 +66,14 @@ __all__ = [
     "BuiltMutant",
     "CheckFailed",
     "Choices",
+    "EntryOutcome",
     "Experiment",
     "Fault",
     "Format",
     "Gate",
     "History",
+    "ImportedEntry",
+    "ImportedLibrary",
     "IncompleteRun",
     "MutantSet",
     "MutatorError",
@@ -102,6 +109,7 @@ __all__ = [
     "draw_control_structure",
     "find_place_notes",
     "find_places",
+    "import_library",
     "init_library",
     "load_review",
     "load_run",

@@ -34,8 +34,8 @@ class Door:
     and `group` the group of entry points.
 
     The modules of the package `shipped_package` hold the shipped ones, each as an attribute named like
-    `addition`, in capitals. A module's name is the name of the object, with `_` for `-`, and after a keyword
-    of Python.
+    `addition`, in capitals and with `_` for a space. A module's name is the name of the object, with `_` for
+    `-`, and after a keyword of Python.
     """
 
     addition: str
@@ -48,7 +48,7 @@ class Door:
     @property
     def attribute_in_module(self) -> str:
         """The name of the object in a shipped module."""
-        return self.addition.upper()
+        return self.addition.upper().replace(" ", "_")
 
     def shipped_names(self) -> tuple[str, ...]:
         """Return the names of the shipped objects."""
@@ -202,6 +202,13 @@ IMPORTERS = Door(
     shipped_package="mutator.outcomes.importers",
     api_argument="trace",
 )
+LIBRARY_IMPORTERS = Door(
+    addition="library importer",
+    group="mutator.library_importers",
+    type_path="mutator.onboarding.library_import:LibraryImporter",
+    shipped_package="mutator.paper.importers",
+    api_argument="format",
+)
 DISTRIBUTORS = Door(
     addition="distributor",
     group="mutator.distributors",
@@ -221,4 +228,4 @@ OPERATORS = Door(
 STUDIES = Door(
     addition="study", group="mutator.studies", type_path="mutator.report.reported_run:PublishedWork"
 )
-DOORS = (EXPORTS, IMPORTERS, DISTRIBUTORS, OPERATORS, STUDIES)
+DOORS = (EXPORTS, IMPORTERS, LIBRARY_IMPORTERS, DISTRIBUTORS, OPERATORS, STUDIES)

@@ -18,6 +18,7 @@ from mutator.mutants.anchors import parsed_file
 from mutator.mutants.possible_places import ListedPlace, places_of
 from mutator.mutants.refused_places import PlaceNote, split_by_refusal
 from mutator.onboarding.first_library import write_first_library
+from mutator.onboarding.library_import import ImportedLibrary, import_into_new_library
 from mutator.onboarding.source_survey import survey_source
 from mutator.onboarding.todo_marks import unfilled_mark_errors
 from mutator.stpa.analysis_checks import list_analysis_problems
@@ -51,6 +52,17 @@ def init_library(
     else:
         write_first_library(survey_source(os.fspath(target), files), Path(folder))
     return Path(folder)
+
+
+def import_library(format: str, source: str | PathLike[str], folder: str | PathLike[str]) -> ImportedLibrary:
+    """Import fault files of others: write a copy of the library that ships with mutator, with the faults in
+    `source`, into a new or empty folder. The files are parsed and never executed.
+
+    `format` is an importer ([doors](doors.md#library-importer)). The result has an entry for each line, also
+    for those that are refused. MutatorError for an unknown format, for files that are not in it, if nothing
+    can be imported, and for a folder that is not empty.
+    """
+    return import_into_new_library(format, Path(source), Path(folder))
 
 
 def unfilled_places(folder: str | Path) -> list[MutatorError]:

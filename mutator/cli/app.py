@@ -29,6 +29,7 @@ from mutator.cli import (
     comparisons,
     exports,
     hazard_analysis,
+    imports,
     list_check_doctor,
     merge_report_clean,
     new_library,
@@ -62,7 +63,7 @@ EXIT_CODES = {
 _PERMISSION_ERRORS = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 SUBCOMMAND_GROUPS = (
-    ("Look around", ("list", "places", "init", "stpa", "check", "doctor", "cache")),
+    ("Look around", ("list", "places", "init", "import", "stpa", "check", "doctor", "cache")),
     ("One fault", ("try", "diff", "generate")),
     ("Before a campaign", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
@@ -133,6 +134,7 @@ def store_workspace_options(
 for module in (
     list_check_doctor,
     new_library,
+    imports,
     hazard_analysis,
     places,
     try_diff_generate,

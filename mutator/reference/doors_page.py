@@ -5,7 +5,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pkgutil import resolve_name
 
-from mutator._common.doors import DISTRIBUTORS, DOORS, EXPORTS, IMPORTERS, OPERATORS, STUDIES, Door
+from mutator._common.doors import (
+    DISTRIBUTORS,
+    DOORS,
+    EXPORTS,
+    IMPORTERS,
+    LIBRARY_IMPORTERS,
+    OPERATORS,
+    STUDIES,
+    Door,
+)
 from mutator._common.table_rendering import TextTable
 from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.workspace import Workspace
@@ -32,6 +41,11 @@ _EXAMPLE_BY_DOOR = {
         "a format of traces; its name is the suffix",
         "jsonl",
         "door_examples.jsonl:IMPORTER",
+    ),
+    LIBRARY_IMPORTERS.addition: (
+        "a format of `mutator import` ([import faults](../how-to/import-faults.md))",
+        "drives",
+        "door_examples.drives:IMPORTER",
     ),
     DISTRIBUTORS.addition: (
         "a way to run experiments elsewhere, chosen by `--cluster NAME:WHERE`",
@@ -130,8 +144,17 @@ def _door_section(door: Door) -> Iterator[str]:
         yield f"Inside the project, it is the attribute `{attribute}` of a module in `{folder}/`."
     yield f"\n{inspect.cleandoc(kind.__doc__)}\n"
     yield f'```toml\n[project.entry-points."{door.group}"]\n{example_name} = "{example_value}"\n```\n'
+    yield from _mapping_tables(door)
     shipped_rows = [(f"`{name}`", door.load(name).about) for name in door.shipped_names()]
     if shipped_rows:
         yield (
             TextTable(heads=(door.addition, "what it is"), rows=shipped_rows).as_markdown(escape=False) + "\n"
         )
+
+
+def _mapping_tables(door: Door) -> Iterator[str]:
+    """Yield what each shipped importer of libraries makes of the entries of its files."""
+    for name in door.shipped_names() if door is LIBRARY_IMPORTERS else ():
+        heads = (f"entry of `{name}`", "what it becomes", "what differs, or why it is refused")
+        rows = door.load(name).mapping
+        yield TextTable(heads=heads, rows=rows).as_markdown(escape=False) + "\n"
