@@ -7,16 +7,19 @@ or do something else as soon as the fault is active.
 import ast
 import builtins
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
+
+from jinja2 import Environment, nodes
 
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel
 from mutator.mutants.anchors import ParsedFile
-from mutator.mutants.name_scopes import names_of_module
+from mutator.mutants.name_scopes import bound_names, names_of_module
 
 _TEMPLATE_TAG_PATTERN = re.compile(r"\{\{.*?\}\}|\{%.*?%\}|\{#.*?#\}", re.DOTALL)
 _WORD_PATTERN = re.compile(r"\w+")
+_CALL_PATTERN = re.compile(r"(?<![\w.])(\w+)\(")
 _BUILTIN_FUNCTIONS = frozenset(name for name in dir(builtins) if callable(getattr(builtins, name)))
 _CALLED_FOR_NUMBERS = frozenset({"float"})  # infinity and NaN as values of parameters
 
@@ -56,31 +59,53 @@ def _called_names(code: str) -> frozenset[str]:
     )
 
 
+@lru_cache(maxsize=256)
+def builtins_always_called(template: str) -> frozenset[str]:
+    """Return the built-in functions that a template calls with any parameters."""
+    return frozenset(_always_called(Environment().parse(template).body))
+
+
+def _always_called(parts: Sequence[nodes.Node]) -> set[str]:
+    names = set[str]()
+    for part in parts:
+        match part:
+            case nodes.If():
+                branches = [part.body, *(branch.body for branch in part.elif_), part.else_]
+                names |= set.intersection(*map(_always_called, branches))
+            case nodes.Output():
+                texts = (text.data for text in part.nodes if isinstance(text, nodes.TemplateData))
+                names |= {name for text in texts for name in _CALL_PATTERN.findall(text)} & _BUILTIN_FUNCTIONS
+    return names
+
+
+class HiddenBuiltins:
+    """Says of which built-in functions a file has other ones of the same name around a line."""
+
+    def __init__(self, file: ParsedFile) -> None:
+        self._file = file
+        everywhere = {*names_of_module(file.data), *_names_bound_in(file.tree)}
+        self._bound_somewhere = everywhere & _BUILTIN_FUNCTIONS
+
+    def are_called(self, names: frozenset[str], line: int) -> bool:
+        """Whether one of `names`, in injected code at a line (from 0), would not be the built-in function."""
+        names &= self._bound_somewhere
+        return bool(names) and not names.isdisjoint(_names_bound_around(self._file, line))
+
+
 def _names_bound_around(file: ParsedFile, line: int) -> Iterator[str]:
     """Yield the names that the module and the functions around a line bind."""
     yield from names_of_module(file.data)
     for node in ast.walk(file.tree):
         match node:
             case ast.FunctionDef() | ast.AsyncFunctionDef() if _has_line(node, line + 1):
-                yield from _names_bound_in(node)
+                yield from (name for part in (node.args, *node.body) for name in _names_bound_in(part))
 
 
 def _has_line(node: ast.stmt, line: int) -> bool:
     return node.lineno <= line <= (node.end_lineno or 0)
 
 
-def _names_bound_in(function: ast.FunctionDef | ast.AsyncFunctionDef) -> Iterator[str]:
-    """Yield the names that a function binds, possibly in a function or class inside it."""
-    for node in ast.walk(function):
-        match node:
-            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
-                yield name
-            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
-                if node is not function:
-                    yield name
-            case ast.alias(name=name, asname=other):
-                yield other or name.partition(".")[0]
-            case ast.ExceptHandler(name=str(name)) | ast.MatchAs(name=str(name)):
-                yield name
-            case ast.MatchStar(name=str(name)) | ast.MatchMapping(rest=str(name)):
-                yield name
+def _names_bound_in(part: ast.AST) -> Iterator[str]:
+    """Yield the names that a part binds, possibly in a function or class inside it, and parameters."""
+    yield from bound_names(part)
+    yield from (node.arg for node in ast.walk(part) if isinstance(node, ast.arg))

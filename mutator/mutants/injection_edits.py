@@ -21,7 +21,7 @@ from mutator.mutants.injected_lines import (
     constant_setting_line,
     default_setting_line,
 )
-from mutator.mutants.name_scopes import normalize_identifier, rescoped_names
+from mutator.mutants.name_scopes import bound_names, normalize_identifier, rescoped_names
 from mutator.mutants.probe import injection_id
 from mutator.mutants.refused_places import check_place_can_be_hit
 from mutator.mutants.splicing import (
@@ -105,7 +105,7 @@ def injection_edit(
         guarded = [*code, "    pass"] if model.kind is SnippetKind.GUARD else code
         check_calls_builtins(file, anchor.first_line, model, "\n".join(guarded))
         _check_rebinds_no_used_name(
-            file, anchor, model, guarded, variables.union(*map(_bound_names, texts.values()))
+            file, anchor, model, guarded, variables.union(*map(_names_bound_by, texts.values()))
         )
         _check_keeps_name_scopes(file, anchor, edit)
         file.verified_edits.add(key)
@@ -252,7 +252,7 @@ def _check_rebinds_no_used_name(
     variables: frozenset[str],
 ) -> None:
     clashes = (
-        {normalize_identifier(name) for name in _bound_names("\n".join(code))} - variables
+        {normalize_identifier(name) for name in _names_bound_by("\n".join(code))} - variables
     ) & anchor.names_used_in_function
     if clashes:
         raise MutatorError(
@@ -264,20 +264,8 @@ def _check_rebinds_no_used_name(
         )
 
 
-def _bound_names(code: str) -> Iterator[str]:
-    """Yield the names that code binds or deletes, including those inside comprehensions and functions."""
-    for node in ast.walk(ast.parse(code)):
-        match node:
-            case ast.Name(id=name, ctx=ast.Store() | ast.Del()):
-                yield name
-            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
-                yield name
-            case ast.alias(name=name, asname=other):
-                yield other or name.partition(".")[0]
-            case ast.ExceptHandler(name=str(name)) | ast.MatchAs(name=str(name)):
-                yield name
-            case ast.MatchStar(name=str(name)) | ast.MatchMapping(rest=str(name)):
-                yield name
+def _names_bound_by(code: str) -> Iterator[str]:
+    return bound_names(ast.parse(code))
 
 
 def _check_keeps_name_scopes(file: ParsedFile, anchor: ResolvedAnchor, edit: LineEdit) -> None:

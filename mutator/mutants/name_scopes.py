@@ -3,6 +3,7 @@
 An assignment makes a name local to the whole function, even if the assignment never runs.
 """
 
+import ast
 import unicodedata
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
@@ -61,6 +62,24 @@ def names_of_module(data: bytes) -> frozenset[str]:
     symbols = _cached_symbol_table(data).get_symbols()
     bound = (s.get_name() for s in symbols if s.is_assigned() or s.is_imported() or s.is_namespace())
     return globals_set_in_functions(data).union(bound)
+
+
+def bound_names(tree: ast.AST) -> Iterator[str]:
+    """Yield the names that code binds or deletes, including those inside comprehensions and functions, but no
+    parameters.
+    """
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()):
+                yield name
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
+                yield name
+            case ast.alias(name=name, asname=other):
+                yield other or name.partition(".")[0]
+            case ast.ExceptHandler(name=str(name)) | ast.MatchAs(name=str(name)):
+                yield name
+            case ast.MatchStar(name=str(name)) | ast.MatchMapping(rest=str(name)):
+                yield name
 
 
 def _nested_tables(table: SymbolTable) -> Iterator[SymbolTable]:

@@ -11,6 +11,7 @@ from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind, Te
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, functions_named, normalized_function_name
 from mutator.mutants.expressions import NO_TEMPLATE_PARTS, Expression, template_parts
+from mutator.mutants.hidden_builtins import HiddenBuiltins, builtins_always_called
 from mutator.mutants.statement_texts import one_line_texts
 
 _OPERATOR_MODEL_PREFIX = "operator_"  # models of mutation operators, which find their own places
@@ -57,6 +58,7 @@ class _PlaceLister:
     def __init__(self, file: ParsedFile, models: Sequence[FaultModel]) -> None:
         self.file = file
         self.models = models
+        self.hidden_builtins = HiddenBuiltins(file)
 
     def places_in_function(self, name: str) -> Iterator[ListedPlace]:
         functions = self.file.functions_by_name[name]
@@ -91,7 +93,12 @@ class _PlaceLister:
             anchor = self.file.resolve_statement(location)
         except MutatorError:
             return  # for example, because the statement shares its line
-        models = tuple(model.name for model in self.models if self.fits_statement(model, kind, anchor))
+        models = tuple(
+            model.name
+            for model in self.models
+            if self.fits_statement(model, kind, anchor)
+            and not self.meets_hidden_builtin(model.template, anchor.first_line)
+        )
         if models:
             yield ListedPlace(
                 line=min(anchor.first_line, len(self.file.lines) - 1) + 1, location=location, models=models
@@ -124,15 +131,27 @@ class _PlaceLister:
             numbers.update(dict.fromkeys(expression.roles, 1))
             nth = numbers[role] if totals[role] > 1 else None
             location = self.location_at(function, Anchor(kind=kind, name=name, which=which, nth=nth))
-            models = tuple(model.name for model in self.models if can_change_value(model, expression))
+            models = self.models_of_value(expression, expression.start[0])
             yield ListedPlace(line=expression.start[0] + 1, location=location, models=models)
 
     def constant_and_default_places(self, function: str | None) -> Iterator[ListedPlace]:
-        models = tuple(model.name for model in self.models if can_change_value(model, None))
         for value in self.file.constants_and_defaults:
             if value.unsettable_reason is None and function in (None, value.function):
                 location = self.location_at(value.function, Anchor(kind=value.kind, name=value.name))
+                models = self.models_of_value(None, value.first_line)
                 yield ListedPlace(line=value.first_line + 1, location=location, models=models)
+
+    def models_of_value(self, expression: Expression | None, line: int) -> tuple[str, ...]:
+        return tuple(
+            model.name
+            for model in self.models
+            if can_change_value(model, expression)
+            and not self.meets_hidden_builtin(model.expression_template or "", line)
+        )
+
+    def meets_hidden_builtin(self, template: str, line: int) -> bool:
+        """Whether the template calls a built-in function that the file hides at a line (from 0)."""
+        return self.hidden_builtins.are_called(builtins_always_called(template), line)
 
     def location_at(self, function: str, anchor: Anchor) -> FaultLocation:
         return FaultLocation(path=self.file.path, function=function, anchor=anchor)

@@ -1,6 +1,7 @@
 """Collects the facts about a file's statements that operators need, using `ast`."""
 
 import ast
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,6 +10,13 @@ from mutator.mutants.expression_roles import blocks_of
 from mutator.operators.variable_kinds import FunctionNames, TypesByName, names_of_functions
 from mutator.targets.source_tree import SourceTree
 
+_LOGGER_METHODS = frozenset(
+    {"debug", "info", "warn", "warning", "error", "exception", "critical", "fatal", "log", "trace"}
+)
+# `log`, `self._logger`, `logging.getLogger(name)`, openpilot's `cloudlog`; not `dialog`
+_LOGGER_PATTERN = re.compile(
+    r"(?:^|[._]|cloud|get)log(?:ger|ging)?(?:\(.*\))?$|^warnings$", re.IGNORECASE | re.DOTALL
+)
 NodeExtent = tuple[int, int, int | None, int | None]
 
 # these bind names of their own scope, which are no locals of the function
@@ -25,6 +33,7 @@ class StatementFacts:
       setter share a name
     * `statement_lines`: the lines of each statement without those of nested statements
     * `function_names`: the local names of each function
+    * `reported_name_extents`: the extents of names in arguments of loggers and `print`, which control nothing
     * `types_by_line`: the types of variables in golden runs, by the line that then begins; None without runs
     """
 
@@ -33,6 +42,7 @@ class StatementFacts:
     first_binding_line_by_name: dict[tuple[int, str], int] = field(default_factory=dict)
     statement_lines: list[range] = field(default_factory=list)
     function_names: tuple[FunctionNames, ...] = ()
+    reported_name_extents: frozenset[NodeExtent] = frozenset()
     types_by_line: Mapping[int, TypesByName] | None = None
 
     def types_at(self, line: int) -> TypesByName | None:
@@ -61,9 +71,27 @@ def statement_facts_of(tree: SourceTree, path: str) -> StatementFacts:
 
 def _collect_facts(path: str, data: bytes, root: Path) -> StatementFacts:
     module = ast.parse(data)
-    facts = StatementFacts(function_names=names_of_functions(module))
+    reported = (name for node in ast.walk(module) for name in _reported_names(node))
+    facts = StatementFacts(
+        function_names=names_of_functions(module), reported_name_extents=frozenset(map(extent_of, reported))
+    )
     _collect_block(module.body, None, facts)
     return facts
+
+
+def _reported_names(node: ast.AST) -> Iterator[ast.Name]:
+    """Yield the names in the arguments of a call such as `self.logger.info(...)`, `print(...)`."""
+    match node:
+        case ast.Call(func=ast.Name(id="print")):
+            pass
+        case ast.Call(func=ast.Attribute(value=owner, attr=method)) if (
+            method in _LOGGER_METHODS and _LOGGER_PATTERN.search(ast.unparse(owner))
+        ):
+            pass
+        case _:
+            return
+    parts = (part for argument in (*node.args, *node.keywords) for part in ast.walk(argument))
+    yield from (part for part in parts if isinstance(part, ast.Name))
 
 
 def _collect_block(body: list[ast.stmt], def_line: int | None, facts: StatementFacts) -> None:

@@ -7,6 +7,7 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection, Value
 from mutator.mutants.anchors import parse_file
+from mutator.mutants.hidden_builtins import builtins_always_called
 from mutator.mutants.injection_edits import injection_edit
 from mutator.workspace import Workspace
 
@@ -62,3 +63,17 @@ def test_the_same_holds_for_values_of_expressions() -> None:
     with pytest.raises(MutatorError, match="Python's `float`"):
         edit(source, "nan", {}, RETURNED)
     edit(source.replace("float", "double"), "nan", {}, RETURNED)
+
+
+@pytest.mark.parametrize(
+    ("template", "names"),
+    [
+        ("{{ a }} = max(0, min(1, {{ b }}))", {"max", "min"}),
+        ("{% if a %}max({{ a }}){% else %}min({{ a }}){% endif %}", set()),
+        ("{% if a %}max(1){% elif b %}max(2) + abs(1){% else %}max(3){% endif %}", {"max"}),
+        ("{% if a %}max(1){% endif %}", set()),
+        ("_fi.max(1) + my_max(2) + max", set()),
+    ],
+)
+def test_a_template_always_calls_what_is_in_all_its_branches(template: str, names: set[str]) -> None:
+    assert builtins_always_called(template) == names

@@ -9,7 +9,7 @@ from mutator.config.location_model import LocationModel
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import ParamSchema
-from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, Injection, Value
+from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection, Value
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.possible_places import ListedPlace, places_of
@@ -160,3 +160,18 @@ def test_annotations_are_no_places(shipped: Workspace, kind: str) -> None:
         for file in files
     )
     assert first == second
+
+
+def test_models_that_call_a_function_that_the_file_hides_are_not_listed(shipped: Workspace) -> None:
+    """`ghost_object` always calls `max`; `offset` does only with a bound, so it stays."""
+    source = b"def f(a, max):\n    x = a\n    return x\n\n\ndef g(a):\n    x = a\n    return x\n"
+    models_by_function = {
+        place.location.function: place.models
+        for place in places_of(parse_file("m.py", source, Path("x")), shipped.fault_models())
+        if place.location.anchor.kind is AnchorKind.AFTER_ASSIGN
+    }
+    assert set(models_by_function["g"]) - set(models_by_function["f"]) == {"ghost_object"}
+    source = b"float = 3.0\nLIMIT = 2.0\n"
+    (*_, limit) = places_of(parse_file("m.py", source, Path("x")), shipped.fault_models())
+    assert not {"nan", "infinity"} & set(limit.models)
+    assert "offset" in limit.models
