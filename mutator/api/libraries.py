@@ -35,9 +35,9 @@ def init_library(
 
     `target` is a controller's source folder or `installed:NAME`. With `target`, write a first library for
     that controller: manifest, entry, scenario, fault and campaign, with places to fill in. The source is
-    read, never imported; with `files`, only files that match one of these globs, relative to the target's
-    root, are searched for the controller. Without `target`, copy the library and templates that ship with
-    mutator.
+    read, never imported; with `files`, only files that match one of these globs, relative to that folder
+    (or to where the package is installed), are searched for the controller. Without `target`, copy the
+    library and templates that ship with mutator.
 
     MutatorError for a folder that is not empty, for a missing target, and for `files` without a target or a
     match; MutatorWarning if nothing in the

@@ -36,7 +36,8 @@ def init(
         typer.Option(
             "--in",
             metavar="GLOB",
-            help="With --target: search only these files for the controller. `**` spans folders. Repeatable.",
+            help="With --target: search only these files for the controller, relative to TREE (for "
+            "installed:NAME, `NAME/...`). `**` spans folders. Repeatable.",
         ),
     ] = None,
     as_json: Json = False,

@@ -55,14 +55,16 @@ class SourceSurvey:
 def survey_source(target: str, globs: Sequence[str] = ()) -> SourceSurvey:
     """Survey a folder, or the package `installed:NAME`; with `globs`, read only the files that match one.
 
-    MutatorError if the target does not exist or no file matches.
+    Globs are relative to the folder, or to where the package is installed. MutatorError if the target does
+    not exist or no file matches.
     """
     survey = _survey_all(target, globs)
     if globs and not (survey.modules or survey.unreadable_files):
         raise MutatorError(
             f"no Python file of {', '.join(survey.packages) or target} matches {', '.join(globs)}",
             argument="files",
-            expected=f"globs relative to {survey.root}, such as `pkg/control/**`",
+            expected=f"globs relative to {survey.root if survey.installed_package else target}, such as "
+            "`pkg/control/**`",
             remedy="correct the glob",
         )
     return survey
@@ -71,7 +73,7 @@ def survey_source(target: str, globs: Sequence[str] = ()) -> SourceSurvey:
 def _survey_all(target: str, globs: Sequence[str]) -> SourceSurvey:
     if target.startswith(INSTALLED_PREFIX):
         return _survey_installed(target.removeprefix(INSTALLED_PREFIX), globs)
-    folder = Path(target).resolve()
+    folder = start = Path(target).resolve()
     if folder.is_file():
         raise MutatorError(
             f"{target} is a file",
@@ -87,13 +89,14 @@ def _survey_all(target: str, globs: Sequence[str]) -> SourceSurvey:
             remedy="correct `target`",
         )
     if (folder / "__init__.py").exists():
-        return _survey_packages(folder.parent, (folder.name,), globs)
+        return _survey_packages(folder.parent, (folder.name,), start, globs)
     packages = [*_packages_in(folder)]
     if "src" in packages and _is_source_folder(folder, packages):
         folder /= "src"
         packages = [*_packages_in(folder)]
     shadowing = tuple(name for name in packages if name.removesuffix(".py") in sys.stdlib_module_names)
-    survey = _survey_packages(folder, tuple(name for name in packages if name not in shadowing), globs)
+    own_packages = tuple(name for name in packages if name not in shadowing)
+    survey = _survey_packages(folder, own_packages, start, globs)
     return replace(survey, shadowing_modules=shadowing)
 
 
@@ -113,7 +116,8 @@ def _survey_installed(name: str, globs: Sequence[str]) -> SourceSurvey:
             expected="the import name of a package",
             remedy="install it in mutator's environment, or correct the name",
         )
-    survey = _survey_packages(package_path.parent, (package_path.name,), globs, any_links=True)
+    root = package_path.parent
+    survey = _survey_packages(root, (package_path.name,), root, globs, any_links=True)
     return replace(survey, installed_package=name, requirement=_distribution_requirement(name))
 
 
@@ -172,16 +176,19 @@ def _parse(path: Path) -> ast.Module:
 
 
 def _survey_packages(
-    root: Path, packages: tuple[str, ...], globs: Sequence[str], *, any_links: bool = False
+    root: Path, packages: tuple[str, ...], start: Path, globs: Sequence[str], *, any_links: bool = False
 ) -> SourceSurvey:
-    """Read the modules of packages, each file once; with `any_links`, links may point out of the root."""
+    """Read the modules of packages, each file once; with `any_links`, links may point out of the root.
+
+    `globs` are relative to `start`, which holds the root, or is a package in it.
+    """
     modules: list[SourceModule] = []
     unread: list[tuple[str, str]] = []
     real_paths = set[Path]()
     # links last, so that a file has the name under which it is stored
     for name in sorted(packages, key=lambda name: (root / name).is_symlink()):
         for path in [root / name] if name.endswith(".py") else _python_files(root / name):
-            if globs and not matches_any_glob(path.relative_to(root).as_posix(), globs):
+            if globs and not matches_any_glob(path.relative_to(start).as_posix(), globs):
                 continue
             if path.resolve() in real_paths:
                 continue

@@ -163,6 +163,16 @@ def test_globs_choose_the_files_that_are_searched(tmp_path: Path) -> None:
         survey_source(str(tmp_path), ("nowhere/**",))
 
 
+def test_globs_are_relative_to_the_folder_that_is_given(tmp_path: Path) -> None:
+    """Also where the root is another one: below `src`, or above a package."""
+    write(tmp_path, "src/pkg/control/law.py", "src/pkg/view.py", "src/pkg/__init__.py")
+    (tmp_path / "pyproject.toml").touch()
+    for folder, glob in (("", "src/pkg/control/**"), ("src/pkg", "control/**")):
+        survey = survey_source(str(tmp_path / folder), (glob,))
+        assert [module.path for module in survey.modules] == ["pkg/control/law.py"]
+        assert survey.root == tmp_path / "src"
+
+
 def test_a_module_of_the_target_shadows_none_of_the_standard_library(tmp_path: Path) -> None:
     """With `random.py` in the root, numpy would import the target's."""
     write(tmp_path, "law.py", "types.py", "random.py")

@@ -245,9 +245,16 @@ def test_without_files_the_tree_has_all_files_of_the_packages(toy: Workspace) ->
         ("packages: [toycar, toycar.py]", "4: 'toycar.py'; expected a package, or a module's file"),
         ("packages: [a/b.py]", "4: 'a/b.py'; expected a package, or a module's file"),
         ("packages: [toycar, _fi.py]", "4: '_fi.py'; expected a package, or a module's file"),
-        ("packages: []", "4: "),
+        (
+            "packages: []",
+            "4: []: the target has no package and no module, so nothing of it could be imported",
+        ),
         ("about: none", "neither `package` nor `packages`; expected one of them"),
         ("package: toycar\npackages: [toycar]", "5: both `package` and `packages`; expected one of them"),
+        (
+            "packages: []",
+            "5: []: the target has no package and no module, so nothing of it could be imported",
+        ),
     ],
 )
 def test_invalid_packages_are_refused(toy: Workspace, packages: str, said: str) -> None:
