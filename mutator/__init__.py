@@ -14,6 +14,7 @@ __version__ = VERSION
 # Type checkers read __init__.pyi, which `python -m mutator.reference` generates from these names.
 NAMES_BY_MODULE = {
     "mutator.api.audits": ("Audit", "seal", "verify"),
+    "mutator.api.benches": ("Bench", "open_bench"),
     "mutator.api.caches": ("cache_entries", "cache_folder", "clear_caches", "prune_caches"),
     "mutator.api.campaigns": ("run",),
     "mutator.api.comparisons": ("RunComparison", "compare", "write_history"),

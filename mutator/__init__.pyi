@@ -2,6 +2,8 @@
 from mutator.api.audits import Audit as Audit
 from mutator.api.audits import seal as seal
 from mutator.api.audits import verify as verify
+from mutator.api.benches import Bench as Bench
+from mutator.api.benches import open_bench as open_bench
 from mutator.api.caches import cache_entries as cache_entries
 from mutator.api.caches import cache_folder as cache_folder
 from mutator.api.caches import clear_caches as clear_caches
@@ -63,6 +65,7 @@ __version__: str
 
 __all__ = [
     "Audit",
+    "Bench",
     "BuiltMutant",
     "CheckFailed",
     "Choices",
@@ -114,6 +117,7 @@ __all__ = [
     "load_review",
     "load_run",
     "merge_runs",
+    "open_bench",
     "plan",
     "prune_caches",
     "run",

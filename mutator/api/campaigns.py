@@ -66,11 +66,11 @@ def run(
         notify=progress,
     )
     if summary.exit_code:
-        warnings.warn(_describe_unfinished(summary), IncompleteRun, stacklevel=2)
+        warnings.warn(describe_unfinished(summary), IncompleteRun, stacklevel=2)
     return Run(RunFolder.open(folder), opened_workspace, summary)
 
 
-def _describe_unfinished(summary: Summary) -> str:
+def describe_unfinished(summary: Summary) -> str:
     parts = [f"experiments with a result: {summary.done} of {summary.planned}"]
     if summary.harness_errors:
         name, detail = summary.harness_errors[0]

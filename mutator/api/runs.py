@@ -174,7 +174,8 @@ class Run(RunFigures):
             raise MutatorError(f"seed {seed}", argument="seed", expected=describe_seeds(seeds))
         selected_seed = seeds[0] if seed is None else seed
         # a run with one seed stores its golden runs without it
-        golden_run = GoldenRun(scenario, changes or (), selected_seed if len(seeds) > 1 else None)
+        golden_seed = selected_seed if self.folder.has_seeded_goldens else None
+        golden_run = GoldenRun(scenario, changes or (), golden_seed)
         folder = self.folder.golden_folder(*golden_run)
         if not folder.is_dir():
             golden_names = sorted(path.name for path in (self.path / "golden").glob("*"))

@@ -150,6 +150,8 @@ def _plan_problems(folder: RunFolder) -> Problems:
     run, head = folder.path, folder.head
     yield from plan_file.plan_problems(run)
     plan = load_plan(folder)
+    if folder.is_bench:
+        yield from plan_file.batch_problems(run, len(plan.experiments))
     campaign = plan.campaign
     expected_head = replace(
         head,

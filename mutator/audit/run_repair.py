@@ -175,7 +175,7 @@ def _segment_changes(folder: RunFolder, ledger: DigestLedger, lost: Collection[s
                 or segment.damaged_line_numbers
                 or not _is_intact_in_place(segment, schema, file_digest, data)
             ):
-                head = {"schema": schema, "plan": folder.head.plan}
+                head = {"schema": schema, "plan": folder.head.plan_of_lines}
                 sentence = f"{name}: {counted(dropped_count, 'line')} set aside, {len(remaining)} kept"
                 yield name, line_file_bytes(path, head, remaining), sentence
     for name, file_digest in ledger.files.items():

@@ -6,6 +6,7 @@
 * The *results digest* covers golden runs, records, and run.json but `KEYS_OUTSIDE_RESULTS_DIGEST`. It leaves
   out all versions and the texts of exceptions, so that it does not depend on versions that compute the same
   results.
+* The *batches digest* covers the borders and reasons of a bench's batches, which no other digest covers.
 * The *review digest* covers the decisions that allowed the run, with `--require-reviewed`.
 
 No digest depends on costs, hosts, or the division of the work into sessions, workers and shards.
@@ -22,14 +23,14 @@ from mutator._common.files import read_json
 from mutator._common.hashing import canonical_json, digest
 from mutator.campaigns.plan_freezing import PLAN_CSV
 from mutator.store import file_digests, plan_file
+from mutator.store.checks_file import CHECKED_GOLDENS_KEY, CHECKS_SCHEMA, MEASURED_LIMITS_KEY
 from mutator.store.checks_file import CHECKS_FILE as CHECKS
-from mutator.store.checks_file import CHECKS_SCHEMA, MEASURED_LIMITS_KEY
 from mutator.store.checksummed_lines import intact_lines, unread_segment
 from mutator.store.recorded_approvals import review_digest
 from mutator.store.records import PROOF_FOLDER, parse_ending
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD
-from mutator.store.session_environments import describe_environments
+from mutator.store.session_environments import describe_environments, version_texts_by_package
 
 SEAL_SCHEMA, RESULTS_DIGEST_SCHEMA = "seal/2", "results-digest/2"
 _RUNS_SCHEMA = "results-digest/1"  # of the plan and its runs, as the seal includes them
@@ -37,7 +38,7 @@ _RUNS_SCHEMA = "results-digest/1"  # of the plan and its runs, as the seal inclu
 UNSEALED_KEYS_BY_FILE = {
     HEAD: ("stretches", "choices.shard", "choices.series_mb"),
     # the key of a cache, which depends on the machine; a cost, and the limits that follow from it
-    CHECKS: ("digest", "run_cpu_s", MEASURED_LIMITS_KEY),
+    CHECKS: ("digest", "run_cpu_s", MEASURED_LIMITS_KEY, CHECKED_GOLDENS_KEY),
 }
 KEYS_OUTSIDE_RESULTS_DIGEST = ("schema", "provenance", *UNSEALED_KEYS_BY_FILE[HEAD])  # of run.json
 _SEALED_FILES = (CAMPAIGN_FILE, PLAN_CSV, plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE)
@@ -56,6 +57,8 @@ class Seals:
     seal: str | None = None  #: the seal; None for a run that is unfinished
     results_digest: str | None = None  #: the results digest; None like the seal
     review_digest: str | None = None  #: the review digest; None for a run without `reviewed.json`
+    #: the batches digest, of the borders and reasons of a bench's batches; None for a campaign
+    batches_digest: str | None = None
 
     def digest_by_name(self) -> dict[str, str]:
         """Return the digests that the run has, by name."""
@@ -63,6 +66,7 @@ class Seals:
             "seal": self.seal,
             "results digest": self.results_digest,
             "review digest": self.review_digest,
+            "batches digest": self.batches_digest,
         }
         return {name: value for name, value in names.items() if value}
 
@@ -72,6 +76,7 @@ def seals_of(folder: RunFolder) -> Seals:
     review = review_digest(folder.path)
     if not folder.is_finished:
         return Seals(review_digest=review)
+    batches = plan_file.last_batch_digest(folder.path) if folder.is_bench else None
     head, goldens = folder.head.as_json(), golden_file_digests(folder)
     runs = digest([_RUNS_SCHEMA, folder.head.plan, goldens, _record_digests(folder, "records")])
     results = digest(
@@ -89,7 +94,12 @@ def seals_of(folder: RunFolder) -> Seals:
         "files": _sha256_by_name(folder, _SEALED_FILES),
         PROOF_FOLDER: _record_digests(folder, PROOF_FOLDER),
     }
-    return Seals(seal=digest([SEAL_SCHEMA, runs, facts]), results_digest=results, review_digest=review)
+    return Seals(
+        seal=digest([SEAL_SCHEMA, runs, facts]),
+        results_digest=results,
+        review_digest=review,
+        batches_digest=batches,
+    )
 
 
 def digests_or_why_no_seal(folder: RunFolder) -> dict[str, str]:
@@ -147,7 +157,13 @@ def _sha256_by_name(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
 
 
 def _version_texts(folder: RunFolder) -> list[str]:
-    """Return the distinct sets of versions that computed anything, as canonical text."""
+    """Return the distinct sets of versions that computed anything, as canonical text.
+
+    A bench meets golden runs, and the packages that they load, in the order of its batches: all are one set.
+    """
+    if folder.is_bench:
+        pythons = {stretch.python for stretch in folder.session_environments}
+        return [canonical_json([sorted(pythons), version_texts_by_package(folder.session_environments)])]
     return sorted(
         {canonical_json([stretch.python, stretch.packages]) for stretch in folder.session_environments}
     )

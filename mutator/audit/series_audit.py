@@ -99,8 +99,8 @@ def _packed_series_problems(
             what = "the index of the chunks beside it"
             yield MutatorError("missing", where=path, expected=what, remedy=repair_remedy(run))
         return
-    if index.plan != folder.head.plan:
-        got, expected = f"series of plan {index.plan[:16]}", folder.head.plan[:16]
+    if index.plan != (plan := folder.head.plan_of_lines):
+        got, expected = f"series of plan {index.plan[:16]}", plan[:16]
         yield MutatorError(got, where=path, expected=expected, remedy=repair_remedy(run))
         return
     damaged = set()

@@ -68,6 +68,7 @@ class Campaign:
     chunk_size: int
     after_hazard: AfterHazard
     yaml_source: YamlSource
+    is_bench: bool = False  # what a bench fixed when it was opened; its experiments come in batches
 
     @property
     def seed(self) -> int:

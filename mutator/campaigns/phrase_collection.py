@@ -61,13 +61,20 @@ def phrases_of_experiment(workspace: Workspace, manifest: TargetManifest, experi
 
 def phrases_of_trigger(workspace: Workspace, trigger: Trigger) -> Mapping[str, PhraseByCase]:
     """Return the phrase of the context that a trigger is; nothing for another trigger."""
+    return phrases_of_contexts(workspace, {(trigger.name, trigger.condition)})
+
+
+def phrases_of_contexts(
+    workspace: Workspace, names_and_conditions: Collection[tuple[str, str]]
+) -> Mapping[str, PhraseByCase]:
+    """Return the phrases of the contexts among triggers, given by name and condition."""
     tables = map(workspace.context_table, workspace.context_tables)
     return _without_empty(
         {
             row.id: row.phrase
             for table in tables
             for row in table.rows
-            if (row.id, row.condition) == (trigger.name, trigger.condition)
+            if (row.id, row.condition) in names_and_conditions
         }
     )
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from mutator._common.argument_checks import check_type
 from mutator._common.message_text import counted, describe_seeds
 from mutator._common.table_rendering import TextTable
+from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign
 from mutator.campaigns.chunks import chunk_lengths_of_runs
@@ -27,7 +28,6 @@ from mutator.store import plan_file
 from mutator.store.plan_choices import Choices
 from mutator.store.preflight_results import mean_golden_run_cpu_s
 from mutator.store.run_folder import GoldenRun, RunFolder
-from mutator.store.run_head import CAMPAIGN_FILE
 from mutator.store.shards import Shard
 from mutator.targets.stop_function import stop_function_source
 from mutator.workspace import Workspace
@@ -94,7 +94,8 @@ class Plan:
 
     def empty_tally(self) -> PlanTally:
         """Return a tally without parts."""
-        return PlanTally(canary=self.canary, has_several_seeds=len(self.seeds) > 1)
+        several = self.campaign.is_bench or len(self.seeds) > 1
+        return PlanTally(canary=self.canary, has_several_seeds=several)
 
     def parts(self) -> Iterator[PlanPart]:
         """Yield the plan as one part."""
@@ -301,7 +302,7 @@ def load_plan(folder: RunFolder, tally: PlanTally | None = None) -> Plan:
     """
     head = folder.head
     large = head.experiments > _MOST_EXPERIMENTS_IN_MEMORY
-    campaign, limits = load_campaign(folder.path / CAMPAIGN_FILE), folder.limits
+    campaign, limits = load_campaign_of_run(folder), folder.limits
     is_limit_known = isinstance(limits, MeasuredLimits) or "cpu_s" not in campaign.measured_limit_names
     plan = Plan(
         campaign=campaign,

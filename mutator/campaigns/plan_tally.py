@@ -60,7 +60,10 @@ class PlanTally:
 
 
 class PlanDigestBuilder:
-    """The digest of the ids and chunks of the experiments, the canary's id ('': none), and the campaign."""
+    """The digest of the ids and chunks of the experiments, the canary's id ('': none), and the campaign.
+
+    A bench has no chunks, so its batches do not change the digest.
+    """
 
     def __init__(self) -> None:
         # a JSON list, hashed as it grows, so that no plan has to be in memory as a whole
@@ -74,9 +77,11 @@ class PlanDigestBuilder:
 
     def finish(self, chunk_lengths: Sequence[int], canary_id: str, campaign: Campaign) -> str:
         # without its opening bracket, because it continues the list that began with the ids
+        chunk_lengths = () if campaign.is_bench else chunk_lengths
         rest = [chunk_lengths, canary_id, as_json_types(campaign.canary), as_json_types(campaign.limits)]
-        self._hash.update(f"],{canonical_json(rest)[1:]}".encode())
-        return self._hash.hexdigest()
+        whole = self._hash.copy()  # a bench's plan can grow further
+        whole.update(f"],{canonical_json(rest)[1:]}".encode())
+        return whole.hexdigest()
 
 
 def plan_digest(ids: Sequence[str], chunk_lengths: Sequence[int], canary_id: str, campaign: Campaign) -> str:

@@ -138,6 +138,19 @@ def append_session_environment(folder: RunFolder, stretch: SessionEnvironment) -
     return _write_session_environments(folder, (*folder.session_environments, stretch))
 
 
+def add_loaded_packages(folder: RunFolder) -> RunFolder:
+    """Add the versions of packages that golden runs have loaded since the session began."""
+    if not folder.session_environments:
+        return folder
+    *before, last = folder.session_environments
+    missing = {*packages_loaded_by_golden_runs(folder)} - last.packages.keys()
+    versions = run_environment.package_versions(missing)
+    if not any(versions.values()):
+        return folder
+    packages = {**last.packages} | {name: version for name, version in versions.items() if version}
+    return _write_session_environments(folder, (*before, replace(last, packages=packages)))
+
+
 def append_worker_machine(folder: RunFolder, machine: WorkerMachine) -> RunFolder:
     *before, last = folder.session_environments
     return _write_session_environments(folder, (*before, replace(last, machines=(*last.machines, machine))))

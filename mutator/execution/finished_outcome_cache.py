@@ -20,7 +20,9 @@ class FinishedRunOutcome:
 
 def remember_finished_run(folder: RunFolder, outcome: FinishedRunOutcome) -> None:
     if key := integrity.verified_cache_key(folder.path):
-        proof = outcome.proof and {"sampled": outcome.proof.sampled, "same": outcome.proof.same}
+        proof = outcome.proof and {
+            name: getattr(outcome.proof, name) for name in ("sampled", "same", "chosen", "same_chosen")
+        }
         outcome_as_json = {"outcomes": dict(outcome.outcomes), "proof": proof, "seals": asdict(outcome.seals)}
         verified_runs_cache.remember_facts(key, ended=outcome_as_json)
 
@@ -36,6 +38,6 @@ def find_finished_run(folder: RunFolder) -> FinishedRunOutcome | None:
     proof = outcome_as_json["proof"]
     return FinishedRunOutcome(
         outcomes=Counter(outcome_as_json["outcomes"]),
-        proof=EquivalenceResult(sampled=proof["sampled"], same=proof["same"]) if proof else None,
+        proof=EquivalenceResult(**proof) if proof else None,
         seals=Seals(**outcome_as_json["seals"]),
     )

@@ -27,6 +27,7 @@ from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import (
     accepted_version_differences,
+    add_loaded_packages,
     append_worker_machine,
     begin_session_environment,
 )
@@ -229,6 +230,32 @@ class Session:
         self.folder = append_worker_machine(self.folder, machine)
         self._ledger_at_start = file_digests.load_ledger(self.folder.path)
 
+    def note_growth(self, folder: RunFolder) -> None:
+        """Note that the plan of a bench has grown, and which packages its golden runs load."""
+        self.folder = add_loaded_packages(folder)
+        self._ledger_at_start = file_digests.load_ledger(folder.path)
+
+    def begin_environment(self, records_glob: str) -> None:
+        """Record the software and machine of a bench, before its first run."""
+        self.folder = begin_session_environment(
+            self.folder,
+            self.workspace,
+            records_glob=records_glob,
+            accept_versions=self.accept_versions,
+        )
+        self._ledger_at_start = file_digests.load_ledger(self.folder.path)
+
+    def check_ledger(self) -> None:
+        """Restore the digests of the run folder, and raise MutatorError, if a mutant has changed them."""
+        expected, run = self._ledger_at_start, self.folder.path
+        if expected is not None and not file_digests.is_ledger_unchanged(run, expected):
+            file_digests.save_ledger(run, expected)
+            raise MutatorError(
+                "was changed by a mutant, or by another program",
+                where=run / file_digests.DIGESTS_FILE,
+                remedy="it is restored: ask again",
+            )
+
     def new_worker_name(self, name: str) -> str:
         """Return a name for a worker's files that no session used before."""
         files = chain.from_iterable(
@@ -366,7 +393,7 @@ class Session:
         folder = self.folder
         if list_unpacked_worker_files(folder.path) and not wait_for_workers(folder.path):
             ranks = worst_first_rank_by_ok_experiment(Results(folder.path).frame())
-            pack_series(folder.path, folder.head.plan, ranks, folder.series_budget_mb)
+            pack_series(folder.path, folder.head.plan_of_lines, ranks, folder.series_budget_mb)
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 import signal
 import socket
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -27,7 +27,7 @@ from mutator.execution.experiment_runner import (
 )
 from mutator.execution.inactivity_check import InactivityCheck
 from mutator.execution.written_files import FileDigests
-from mutator.model import Experiment, Status
+from mutator.model import Experiment, Record, Status
 from mutator.preflight import equivalence_check
 from mutator.preflight.equivalence_check import SampledExperiment
 from mutator.store import plan_file
@@ -64,6 +64,9 @@ class Worker:
         with raising_disk_full(self.folder.scratch_folder):
             self.folder.scratch_folder.mkdir(exist_ok=True)
         self._inputs, self._manifest, self._assignment = inputs, inputs.manifest, assignment
+        self._scenario_files = dict(inputs.scenario_files)
+        self._digest_by_golden_folder: dict[Path, str] = {}
+        self.add_inputs(goldens=assignment.golden_digests)
         self._runner = self._make_runner(
             self._make_engine(assignment.engine), with_series=bool(self.folder.series_budget_mb)
         )
@@ -81,20 +84,36 @@ class Worker:
         experiments = plan_file.load_chunk(
             self.folder.path, self.folder.head.chunks[pending.chunk_index], self._faults
         )
+        pending_experiments = [experiments[place] for place in pending.pending_positions]
+        return [
+            (record.experiment_id, record.detail)
+            for record in self.run_experiments(pending_experiments)
+            if record.status is Status.HARNESS_ERROR
+        ]
+
+    def run_experiments(self, experiments: Sequence[Experiment]) -> Iterator[Record]:
+        """Run experiments of the plan, at least one; store what each gave, and yield its record."""
         self._prune_cached_images(experiments[0].seed)
-        errors = []
-        for ended in self._runner.run([experiments[place] for place in pending.pending_positions]):
+        for ended in self._runner.run(experiments):
             finished = self._without_outcome_if_suspended(ended)
             self._store_finished(finished)
             if finished.mode in MODES_TO_PROVE:
                 self._needs_proof = True
-            if finished.record.status is Status.HARNESS_ERROR:
-                errors.append((finished.experiment.id, finished.record.detail))
-        return errors
+            yield finished.record
+
+    def add_inputs(
+        self, *, goldens: Mapping[str, str] | None = None, scenario_files: Mapping[str, Path] | None = None
+    ) -> None:
+        """Add digests of golden runs, by key, and files of scenarios, for a plan that has grown."""
+        self._scenario_files |= scenario_files or {}
+        self._digest_by_golden_folder |= {
+            path_below(self.folder.path / "golden", key): golden_digest
+            for key, golden_digest in (goldens or {}).items()
+        }
 
     def _prune_cached_images(self, seed: int) -> None:
         """Delete images of earlier seeds, which would fill the disk."""
-        if len(self.folder.seeds) > 1 and seed != self._current_seed:
+        if self.folder.has_seeded_goldens and seed != self._current_seed:
             cache_layout_and_pruning.prune_target_cache(self._manifest.cache_name)
         self._current_seed = seed
 
@@ -109,16 +128,22 @@ class Worker:
             self._needs_proof = equivalence_check.reason_check_not_needed(self.folder) is None
         if not self._needs_proof:
             return []
+        if not self._planned_experiments:
+            self._planned_experiments = PlannedExperiments(self.folder.path)
+        return [
+            (record.experiment_id, record.detail)
+            for record in self.prove_experiments([self._planned_experiments[sample.id]])
+            if record.status is Status.HARNESS_ERROR
+        ]
+
+    def prove_experiments(self, experiments: Sequence[Experiment]) -> Iterator[Record]:
+        """Run experiments on the reference engine for the proof, and yield their records."""
         if self._prover is None:
             self._prover = self._make_runner(self._make_independent_engine())
-            self._planned_experiments = PlannedExperiments(self.folder.path)
-        errors = []
-        for ended in self._prover.run([self._planned_experiments[sample.id]]):
+        for ended in self._prover.run(experiments):
             finished = self._without_outcome_if_suspended(ended)
             self._writer.append_proof(finished.record)
-            if finished.record.status is Status.HARNESS_ERROR:
-                errors.append((finished.experiment.id, finished.record.detail))
-        return errors
+            yield finished.record
 
     @property
     def file_digests(self) -> FileDigests:
@@ -131,15 +156,11 @@ class Worker:
 
     def _make_runner(self, engine: Engine, *, with_series: bool = False) -> ExperimentRunner:
         folder = self.folder
-        several = len(folder.seeds) > 1
         goldens = LoadedGoldens(
             self._manifest,
             folder.golden_folder_of,
-            several_seeds=several,
-            digests={
-                path_below(folder.path / "golden", key): golden_digest
-                for key, golden_digest in self._assignment.golden_digests.items()
-            },
+            several_seeds=folder.has_seeded_goldens,
+            digests=self._digest_by_golden_folder,
         )
         inputs = self._inputs
         return ExperimentRunner(
@@ -147,7 +168,7 @@ class Worker:
             inputs.fault_models,
             engine,
             goldens,
-            inputs.scenario_files.__getitem__,
+            self._scenario_files.__getitem__,
             with_series=with_series,
             inactivity_check=InactivityCheck(self._engine_arguments()),
         )

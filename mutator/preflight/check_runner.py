@@ -1,6 +1,6 @@
 """The runs of the checks before a campaign: golden runs, each twice, null mutants, the canary."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from mutator.model import Experiment, Limits
 from mutator.mutants.mutant_building import build
 from mutator.preflight import canary, unreached_triggers
 from mutator.preflight.check_run_problems import CheckRun, read_check_run
-from mutator.store.run_folder import RunFolder
+from mutator.store.run_folder import GoldenRun
 from mutator.store.run_progress import Progress, StagePace
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
@@ -37,10 +37,13 @@ class CheckRunner:
     """Executes the runs that the checks judge; golden runs and observations stay in `pending_folder`."""
 
     workspace: Workspace
-    folder: RunFolder
     manifest: TargetManifest
-    pending_folder: Path
     campaign: Campaign
+    golden_runs: Sequence[GoldenRun]
+    seed: int  # of golden runs whose key has none
+    canary_experiment: Experiment | None
+    scratch_folder: Path
+    pending_folder: Path
 
     def run_all(self, workers: int, notify: OnProgress) -> tuple[CheckRunByName, canary.CanaryVerdict | None]:
         """Do all runs of all checks, `workers` at a time. Return them with the verdict on a canary."""
@@ -71,7 +74,7 @@ class CheckRunner:
 
     @contextmanager
     def _engine_and_pool(self, workers: int) -> Iterator[tuple[ReferenceEngine, ThreadPoolExecutor]]:
-        work = self.folder.scratch_folder / "checks"
+        work = self.scratch_folder / "checks"
         for scratch in (work, self.pending_folder):
             remove_folder(scratch)
         work.mkdir(parents=True)
@@ -92,8 +95,8 @@ class CheckRunner:
     def _judge_canary(
         self, engine: ReferenceEngine, futures: Mapping[tuple[str, Any], Future[CheckRun]]
     ) -> canary.CanaryVerdict | None:
-        experiment, hazard = self.folder.canary, self.folder.head.canary_hazard
-        if experiment is None or hazard is None:
+        experiment, facts = self.canary_experiment, self.campaign.canary
+        if experiment is None or facts is None:
             return None
         goldens = [future.result() for name, future in futures.items() if name[0] == GOLDEN]
         canary_engine = ReferenceEngine(self.manifest, engine.work_folder, self.measure_limits(goldens))
@@ -106,16 +109,16 @@ class CheckRunner:
             )
 
         return canary.run_until_hazard(
-            canary.canary_with_other_values(self.workspace, self.manifest, experiment), run, hazard
+            canary.canary_with_other_values(self.workspace, self.manifest, experiment), run, facts.hazard
         )
 
     def _jobs_by_name(self) -> dict[tuple[str, Any], Job]:
         jobs: dict[tuple[str, Any], Job] = {}
         null = build(self.manifest, self.workspace.fault_models(), None, always_trigger())
-        for key in self.folder.golden_runs:
+        for key in self.golden_runs:
             common: dict[str, Any] = {
                 "scenario": self.workspace.scenario(key.scenario),
-                "seed": self.folder.head.seed if key.seed is None else key.seed,
+                "seed": self.seed if key.seed is None else key.seed,
                 "scenario_changes": key.changes,
             }
             name = key.key

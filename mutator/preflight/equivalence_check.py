@@ -6,7 +6,7 @@ records are in the run's folder `proof/`, which is removed if no experiment was 
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
@@ -26,6 +26,8 @@ from mutator.store.run_folder import RunFolder
 _MIN_SAMPLE = 20  # finds an engine that changes one record in seven with a chance of 95%
 _PROOF_ERROR_PREFIX = "in the proof: "
 _EXPERIMENTS_PER_SAMPLED_EXPERIMENT = 100  # one experiment in this many
+# Of a bench, which can end after few experiments: a tenth of the first ones.
+_EARLY_RATE, _EARLY_EXPERIMENTS, _LEAST_CHOSEN = 10, 200, 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,15 +47,26 @@ class EquivalenceResult:
     sampled: int
     same: int
     errors: tuple[tuple[str, str], ...] = ()
+    chosen: int = 0  # experiments of a bench that were chosen, not drawn: no part of a share
+    same_chosen: int = 0
 
     @property
     def is_complete(self) -> bool:
-        return self.same == self.sampled
+        return self.same == self.sampled and self.same_chosen == self.chosen
 
     def __str__(self) -> str:
+        if not self.chosen:
+            return self._describe_sample()
+        chosen = f"{self.same_chosen} of {self.chosen} chosen for their fault type or scenario"
+        if not self.sampled:
+            return f"{chosen} came out the same on the reference engine; no experiment was drawn"
+        return f"{self._describe_sample()}; besides, {chosen}"
+
+    def _describe_sample(self) -> str:
         sampled = counted(self.sampled, "experiment")
-        same = f"{self.same} of {sampled} came out the same on the reference engine"
-        if self.is_complete:
+        drawn = f"{sampled} that were drawn" if self.chosen else sampled
+        same = f"{self.same} of {drawn} came out the same on the reference engine"
+        if self.same == self.sampled:
             return same
         # a difference raises CheckFailed, so the others have no result
         others = f"{same}; the others" if self.same else f"none of {sampled}"
@@ -88,7 +101,42 @@ def _sample_ids_of_plan(folder: RunFolder) -> set[str]:
     """Ids of a plan's sample. For several seeds, each seed after the first adds one experiment in a
     hundred.
     """
+    if folder.is_bench:
+        sample = _cached_bench_sample(folder.path, folder.head.plan)
+        return {*sample.drawn, *sample.chosen}
     return set(_cached_sample_ids(folder.path, folder.head.plan, len(folder.seeds)))
+
+
+@dataclass(frozen=True, slots=True)
+class BenchSample:
+    """The ids of a bench's sample: drawn ones, and those chosen as the first of their kind."""
+
+    drawn: frozenset[str]
+    chosen: frozenset[str]
+
+
+def sample_of_bench(experiments: Iterable[Experiment], seed: int) -> BenchSample:
+    """Return the sample of a bench. Whoever is in it stays in it when the bench grows.
+
+    A hash of seed and id draws one in ten of the first 200 experiments, and one in a hundred of the others.
+    The first three are chosen, and the first of each fault type and scenario.
+    """
+    drawn, chosen, covered = set[str](), set[str](), set[tuple[str, ...]]()
+    for position, experiment in enumerate(experiments):
+        traits = set(_traits_to_cover(experiment))
+        rate = _EARLY_RATE if position < _EARLY_EXPERIMENTS else _EXPERIMENTS_PER_SAMPLED_EXPERIMENT
+        if int(digest([seed, experiment.id])[:16], 16) % rate == 0:
+            drawn.add(experiment.id)
+        elif position < _LEAST_CHOSEN or not traits <= covered:
+            chosen.add(experiment.id)
+        covered |= traits
+    return BenchSample(frozenset(drawn), frozenset(chosen))
+
+
+@lru_cache(maxsize=4)
+def _cached_bench_sample(run: Path, plan: str) -> BenchSample:
+    head = RunFolder.open_unverified(run).head
+    return sample_of_bench(plan_file.iterate_experiments(run), head.seed)
 
 
 @lru_cache(maxsize=4)  # a session asks several times
@@ -168,7 +216,7 @@ def compare_sample(folder: RunFolder, records: Mapping[str, Record]) -> Equivale
     if not (folder.path / PROOF_FOLDER).is_dir():
         return None
     reference_records = folder.records(PROOF_FOLDER)
-    same, errors = 0, []
+    same_ids, errors = set[str](), []
     for name, reference_record in reference_records.items():
         record = records.get(name)
         if record is None or not _is_result(record):
@@ -184,9 +232,17 @@ def compare_sample(folder: RunFolder, records: Mapping[str, Record]) -> Equivale
                 expected="the same record from every engine",
                 remedy="do not trust this run: rerun it with --engine reference, and report the problem",
             )
-        same += 1
+        same_ids.add(name)
+    sampled, chosen = len(sample_ids_in_folder(folder)), frozenset[str]()
+    if folder.is_bench:
+        chosen = _cached_bench_sample(folder.path, folder.head.plan).chosen
+    same_chosen = len(chosen & same_ids)
     return EquivalenceResult(
-        sampled=len(sample_ids_in_folder(folder)), same=same, errors=tuple(sorted(errors))
+        sampled=sampled - len(chosen),
+        same=len(same_ids) - same_chosen,
+        errors=tuple(sorted(errors)),
+        chosen=len(chosen),
+        same_chosen=same_chosen,
     )
 
 

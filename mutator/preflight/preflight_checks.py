@@ -1,7 +1,7 @@
 """The checks that must pass before a campaign starts: equal golden runs, null mutants, canary, anchors."""
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,11 +12,13 @@ from mutator._common.confined_files import path_below
 from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import digest
 from mutator.campaigns import run_environment
-from mutator.campaigns.campaign_files import Campaign, load_campaign
+from mutator.campaigns.bench_files import load_campaign_of_run
+from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import scenarios_sharing_runs
 from mutator.errors import CheckFailed, DiskFull, InvalidMutant, MutatorError
-from mutator.model import Limits
+from mutator.faults.fault_models import FaultModels
+from mutator.model import Fault, Limits
 from mutator.mutants.mutant_building import build
 from mutator.preflight import preflight_cache, unreached_triggers
 from mutator.preflight.check_run_problems import (
@@ -39,7 +41,6 @@ from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA, MEASURED_LIMIT
 from mutator.store.file_digests import FileDigest
 from mutator.store.preflight_results import CheckResult
 from mutator.store.run_folder import GoldenRun, RunFolder
-from mutator.store.run_head import CAMPAIGN_FILE
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
@@ -108,7 +109,7 @@ class _PreflightChecks:
         self.manifest: TargetManifest = workspace.manifest(head.target)
         self.models = workspace.fault_models()
         self.golden_runs = folder.golden_runs
-        self.campaign = load_campaign(folder.path / CAMPAIGN_FILE)
+        self.campaign = load_campaign_of_run(folder)
         now = RunInputs.from_workspace(workspace, self.manifest, folder.scenarios).digest_by_source()
         self.fault_by_variant = {fault.spec: fault for fault in plan_file.load_faults(folder.path).values()}
         places = sorted(
@@ -172,7 +173,7 @@ class _PreflightChecks:
         runs, canary_verdict = check_runner.run_all(workers, notify)
         results = [anchors, *self._judge_goldens(runs)]
         if canary_verdict:
-            results.append(_build_check_result("canary", canary_verdict.problem, canary_verdict.success))
+            results.append(build_check_result("canary", canary_verdict.problem, canary_verdict.success))
         goldens = {golden_run.key: runs[GOLDEN, golden_run].output_digest for golden_run in self.golden_runs}
         self._check_goldens_same_as_before(goldens)
         golden_runs = [runs[GOLDEN, key] for key in self.golden_runs]
@@ -181,7 +182,7 @@ class _PreflightChecks:
             "digest": self.digest,
             "results": [asdict(result) for result in results],
             "goldens": goldens,
-            "packages": self._loaded_packages(runs),
+            "packages": loaded_packages(self.manifest, golden_runs),
             "run_cpu_s": sum(run.cpu_s for run in golden_runs) / len(golden_runs),
             **measured_limits_as_json(check_runner.measure_limits(golden_runs)),
         }
@@ -191,10 +192,13 @@ class _PreflightChecks:
     def _build_check_runner(self, pending_folder: Path) -> CheckRunner:
         return CheckRunner(
             workspace=self.workspace,
-            folder=self.folder,
             manifest=self.manifest,
-            pending_folder=pending_folder,
             campaign=self.campaign,
+            golden_runs=self.golden_runs,
+            seed=self.folder.head.seed,
+            canary_experiment=self.folder.canary,
+            scratch_folder=self.folder.scratch_folder,
+            pending_folder=pending_folder,
         )
 
     def _store_in_run_folder(self, results: Mapping[str, Any]) -> None:
@@ -236,20 +240,9 @@ class _PreflightChecks:
                 remedy="use the versions recorded in run.json, or choose another run folder",
             )
 
-    def _loaded_packages(self, runs: CheckRunByName) -> list[str]:
-        """Return the packages that the golden runs loaded, without the target and the standard library."""
-        loaded = {module for key in self.golden_runs for module in runs[GOLDEN, key].third_party_modules}
-        target_modules = {path.split("/")[0].removesuffix(".py") for path in self.manifest.tree.files}
-        return list(run_environment.packages_of_modules(loaded - target_modules))
-
     def _judge_goldens(self, runs: CheckRunByName) -> Iterator[CheckResult]:
         for key in self.golden_runs:
-            first, again, null = (runs[name, key] for name in (GOLDEN, GOLDEN_AGAIN, NULL_MUTANT))
-            detail = golden_pair_problem(first, again)
-            yield _build_check_result(f"golden {key.key}", detail, "the same bytes twice")
-            if not first.problem:
-                detail = null_mutant_problem(first, null)
-                yield _build_check_result(f"null mutant {key.key}", detail, "the same bytes as golden")
+            yield from golden_run_results(runs, key)
         yield from self._judge_equal_scenarios(runs)
 
     def _judge_equal_scenarios(self, runs: CheckRunByName) -> Iterator[CheckResult]:
@@ -262,24 +255,47 @@ class _PreflightChecks:
                 ]
         for golden_run, goldens in equal_runs.items():
             name = golden_run._replace(scenario="+".join(goldens)).key
-            yield _build_check_result(f"same {name}", equal_scenarios_problem(goldens), "one run for all")
+            yield build_check_result(f"same {name}", equal_scenarios_problem(goldens), "one run for all")
 
     def _judge_anchors(self) -> CheckResult:
-        """Check that each variant of the plan finds its statements. A mutant that does not compile
-        passes this check.
-        """
-        problems: dict[str, list[str]] = {}
-        for fault in self.fault_by_variant.values():
-            try:
-                build(self.manifest, self.models, fault, always_trigger())
-            except InvalidMutant:
-                continue
-            except MutatorError as err:
-                problems.setdefault(str(err), []).append(fault.spec)
-        text = "; ".join(f"{', '.join(specs)}: {problem}" for problem, specs in problems.items())
-        return _build_check_result(
-            "anchors", text, f"{len(self.fault_by_variant)} variants found their statements"
-        )
+        problem = anchor_problem(self.manifest, self.models, self.fault_by_variant.values())
+        return anchor_result(problem, len(self.fault_by_variant))
+
+
+def golden_run_results(runs: CheckRunByName, key: GoldenRun) -> Iterator[CheckResult]:
+    """Judge the two golden runs and the null mutant of a golden run."""
+    first, again, null = (runs[name, key] for name in (GOLDEN, GOLDEN_AGAIN, NULL_MUTANT))
+    detail = golden_pair_problem(first, again)
+    yield build_check_result(f"golden {key.key}", detail, "the same bytes twice")
+    if not first.problem:
+        detail = null_mutant_problem(first, null)
+        yield build_check_result(f"null mutant {key.key}", detail, "the same bytes as golden")
+
+
+def anchor_problem(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> str:
+    """Return which variants do not find their statements; empty if all do. A mutant that does not compile
+    has found them.
+    """
+    problems: dict[str, list[str]] = {}
+    for fault in faults:
+        try:
+            build(manifest, models, fault, always_trigger())
+        except InvalidMutant:
+            continue
+        except MutatorError as err:
+            problems.setdefault(str(err), []).append(fault.spec)
+    return "; ".join(f"{', '.join(specs)}: {problem}" for problem, specs in problems.items())
+
+
+def anchor_result(problem: str, variant_count: int) -> CheckResult:
+    return build_check_result("anchors", problem, f"{variant_count} variants found their statements")
+
+
+def loaded_packages(manifest: TargetManifest, golden_runs: Iterable[CheckRun]) -> list[str]:
+    """Return the packages that golden runs loaded, without the target and the standard library."""
+    loaded = {module for run in golden_runs for module in run.third_party_modules}
+    target_modules = {path.split("/")[0].removesuffix(".py") for path in manifest.tree.files}
+    return list(run_environment.packages_of_modules(loaded - target_modules))
 
 
 def _limits_that_checks_depend_on(campaign: Campaign) -> dict[str, Any] | Limits:
@@ -296,5 +312,5 @@ def _limits_of_earlier_session(stored: Mapping[str, Any] | None) -> dict[str, An
     return {key: stored[key] for key in (MEASURED_LIMITS_KEY,) if is_used and stored and key in stored}
 
 
-def _build_check_result(name: str, problem: str, success: str) -> CheckResult:
+def build_check_result(name: str, problem: str, success: str) -> CheckResult:
     return CheckResult(name=name, passed=not problem, detail=problem or success)

@@ -10,6 +10,7 @@ from mutator.model import MOST_LIMIT_OR_TIME, Limits, MeasuredLimits
 
 CHECKS_SCHEMA = "checks/1"
 CHECKS_FILE = "checks.json"
+CHECKED_GOLDENS_KEY = "checked"  # of a bench: what each golden run's checks gave, with its CPU time
 MEASURED_LIMITS_KEY = "measured_limits"
 
 

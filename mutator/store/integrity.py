@@ -220,7 +220,7 @@ def record_problems(
         for path in sorted((run / kind).glob("*.jsonl")):
             segment, lines = unread_segment(path), intact_lines(path)
             try:
-                yield from _segment_head_problem(segment, lines, head.plan)
+                yield from _segment_head_problem(segment, lines, head.plan_of_lines)
                 for number, name, patch, content in _final_records(segment, lines, planned):
                     if isinstance(name, MutatorError):
                         yield name

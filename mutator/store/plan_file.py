@@ -1,5 +1,6 @@
 """The frozen plan on disk: one line per experiment, read as a whole or chunk by chunk."""
 
+import json
 from bisect import bisect_right
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
@@ -26,6 +27,7 @@ from mutator.store.plan_lines import (
 
 EXPERIMENTS_FILE = "plan/experiments.jsonl"
 FAULTS_FILE = "plan/faults.jsonl"
+BATCHES_FILE = "plan/batches.jsonl"  # of a bench
 
 _T = TypeVar("_T")
 Chunk = tuple[int, int, int]  # offset and length in bytes, number of experiments
@@ -46,7 +48,7 @@ class PlanWriter:
 
     def append(self, experiments: Sequence[Experiment], chunk_lengths: Iterable[int]) -> None:
         """Write the experiments of the next chunks, which have these lengths."""
-        lines = (canonical_json(_line_values(experiment)).encode() + b"\n" for experiment in experiments)
+        lines = map(experiment_line, experiments)
         for count in chunk_lengths:
             data = b"".join(islice(lines, count))
             self._experiments.write(data)
@@ -58,9 +60,15 @@ class PlanWriter:
             if planned.fault.id not in self._written_fault_ids
         }
         self._written_fault_ids.update(new_faults)
-        self._faults.write(
-            b"".join(canonical_json(as_json_types(fault)).encode() + b"\n" for fault in new_faults.values())
-        )
+        self._faults.write(b"".join(map(fault_line, new_faults.values())))
+
+
+def experiment_line(experiment: Experiment) -> bytes:
+    return canonical_json(_line_values(experiment)).encode() + b"\n"
+
+
+def fault_line(fault: Fault) -> bytes:
+    return canonical_json(as_json_types(fault)).encode() + b"\n"
 
 
 def write_plan(run: Path, experiments: Sequence[Experiment], chunk_lengths: Sequence[int]) -> list[Chunk]:
@@ -207,6 +215,40 @@ def _parse_experiments(
 def experiment_ids(run: Path) -> Iterator[str]:
     path = run / EXPERIMENTS_FILE
     return _parse_lines(path, _numbered_lines(path), id_on_line)
+
+
+def last_batch_digest(run: Path) -> str:
+    """Return the digest of the last line of a bench's batches, and so of all of them."""
+    last = b""
+    for line in read_plan_lines(run / BATCHES_FILE):
+        last = line
+    return sha256(last).hexdigest()
+
+
+def batch_problems(run: Path, experiment_count: int) -> Iterator[MutatorError]:
+    """Yield a problem for each line of a bench's batches that does not follow from the line before, and if
+    they do not add up to the plan.
+    """
+    path, before, total = run / BATCHES_FILE, "", 0
+    for number, line in enumerate(read_plan_lines(path), start=1):
+        try:
+            values = json.loads(line)
+            total += int(values["experiments"])
+            follows = values["before"] == before and values["batch"] == number
+        except (ValueError, LookupError, TypeError, RecursionError):
+            follows = False
+        if not follows:
+            got = "a line that does not follow from the line before"
+            yield MutatorError(got, where=path, line=number, remedy=DAMAGED_PLAN_REMEDY)
+            return
+        before = sha256(line).hexdigest()
+    if total != experiment_count:
+        yield MutatorError(
+            f"batches of {counted(total, 'experiment')}",
+            where=path,
+            expected=f"{experiment_count}, as in {EXPERIMENTS_FILE}",
+            remedy=DAMAGED_PLAN_REMEDY,
+        )
 
 
 def plan_problems(run: Path) -> Iterator[MutatorError]:

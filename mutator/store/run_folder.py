@@ -181,6 +181,16 @@ class RunFolder:
         return self.head.severity
 
     @property
+    def is_bench(self) -> bool:
+        """Whether the plan grew in batches, instead of following from a campaign."""
+        return self.head.bench is not None
+
+    @property
+    def has_seeded_goldens(self) -> bool:
+        """Whether the keys of golden runs contain the seed. In a bench, any seed can follow."""
+        return self.is_bench or len(self.seeds) > 1
+
+    @property
     def series_budget_mb(self) -> int:
         chosen = self.head.choices.series_mb
         return DEFAULT_SERIES_BUDGET_MB if chosen is None else chosen
@@ -213,7 +223,7 @@ class RunFolder:
         return {golden_run.scenario for golden_run in self.golden_runs}
 
     def golden_run_of(self, experiment: Experiment) -> GoldenRun:
-        return GoldenRun.for_experiment(experiment, several_seeds=len(self.seeds) > 1)
+        return GoldenRun.for_experiment(experiment, several_seeds=self.has_seeded_goldens)
 
     def golden_folder(self, scenario: str, changes: tuple[str, ...] = (), seed: int | None = None) -> Path:
         return path_below(self.path / "golden", GoldenRun(scenario, changes, seed).key)

@@ -36,6 +36,15 @@ class Provenance:
     mutator: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchFacts:
+    """What tells a bench's run folder from a campaign's. `origin`: the digest of the plan before its first
+    experiment, with which files of lines begin, because the plan's digest changes as the plan grows.
+    """
+
+    origin: Sha256
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlanFacts:
     """What run.json says about the plan."""
@@ -54,6 +63,7 @@ class PlanFacts:
     experiments: int
     runs: int
     limits: Limits
+    bench: BenchFacts | None = added_field(None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +83,11 @@ class RunHead(TargetFacts, PlanFacts):
     keys_of_later_versions: Mapping[str, Any] = field(
         default_factory=dict
     )  # keys that a later version adds: kept, and sealed
+
+    @property
+    def plan_of_lines(self) -> Sha256:
+        """The digest of the plan with which the files of lines begin."""
+        return self.bench.origin if self.bench else self.plan
 
     def as_json(self) -> dict[str, Any]:
         """Return the keys and their values in JSON types, in the order of the file."""

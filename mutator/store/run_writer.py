@@ -22,7 +22,7 @@ class RunWriter:
     """
 
     def __init__(self, folder: RunFolder, name: str) -> None:
-        self._run, self._plan, self._name = folder.path, folder.head.plan, name
+        self._run, self._plan, self._name = folder.path, folder.head.plan_of_lines, name
         self._patches = PatchWriter(folder.path, name)
         self._series = SeriesWriter(folder.path, name) if folder.series_budget_mb else None
         self._records = self._open_lines(RECORDS_FOLDER, self._sync_blocks)
@@ -98,5 +98,5 @@ def copy_line_files(folder: RunFolder, out: Path, suffix: str) -> None:
         for path in sorted((folder.path / kind).glob("*.jsonl")):
             copy_path = path_below(out / kind, f"{path.stem}{suffix}.jsonl")
             lines = verified_lines(path, schema)
-            head = {"schema": schema, "plan": folder.head.plan}
+            head = {"schema": schema, "plan": folder.head.plan_of_lines}
             write_lines_with_new_head(copy_path, head, (line for _, _, line in lines))

@@ -105,7 +105,7 @@ def _bundle_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Itera
         "are_limits_measured": isinstance(folder.limits, MeasuredLimits),
         "seed": head.seed,
         "series": bool(folder.series_budget_mb),
-        "several_seeds": len(folder.seeds) > 1,
+        "several_seeds": folder.has_seeded_goldens,
         "goldens": [
             {"golden": golden.to_stored(), "digest": digests[golden.key]} for golden in folder.golden_runs
         ],

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -236,3 +237,34 @@ def test_an_experiment_that_must_run_again_can_be_forked(toycar: Workspace, tmp_
     for path in (run / "records").iterdir():
         path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
     assert equivalence_check.reason_check_not_needed(RunFolder.open_unverified(run)) is None
+
+
+def test_the_sample_of_a_bench_only_grows(experiment: Callable[..., Experiment]) -> None:
+    """What `prove` has proved stays in the sample when the bench grows."""
+    planned = [experiment(number) for number in range(400)]
+    planned[150] = experiment(150, scenario="rare")
+    samples = [equivalence_check.sample_of_bench(planned[:count], 3) for count in range(0, 401, 25)]
+    for smaller, larger in pairwise(samples):
+        assert smaller.drawn <= larger.drawn and smaller.chosen <= larger.chosen
+    last = samples[-1]
+    assert not last.drawn & last.chosen
+    assert {e.id for e in planned[:3]} <= last.drawn | last.chosen
+    assert planned[150].id in last.drawn | last.chosen
+    assert 10 <= len(last.drawn) <= 35
+    assert equivalence_check.sample_of_bench(planned, 4).drawn != last.drawn
+
+
+def test_chosen_members_are_no_part_of_the_share() -> None:
+    """A share is about what was drawn; what was chosen is told besides."""
+    both = equivalence_check.EquivalenceResult(sampled=12, same=12, chosen=4, same_chosen=4)
+    assert both.is_complete
+    assert str(both) == (
+        "12 of 12 experiments that were drawn came out the same on the reference engine; besides, 4 of 4 "
+        "chosen for their fault type or scenario"
+    )
+    chosen = equivalence_check.EquivalenceResult(sampled=0, same=0, chosen=4, same_chosen=3)
+    assert not chosen.is_complete
+    assert str(chosen) == (
+        "3 of 4 chosen for their fault type or scenario came out the same on the reference engine; no "
+        "experiment was drawn"
+    )

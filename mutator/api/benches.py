@@ -1,0 +1,180 @@
+"""Benches: ask list after list of experiments, at the price of the engine."""
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from mutator._common.argument_checks import check_whole_number
+from mutator.api.campaigns import describe_unfinished
+from mutator.api.experiments import ExperimentBuilder
+from mutator.api.runs import Run
+from mutator.api.target_and_fault_selection import (
+    FaultLike,
+    SelectedTarget,
+    TriggerLike,
+    WorkspaceLike,
+    open_workspace,
+)
+from mutator.campaigns.campaign_files import load_campaign
+from mutator.engines.engine_choice import check_engine_is_offered
+from mutator.errors import EXIT_CHECK_FAILED, IncompleteRun, MutatorError, MutatorWarning
+from mutator.execution import bench as bench_in_folder
+from mutator.execution.session import Summary
+from mutator.model import AfterHazard, Experiment, Fault, Record
+from mutator.preflight.equivalence_check import EquivalenceResult
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+
+@contextmanager
+def open_bench(
+    workspace: WorkspaceLike,
+    out: str | Path,
+    *,
+    target: str | None = None,
+    campaign: str | Path | None = None,
+    canary: Mapping[str, Any] | None = None,
+    limits: Mapping[str, int] | None = None,
+    reading: str | None = None,
+    seed: int = 0,
+    after_hazard: AfterHazard | str = AfterHazard.GO_ON,
+    workers: int = 1,
+    engine: str | None = None,
+) -> "Iterator[Bench]":
+    """Open a bench in the run folder `out`, for a `with` block: it answers list after list of experiments.
+
+    Workers, fork servers and golden runs stay between lists. The folder is an ordinary run folder, which all
+    commands read. It can be opened again, also after an interruption: nothing that has finished is repeated.
+    At the end of the block, a sample is proved, and tables and seal are made, as at the end of a campaign.
+
+    * `canary`, `limits`: as the keys of a campaign file; default: those of `campaign`, if one is named.
+      Without a canary, results begin with a note.
+    * `reading`, `after_hazard`: what all experiments have. `seed` decides what the proof draws.
+    * `workers`: number of processes. `engine`: as for `run`.
+
+    MutatorError for an invalid argument, and if `out` holds another run or is in use. After the block, an
+    IncompleteRun warning is issued if experiments have no result.
+    """
+    check_whole_number("workers", workers)
+    check_whole_number("seed", seed)
+    check_engine_is_offered(engine)
+    if workers < 1:
+        raise MutatorError(f"{workers}", argument="workers", expected="a whole number, at least 1")
+    opened_workspace = open_workspace(workspace)
+    shared = _values_of_campaign(opened_workspace, campaign)
+    selected_target = SelectedTarget.of(opened_workspace, target or shared.pop("target", None))
+    readings = opened_workspace.readings()
+    if reading is not None:
+        readings.check_name(reading)
+    values = {
+        "name": "bench",
+        "about": "Experiments that were asked for in batches.",
+        **shared,
+        **{name: value for name, value in (("canary", canary), ("limits", limits)) if value is not None},
+        "target": selected_target.manifest.name,
+        "reading": readings.default_name if reading is None else reading,
+        "seed": seed,
+        "after_hazard": AfterHazard(after_hazard).value,
+    }
+    with bench_in_folder.opened_bench(
+        opened_workspace, Path(out), values, workers=workers, engine=engine
+    ) as opened:
+        bench = Bench(opened, selected_target, str(values["reading"]))
+        yield bench
+    _warn_of_end(opened.summary)
+
+
+class Bench:
+    """An open bench. One caller uses it at a time."""
+
+    def __init__(self, opened: bench_in_folder.Bench, selected_target: SelectedTarget, reading: str) -> None:
+        self._opened, self._reading = opened, reading
+        self._selected_target, self._builder = selected_target, ExperimentBuilder(selected_target)
+
+    def __repr__(self) -> str:
+        return f"<Bench {self.path.name}: {self._opened.experiment_count} experiments>"
+
+    @property
+    def path(self) -> Path:
+        """The run folder."""
+        return self._opened.path
+
+    @property
+    def pending(self) -> tuple[Experiment, ...]:
+        """Planned experiments without a result: they were cut off, or the harness failed."""
+        return self._opened.pending
+
+    def build_experiment(
+        self,
+        fault: FaultLike,
+        scenario: str,
+        trigger: TriggerLike = "always",
+        *,
+        value: float | None = None,
+        hold_s: float | None = None,
+        seed: int = 0,
+        armed_after_s: float | None = None,
+        setting: Sequence[str] = (),
+        beyond: bool = False,
+    ) -> Experiment:
+        """Build an experiment for this bench: see `mutator.build_experiment`."""
+        return self._builder.build(
+            fault,
+            scenario,
+            trigger,
+            value=value,
+            hold_s=hold_s,
+            seed=seed,
+            reading=None if isinstance(fault, Fault) else self._reading,
+            armed_after_s=armed_after_s,
+            setting=setting,
+            after_hazard=self._opened.after_hazard,
+            beyond=beyond,
+        )
+
+    def run(self, experiments: Sequence[Experiment], reason: str = "") -> list[Record]:
+        """Return the record of each experiment, in order.
+
+        An experiment that has a result is not run again. `reason` is kept with the batch. MutatorError for an
+        experiment that does not fit the bench, for a source that was edited while it was open, for a second
+        caller, and if a worker fails; CheckFailed if a golden run fails its checks. Nothing of the batch is
+        then planned, except after the failure of a worker.
+        """
+        return self._opened.run(experiments, reason)
+
+    def prove(self) -> EquivalenceResult | None:
+        """Run again, on the reference engine, what the final sample contains of the experiments so far.
+
+        None if no experiment was forked. CheckFailed if a record differs.
+        """
+        return self._opened.prove()
+
+    def load(self) -> Run:
+        """Return the run folder as it is now; call it again after the next batch."""
+        return Run(RunFolder.open(self.path), self._selected_target.workspace)
+
+
+def _warn_of_end(summary: Summary | None) -> None:
+    if summary is None or not summary.exit_code:
+        return
+    if summary.exit_code == EXIT_CHECK_FAILED:
+        text = "no experiment reached a hazard, and without a canary nothing shows that one can be reached"
+        warnings.warn(text, MutatorWarning, stacklevel=4)
+    else:
+        warnings.warn(describe_unfinished(summary), IncompleteRun, stacklevel=4)
+
+
+def _values_of_campaign(workspace: Workspace, campaign: str | Path | None) -> dict[str, Any]:
+    """Return what a bench takes over from a campaign: target, canary, and the limits that its file names."""
+    if campaign is None:
+        return {}
+    loaded = load_campaign(workspace.campaign(campaign))
+    values: dict[str, Any] = {"target": loaded.target}
+    if loaded.canary is not None:
+        values["canary"] = asdict(loaded.canary)
+    if limits := loaded.yaml_source.data.get("limits"):
+        values["limits"] = dict(limits)
+    return values

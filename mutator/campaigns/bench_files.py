@@ -1,0 +1,83 @@
+"""`campaign.yaml` of a bench: what was fixed when it was opened. Its experiments come in batches."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import checked_name_not_path
+from mutator.campaigns.campaign_files import Campaign, load_campaign
+from mutator.campaigns.campaign_model import Canary
+from mutator.campaigns.campaign_triggers import EVERY_READING
+from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
+from mutator.model import AfterHazard, Limits, Method
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import CAMPAIGN_FILE
+
+BENCH_SCHEMA = "bench/1"
+EXPERIMENTS_PER_CHUNK = 100  # of a bench's plan: whatever its batches, the same experiments are together
+
+
+class BenchModel(StrictModel, title="The file"):
+    """What a bench fixes for all its batches."""
+
+    name: str = Field(pattern=r"^[a-z0-9_]+$", description="The name: lowercase letters, digits and `_`.")
+    about: str = Field(description="The purpose of the bench.")
+    target: str = Field(description="The name of the target's manifest.")
+    reading: str = Field(description="The reading of all faults; empty in a library without readings.")
+    seed: int = Field(ge=0, lt=2**63, description="The seed that decides what the equivalence check draws.")
+    after_hazard: Annotated[AfterHazard, Field(strict=False)] = Field(
+        AfterHazard.GO_ON, description="Whether runs end at their first terminal hazard (`stop`)."
+    )
+    canary: YamlRecord[Canary] | None = Field(None, description="As in a campaign.")
+    limits: YamlRecord[Limits] = Field(Limits(), description="As in a campaign.")
+
+
+def bench_file_bytes(values: Mapping[str, Any]) -> bytes:
+    """Return the file with these values. JSON is YAML, one key a line."""
+    lines = (f"{key}: {json.dumps(value)}\n" for key, value in {"schema": BENCH_SCHEMA, **values}.items())
+    return "".join(lines).encode()
+
+
+def load_bench_file(path: Path) -> Campaign:
+    """Read the file strictly; any mistake raises MutatorError with file and line."""
+    model, source = load_yaml_model(path, BenchModel, BENCH_SCHEMA)
+    with source.locating_errors(("target",)):
+        checked_name_not_path(model.target, path)
+    return Campaign(
+        name=model.name,
+        purpose=model.about.strip(),
+        study=None,
+        path=path,
+        file_bytes=read_bounded(path),
+        target=model.target,
+        scenarios=(),
+        changes_by_reading={EVERY_READING: ()},
+        fault_selections=(),
+        reading=model.reading,
+        methods=tuple(Method),
+        context_table=None,
+        context_ids=None,
+        listed_triggers=(),
+        armed_after_s_by_reading={},
+        random_until_s=None,
+        hold_s=None,
+        sample_size=None,
+        is_sample_proportional=False,
+        seeds=range(model.seed, model.seed + 1),
+        canary=model.canary,
+        limits=model.limits,
+        chunk_size=EXPERIMENTS_PER_CHUNK,
+        after_hazard=model.after_hazard,
+        yaml_source=source,
+        is_bench=True,
+    )
+
+
+def load_campaign_of_run(folder: RunFolder) -> Campaign:
+    """Read the campaign of a run folder, or what its bench fixed."""
+    load = load_bench_file if folder.is_bench else load_campaign
+    return load(folder.path / CAMPAIGN_FILE)

@@ -1,0 +1,304 @@
+"""The checks of a bench: of each golden run once, with its null mutant, when a batch first needs it."""
+
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from mutator._common import cached_folders
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import path_below
+from mutator._common.files import json_bytes, read_json, remove_folder, write_atomic
+from mutator._common.hashing import digest
+from mutator.campaigns import run_environment
+from mutator.campaigns.campaign_files import Campaign
+from mutator.campaigns.run_inputs import RunInputs
+from mutator.campaigns.shared_runs import scenarios_sharing_runs
+from mutator.engines.run_limits import measure_limits
+from mutator.errors import CheckFailed, MutatorError
+from mutator.model import Experiment, Fault
+from mutator.preflight import preflight_cache
+from mutator.preflight.check_run_problems import output_digest_of
+from mutator.preflight.check_runner import GOLDEN, CheckRunner
+from mutator.preflight.preflight_checks import (
+    anchor_problem,
+    anchor_result,
+    build_check_result,
+    golden_run_results,
+    loaded_packages,
+)
+from mutator.store import file_digests
+from mutator.store.checks_file import (
+    CHECKED_GOLDENS_KEY,
+    CHECKS_FILE,
+    CHECKS_SCHEMA,
+    measured_limits_as_json,
+)
+from mutator.store.file_digests import FileDigest
+from mutator.store.preflight_results import CheckResult
+from mutator.store.run_folder import GoldenRun
+from mutator.targets.manifest import TargetManifest
+from mutator.workspace import Workspace
+
+_CACHED_FACTS_FILE, _CACHED_FACTS_SCHEMA = "golden.json", "checked-golden/1"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckedGolden:
+    """A golden run that passed its checks. `canary`: the check of the canary that is compared with it."""
+
+    output_digest: str
+    trace_digest: str
+    cpu_s: float
+    packages: tuple[str, ...]
+    results: tuple[CheckResult, ...]
+    canary: CheckResult | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        return {**asdict(self), "packages": list(self.packages), "results": list(map(asdict, self.results))}
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> "CheckedGolden":
+        results = tuple(CheckResult(**result) for result in values["results"])
+        canary = CheckResult(**values["canary"]) if values["canary"] else None
+        return cls(**{**values, "packages": tuple(values["packages"]), "results": results, "canary": canary})
+
+
+@dataclass
+class BenchChecks:
+    """Checks what a bench needs. New golden runs stay in `pending_folder` until `store` moves them."""
+
+    workspace: Workspace
+    manifest: TargetManifest
+    campaign: Campaign
+    canary: Experiment | None
+    scratch_folder: Path
+    workers: int = 1
+    goldens: dict[GoldenRun, CheckedGolden] = field(default_factory=dict)
+    _variants: set[str] = field(default_factory=set)
+    _digests_elsewhere: dict[GoldenRun, str] = field(default_factory=dict)  # of another machine or software
+
+    @property
+    def pending_folder(self) -> Path:
+        return self.scratch_folder / "kept"
+
+    def read(self, run: Path, golden_runs: Iterable[GoldenRun]) -> None:
+        """Read what an earlier command checked; golden runs without results are checked again."""
+        path = run / CHECKS_FILE
+        if not path.is_file():
+            return
+        stored = read_json(path, CHECKS_SCHEMA)
+        try:
+            self._read_stored(run, stored, golden_runs)
+        except (KeyError, TypeError, AttributeError) as err:
+            raise MutatorError(
+                f"damaged ({err!r})",
+                where=path,
+                expected="the checks of a bench",
+                remedy="restore the file from a copy of the run folder",
+            ) from None
+
+    def _read_stored(self, run: Path, stored: Mapping[str, Any], golden_runs: Iterable[GoldenRun]) -> None:
+        checked_values = stored[CHECKED_GOLDENS_KEY].items()
+        checked = {key: CheckedGolden.from_json(values) for key, values in checked_values}
+        for golden_run in golden_runs:
+            folder = path_below(run / "golden", golden_run.key)
+            golden = checked.get(golden_run.key)
+            if golden is None or output_digest_of(self.manifest, folder) != golden.output_digest:
+                continue
+            if stored["digest"] == _environment_digest():
+                self.goldens[golden_run] = golden
+            else:
+                self._digests_elsewhere[golden_run] = golden.output_digest
+
+    def check_anchors(self, faults: Iterable[Fault]) -> None:
+        """Raise MutatorError for a variant that does not find its statement in the target."""
+        new = {fault.spec: fault for fault in faults if fault.spec not in self._variants}
+        if problem := anchor_problem(self.manifest, self.workspace.fault_models(), new.values()):
+            raise MutatorError(
+                problem,
+                expected="faults whose statements are in the target",
+                remedy="correct the spec, or leave these experiments out",
+            )
+        self._variants |= new.keys()
+
+    def check_goldens(self, golden_runs: Sequence[GoldenRun]) -> tuple[GoldenRun, ...]:
+        """Check the golden runs that were not checked yet, and return them; CheckFailed if one fails."""
+        new = tuple(golden_run for golden_run in golden_runs if golden_run not in self.goldens)
+        if not new:
+            return ()
+        remove_folder(self.pending_folder)
+        failed = [] if all(map(self._take_from_cache, new)) else self._run_checks(new)
+        failed += [result for result in self._equal_scenario_results(golden_runs) if not result.passed]
+        failed += self._changed_golden_results(new)
+        if failed:
+            for golden_run in new:
+                self.goldens.pop(golden_run, None)
+            text = "; ".join(f"{result.name}: {result.detail}" for result in failed[:3])
+            raise CheckFailed(
+                f"checks failed: {text}",
+                expected="golden runs and canary that pass",
+                remedy="fix target, scenario or canary (`mutator check --drive` shows details); nothing of "
+                "this batch was planned",
+            )
+        return new
+
+    def _run_checks(self, new: Sequence[GoldenRun]) -> list[CheckResult]:
+        """Run what is needed; note what passed, and return what failed."""
+        canary_golden = self._canary_golden
+        runner = self._runner(new, canary=self.canary if canary_golden in new else None)
+        runs, verdict = runner.run_all(self.workers, lambda progress: None)
+        canary = build_check_result("canary", verdict.problem, verdict.success) if verdict else None
+        for golden_run in new:
+            first = runs[GOLDEN, golden_run]
+            self.goldens[golden_run] = CheckedGolden(
+                output_digest=first.output_digest,
+                trace_digest=digest([first.trace_digest, first.alerts]),
+                cpu_s=first.cpu_s,
+                packages=tuple(loaded_packages(self.manifest, [first])),
+                results=tuple(golden_run_results(runs, golden_run)),
+                canary=canary if golden_run == canary_golden else None,
+            )
+        results = [result for golden_run in new for result in self.goldens[golden_run].results]
+        failed = [result for result in (*results, *([canary] if canary else [])) if not result.passed]
+        if not failed:
+            for golden_run in new:
+                self._store_in_cache(golden_run)
+        return failed
+
+    def _changed_golden_results(self, new: Iterable[GoldenRun]) -> Iterator[CheckResult]:
+        """Yield a failed check for each golden run that differs from the one the bench began with."""
+        for golden_run in new:
+            before = self._digests_elsewhere.get(golden_run, "")
+            if before and self.goldens[golden_run].output_digest != before:
+                problem = (
+                    "differs from the one this bench began with, on another machine or with other versions"
+                )
+                yield build_check_result(f"golden {golden_run.key}", problem, "")
+
+    @property
+    def _canary_golden(self) -> GoldenRun | None:
+        return GoldenRun.for_experiment(self.canary, several_seeds=True) if self.canary else None
+
+    def _runner(self, golden_runs: Sequence[GoldenRun], canary: Experiment | None) -> CheckRunner:
+        return CheckRunner(
+            workspace=self.workspace,
+            manifest=self.manifest,
+            campaign=self.campaign,
+            golden_runs=golden_runs,
+            seed=self.campaign.seed,
+            canary_experiment=canary,
+            scratch_folder=self.scratch_folder,
+            pending_folder=self.pending_folder,
+        )
+
+    def store(
+        self, run: Path, golden_runs: Sequence[GoldenRun], new: Sequence[GoldenRun], variants: int
+    ) -> None:
+        """Move new golden runs into the run folder, and write checks.json."""
+        files: dict[str, FileDigest | None] = {}
+        for golden_run in new:
+            for path in sorted(path_below(self.pending_folder / "golden", golden_run.key).rglob("*")):
+                if path.is_file():
+                    name = path.relative_to(self.pending_folder).as_posix()
+                    files[name] = FileDigest.of_bytes(read_bounded(path))
+        checks = json_bytes(self._as_json(golden_runs, variants))
+        with file_digests.announcing_rewrites(run, {**files, CHECKS_FILE: FileDigest.of_bytes(checks)}):
+            for golden_run in new:
+                destination = path_below(run / "golden", golden_run.key)
+                shutil.rmtree(destination, ignore_errors=True)
+                destination.parent.mkdir(parents=True, exist_ok=True)
+                path_below(self.pending_folder / "golden", golden_run.key).rename(destination)
+            write_atomic(run / CHECKS_FILE, checks)
+
+    @property
+    def packages(self) -> tuple[str, ...]:
+        """The packages that golden runs loaded."""
+        return tuple(sorted({name for golden in self.goldens.values() for name in golden.packages}))
+
+    def _as_json(self, golden_runs: Sequence[GoldenRun], variants: int) -> dict[str, Any]:
+        checked = [self.goldens[golden_run] for golden_run in golden_runs]
+        cpu_s = [golden.cpu_s for golden in checked]
+        limits = measure_limits(self.campaign.limits, self.campaign.measured_limit_names, cpu_s)
+        results = [
+            anchor_result("", variants),
+            *(result for golden in checked for result in golden.results),
+            *self._equal_scenario_results(golden_runs),
+            *(golden.canary for golden in checked if golden.canary),
+        ]
+        return {
+            "schema": CHECKS_SCHEMA,
+            "digest": _environment_digest(),
+            "results": list(map(asdict, results)),
+            "goldens": {
+                golden_run.key: golden.output_digest
+                for golden_run, golden in zip(golden_runs, checked, strict=True)
+            },
+            "packages": list(self.packages),
+            "run_cpu_s": sum(cpu_s) / len(cpu_s),
+            CHECKED_GOLDENS_KEY: {
+                golden_run.key: golden.as_json()
+                for golden_run, golden in zip(golden_runs, checked, strict=True)
+            },
+            **measured_limits_as_json(limits),
+        }
+
+    def _equal_scenario_results(self, golden_runs: Sequence[GoldenRun]) -> list[CheckResult]:
+        """Compare golden runs of scenarios that a change makes equal, according to the manifest."""
+        groups: dict[GoldenRun, dict[str, CheckedGolden]] = {}
+        for golden_run in golden_runs:
+            is_shared = golden_run.scenario in scenarios_sharing_runs(self.manifest, golden_run.changes)
+            if is_shared and golden_run in self.goldens:
+                group = groups.setdefault(golden_run._replace(scenario=""), {})
+                group[golden_run.scenario] = self.goldens[golden_run]
+        results = []
+        for golden_run, goldens in groups.items():
+            differs = len({golden.trace_digest for golden in goldens.values()}) > 1
+            problem = "they differ, although the manifest says that they are equal (same_in)" * differs
+            name = golden_run._replace(scenario="+".join(goldens)).key
+            results.append(build_check_result(f"same {name}", problem, "one run for all"))
+        return results
+
+    def _cached_path(self, golden_run: GoldenRun) -> Path:
+        inputs = RunInputs.from_workspace(self.workspace, self.manifest, [golden_run.scenario])
+        facts: list[Any] = [inputs.digest_by_source(), golden_run.to_stored()]
+        facts.append(asdict(self.campaign.golden_run_limits))
+        if golden_run == self._canary_golden and self.canary and self.campaign.canary:
+            facts += [self.canary.id, self.campaign.canary.hazard]
+        return preflight_cache.cached_checks_path(digest([*facts, _environment_digest()]))
+
+    def _store_in_cache(self, golden_run: GoldenRun) -> None:
+        def fill(entry: Path) -> None:
+            shutil.copytree(path_below(self.pending_folder / "golden", golden_run.key), entry / "golden")
+            facts = {"schema": _CACHED_FACTS_SCHEMA, **self.goldens[golden_run].as_json()}
+            write_atomic(entry / _CACHED_FACTS_FILE, json_bytes(facts))
+
+        cached_folders.store_in_cache(self._cached_path(golden_run), fill)
+
+    def _take_from_cache(self, golden_run: GoldenRun) -> bool:
+        """Take over checks that passed before on this machine. The golden run itself is repeated, because a
+        mutant can write to the cache.
+        """
+        copy = self.scratch_folder / "cached"
+        try:
+            cached_folders.copy_from_cache(self._cached_path(golden_run), copy)
+            facts = read_json(copy / _CACHED_FACTS_FILE, _CACHED_FACTS_SCHEMA)
+            facts.pop("schema")
+            golden = CheckedGolden.from_json(facts)
+        except (MutatorError, OSError, KeyError, TypeError, AttributeError):
+            return False  # missing or damaged
+        again = replace(self._runner([golden_run], None), pending_folder=self.scratch_folder / "again")
+        if not all(result.passed for result in golden.results) or again.run_goldens(
+            1, lambda progress: None
+        ) != {golden_run.key: golden.output_digest}:
+            return False  # forged, or no longer true
+        destination = path_below(self.pending_folder / "golden", golden_run.key)
+        destination.parent.mkdir(parents=True, exist_ok=True)
+        path_below(again.pending_folder / "golden", golden_run.key).rename(destination)
+        self.goldens[golden_run] = golden
+        return True
+
+
+def _environment_digest() -> str:
+    return digest(run_environment.environment_affecting_results())

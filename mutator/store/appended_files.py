@@ -1,0 +1,61 @@
+"""Files of a run folder that only grow, with the digest of all that is in them."""
+
+import os
+from collections.abc import Iterable
+from hashlib import sha256
+from pathlib import Path
+
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import open_descriptor_below, path_below, read_below, write_below
+from mutator._common.files import raising_disk_full
+from mutator._common.hashing import digest
+from mutator.store import file_digests
+from mutator.store.file_digests import FileDigest
+from mutator.store.run_head import HEAD
+
+
+class AppendedFile:
+    """A file that grows. `digest` is what it has once `write_added` has written what was added."""
+
+    def __init__(self, run: Path, name: str) -> None:
+        self.name = name
+        self._run = run
+        path = path_below(run, name)
+        data = read_bounded(path) if path.is_file() else b""
+        self._hash, self._size = sha256(data), len(data)
+        self._added = b""
+
+    def add(self, data: bytes) -> None:
+        self._added += data
+        self._hash.update(data)
+        self._size += len(data)
+
+    @property
+    def digest(self) -> FileDigest:
+        return FileDigest(size=self._size, sha256=self._hash.hexdigest())
+
+    def write_added(self) -> None:
+        added, self._added = self._added, b""
+        with raising_disk_full(path_below(self._run, self.name)):
+            file = open_descriptor_below(self._run, self.name, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+            try:
+                while added:
+                    added = added[os.write(file, added) :]
+                os.fsync(file)  # run.json must not name bytes that a power cut can still take
+            finally:
+                os.close(file)
+
+
+def undo_unfinished_growth(run: Path, names: Iterable[str]) -> None:
+    """Cut off what a killed command added to these files, unless it also wrote the run.json that has it."""
+    ledger = file_digests.load_ledger(run)
+    new_head = ledger.rewriting.get(HEAD)
+    if not ledger.rewriting or (new_head and new_head.has_same_bytes(FileDigest.of_file_below(run, HEAD))):
+        return
+    for name in names:
+        before = ledger.files.get(name)
+        if before is None or not path_below(run, name).is_file():
+            continue
+        data = read_below(run, name)
+        if len(data) > before.size and digest(data[: before.size]) == before.sha256:
+            write_below(run, name, data[: before.size])

@@ -1,0 +1,49 @@
+"""How experiments are dealt to the workers of a bench."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+from mutator.execution.bench_crew import _assignment, _cut_into_pieces, _pop_piece_for
+from mutator.model import Experiment
+
+
+def runs_in(experiment: Callable[..., Experiment], *scenarios: str) -> list[list[Experiment]]:
+    return [[experiment(scenario=name)] for name in scenarios]
+
+
+def worker() -> Any:
+    return cast(Any, SimpleNamespace(golden_key=(), sent_goldens=set(), sent_scenarios=set()))
+
+
+def test_a_piece_has_one_golden_run(experiment: Callable[..., Experiment]) -> None:
+    """Pieces are small enough for all workers, and none mixes golden runs."""
+    pieces = _cut_into_pieces(runs_in(experiment, *"A" * 10, *"B" * 3), 1)
+    assert [[run[0].scenario for run in piece] for piece in pieces] == [
+        ["A"] * 4,
+        ["A"] * 4,
+        ["A"] * 2,
+        ["B"] * 3,
+    ]
+    assert [len(piece) for piece in _cut_into_pieces(runs_in(experiment, *"A" * 4), 2)] == [1, 1, 1, 1]
+
+
+def test_a_worker_goes_on_with_the_golden_run_that_it_has(experiment: Callable[..., Experiment]) -> None:
+    """A fork server that waits in a golden run is used further, if anything is left for it."""
+    pieces = _cut_into_pieces(runs_in(experiment, *"AABB"), 2)
+    first, second = worker(), worker()
+    dealt = [_pop_piece_for(who, pieces)[0][0].scenario for who in (first, second, second, first)]
+    assert dealt == ["A", "A", "B", "B"]
+    pieces = _cut_into_pieces(runs_in(experiment, *"AABB"), 2)
+    first.golden_key = ("B", pieces[-1][0][0].changes, 7)
+    assert _pop_piece_for(first, pieces)[0][0].scenario == "B"
+
+
+def test_a_worker_is_told_only_what_is_new(experiment: Callable[..., Experiment]) -> None:
+    """Digests of golden runs and files of scenarios are sent to each worker once."""
+    who, piece = worker(), runs_in(experiment, "A")
+    sent = [_assignment(who, piece, {"A@1": "d"}, {"A": Path("A.yaml")}, False) for _ in range(2)]
+    assert (sent[0].golden_digests, sent[0].scenario_files) == ({"A@1": "d"}, {"A": Path("A.yaml")})
+    assert not sent[1].golden_digests and not sent[1].scenario_files
+    assert sent[1].experiments == tuple(piece[0])
