@@ -130,7 +130,7 @@ def test_a_title_says_what_the_faults_are(open_page: Callable[..., Any]) -> None
     """The sentence of the spec stands above the place, and the search finds it."""
     page = open_page("q=further away")
     title = page.inner_text(".group:visible .about")
-    assert re.fullmatch(r"sensor/distance/longer \d+ to \d+ m: The other car seems further away\.", title)
+    assert re.fullmatch(r"sensor/distance/longer \d+ to \d+\sm: The other car seems further away\.", title)
 
 
 def test_wide_content_scrolls_in_its_own_box(open_page: Callable[..., Any]) -> None:

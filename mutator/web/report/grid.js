@@ -13,12 +13,12 @@ class Grid {
   static COLUMNS = [
     { name: "kind", title: "fault type", px: 174, narrow: true, beside: true, cell: (t, r) => Grid.kind(t.text(r, "kind")) },
     { name: "variant", title: "variant", px: 72 },
-    { name: "value", title: "value", px: 70, beside: true, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
+    { name: "value", title: "value", px: 102, beside: true, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
     { name: "scenario", title: "scenario", px: 76, narrow: true },
     { name: "method", title: "method", px: 66 },
     { name: "trigger", title: "trigger", px: 92, beside: true },
     { name: "ending", title: "outcome", px: 102, narrow: true, beside: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
-    { name: "severity", title: "severity", px: 190, narrow: true, cell: (t, r) => Grid.severity(t.called("severity", t.text(r, "severity"))) },
+    { name: "severity", title: "severity", px: 124, narrow: true, cell: (t, r) => Grid.severity(t.called("severity", t.text(r, "severity"))) },
     { name: "t_activation", title: "activated", px: 80, time: true },
     { name: "t_manifest", title: "manifested", px: 92, time: true },
     { name: "hazards", title: "hazards", px: 72 },
@@ -40,10 +40,9 @@ class Grid {
     return Dom.el(`span.ending.${text || "none"}`, {}, text.replaceAll("_", " "));
   }
 
-  /** A severity class in words: S1 alone is also a scenario. */
+  /** A severity class in words, with its code in the tooltip: S1 alone is also a scenario. */
   static severity(text) {
-    const [words, code] = text.split(" (severity ");
-    return text ? Dom.el("span.class", { title: text }, words, code ? Dom.el("span.word", {}, ` (severity ${code}`) : "") : "";
+    return text ? Dom.el("span.class", { title: text }, text.split(" (severity ")[0]) : "";
   }
 
   /** A number with three significant digits, or '' if there is none. */
