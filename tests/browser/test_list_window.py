@@ -62,3 +62,10 @@ def test_other_columns_or_measures_do_not_scroll_the_list(page: "Page") -> None:
     page.page.select_option("#measure", "activated")
     page.page.wait_for_function("location.hash.includes('heat=activated')")
     assert page.page.evaluate(f"{WINDOW}.scrollTop") == 9000
+
+
+def test_a_severity_class_is_short_and_its_code_in_the_tooltip(page: "Page") -> None:
+    """Words and code together leave no room for values and times."""
+    label = "const label = Grid.severity('possibly fatal (severity S3)')"
+    shown = page.page.evaluate(f"(() => {{ {label}; return [label.textContent, label.title]; }})()")
+    assert shown == ["possibly fatal", "possibly fatal (severity S3)"]
