@@ -7,6 +7,7 @@ import pytest
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault, Value
 from mutator.review.value_ranges import units_of_parameters, value_ranges_of
+from mutator.serve.served_trials import range_as_json
 from mutator.workspace import Workspace
 
 
@@ -71,3 +72,41 @@ def test_units_are_those_of_the_injected_code(toycar: Workspace) -> None:
     file.write_text(file.read_text().replace("unit: m\n", "unit: cm\n", 1))
     disagreeing = {spec.name: spec for spec in toycar.specs()}
     assert units_of_parameters(distance, disagreeing, models) == {}
+
+
+PAIRS = """\
+schema: fault_spec/1
+module: sensor
+fault_type: pair
+about: Two wrong values.
+variants:
+  both:
+    about: Two values that belong together.
+    draw:
+      near_m: {values: [3, 1]}
+      far_m: {values: [7, 9]}
+    as_described:
+      injections:
+        - at: {file: toycar/sensing.py, function: Sensor.sense, after_assign: gap}
+          model: offset
+          unit: m
+          params: {by_m: near}
+        - at: {file: toycar/sensing.py, function: Sensor.sense, after_assign: gap}
+          model: offset
+          unit: m
+          params: {by_m: -far}
+"""
+
+
+def test_values_in_pairs_have_a_range_each(toycar: Workspace) -> None:
+    """The reviewer sees all values of both lists, also if a campaign takes only some of them."""
+    (toycar.library / "faults" / "sensor" / "pair.yaml").write_text(PAIRS)
+    specs, models = {spec.name: spec for spec in toycar.specs()}, toycar.fault_models()
+    first = faults(toycar, "sensor/pair", 1)[:1]
+    assert value_ranges_of(first, specs, models) == {"1.by": (1.0, 3.0), "2.by": (-9.0, -7.0)}
+
+
+def test_values_in_pairs_cannot_be_chosen_on_a_slider(toycar: Workspace) -> None:
+    (toycar.library / "faults" / "sensor" / "pair.yaml").write_text(PAIRS)
+    (variant,) = toycar.spec("sensor/pair")
+    assert range_as_json(variant) is None
