@@ -19,8 +19,6 @@ from mutator.api.libraries import check_library as check_library
 from mutator.api.libraries import check_target as check_target
 from mutator.api.libraries import doctor as doctor
 from mutator.api.libraries import draw_control_structure as draw_control_structure
-from mutator.api.libraries import find_place_notes as find_place_notes
-from mutator.api.libraries import find_places as find_places
 from mutator.api.libraries import import_library as import_library
 from mutator.api.libraries import init_library as init_library
 from mutator.api.mutant_files import MutantSet as MutantSet
@@ -34,6 +32,8 @@ from mutator.api.run_experiments import RunExperiment as RunExperiment
 from mutator.api.runs import Run as Run
 from mutator.api.runs import load_run as load_run
 from mutator.api.runs import merge_runs as merge_runs
+from mutator.api.target_places import find_place_notes as find_place_notes
+from mutator.api.target_places import find_places as find_places
 from mutator.api.trials import Trial as Trial
 from mutator.api.trials import try_fault as try_fault
 from mutator.audit.seal import Seals as Seals

@@ -14,9 +14,6 @@ from mutator.checks.findings import Finding
 from mutator.checks.unrecorded_values import unrecorded_values_finding
 from mutator.checks.unused_draws_and_parameters import unused_draws_and_parameters_finding
 from mutator.errors import MutatorError
-from mutator.mutants.anchors import parsed_file
-from mutator.mutants.possible_places import ListedPlace, places_of
-from mutator.mutants.refused_places import PlaceNote, split_by_refusal
 from mutator.onboarding.first_library import write_first_library
 from mutator.onboarding.library_import import ImportedLibrary, import_into_new_library
 from mutator.onboarding.source_survey import survey_source
@@ -24,7 +21,6 @@ from mutator.onboarding.todo_marks import unfilled_mark_errors
 from mutator.stpa.analysis_checks import list_analysis_problems
 from mutator.stpa.analysis_files import HazardAnalysis
 from mutator.stpa.structure_drawing import render_structure
-from mutator.targets.allowed_locations import check_file_allowed
 from mutator.workspace import Workspace
 
 
@@ -77,43 +73,6 @@ def check_library(workspace: WorkspaceLike = None, *, target: str | None = None)
     """
     opened_workspace = open_workspace(workspace)
     return library_check.library_problems(opened_workspace, opened_workspace.target_name(target))
-
-
-def find_places(
-    where: str, workspace: WorkspaceLike = None, *, target: str | None = None
-) -> list[ListedPlace]:
-    """Return the places where faults can be injected in a file of the target, or in a function
-    (`FILE::FUNCTION`): line, anchor and fault models of each, from top to bottom.
-
-    `find_place_notes` says what is left out. MutatorError for a file in which faults are not allowed, and for
-    an unknown function.
-    """
-    return places_and_notes(where, workspace, target)[0]
-
-
-def find_place_notes(
-    where: str, workspace: WorkspaceLike = None, *, target: str | None = None
-) -> list[PlaceNote]:
-    """Return the functions and constants of a file or function that `find_places` leaves out, or in which a
-    fault acts only once, each with line and reason: compiled functions, fields of classes that copy their
-    defaults, files that another file shadows.
-
-    MutatorError as `find_places`.
-    """
-    return places_and_notes(where, workspace, target)[1]
-
-
-def places_and_notes(
-    where: str, workspace: WorkspaceLike, target: str | None
-) -> tuple[list[ListedPlace], list[PlaceNote]]:
-    """Return what `find_places` and `find_place_notes` return, with the target read once."""
-    opened_workspace = open_workspace(workspace)
-    manifest = opened_workspace.manifest(opened_workspace.target_name(target))
-    path, _, function = where.partition("::")
-    check_file_allowed(manifest, path)  # a forbidden file must not even be read
-    file = parsed_file(manifest.tree, path)
-    places = places_of(file, opened_workspace.fault_models(), function or None)
-    return split_by_refusal(manifest, file, places)
 
 
 def check_target(

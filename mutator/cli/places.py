@@ -41,7 +41,7 @@ def list_places(
     Each line shows an anchor as you write it under `at` in a spec: a statement, a value changed in place, a
     constant, or a default.
     """
-    from mutator.api.libraries import places_and_notes
+    from mutator.api.target_places import places_and_notes
 
     terminal = Terminal(as_json, wide)
     places, notes = places_and_notes(where, workspace_options.workspace(), manifest)

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
+from mutator.targets.manifest_names import manifest_path_by_name
 from mutator.workspace import Workspace
 
 
@@ -41,3 +42,30 @@ def test_a_damaged_manifest_does_not_hide_the_others(toycar: Workspace) -> None:
     assert toycar.manifest("toycar").name == "toycar"
     with pytest.raises(MutatorError, match=r"damaged.yaml:\d+: not valid YAML"):
         toycar.manifest("damaged")
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("name: plain\nroot: [", "plain"),
+        ("root: .\n\nname: plain\nabout: x\n", "plain"),
+        ("name: two\n  lines\n", "two lines"),
+        ("name: >-\n  folded\n", "folded"),
+        ('name: "quoted"\r\n', "quoted"),
+        ("{name: flow}", "flow"),
+        ("about: |\n  name: inner\nname: outer\n", "outer"),
+        ("about: 'a\nname: inner'\nname: outer\n", "outer"),
+        ("name: true\n", "file"),
+        ("name: on\n", "on"),
+        ("name: 12\n", "file"),
+        ("names: [x]\n", "file"),
+        ("name: ../up\n", "file"),
+        ("name: a\nname: b\n", "file"),
+    ],
+)
+def test_a_name_is_what_yaml_says_although_mostly_one_line_is_read(
+    tmp_path: Path, text: str, name: str
+) -> None:
+    path = tmp_path / "file.yaml"
+    path.write_bytes(text.encode())
+    assert manifest_path_by_name({"file": path}) == {name: path}
