@@ -62,6 +62,8 @@ def build_camera_and_detector(pictures: PictureOptions | None, road: Road, seed:
         "frames_digest": library.digest,
         "translation": pictures.translation,
     }
+    if pictures.threshold is not None:
+        description["threshold"] = pictures.threshold
     return CameraAndDetector(
         camera=camera,
         detector=_build_detector_with_memory(pictures, camera),
@@ -70,15 +72,16 @@ def build_camera_and_detector(pictures: PictureOptions | None, road: Road, seed:
     )
 
 
-def build_detector(name: str, model: CameraModel):
+def build_detector(name: str, model: CameraModel, threshold: float | None = None):
+    """Return a detector; `threshold` is for the one as coded; None: its own."""
     if name == PAPER_DETECTOR:
         from selfdrive.visiond.compiled_paper import build_paper_detector
 
         return build_paper_detector(model)
     if name == AUTHORS_CODE_DETECTOR:
-        from selfdrive.visiond.compiled_authors_code import build_authors_code_detector
+        from selfdrive.visiond.compiled_authors_code import MIN_LOG_ODDS, build_authors_code_detector
 
-        return build_authors_code_detector(model)
+        return build_authors_code_detector(model, MIN_LOG_ODDS if threshold is None else threshold)
     from selfdrive.visiond.compiled_robust import build_robust_detector
 
     return build_robust_detector(model)
@@ -88,9 +91,15 @@ def _build_detector_with_memory(pictures: PictureOptions, camera) -> LaneDetecto
     from selfdrive.sim.detection_memory import DetectionMemory
     from selfdrive.sim.remembering_detector import RememberingDetector
 
-    detector = build_detector(pictures.detector, camera.model)
+    detector = build_detector(pictures.detector, camera.model, pictures.threshold)
     if pictures.ignore_stored or pictures.cache is None:
         return detector
     memory = DetectionMemory(pictures.cache)
-    made_of = (pictures.detector, camera.model, detector.calculated_by, camera.calculated_by)
+    made_of = (
+        pictures.detector,
+        pictures.threshold,
+        camera.model,
+        detector.calculated_by,
+        camera.calculated_by,
+    )
     return RememberingDetector(detector, made_of, memory)

@@ -14,7 +14,8 @@ class PictureOptions:
 
     `frames` is a folder of user frames; None: a rendered road with these `marks` (both solid, or the right
     one dashed). `translation` is how frames follow the car's offset and heading: by the ground's homography,
-    or by shifting, as in the paper's text or in its authors' code. The folder `cache` stores frames and
+    or by shifting, as in the paper's text or in its authors' code. `threshold` is the lowest log odds of a
+    window with a mark, for the detector as coded; None: its own. The folder `cache` stores frames and
     detections; None: nothing is stored. With `forget`, stored detections are not used, as needed for
     detection code that depends on time.
     """
@@ -23,5 +24,6 @@ class PictureOptions:
     marks: str = SOLID_MARKS
     frames: Path | None = None
     translation: str = GROUND_TRANSLATION
+    threshold: float | None = None
     cache: Path | None = None
     ignore_stored: bool = False

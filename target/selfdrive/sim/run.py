@@ -11,11 +11,13 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from hashlib import sha256
+from math import isfinite, nan
 from pathlib import Path
 
 from selfdrive.common import compiled
 from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.picture_options import (
+    AUTHORS_CODE_DETECTOR,
     DETECTORS,
     GROUND_TRANSLATION,
     MARKS,
@@ -123,6 +125,12 @@ def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--detector", choices=DETECTORS, default=PAPER_DETECTOR, help="lane detector for pictures"
     )
+    parser.add_argument(
+        "--threshold",
+        type=_parse_number,
+        metavar="X",
+        help="lowest log odds of a window with a mark, for the detector as_coded",
+    )
     parser.add_argument("--marks", choices=MARKS, default=SOLID_MARKS, help="the rendered road's right line")
     parser.add_argument("--frames", type=Path, metavar="DIR", help="use your own pictures, not rendered ones")
     parser.add_argument(
@@ -139,17 +147,25 @@ def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _picture_options(options: argparse.Namespace) -> PictureOptions | None:
+    if not options.pictures and options.frames:
+        raise ConfigError(
+            f"--frames {options.frames}", expected="--pictures with it", remedy="give both or none"
+        )
+    coded = options.pictures and options.detector == AUTHORS_CODE_DETECTOR
+    if options.threshold is not None and not coded:
+        raise ConfigError(
+            f"--threshold {options.threshold:g}",
+            expected=f"--pictures and --detector {AUTHORS_CODE_DETECTOR} with it",
+            remedy="give all three, or leave it out",
+        )
     if not options.pictures:
-        if options.frames:
-            raise ConfigError(
-                f"--frames {options.frames}", expected="--pictures with it", remedy="give both or none"
-            )
         return None
     return PictureOptions(
         detector=options.detector,
         marks=options.marks,
         frames=options.frames,
         translation=options.translation,
+        threshold=options.threshold,
         cache=options.cache,
         ignore_stored=options.forget,
     )
@@ -159,6 +175,16 @@ def _parse_seed(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 0 or more")
     return int(text)
+
+
+def _parse_number(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = nan
+    if not isfinite(number):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
+    return number
 
 
 def _parse_positive(text: str) -> int:

@@ -156,3 +156,8 @@ def _column_at_read_row(pixels: np.ndarray, counts: np.ndarray) -> float:
 def lateral_position(column: float) -> float:
     """Lateral position (m, left positive) of the road in this column of row LINE_READ_ROW."""
     return (MIDDLE_COLUMN - column) * METRES_PER_PIXEL
+
+
+def column_of(lateral_position: float) -> float:
+    """Column of the road at this lateral position (m, left positive) in row LINE_READ_ROW."""
+    return MIDDLE_COLUMN - lateral_position / METRES_PER_PIXEL

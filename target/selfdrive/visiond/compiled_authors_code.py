@@ -40,20 +40,22 @@ class _AuthorsCodeStructure(ctypes.Structure):
     _fields_ = (*((name, ctypes.c_void_p) for name in _ARRAY_SHAPES), ("lines", ctypes.c_double * 2))
 
 
-def build_authors_code_detector(model: CameraModel) -> AuthorsCodeDetector:
+def build_authors_code_detector(model: CameraModel, threshold: float = MIN_LOG_ODDS) -> AuthorsCodeDetector:
     libraries = [compiled.library(source) for source in (C_SOURCE, compiled_windows.C_SOURCE)]
     if None in libraries or not has_identical_sums(libraries[0]):
-        return AuthorsCodeDetector(model)
-    return CompiledAuthorsCodeDetector(model, *libraries)
+        return AuthorsCodeDetector(model, threshold)
+    return CompiledAuthorsCodeDetector(model, threshold, *libraries)
 
 
 class CompiledAuthorsCodeDetector(AuthorsCodeDetector):
     """AuthorsCodeDetector that calls compiled C: `coded_lines.c` (`lines`), `mark_windows.c` (`windows`)."""
 
-    def __init__(self, model: CameraModel, lines: compiled.Library, windows: compiled.Library) -> None:
-        super().__init__(model)
+    def __init__(
+        self, model: CameraModel, threshold: float, lines: compiled.Library, windows: compiled.Library
+    ) -> None:
+        super().__init__(model, threshold)
         self.calculated_by = lines.digest.hex() + windows.digest.hex()
-        self._windows = MarkWindowFinder(WINDOWS_PART_SIZE, MIN_LOG_ODDS, windows)
+        self._windows = MarkWindowFinder(WINDOWS_PART_SIZE, threshold, windows)
         self._arrays = {name: np.zeros(*room) for name, room in _ARRAY_SHAPES.items()}
         self._coded = _AuthorsCodeStructure(
             **{name: array.ctypes.data for name, array in self._arrays.items()}

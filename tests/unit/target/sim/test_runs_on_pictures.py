@@ -1,5 +1,6 @@
 """Runs in which the controller sees the road in frames."""
 
+import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -245,3 +246,39 @@ def test_fault_free_runs_with_the_detector_as_coded_have_no_hazard(
         if "steer_saturated" in {alert["name"] for alert in result.record["alerts"]}:
             found.add(name)
     assert found == alerting
+
+
+def test_the_threshold_of_the_detector_as_coded_can_be_chosen(scenarios, tmp_path):
+    """Another threshold detects other lines and is recorded; detections are stored by threshold."""
+    steps, traces, records = 150, {}, {}
+    for name, arguments in (("own", []), ("same", ["--threshold", "4.0"]), ("none", ["--threshold", "50"])):
+        out = tmp_path / name
+        command = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(out), "--pictures"]
+        command += ["--detector", "as_coded", "--cache", str(tmp_path / "cache"), "--max-steps", str(steps)]
+        assert main([*command, *arguments]) == 0
+        traces[name], records[name] = (
+            (out / "trace.npz").read_bytes(),
+            json.loads((out / "record.json").read_text()),
+        )
+    assert traces["own"] == traces["same"] != traces["none"]
+    assert "threshold" not in records["own"]["pictures"]
+    assert records["none"]["pictures"]["threshold"] == 50.0
+
+
+@pytest.mark.parametrize("arguments", [[], ["--pictures"], ["--pictures", "--detector", "robust"]])
+def test_a_threshold_without_the_detector_as_coded_is_refused(scenarios, tmp_path, capsys, arguments):
+    command = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path), "--threshold", "2.5"]
+    assert main([*command, *arguments]) == 2
+    assert (
+        "error: --threshold 2.5, expected --pictures and --detector as_coded with it"
+        in capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "high"])
+def test_a_threshold_is_a_finite_number(scenarios, tmp_path, capsys, value):
+    command = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path), "--threshold", value]
+    with pytest.raises(SystemExit) as ended:
+        main(command)
+    assert ended.value.code == 2
+    assert f"{value!r} is not a finite number" in capsys.readouterr().err
