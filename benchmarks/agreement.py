@@ -20,7 +20,7 @@ def main() -> None:
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="a run folder")
     options = parser.parse_args()
     published = load_published_numbers(REFERENCES)
-    frames = [load_usable_results(run) for run in options.runs]
+    frames = [load_usable_results(run / "results.csv") for run in options.runs]
     tallies = [tally_by_fault_type(frame) for frame in frames]
     width = max(12, *(len(run.name) for run in options.runs))
     print(
