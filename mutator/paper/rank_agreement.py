@@ -31,10 +31,10 @@ class RankAgreement:
 
 def measure_agreement(frame: pd.DataFrame, published: PublishedNumbers) -> RankAgreement:
     """Compare guided experiments. Fault types that never activated, here or there, are left out."""
-    ours, pairs = tally_by_fault_type(frame), []
-    for key, theirs in published.tally_by_fault_type.items():
-        if key[0] == GUIDED and key in ours and ours[key].activated and theirs.activated:
-            pairs.append((ours[key].hazards / ours[key].activated, theirs.hazards / theirs.activated))
+    tallies, pairs = tally_by_fault_type(frame), []
+    for key, printed in published.tally_by_fault_type.items():
+        if key[0] == GUIDED and key in tallies and tallies[key].activated and printed.activated:
+            pairs.append((tallies[key].hazards / tallies[key].activated, printed.hazards / printed.activated))
     here, there = (np.array(values) for values in zip(*pairs, strict=True))
     low, high = resampled_interval((here, there), rank_correlation)
     return RankAgreement(
@@ -52,9 +52,9 @@ def rank_correlation(first: Any, second: Any, axis: int = -1) -> Any:
     from scipy.stats import rankdata  # type: ignore[import-untyped]
 
     ranks = [rankdata(values, axis=axis) for values in (first, second)]
-    one, other = (rank - rank.mean(axis=axis, keepdims=True) for rank in ranks)
+    x, y = (rank - rank.mean(axis=axis, keepdims=True) for rank in ranks)
     with np.errstate(invalid="ignore"):
-        return (one * other).sum(axis) / np.sqrt((one * one).sum(axis) * (other * other).sum(axis))
+        return (x * y).sum(axis) / np.sqrt((x * x).sum(axis) * (y * y).sum(axis))
 
 
 def _count_tied(values: np.ndarray) -> int:

@@ -51,7 +51,7 @@ LEFT_LANE = "H3"
 
 def count_lines(threshold: float, frames: Sequence[LabelledFrame]) -> int:
     """How many of the frames' lines, two each, the detector finds."""
-    found = 0
+    line_count = 0
     for frame in frames:
         view = CameraView(
             left_lane_y=0.0, right_lane_y=0.0, path_y=0.0, bend=(), lead_d_rel=0.0, picture=frame.grey
@@ -64,8 +64,8 @@ def count_lines(threshold: float, frames: Sequence[LabelledFrame]) -> int:
             (coded.column_of(lines.left.y) - coded.INWARD_PIXELS, frame.left_column),
             (coded.column_of(lines.right.y) + coded.INWARD_PIXELS, frame.right_column),
         )
-        found += sum(abs(column - true) <= limit for column, true in columns)
-    return found
+        line_count += sum(abs(column - true) <= limit for column, true in columns)
+    return line_count
 
 
 def load_scenarios(folder: Path) -> list[Scenario]:
