@@ -251,10 +251,6 @@ def test_without_files_the_tree_has_all_files_of_the_packages(toy: Workspace) ->
         ),
         ("about: none", "neither `package` nor `packages`; expected one of them"),
         ("package: toycar\npackages: [toycar]", "5: both `package` and `packages`; expected one of them"),
-        (
-            "packages: []",
-            "5: []: the target has no package and no module, so nothing of it could be imported",
-        ),
     ],
 )
 def test_invalid_packages_are_refused(toy: Workspace, packages: str, said: str) -> None:
