@@ -1,12 +1,13 @@
 """Read values from the JSON types into which `hashing.as_json_types` converts them.
 
 What fits follows from the annotations alone: a dataclass is an object, a named tuple the list of its values,
-another tuple a list, a mapping an object with any keys. Only the standard library is used, because workers
-read heads of runs.
+another tuple a list, a mapping or counter an object with any keys. Only the standard library is used, because
+workers read heads of runs.
 """
 
 import dataclasses
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from functools import cache
@@ -46,6 +47,9 @@ def _reader_of(kind: Any) -> _Reader:
         return _union_reader(kind, [_reader_of(part) for part in arguments])
     if origin is Mapping:
         return _mapping_reader(_reader_of(arguments[1]))
+    if origin is Counter:
+        counts = _mapping_reader(_reader_of(int))
+        return lambda data: Counter(counts(data))
     if origin is tuple and arguments[-1] is Ellipsis:
         return _tuple_reader(_reader_of(arguments[0]))
     if origin is tuple:

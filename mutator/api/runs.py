@@ -16,7 +16,7 @@ from mutator.api.run_figures import RunFigures
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
-from mutator.execution.session import ProgressCallback, Summary
+from mutator.execution.session import Summary
 from mutator.execution.shard_merging import merge_shards
 from mutator.exports import ExportSelection, Format, find_export
 from mutator.exports import ExportTable as ExportedTable
@@ -40,6 +40,7 @@ from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import run_deletion
 from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_progress import ProgressCallback
 from mutator.targets.scene_json import scene_as_json
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import shutil
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -49,6 +49,7 @@ from mutator.execution.finished_outcome_cache import (
     remember_finished_run,
 )
 from mutator.execution.frozen_plan import open_or_freeze_run
+from mutator.execution.watched_progress import writing_progress
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Outcome, Record
 from mutator.preflight import equivalence_check
@@ -66,21 +67,14 @@ from mutator.store.plan_choices import Choices
 from mutator.store.preflight_results import golden_digests
 from mutator.store.records import LINE_SCHEMA_BY_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_progress import Progress, progress_label
+from mutator.store.run_progress import Progress, ProgressCallback, progress_label
 from mutator.store.series_packing import list_unpacked_worker_files, pack_series
 from mutator.store.session_environments import WorkerMachine
-from mutator.store.session_progress import (
-    SessionProgress,
-    remove_session_progress,
-    write_session_progress,
-)
 from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 _SECRET_BYTES = 16  # 128 bits, which no mutant can guess
-
-ProgressCallback = Callable[[Progress], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,14 +134,13 @@ class Session:
         workers: int = 0,
         engine: str | None = None,
         accept_versions: bool = False,
-        notify: ProgressCallback | None = None,
+        notify: ProgressCallback = lambda progress: None,
     ) -> None:
         self.workspace = workspace
         self.folder = folder
         self.workers = workers
         self.accept_versions = accept_versions
-        self._notify = notify
-        self._latest_progress = Progress(stage="plan")
+        self.notify = notify  # tells whoever started or watches the session how far it is
         self.pending: tuple[PendingChunk, ...] = ()
         self.proof: tuple[equivalence_check.SampledExperiment, ...] = ()
         self.manifest = workspace.manifest(folder.head.target)
@@ -166,24 +159,6 @@ class Session:
         self._finished_count_before = 0
         self._records: Mapping[str, Record] | None = None
         self._earlier_outcome: FinishedRunOutcome | None = None
-
-    def notify(self, progress: Progress) -> None:
-        """Tell whoever started or watches the session how far it is."""
-        self._latest_progress = progress
-        write_session_progress(self.folder.path, SessionProgress.of(progress))
-        if self._notify:
-            self._notify(progress)
-
-    @property
-    def stage(self) -> str:
-        return self._latest_progress.stage
-
-    def note_end(self, problem: str) -> None:
-        """Leave the cause for those who watch the session if it failed, or nothing."""
-        if problem:
-            write_session_progress(self.folder.path, SessionProgress.of(self._latest_progress, problem))
-        else:
-            remove_session_progress(self.folder.path)
 
     def prepare(self, packages: Iterable[str] = ()) -> None:
         """Find the work to do. If there is any, run the checks and begin a stretch, which records the
@@ -432,25 +407,17 @@ def open_session(
         for path in chain(*candidates):
             if is_half_written(path.name) and path.is_file():
                 path.unlink()
-        session = Session(
-            workspace,
-            folder,
-            workers=workers,
-            engine=engine,
-            accept_versions=accept_versions,
-            notify=notify,
-        )
-        write_session_progress(folder.path, SessionProgress.of(Progress(stage="plan")))
         try:
-            yield session
-        except Exception as error:
-            is_refused = session.stage == "plan"  # before any work: the folder stays as it was
-            session.note_end("" if is_refused else str(error) or type(error).__name__)
-            raise
-        except BaseException:  # an interruption is no failure
-            session.note_end("")
-            raise
-        else:
-            session.note_end(session.problem)
+            with writing_progress(folder.path, notify) as progress:
+                session = Session(
+                    workspace,
+                    folder,
+                    workers=workers,
+                    engine=engine,
+                    accept_versions=accept_versions,
+                    notify=progress.notify,
+                )
+                yield session
+                progress.problem = session.problem
         finally:
             remove_anything_at(folder.scratch_folder)

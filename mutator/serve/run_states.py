@@ -42,7 +42,7 @@ class RunState:
 def state_of_run(folder: RunFolder) -> RunState:
     """Return the state of a run. A command is only seen if it runs on this machine."""
     stored = read_session_progress(folder.path)
-    progress = stored.as_progress if stored else None
+    progress = stored.progress if stored else None
     if is_owner_alive(folder.path):
         # a finished run that is resumed has nothing left to do
         return RunState(state=FINISHED if folder.is_finished else RUNNING, progress=progress)

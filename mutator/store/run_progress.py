@@ -3,6 +3,7 @@
 import json
 import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,6 +24,7 @@ class Progress:
     remaining_s: float | None = None  #: estimated time in s to the end of the stage
 
 
+ProgressCallback = Callable[[Progress], None]
 FIRST_STEPS_S = 1.0  # workers that started together finish their first steps within this time
 
 

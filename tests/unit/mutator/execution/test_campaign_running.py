@@ -79,7 +79,7 @@ def test_a_run_resumed_by_another_distributor_has_the_same_results(toycar: Works
     assert (summary.exit_code, summary.done, summary.problem) == (3, 0, "no machine answered")
     left = read_session_progress(tmp_path / "idle")
     assert left is not None
-    assert (left.stage, left.problem) == ("tables", "no machine answered")
+    assert (left.progress.stage, left.problem) == ("tables", "no machine answered")
     summary = run_campaign(toycar, "small", tmp_path / "idle", distributor=InOrder())
     assert summary.exit_code == 0
     assert not (tmp_path / "idle" / PROGRESS_FILE).exists()

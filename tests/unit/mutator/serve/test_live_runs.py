@@ -21,7 +21,7 @@ from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress
-from mutator.store.session_progress import SessionProgress, write_session_progress
+from mutator.store.session_progress import write_session_progress
 from mutator.workspace import Workspace
 
 HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0),)}
@@ -135,11 +135,11 @@ def test_the_state_of_a_run_is_that_of_its_session(planned: RunFolder) -> None:
     progress = Progress(stage="golden", done=1, total=2)
     assert state_of_run(planned).state == "unfinished"
     with lock_run_folder(planned.path):
-        write_session_progress(planned.path, SessionProgress.of(progress))
+        write_session_progress(planned.path, progress)
         running = state_of_run(planned)
         assert (running.state, running.progress) == ("running", progress)
     assert state_of_run(planned).state == "unfinished"  # killed: nobody holds the lock
-    write_session_progress(planned.path, SessionProgress.of(progress, f"{planned.path}/x: no space left"))
+    write_session_progress(planned.path, progress, f"{planned.path}/x: no space left")
     failed = state_of_run(planned)
     assert (failed.state, failed.problem) == ("failed", "x: no space left")
     file_digests.add_segments_to_ledger(planned.path, finished=True)

@@ -14,7 +14,7 @@ from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.model import Outcome
 from mutator.serve.served_trials import _trigger_text
 from mutator.store.run_progress import Progress
-from mutator.store.session_progress import SessionProgress, write_session_progress
+from mutator.store.session_progress import write_session_progress
 from mutator.store.trial_file import StoredTrial
 from mutator.workspace import Workspace
 
@@ -44,8 +44,7 @@ def test_a_run_in_progress_leads_to_its_live_page(watching: Client) -> None:
     run = watching.place / "runs" / "half"
     with lock_run_folder(run):
         write_session_progress(
-            run,
-            SessionProgress.of(Progress(stage="experiments", done=6, total=12, per_s=2.0, remaining_s=3.0)),
+            run, Progress(stage="experiments", done=6, total=12, per_s=2.0, remaining_s=3.0)
         )
         answer = watching.get("/runs/half/report/index.html")
         assert (answer.status, answer.headers["location"]) == (307, "/live/half")
