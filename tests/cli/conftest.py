@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,8 @@ import pytest
 
 from mutator.cli.app import main
 from mutator.workspace import Workspace
+
+from .finished_runs import finish_run
 
 TOY = Path(__file__).parents[1] / "toy"
 
@@ -63,6 +66,21 @@ def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         monkeypatch.delenv(f"MUTATOR_{name}", raising=False)
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
+    """The root with the finished run `runs/first`, and what `mutator run` printed."""
+    root = tmp_path_factory.mktemp("finished") / "toy"
+    return root, finish_run(root)
+
+
+@pytest.fixture
+def run(finished: tuple[Path, Any], monkeypatch: pytest.MonkeyPatch) -> Path:
+    root, _ = finished
+    monkeypatch.chdir(root)
+    monkeypatch.setenv("MUTATOR_ROOT", str(root))
+    return root / "runs" / "first"
 
 
 @pytest.fixture(scope="session")
