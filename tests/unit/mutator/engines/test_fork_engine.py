@@ -20,19 +20,7 @@ from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 
 from ..fork_on_toy import LIMITS, Edit, Fork
-
-
-def gone(pid: int) -> bool:
-    deadline = time.monotonic() + 20.0
-    while time.monotonic() < deadline:
-        try:
-            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-        except (FileNotFoundError, ProcessLookupError):
-            return True
-        if state == "Z":
-            return True
-        time.sleep(0.05)
-    return False
+from .ended_processes import ended
 
 
 def test_forking_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
@@ -44,7 +32,7 @@ def test_forking_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -
         status = Path(f"/proc/{pid}/status").read_text()
         assert "\nThreads:\t1\n" in status
     fork.close()
-    assert all(map(gone, pids))
+    assert all(map(ended, pids))
     assert [path.name for path in (fork.folder / "work").iterdir() if "server" in path.name] == []
 
 
@@ -81,7 +69,7 @@ def test_a_killed_process_causes_a_harness_error_for_one_job_only(fork: Fork) ->
         assert fork.run(job).status is Status.OK
         victims = fork.processes()
         os.kill(victims[place], signal.SIGKILL)
-        assert gone(victims[place])
+        assert ended(victims[place])
         time.sleep(0.1)
         execution = fork.run(job)
         if execution.status is Status.OK:  # a waiting process could still run the job
@@ -90,7 +78,7 @@ def test_a_killed_process_causes_a_harness_error_for_one_job_only(fork: Fork) ->
         assert execution.status is Status.HARNESS_ERROR
         assert "fork server" in execution.detail
         assert fork.run(job).status is Status.OK
-        assert all(map(gone, victims)), "a process of the killed server is still running"
+        assert all(map(ended, victims)), "a process of the killed server is still running"
 
 
 def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
@@ -99,17 +87,17 @@ def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
     assert guard == fork.pool._process.pid
     assert waiting
     os.kill(first, signal.SIGKILL)
-    assert all(map(gone, (guard, *waiting)))
+    assert all(map(ended, (guard, *waiting)))
 
 
 def test_a_killed_guard_is_reported_by_the_next_run(fork: Fork) -> None:
     fork.run(fork.job(trigger_at_time(2.0)))
     pids = fork.processes()
     os.kill(fork.pool._process.pid, signal.SIGKILL)
-    assert gone(fork.pool._process.pid)
+    assert ended(fork.pool._process.pid)
     execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert (execution.status, execution.detail) == (Status.HARNESS_ERROR, "the fork server is gone")
-    assert all(map(gone, pids))
+    assert all(map(ended, pids))
 
 
 ENGINE = """
@@ -140,7 +128,7 @@ def test_the_server_ends_when_its_engine_is_killed(toycar: Workspace, tmp_path: 
     finally:
         engine.kill()
         engine.communicate()
-    assert all(map(gone, pids))
+    assert all(map(ended, pids))
 
 
 @pytest.mark.slow
