@@ -10,10 +10,8 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from secrets import token_bytes
-from typing import NamedTuple
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import (
@@ -34,6 +32,7 @@ from mutator.engines.fork_server_processes import (
     WaitingProcess,
     raising_if_server_input_changes,
 )
+from mutator.engines.golden_run_keys import GoldenRunKey, golden_run_key, resolved_path
 from mutator.engines.job_folder import PLAIN_OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
 from mutator.engines.observation_store import ObservationStore
 from mutator.engines.process_endings import (
@@ -52,14 +51,6 @@ from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import ProbeSource, untriggered_report
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
-
-
-class _GoldenRunKey(NamedTuple):
-    """What tells golden runs apart; `scenario_path` is absolute, without links."""
-
-    scenario_path: str
-    seed: int
-    scenario_changes: tuple[str, ...]
 
 
 class ForkEngine:
@@ -95,7 +86,7 @@ class ForkEngine:
             None if manifest.stepwise_function else NotForkable(f"target {manifest.name} is not stepwise")
         )
         self._observations_by_golden: dict[
-            _GoldenRunKey, GoldenObservations | NotForkable
+            GoldenRunKey, GoldenObservations | NotForkable
         ] = {}  # observations, or why there are none
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, JobResult]]:
@@ -190,7 +181,7 @@ class ForkEngine:
         return self._run_in_fork(first, job, folder, swap, _BEFORE_FIRST_STEP)
 
     def _ensure_server(self, job: Job) -> ForkServer:
-        scenarios = Path(_resolved_path(job.scenario)).parent
+        scenarios = Path(resolved_path(job.scenario)).parent
         if self._server is None:
             self._server_count += 1
             home = self._runs_folder / f"server-{self._server_count}"
@@ -205,7 +196,7 @@ class ForkEngine:
 
     def _process_before_step(self, job: Job, step: int, swap: CodeSwap) -> WaitingProcess:
         pool = self._ensure_server(job)
-        key = _golden_run_key(job)
+        key = golden_run_key(job)
         golden = GoldenRunRequest(
             key=key, scenario=job.scenario, arguments=lambda: self._target_arguments(job, pool.scratch_folder)
         )
@@ -307,7 +298,7 @@ class ForkEngine:
 
     def _golden_observations(self, job: Job, golden: Path) -> GoldenObservations:
         """Return what a probe observes in a job's golden run. The first call runs it."""
-        key = _golden_run_key(job)
+        key = golden_run_key(job)
         if key not in self._observations_by_golden:
             try:
                 self._observations_by_golden[key] = self._observe_golden_run(job, golden)
@@ -319,7 +310,7 @@ class ForkEngine:
         return observations
 
     def _observe_golden_run(self, job: Job, golden: Path) -> GoldenObservations:
-        golden_id = content_id(_golden_run_key(job))
+        golden_id = content_id(golden_run_key(job))
         if stored := self._observation_store.load(golden_id):
             return stored
         folder = self._runs_folder / f"watch-{golden_id}"
@@ -361,15 +352,6 @@ _BEFORE_FIRST_STEP = ForkPoint(step=0, observation_count=0, earliest_time_s=None
 
 def _modules_to_load(swap: CodeSwap) -> list[str]:
     return [*dict.fromkeys(function.module for function in swap.functions), *swap.imported_modules]
-
-
-def _golden_run_key(job: Job) -> _GoldenRunKey:
-    return _GoldenRunKey(_resolved_path(job.scenario), job.seed, job.scenario_changes)
-
-
-@cache
-def _resolved_path(scenario: Path) -> str:
-    return str(scenario.resolve())
 
 
 def _golden_result_of_inactive_fault(job: Job, golden: Path) -> JobResult:
