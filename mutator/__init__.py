@@ -41,7 +41,7 @@ NAMES_BY_MODULE = {
     "mutator.campaigns.plan": ("Plan",),
     "mutator.comparison.run_comparison": ("Gate",),
     "mutator.errors": ("CheckFailed", "IncompleteRun", "MutatorError", "MutatorWarning"),
-    "mutator.execution.session": ("Summary",),
+    "mutator.execution.session_summary": ("Summary",),
     "mutator.exports": ("Format",),
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),
     "mutator.onboarding.library_import": ("EntryOutcome", "ImportedEntry", "ImportedLibrary"),

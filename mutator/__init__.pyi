@@ -43,7 +43,7 @@ from mutator.errors import CheckFailed as CheckFailed
 from mutator.errors import IncompleteRun as IncompleteRun
 from mutator.errors import MutatorError as MutatorError
 from mutator.errors import MutatorWarning as MutatorWarning
-from mutator.execution.session import Summary as Summary
+from mutator.execution.session_summary import Summary as Summary
 from mutator.exports import Format as Format
 from mutator.model import Experiment as Experiment
 from mutator.model import Fault as Fault

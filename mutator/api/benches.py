@@ -22,7 +22,7 @@ from mutator.campaigns.campaign_files import load_campaign
 from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.errors import EXIT_CHECK_FAILED, IncompleteRun, MutatorError, MutatorWarning
 from mutator.execution import bench as bench_in_folder
-from mutator.execution.session import Summary
+from mutator.execution.session_summary import Summary
 from mutator.model import AfterHazard, Experiment, Fault, Record
 from mutator.preflight.equivalence_check import EquivalenceResult
 from mutator.store.run_folder import RunFolder

@@ -10,7 +10,7 @@ from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.errors import IncompleteRun
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.distributor_choice import choose_distributor
-from mutator.execution.session import Summary
+from mutator.execution.session_summary import Summary
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback

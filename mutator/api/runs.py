@@ -16,7 +16,7 @@ from mutator.api.run_figures import RunFigures
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
-from mutator.execution.session import Summary
+from mutator.execution.session_summary import Summary
 from mutator.execution.shard_merging import merge_shards
 from mutator.exports import ExportSelection, Format, find_export
 from mutator.exports import ExportTable as ExportedTable

@@ -39,7 +39,7 @@ from mutator.execution.progress_text import describe_duration
 if TYPE_CHECKING:
     from mutator.api.runs import Run
     from mutator.campaigns.plan import PlanCost
-    from mutator.execution.session import Summary
+    from mutator.execution.session_summary import Summary
     from mutator.report.report_builder import WrittenReport
     from mutator.store.run_progress import ProgressCallback
 

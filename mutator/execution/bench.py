@@ -30,7 +30,8 @@ from mutator.errors import MutatorError
 from mutator.execution.batch_check import BatchCheck
 from mutator.execution.bench_crew import BenchCrew
 from mutator.execution.bench_messages import BenchWorkerStart
-from mutator.execution.session import Session, Summary
+from mutator.execution.session import Session
+from mutator.execution.session_summary import Summary
 from mutator.execution.worker import WorkerAssignment
 from mutator.model import AfterHazard, Experiment, Record, Status
 from mutator.preflight import equivalence_check

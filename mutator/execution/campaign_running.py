@@ -10,7 +10,8 @@ from mutator.errors import MutatorWarning
 from mutator.execution.distributor_choice import Distributor, packages_of_distributor
 from mutator.execution.local_distributor import LocalDistributor
 from mutator.execution.progress_reporting import reporting_progress
-from mutator.execution.session import Summary, open_session
+from mutator.execution.session import open_session
+from mutator.execution.session_summary import Summary
 from mutator.execution.stray_files import StrayFiles
 from mutator.store.plan_choices import Choices
 from mutator.store.run_progress import ProgressCallback

@@ -11,7 +11,6 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -21,7 +20,7 @@ from typing import Any
 from mutator._common.files import is_half_written, remove_anything_at
 from mutator._common.folder_locks import lock_run_folder, wait_for_workers
 from mutator._common.interrupts import raising_keyboard_interrupts
-from mutator.audit.seal import Seals, seals_of
+from mutator.audit.seal import seals_of
 from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
 from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.run_inputs import RunInputs
@@ -35,9 +34,6 @@ from mutator.engines.engine_choice import choose_engine, reason_not_to_fork
 from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import ensure_work_folder
 from mutator.errors import (
-    EXIT_CHECK_FAILED,
-    EXIT_HARNESS_ERRORS,
-    EXIT_OK,
     CheckFailed,
     DiskFull,
     MutatorError,
@@ -49,6 +45,7 @@ from mutator.execution.finished_outcome_cache import (
     remember_finished_run,
 )
 from mutator.execution.frozen_plan import open_or_freeze_run
+from mutator.execution.session_summary import Summary
 from mutator.execution.watched_progress import writing_progress
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Outcome, Record
@@ -73,54 +70,7 @@ from mutator.store.session_environments import WorkerMachine
 from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
 
-EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 _SECRET_BYTES = 16  # 128 bits, which no mutant can guess
-
-
-@dataclass(frozen=True, kw_only=True)
-class Summary:
-    """The outcome of a session. `outcomes` is as in Progress."""
-
-    planned: int  #: planned experiments in this folder
-    done: int  #: experiments with a final record
-    ran: int  #: experiments that ran in this session
-    outcomes: Counter[str]  #: experiments by outcome or status
-    harness_errors: tuple[tuple[str, str], ...]  #: (experiment id, detail) of each harness error
-    problem: str  #: why the session ended early (disk full, a worker died); else empty
-    interrupted: bool  #: whether a signal ended the session
-    results: Path | None  #: path of results.csv; None if the disk was full
-    proof: equivalence_check.EquivalenceResult | None  #: the equivalence check; None if none was needed
-    seals: Seals  #: the digests to publish: the seal, the results digest and the review digest
-    not_forked: (
-        str  #: why no experiment was forked; empty if one was, or if the reference engine was requested
-    )
-    elapsed_s: float  #: duration of the session (s)
-    #: whether, without a canary, no experiment of the whole plan has reached a hazard
-    has_reached_nothing: bool = False
-
-    @property
-    def seal(self) -> str | None:
-        """The seal; None if the run is not finished."""
-        return self.seals.seal
-
-    @property
-    def proof_note(self) -> str:
-        """The state of the proof, or why there is none; empty if the reference engine was requested."""
-        if self.not_forked:
-            return f"none is needed, because no experiment was forked: {self.not_forked}"
-        return str(self.proof) if self.proof else ""
-
-    @property
-    def exit_code(self) -> int:
-        """0: success; 1: no hazard was reached, and no canary shows that one can be; 3: harness errors, or
-        experiments left to run; 130: interrupted.
-        """
-        if self.interrupted:
-            return EXIT_INTERRUPTED
-        whole = self.done == self.planned and (self.proof is None or self.proof.is_complete)
-        if not whole or self.problem:
-            return EXIT_HARNESS_ERRORS
-        return EXIT_CHECK_FAILED if self.has_reached_nothing else EXIT_OK
 
 
 class Session:

@@ -16,7 +16,8 @@ from mutator._common.resource_shortages import find_shortage
 from mutator.errors import MutatorError, PytestItemFailed
 from mutator.execution.progress_reporting import reporting_progress
 from mutator.execution.progress_text import ProgressLines
-from mutator.execution.session import Session, Summary, open_session
+from mutator.execution.session import Session, open_session
+from mutator.execution.session_summary import Summary
 from mutator.execution.suspended_workers import WorkerContinuer
 from mutator.execution.worker import WorkerAssignment, python_command_dying_with
 from mutator.execution.xdist_worker import (

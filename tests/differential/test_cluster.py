@@ -15,7 +15,7 @@ from mutator.errors import MutatorWarning
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.cluster import bundle
 from mutator.execution.distributor_choice import choose_distributor
-from mutator.execution.session import Summary
+from mutator.execution.session_summary import Summary
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

@@ -17,7 +17,7 @@ from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
-from mutator.execution.session import Summary
+from mutator.execution.session_summary import Summary
 from mutator.execution.single_run import rerun_experiment, run_single
 from mutator.execution.worker import Worker
 from mutator.model import Status

@@ -23,7 +23,7 @@ EXCEPTIONS: dict[str, str] = {
     **dict.fromkeys(
         (
             "mutator/checks/findings.py::Finding.found",
-            "mutator/execution/session.py::Summary.done",
+            "mutator/execution/session_summary.py::Summary.done",
             "mutator/glue.py::Run.done",
             "mutator/store/run_progress.py::Progress.done",
         ),

@@ -1,0 +1,57 @@
+"""What a session reports when it ends."""
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from mutator.audit.seal import Seals
+from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, EXIT_OK
+from mutator.preflight import equivalence_check
+
+EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """The outcome of a session. `outcomes` is as in Progress."""
+
+    planned: int  #: planned experiments in this folder
+    done: int  #: experiments with a final record
+    ran: int  #: experiments that ran in this session
+    outcomes: Counter[str]  #: experiments by outcome or status
+    harness_errors: tuple[tuple[str, str], ...]  #: (experiment id, detail) of each harness error
+    problem: str  #: why the session ended early (disk full, a worker died); else empty
+    interrupted: bool  #: whether a signal ended the session
+    results: Path | None  #: path of results.csv; None if the disk was full
+    proof: equivalence_check.EquivalenceResult | None  #: the equivalence check; None if none was needed
+    seals: Seals  #: the digests to publish: the seal, the results digest and the review digest
+    not_forked: (
+        str  #: why no experiment was forked; empty if one was, or if the reference engine was requested
+    )
+    elapsed_s: float  #: duration of the session (s)
+    #: whether, without a canary, no experiment of the whole plan has reached a hazard
+    has_reached_nothing: bool = False
+
+    @property
+    def seal(self) -> str | None:
+        """The seal; None if the run is not finished."""
+        return self.seals.seal
+
+    @property
+    def proof_note(self) -> str:
+        """The state of the proof, or why there is none; empty if the reference engine was requested."""
+        if self.not_forked:
+            return f"none is needed, because no experiment was forked: {self.not_forked}"
+        return str(self.proof) if self.proof else ""
+
+    @property
+    def exit_code(self) -> int:
+        """0: success; 1: no hazard was reached, and no canary shows that one can be; 3: harness errors, or
+        experiments left to run; 130: interrupted.
+        """
+        if self.interrupted:
+            return EXIT_INTERRUPTED
+        whole = self.done == self.planned and (self.proof is None or self.proof.is_complete)
+        if not whole or self.problem:
+            return EXIT_HARNESS_ERRORS
+        return EXIT_CHECK_FAILED if self.has_reached_nothing else EXIT_OK
