@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import files_inside
+from mutator._common.confined_files import checked_path_inside
 from mutator._common.message_text import counted, shortened_repr
 from mutator.errors import MutatorError
 
@@ -76,7 +76,8 @@ def read_fault_files(folder: Path) -> tuple[tuple[FaultFile, ...], dict[str, str
     if not folder.is_dir():
         raise MutatorError("no such folder", where=folder, expected="a checkout of the authors' repository")
     below = LIBRARY_FOLDER if (folder / LIBRARY_FOLDER).is_dir() else "."
-    paths = [path for path in files_inside(folder, below, "*.txt") if path.parent == folder / below]
+    # not in the folders below: somebody may name a home folder
+    paths = [checked_path_inside(folder, path) for path in sorted((folder / below).glob("*.txt"))]
     numbered = sorted(
         (int(match[1]), path) for path in paths if (match := _FILE_NAME_PATTERN.fullmatch(path.name))
     )

@@ -99,6 +99,9 @@ def test_folders_without_readable_files_are_refused(tmp_path: Path) -> None:
         read_fault_files(tmp_path / "missing")
     with pytest.raises(MutatorError, match="no fault files"):
         read_fault_files(tmp_path)
+    shutil.copytree(FILES / "fault_library", tmp_path / "deeper")  # is not searched
+    with pytest.raises(MutatorError, match="no fault files"):
+        read_fault_files(tmp_path)
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "scenario_1.txt").symlink_to("/etc/passwd")
     with pytest.raises(MutatorError, match=r"scenario_1\.txt"):
