@@ -129,7 +129,8 @@ def test_drifting_lanes_saturate_the_steering(s1):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_lanes_too_far_off_for_a_solution_give_full_torque_to_the_left(s1, side):
-    trace = drive(replace(s1, steps=1300), lanes_from(5.0, lambda t: 50.0 * side * (t - 5.0))).trace
+    """This begins when the lanes are some 400 m away."""
+    trace = drive(replace(s1, steps=1500), lanes_from(5.0, lambda t: 50.0 * side * (t - 5.0))).trace
     unsolved = np.flatnonzero(np.isnan(trace["angle_desired"]))
     assert len(unsolved) > 50
     # a command acts in the next step; 3840 counts are the EPS' full torque
