@@ -7,7 +7,6 @@ bytecode.
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
-from pathlib import PurePosixPath
 from types import CodeType
 from typing import NamedTuple
 
@@ -85,7 +84,8 @@ class _FileIndex:
 
 
 def _folders_above(path: str) -> list[str]:
-    return [str(folder) for folder in PurePosixPath(path).parents][:-1]
+    folders = path.split("/")[:-1]
+    return ["/".join(folders[: i + 1]) for i in range(len(folders))]
 
 
 def _endings(path: str) -> Iterator[str]:
