@@ -114,8 +114,9 @@ def _wrong_reaction(sentence: str, drive: Drive, start: float) -> Iterator[str]:
         yield f"whether an actuator changes: {change}"
     later = change and (change[0], -change[1])
     for words, expected in _DIRECTIONS.items():
-        if words in sentence and expected != (later if f"then {words}" in sentence else change):
-            yield f"{words}, but the first difference is {change}"
+        for match in re.finditer(f"(then )?{words}", sentence):
+            if expected != (later if match[1] else change):
+                yield f"{match[0]}, but the first difference is {change}"
     if change:
         yield from _wrong_whole(sentence, drive, change, first_hazard)
     between = (drive.faulty["t"] >= start - _SLACK) & (drive.faulty["t"] <= first_hazard + _SLACK)

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 # what each falsification replaces in a sentence, and with what
 FALSIFICATIONS = {
     r"further left": "further right", r"brakes less": "brakes harder", r"gives more": "gives less",
-    r" at first, then [a-z ]+(?=[.,]| and)": "", r"(?<=gas)(?= and|\.)": " at first",
+    r" at first, then [a-z ]+(?=[.,]| and)": "", r"(?<=car gives more gas)(?= and|\.)": " at first",
     r"accelerates to": "slows to", r"slows to": "accelerates to", r"No alert": "Alert fcw at 3 s",
     r" No hazard follows\.": "", r"changes no actuator": "brakes less",
     r"touches": "leaves", r"(?<= from )[0-9.]+": "77", r"[0-9.]+(?= s later)": "77", r"[0-9.]+(?= m/s)": "77",
