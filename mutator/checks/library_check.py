@@ -216,7 +216,12 @@ def example_problems(models: FaultModels) -> Iterator[MutatorError]:
 
 def apply_example(model: FaultModel, models: FaultModels, example: FaultModelExample) -> str:
     """Splice the example's injection into its `before`; the result must also un-splice."""
-    file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
+    location = example.injection.location
+    if location is None:
+        raise MutatorError(
+            "an example at a `message`", expected="`at`", remedy="name the place in the source"
+        )
+    file = parse_file(location.path, example.before.encode(), Path("example"))
     injection = resolve_injection(example.injection, model, model.source)
     edit = injection_edit(file, models, injection, EXAMPLE_TAG)
     after = mutated_bytes(apply_edits(file, as_line_edits(file, [edit])))

@@ -15,6 +15,7 @@ from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.checks.findings import CheckState, Finding, FindingPlace
 from mutator.engines.engine_jobs import Job, JobResult
+from mutator.faults.message_places import location_of
 from mutator.model import FaultLocation, Method, Trigger
 from mutator.mutants.counting_mutant import build_counting_mutant
 from mutator.outcomes.inactivity_reasons import PlaceReach, Reach, reach_of_place
@@ -169,7 +170,8 @@ def _spec_statements(workspace: Workspace, manifest: TargetManifest) -> Iterator
                 for reading in variant.injections_by_reading.values()
                 for injection_spec in reading
             ):
-                at, key = injection.location, (injection.location, variant.changes)
+                at = location_of(injection, manifest, spec.source)
+                key = (at, variant.changes)
                 if key not in yielded:
                     yielded.add(key)
                     anchor = f"{at.anchor.kind.value} {at.anchor.name}".strip()

@@ -43,6 +43,24 @@ def is_assignable(text: str) -> bool:
     return whole and text.isprintable()  # excludes line breaks
 
 
+def is_message_expression(text: str) -> bool:
+    """Whether `text` is `message` with attributes, items by constant, and calls without arguments."""
+    try:
+        node: ast.expr = ast.parse(text, mode="eval").body
+        ast.parse(f"({text})", mode="eval")  # a comment would swallow the bracket
+    except _INVALID_SOURCE_ERRORS:
+        return False
+    while not isinstance(node, ast.Name):
+        match node:
+            case ast.Attribute(value=inner) | ast.Call(func=inner, args=[], keywords=[]):
+                node = inner
+            case ast.Subscript(value=inner, slice=index) if _is_constant(index):
+                node = inner
+            case _:
+                return False
+    return node.id == "message" and text.isprintable()
+
+
 def base_variable(text: str) -> str:
     return re.split(r"[.\[\s]", text, maxsplit=1)[0]
 

@@ -18,7 +18,16 @@ from mutator.targets.stored_phrases import PhraseByCase
 TEMPLATE_FOLDER_GLOBS = ("*.yaml", "*.j2")  # what a templates folder consists of
 UNIT_OF_CHANGED_VARIABLE = "target"
 ParamType = Literal[
-    "variable", "import", "number", "integer", "boolean", "constant", "choice", "unit", "seed"
+    "variable",
+    "import",
+    "number",
+    "integer",
+    "boolean",
+    "constant",
+    "choice",
+    "unit",
+    "seed",
+    "expression",
 ]
 NAME_PARAM_TYPES = ("variable", "import")
 _EXPRESSION_PART_PATTERN = re.compile(r"\b(?:left|right|called|arguments)\b")
@@ -50,8 +59,8 @@ class UnnamedParamSchema:
         metadata=yaml_metadata(
             "The type of a value. `variable`: a name in the function. `import`: a dotted name to import. "
             "`number`, `integer`, `boolean`: a value of that type. `constant`: a number, truth value, text "
-            "or null. `choice`: one of the terms in `choices`. `unit`: the suffix of a unit. `seed`: drawn "
-            "during expansion; a spec cannot set it."
+            "or null. `choice`: one of the terms in `choices`. `unit`: the suffix of a unit. `expression`: "
+            "an expression of `message`. `seed`: drawn during expansion; a spec cannot set it."
         )
     )
     about: str = field(metadata=yaml_metadata("What the parameter is."))

@@ -13,6 +13,7 @@ from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.faults.injection_specs import (
     InjectionSpec,
+    MessagePlace,
     ParamSpec,
     ParamValue,
     parse_draw_reference,
@@ -20,10 +21,24 @@ from mutator.faults.injection_specs import (
 from mutator.model import LOAD_TIME_ANCHORS, AnchorKind
 
 
-class InjectionModel(StrictModel, title="An injection"):
-    """One fault model applied at one place."""
+class MessageModel(StrictModel, title="A message"):
+    """A message instead of a place: a topic, and one of its readers. The target's manifest declares both
+    under [`messages`](target-manifest.md#a-reader-of-messages).
+    """
 
-    at: LocationModel = Field(description="The place where the fault is injected.")
+    topic: str = Field(description="The topic.")
+    reader: str = Field(description="The part of the target that reads it.")
+
+
+class InjectionModel(StrictModel, title="An injection"):
+    """One fault model applied at one place. Give either `at` or `message`."""
+
+    at: LocationModel | None = Field(None, description="The place where the fault is injected.")
+    message: MessageModel | None = Field(
+        None,
+        description="Instead of `at`: the message that a fault model for messages (`message_loss`, "
+        "`message_delay`, ...) changes on its way to a reader.",
+    )
     model: str = Field(description="A [fault model](fault-models.md).")
     unit: str | None = Field(
         None,
@@ -77,10 +92,19 @@ class InjectionModel(StrictModel, title="An injection"):
                     keys=param_keys,
                 )
             )
-        location = self.at.location(source, (*keys, "at"))
-        self._check_instance_keys(location.anchor.kind, source, keys)
+        if (self.at is None) == (self.message is None):
+            raise source.error(
+                keys,
+                "neither `at` nor `message`" if self.at is None else "both `at` and `message`",
+                expected="one of them: a place in the source, or a message",
+            )
+        location = self.at.location(source, (*keys, "at")) if self.at else None
+        self._check_instance_keys(location.anchor.kind if location else None, source, keys)
         return InjectionSpec(
             location=location,
+            message=MessagePlace(topic=self.message.topic, reader=self.message.reader)
+            if self.message
+            else None,
             model=self.model,
             params=tuple(params),
             unit=unit_suffix,
@@ -90,9 +114,9 @@ class InjectionModel(StrictModel, title="An injection"):
             every=self.every,
         )
 
-    def _check_instance_keys(self, kind: AnchorKind, source: YamlSource, keys: KeyPath) -> None:
+    def _check_instance_keys(self, kind: AnchorKind | None, source: YamlSource, keys: KeyPath) -> None:
         instance_keys = [name for name in ("where", "call", "every") if getattr(self, name) is not None]
-        if instance_keys and kind in LOAD_TIME_ANCHORS:
+        if instance_keys and kind is not None and kind in LOAD_TIME_ANCHORS:
             raise source.error(
                 (*keys, instance_keys[0]),
                 f"`{instance_keys[0]}` at a {kind.value}",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from mutator._common.message_text import describe_choices, shortened_repr, spelling_suggestion
 from mutator._common.random_streams import random_generator
 from mutator.config import units
-from mutator.config.location_syntax import is_assignable, is_dotted_name
+from mutator.config.location_syntax import is_assignable, is_dotted_name, is_message_expression
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.draw_specs import DrawSpec
@@ -51,15 +51,17 @@ def resolve_injection(
     defaults to the name that the anchor assigns. A `seed` parameter is drawn from (seed, key). MutatorError
     with file and line for anything that does not fit the model.
     """
+    location = spec.location
+    assert location is not None, "a message's place is found before"
     resolver = _ParameterResolver(spec, model, source, {drawn.draw.name: drawn for drawn in drawn_values})
     params: dict[str, Value] = {}
     for param in spec.params:
         schema = resolver.checked_schema_of(param)
         params[schema.name] = resolver.resolved_value(param, schema)
-        if schema.name == "target" and spec.location.anchor.kind in _ANCHOR_KINDS_WITHOUT_TARGET:
+        if schema.name == "target" and location.anchor.kind in _ANCHOR_KINDS_WITHOUT_TARGET:
             raise source.error(
                 param.keys,
-                f"'{param.value}' for '{param.key}' at `{spec.location.anchor.kind.value}`",
+                f"'{param.value}' for '{param.key}' at `{location.anchor.kind.value}`",
                 expected="no target, because the anchored expression is changed",
                 remedy="leave it out, or anchor at a statement",
             )
@@ -67,9 +69,9 @@ def resolve_injection(
         if schema.type == "seed":
             # up to 2**53, every whole number is exact as a float, too
             params[schema.name] = int(random_generator(seed, f"{key}/{schema.name}").random() * 2**53)
-        elif schema.name == "target" and spec.location.anchor.kind in _ANCHOR_KINDS_WITH_DEFAULT_TARGET:
-            params.setdefault("target", spec.location.anchor.name)
-        at_value = schema.name == "target" and spec.location.anchor.kind in _ANCHOR_KINDS_WITHOUT_TARGET
+        elif schema.name == "target" and location.anchor.kind in _ANCHOR_KINDS_WITH_DEFAULT_TARGET:
+            params.setdefault("target", location.anchor.name)
+        at_value = schema.name == "target" and location.anchor.kind in _ANCHOR_KINDS_WITHOUT_TARGET
         if schema.name not in params and not (schema.optional or at_value):
             raise source.error(
                 (*spec.keys, "params"),
@@ -78,7 +80,7 @@ def resolve_injection(
                 remedy=f"add {resolver.example_key(schema)}",
             )
     return Injection(
-        location=spec.location,
+        location=location,
         model=model.name,
         params=tuple(sorted(params.items())),
         where=spec.where,
@@ -166,6 +168,10 @@ class _ParameterResolver:
             fits = is_dotted_name if schema.type == "import" else is_assignable
             if not isinstance(param.value, str) or not fits(param.value):
                 raise self._value_error(param, _EXPECTED_BY_NAME_TYPE[schema.type])
+            return param.value
+        if schema.type == "expression":
+            if not isinstance(param.value, str) or not is_message_expression(param.value):
+                raise self._value_error(param, "an expression of `message`, such as `message.topic`")
             return param.value
         if schema.type == "boolean":
             if not isinstance(param.value, bool):

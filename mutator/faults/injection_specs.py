@@ -42,14 +42,26 @@ class ParamSpec:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InjectionSpec:
-    """One injection as written. `unit` is the unit of the changed variable, if the model needs it."""
+class MessagePlace:
+    """A topic and who reads it, as the target's manifest declares them."""
 
-    location: FaultLocation
+    topic: str
+    reader: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InjectionSpec:
+    """One injection as written. `unit` is the unit of the changed variable, if the model needs it.
+
+    It has a location, or a message for which `message_places` finds one in the manifest.
+    """
+
+    location: FaultLocation | None
     model: str
     params: tuple[ParamSpec, ...]
     unit: str | None
     keys: KeyPath
+    message: MessagePlace | None = None
     where: str | None = None
     call: int | None = None
     every: int | None = None

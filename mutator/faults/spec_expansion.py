@@ -15,6 +15,7 @@ from mutator.faults.fault_specs import FaultSpec, Variant
 from mutator.faults.import_checks import check_import_defined
 from mutator.faults.injection_parameters import DrawnValue, resolve_injection
 from mutator.faults.injection_specs import InjectionSpec
+from mutator.faults.message_places import check_changes_messages, locate_injection, location_of
 from mutator.faults.phrase_holes import fault_holes
 from mutator.model import Fault, Injection
 from mutator.targets.allowed_locations import check_location_allowed
@@ -126,7 +127,7 @@ class _SpecExpander:
     ) -> tuple[Injection, ...]:
         return tuple(
             resolve_injection(
-                injection,
+                locate_injection(injection, self.manifest, self.spec.source),
                 self.models.get(injection.model),
                 self.spec.source,
                 drawn_values=drawn,
@@ -168,10 +169,14 @@ class _SpecExpander:
 
     def _check_injection(self, injection: InjectionSpec) -> None:
         keys: KeyPath = (*injection.keys, "model")
+        located = locate_injection(injection, self.manifest, self.spec.source)
+        location = location_of(injection, self.manifest, self.spec.source)
         try:
             model = self.models.get(injection.model)
-            keys = (*injection.keys, "at", "file")
-            check_location_allowed(self.manifest, injection.location)
+            keys = (*injection.keys, *(("message",) if injection.message else ("at", "file")))
+            check_location_allowed(self.manifest, location)
+            if injection.message:
+                check_changes_messages(located, model, self.models)
             for param in injection.params:
                 schema = model.param(param.name)
                 if schema and schema.type == "import":

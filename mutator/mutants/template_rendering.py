@@ -209,6 +209,8 @@ def _checked_param(param: ParamSchema, params: Mapping[str, Value]) -> Value:
     if param.type == "constant":
         number = isinstance(value, int | float) and not isinstance(value, bool)
         return value if number or param.name not in params else repr(value)
+    if param.type == "expression" or (value is None and param.optional and param.type == "variable"):
+        return value  # an expression is checked when its spec is expanded
     words = {"choice": param.choices, "unit": units.UNITS}.get(param.type)
     if words is not None:
         if value not in words and not (value is None and param.optional):

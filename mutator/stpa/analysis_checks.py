@@ -7,6 +7,7 @@ from mutator._common.message_text import spelling_suggestion
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
+from mutator.faults.message_places import location_of
 from mutator.stpa.analysis_files import CausalFactorModel, HazardAnalysis, UnsafeActionModel, UnsafeCategory
 from mutator.stpa.context_tables import ContextRow
 from mutator.targets.manifest import TargetManifest
@@ -36,7 +37,7 @@ def list_analysis_problems(
         *_unmatched_hazards(analysis),
         *_actions_without_factor(analysis),
         *_missing_files_and_places(analysis, manifest),
-        *_factor_problems(analysis, specs_by_name),
+        *_factor_problems(analysis, specs_by_name, manifest),
         *_specs_without_factor(analysis, specs),
     ]
 
@@ -222,7 +223,9 @@ def top_level_functions(code: bytes) -> Iterator[str]:
             yield from (f"{node.name}.{item.name}" for item in node.body if isinstance(item, ast.FunctionDef))
 
 
-def _factor_problems(analysis: HazardAnalysis, specs: SpecsByName) -> Iterator[MutatorError]:
+def _factor_problems(
+    analysis: HazardAnalysis, specs: SpecsByName, manifest: TargetManifest
+) -> Iterator[MutatorError]:
     for name, factor in analysis.factors_by_id.items():
         keys: KeyPath = ("causal_factors", name)
         all_exist = True
@@ -236,14 +239,18 @@ def _factor_problems(analysis: HazardAnalysis, specs: SpecsByName) -> Iterator[M
                     remedy="correct the name" + spelling_suggestion(fault, list(specs)),
                 )
         if all_exist and factor.faults:
-            yield from _wrong_places(analysis, keys, factor, specs)
+            yield from _wrong_places(analysis, keys, factor, specs, manifest)
             yield from _wrong_aims(analysis, keys, factor, specs)
 
 
 def _wrong_places(
-    analysis: HazardAnalysis, keys: KeyPath, factor: CausalFactorModel, specs: SpecsByName
+    analysis: HazardAnalysis,
+    keys: KeyPath,
+    factor: CausalFactorModel,
+    specs: SpecsByName,
+    manifest: TargetManifest,
 ) -> Iterator[MutatorError]:
-    actual = {place for fault in factor.faults for place in injection_places(specs[fault])}
+    actual = {place for fault in factor.faults for place in injection_places(specs[fault], manifest)}
     if actual != set(factor.at):
         yield analysis.factors_source.error(
             (*keys, "at"),
@@ -268,13 +275,17 @@ def _wrong_aims(
                 )
 
 
-def injection_places(spec: FaultSpec) -> set[str]:
-    """Return the places at which a spec injects in any reading, as `file::function`."""
+def injection_places(spec: FaultSpec, manifest: TargetManifest) -> set[str]:
+    """Return the places at which a spec injects in any reading, as `file::function`.
+
+    A function inside another one counts as the outer one.
+    """
     return {
-        f"{injection.location.path}::{injection.location.function}"
+        f"{location.path}::{location.function.partition('.<locals>')[0]}"
         for variant in spec
         for injections in variant.injections_by_reading.values()
         for injection in injections
+        for location in [location_of(injection, manifest, spec.source)]
     }
 
 

@@ -16,6 +16,7 @@ from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
 from mutator.targets.contact_severity import DELTA_V_NAME, ContactSettings, SeveritySettings
 from mutator.targets.criteria import Hazard, Metric
+from mutator.targets.message_readers import MessageReader
 from mutator.targets.observed_values import Observation
 from mutator.targets.overhead_view import OverheadView
 from mutator.targets.placeholders import fill_placeholders
@@ -103,6 +104,7 @@ class TargetManifest:
     film: FilmCommands | None = None
     # change -> scenarios that it makes identical, e.g. because they differ only in traffic that it removes
     same_scenarios_by_change: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    message_readers: Mapping[str, MessageReader] = field(default_factory=dict)
     speed: str = ""  # formula of the car's speed in m/s
     sandbox: bool = False  # whether the target's code runs in a sandbox
 

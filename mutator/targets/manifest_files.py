@@ -14,6 +14,7 @@ from mutator.targets.criteria_model import HazardModel, MetricModel, build_hazar
 from mutator.targets.entry_model import EntryModel, ScenarioChangeModel, check_commands
 from mutator.targets.manifest import FilmCommands, TargetManifest
 from mutator.targets.manifest_formulas import manifest_formula
+from mutator.targets.message_readers_model import MessageReaderModel, build_message_readers
 from mutator.targets.observation_model import ObservationModel, build_observation
 from mutator.targets.overhead_view_model import OverheadViewModel, build_overhead_view
 from mutator.targets.process_environment import check_environment
@@ -116,6 +117,11 @@ class ManifestModel(StrictModel, title="The file"):
     severity: SeverityModel | None = Field(
         None, description="How severe hazards are. Without it, results have no severity class."
     )
+    messages: dict[str, MessageReaderModel] = Field(
+        default_factory=dict,
+        description="Reader -> where it gets its messages. Specs can then name a "
+        "[message](fault-spec.md#a-message) instead of a place.",
+    )
     scene: OverheadViewModel | None = Field(None, description="How to draw a drive from above.")
     speed: str | None = Field(
         None,
@@ -200,6 +206,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         alerts=tuple(model.alerts),
         source=source,
         film=model.film,
+        message_readers=build_message_readers(model.messages, source),
         speed=manifest_formula(model.speed, judgeable_names, source, ("speed",)),
     )
 

@@ -31,7 +31,7 @@ EXAMPLES = {  # pages, and the package that their commands need
     for folder, package in (("cartpole", "gymnasium"), ("highway", "highway_env"), ("opendbc", "opendbc"))
 }
 PAGES = [README, CONTRIBUTING, BENCHMARKS, *sorted((CLONE / "docs").rglob("*.md"))]
-PAGES += [CLONE / "examples" / "README.md", *EXAMPLES]
+PAGES += [CLONE / "examples" / "README.md", CLONE / "examples" / "openpilot" / "README.md", *EXAMPLES]
 TUTORIAL = CLONE / "docs" / "tutorial" / "first-campaign.md"
 HOW_TO = CLONE / "docs" / "how-to"
 COMPARISON = HOW_TO / "compare-with-openpilot.md"
@@ -44,6 +44,7 @@ WORKED_THROUGH = [
     TUTORIAL.with_name("tour-controller-developer.md"),
     TUTORIAL.with_name("tour-researcher.md"),
     COMPARISON,
+    HOW_TO / "inject-into-messages.md",
     *sorted(set(HOW_TO.glob("add-a-*.md")) - {HOW_TO / "add-a-study.md"}),  # test_studies runs its code
     *EXAMPLES,
 ]

@@ -58,7 +58,7 @@ class Toy:
 
 @pytest.fixture
 def toy(clone: Workspace) -> Make:
-    def make(source: str, kind: AnchorKind, name: str, model: str, **params: Value) -> Toy:
+    def make(source: str, kind: AnchorKind, name: str, model: str, /, **params: Value) -> Toy:
         return Toy(clone, source, Anchor(kind=kind, name=name), model, **params)
 
     return make
@@ -374,3 +374,61 @@ def test_what_cannot_be_copied_is_refused_by_name(toy: Make) -> None:
     made = toy("def f(x):\n    y = x\n    return y\n", AnchorKind.AFTER_ASSIGN, "y", "stuck", target="y")
     with pytest.raises(TypeError, match="generator cannot be copied to repeat it later: "):
         made.run("x", lambda: (number for number in ()))
+
+
+READ = "def f(queue):\n    return [content for name, content in queue]\n"
+CALLBACK = "def f(scan):\n    return scan\n"
+SPEED = {"topic": "message[0]", "name": "speed"}
+
+
+def numbered(topic: str, counts: list[int]) -> Callable[[], list[tuple[str, int]]]:
+    """Return a reader's queues: in each step so many messages of the topic, numbered, and one of another."""
+    number, steps = counting(), iter(counts)
+    return lambda: [*((topic, number()) for _ in range(next(steps))), ("gear", 0)]
+
+
+@pytest.mark.parametrize(
+    ("model", "more", "expected"),
+    [
+        ("message_loss", {}, [[1, 0], [0], [0], [0], [5, 0]]),
+        ("message_freeze", {}, [[1, 0], [2, 0], [2, 0], [2, 0], [5, 0]]),
+        ("message_delay", {"delay": 0.1}, [[1, 0], [0], [0, 2], [0, 3], [5, 0]]),
+        ("message_delay", {"delay": 0.0}, [[1, 0], [0, 2], [0, 3], [0, 4], [5, 0]]),
+        ("message_repetition", {}, [[1, 0], [2, 2, 0], [3, 3, 0], [4, 4, 0], [5, 0]]),
+        ("message_reordering", {}, [[1, 0], [0], [3, 2, 0], [0], [5, 0]]),
+    ],
+)
+def test_messages_of_one_topic_are_changed_on_their_way(
+    toy: Make, model: str, more: dict[str, Value], expected: list[list[int]]
+) -> None:
+    """Only messages of the topic are changed, only while the fault is active."""
+    made = toy(READ, AnchorKind.ENTRY, "", model, queue="queue", **SPEED, **more)
+    assert made.run(".xxx.", numbered("speed", [1] * 5)) == expected
+
+
+def test_messages_overtake_each_other_within_one_reading(toy: Make) -> None:
+    made = toy(READ, AnchorKind.ENTRY, "", "message_reordering", queue="queue", **SPEED)
+    assert made.run("xx", numbered("speed", [3, 1])) == [[2, 1, 0], [4, 3, 0]]
+
+
+def test_an_empty_place_in_a_queue_is_no_message(toy: Make) -> None:
+    """openpilot's readers put None into the list for a topic without a new message."""
+    source = "def f(queue):\n    return queue\n"
+    for model in ("message_loss", "message_freeze", "message_repetition", "message_reordering"):
+        made = toy(source, AnchorKind.ENTRY, "", model, queue="queue", topic="message.which()", name="speed")
+        assert made.run("x", lambda: [None]) == [[None]]
+
+
+@pytest.mark.parametrize(
+    ("model", "more", "expected"),
+    [
+        ("message_loss", {}, [1, None, None, None, 5]),
+        ("message_freeze", {}, [1, 2, 2, 2, 5]),
+        ("message_delay", {"delay": 0.1}, [1, None, 2, 3, 5]),
+    ],
+)
+def test_a_callback_gets_no_message_or_another(
+    toy: Make, model: str, more: dict[str, Value], expected: list[int | None]
+) -> None:
+    made = toy(CALLBACK, AnchorKind.ENTRY, "", model, message="scan", **more)
+    assert made.run(".xxx.", counting()) == expected

@@ -86,6 +86,7 @@ def test_models_are_in_reading_order() -> None:
     names = order_models(schema_by_model(build_spec_model(Workspace.find(CLONE).readings())))
     assert names == [
         "Spec", "Variant", "SignedPhrase", "Draw", "Sweep", "VariantReading", "Injection", "Location",
+        "Message",
     ]  # fmt: skip
 
 

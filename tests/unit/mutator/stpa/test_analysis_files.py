@@ -1,6 +1,7 @@
 """The shipped hazard analysis, and mistakes in an analysis."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -66,10 +67,26 @@ def test_faults_are_injected_at_the_papers_locations_and_in_software(analysis: H
 
 def test_a_spec_with_two_locations_is_listed_at_both(clone: Workspace) -> None:
     """The as-coded reading can inject at another location."""
-    assert injection_places(clone.spec("radar/jamming")) == {
+    assert injection_places(clone.spec("radar/jamming"), clone.manifest("openpilot")) == {
         "selfdrive/sim/radar.py::RadarSensor.measure",
         "selfdrive/sim/simulator.py::Simulator.step",
     }
+
+
+def test_a_function_inside_another_counts_as_the_outer_one(clone: Workspace) -> None:
+    """Causal factors name functions that the hazard analysis can find."""
+    spec = clone.spec("radar/chaff")
+    (variant, *_) = spec
+    readings = {
+        name: tuple(
+            replace(injection, location=replace(injection.location, function="Outer.f.<locals>.g"))
+            for injection in injections
+            if injection.location
+        )
+        for name, injections in variant.injections_by_reading.items()
+    }
+    nested = replace(spec, variants=(replace(variant, injections_by_reading=readings),))
+    assert injection_places(nested, clone.manifest("openpilot")) == {"selfdrive/sim/radar.py::Outer.f"}
 
 
 @pytest.mark.parametrize(
