@@ -117,7 +117,8 @@ def _add_causal_factor(folder: Path, spec_names: Set[str]) -> None:
     ]
     if analysis is None or not specs:
         return
-    places = sorted({place for spec in specs for place in injection_places(spec)})
+    manifest = workspace.manifest(workspace.target_name())
+    places = sorted({place for spec in specs for place in injection_places(spec, manifest)})
     paths = {place.partition("::")[0] for place in places}
     components = [
         name for name, component in analysis.structure.components.items() if paths & {*component.modules}

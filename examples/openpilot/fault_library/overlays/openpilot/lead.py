@@ -38,10 +38,11 @@ class Loop:
 
     def step(self, t):
         lead = self.truth(t)["lead"]
+        accel = (self.truth(t + DT_MDL)["lead"] - lead) / DT_MDL
         for tick in range(round(DT_MDL / DT_CTRL)):
             self.bus.now = t + tick * DT_CTRL
             self.drive(lead)
-        self.see(lead)
+        self.see(lead, accel)
         self.bus.read(self.radard_reads)
         self.radard.update(self.radard_reads, self.radard_reads["liveTracks"])
         self.radard.publish(self.bus)
@@ -82,7 +83,7 @@ class Loop:
         self.speed = max(0.0, self.speed + self.accel * DT_CTRL)
         self.gap += (lead - self.speed) * DT_CTRL
 
-    def see(self, lead):
+    def see(self, lead, accel):
         """Send what a camera and a radar without errors would report."""
         message, model = self.bus.new("modelV2")
         times, ones = np.array(ModelConstants.T_IDXS), np.ones(ModelConstants.IDX_N)
@@ -92,7 +93,7 @@ class Loop:
         model.meta.disengagePredictions.gasPressProbs = [1.0] * 6
         for seen, prob in zip(model.init("leadsV3", 2), (1.0, 0.0), strict=True):
             seen.prob, seen.x, seen.y = prob, [self.gap + RADAR_TO_CAMERA], [0.0]
-            seen.v, seen.a, seen.xStd, seen.yStd, seen.vStd = [lead], [0.0], [2.0], [0.5], [1.0]
+            seen.v, seen.a, seen.xStd, seen.yStd, seen.vStd = [lead], [accel], [2.0], [0.5], [1.0]
         self.bus.send("modelV2", message)
         message, tracks = self.bus.new("liveTracks")
         ahead = {"trackId": 1, "dRel": self.gap, "yRel": 0.0, "vRel": lead - self.speed}
