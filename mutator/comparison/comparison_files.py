@@ -18,6 +18,7 @@ from mutator.comparison.run_comparison import Comparison, Gate, describe_ending_
 from mutator.results.plan_columns import plan_row
 from mutator.results.result_rows import ResultRow
 from mutator.web import asset_text, load_order
+from mutator.web.html_templates import html_environment
 
 MOST_LISTED_EXPERIMENTS = (
     50  # number of experiments that the Markdown lists for each change; the page and the CSV list all
@@ -175,16 +176,10 @@ def verdict(comparison: Comparison) -> tuple[str, str]:
 
 def render_html_page(comparison: Comparison, addresses: ReportAddresses) -> str:
     """Return the comparison as one HTML page, which links to the reports. All text from runs is escaped."""
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=lambda value: bind_numbers(value) if type(value) is str else value,  # not in HTML
-    )
+    # numbers are bound to their units in text, not in HTML
+    environment = html_environment(lambda value: bind_numbers(value) if type(value) is str else value)
     counts = Counter(change for pair in comparison.pairs for change in pair.change_kinds)
     return environment.from_string(asset_text("comparison/comparison.html")).render(
         c=comparison,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from mutator._common.message_text import bind_numbers
 from mutator._common.table_rendering import TextTable
+from mutator.web.html_templates import html_environment
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -42,16 +43,10 @@ class ReportPage:
 
 def rendered(template: str, **values: Any) -> "Markup":
     """Render a Jinja template as HTML. Values that are not Markup are escaped."""
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=lambda value: bind_numbers(value) if type(value) is str else value,  # not in HTML
-    )
+    # numbers are bound to their units in text, not in HTML
+    environment = html_environment(lambda value: bind_numbers(value) if type(value) is str else value)
     environment.filters["marked"] = render_note
     return Markup(environment.from_string(template).render(**values))
 

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from mutator._common.files import write_atomic
@@ -17,6 +16,7 @@ from mutator.review.effect_pictures import can_have_pictures
 from mutator.review.group_display import fault_value_table, title_lines, trigger_condition_lines
 from mutator.review.mutant_groups import Group
 from mutator.web import asset_text, json_script_element, load_order, packed_script_element
+from mutator.web.html_templates import html_environment
 
 
 def write_review_page(
@@ -54,10 +54,8 @@ def review_page_html(
 
 
 def render_review_page(data: dict[str, Any]) -> str:
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    return environment.from_string(asset_text("review/review.html")).render(
+    template = html_environment().from_string(asset_text("review/review.html"))
+    return template.render(
         target=data["target"],
         count=len(data["groups"]),
         served=data.get("served") is not None,

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from mutator.config.yaml_files import load_yaml
@@ -14,6 +13,7 @@ from mutator.errors import MutatorError
 from mutator.mutants.injected_lines import tags_for_page_scripts
 from mutator.serve.served_trials import range_as_json
 from mutator.web import asset_text, json_script_element, load_order
+from mutator.web.html_templates import html_environment
 from mutator.workspace import Workspace
 
 _EXPERIMENT_SCRIPT, _PATH_SCRIPT = "report/experiment.js", "report/path.js"
@@ -129,9 +129,7 @@ def _newest_comparable_pair(runs: Sequence[Mapping[str, Any]]) -> tuple[str, str
 
 
 def _render_html_page(name: str, **content: Any) -> str:
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    environment = html_environment()
     environment.filters["quoted"] = lambda text: quote(text, safe="")
     environment.filters["moment"] = _describe_moment
     environment.filters["state"] = _describe_state

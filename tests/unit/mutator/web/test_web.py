@@ -7,6 +7,7 @@ import json
 import pytest
 
 from mutator import web
+from mutator.web.html_templates import html_environment
 
 PAGES = ("comparison", "golden", "report", "review", "serve", "trial")
 
@@ -51,3 +52,17 @@ def test_load_orders_name_every_script_once() -> None:
     }
     styles = {name for page in PAGES for name in web.load_order(page, ".css")}
     assert styles == {*web.asset_names(".css")} - {"report/source.css", "serve/live.css"}
+
+
+def test_pages_share_one_head() -> None:
+    """It escapes the title, and has a policy only if the page sets one."""
+    template = html_environment().from_string(
+        '{% set title %}{{ name }} - page{% endset %}\n{% include "shared/head.html" %}\n</head>\n'
+    )
+    page = template.render(name="a < b", styles=["x{}"])
+    assert page.startswith("<!doctype html>\n<html lang")
+    assert "<title>a &lt; b - page</title>\n<style>\nx{}</style>\n</head>" in page
+    assert "Content-Security-Policy" not in page
+    assert '<meta http-equiv="Content-Security-Policy" content="none">' in template.render(
+        name="", styles=[], policy="none"
+    )
