@@ -22,7 +22,7 @@ class _Text:
         self.kept_offsets = [i for i, c in enumerate(text) if c not in _CHARACTERS_LIBCST_LOSES]
 
     @property
-    def kept_characters(self) -> str:
+    def text_without_layout(self) -> str:
         return "".join(self.text[i] for i in self.kept_offsets)
 
     def offset_of(self, position: CodePosition) -> int:
@@ -41,7 +41,7 @@ def align_positions(positions: RangeByNode, written: str, original: str) -> Rang
     `written` is the text that LibCST writes.
     """
     new, old = _Text(written), _Text(original)
-    if new.kept_characters != old.kept_characters:
+    if new.text_without_layout != old.text_without_layout:
         return None
     offsets = [*old.kept_offsets, len(original)]
 
