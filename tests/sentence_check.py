@@ -114,6 +114,8 @@ def _wrong_reaction(sentence: str, drive: Drive, start: float) -> Iterator[str]:
         yield f"whether an actuator changes: {change}"
     later = change and (change[0], -change[1])
     for words, expected in _DIRECTIONS.items():
+        if words == "brakes to" and change and change[0] == "steer_torque":
+            continue  # its speed is checked below
         for match in re.finditer(f"(then )?{words}", sentence):
             if expected != (later if match[1] else change):
                 yield f"{match[0]}, but the first difference is {change}"
@@ -127,12 +129,14 @@ def _wrong_reaction(sentence: str, drive: Drive, start: float) -> Iterator[str]:
     if faster:
         yield from _compare(rf"accelerates to {_NUMBER} m/s", sentence, float(speeds.max()))
         named = later if "then accelerates" in sentence else change
-        if named not in (("gas", 1), ("brake", -1)) or speeds.max() <= max(speeds[0], golden_speeds.max()):
+        is_named = (named or ("", 0))[0] == "steer_torque" or named in (("gas", 1), ("brake", -1))
+        if not is_named or speeds.max() <= max(speeds[0], golden_speeds.max()):
             yield f"accelerates, but {named}"
     if slower:
         yield from _compare(rf"(?:slows|brakes) to {_NUMBER} m/s", sentence, float(speeds.min()))
         named = later if re.search("then (?:slows|brakes) to", sentence) else change
-        if named not in (("gas", -1), ("brake", 1)) or speeds.min() >= min(speeds[0], golden_speeds.min()):
+        is_named = (named or ("", 0))[0] == "steer_torque" or named in (("gas", -1), ("brake", 1))
+        if not is_named or speeds.min() >= min(speeds[0], golden_speeds.min()):
             yield f"slows, but {named}"
 
 

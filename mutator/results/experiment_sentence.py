@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.phrase_texts import fill_phrase, measured_number, measured_time, planned_number
+from mutator._common.phrase_texts import fill_phrase, holes_of, measured_number, measured_time, planned_number
 from mutator.model import Fault, Hold, Outcome, Status
 from mutator.results.fault_phrases import describe_fault
 from mutator.targets.contact_severity import SeverityScale
@@ -27,6 +27,7 @@ from mutator.targets.stored_phrases import (
     LOWEST_SPEED,
     NO_NUMBER,
     SPEED_AT_ACTIVATION,
+    PhraseByCase,
     Phrases,
 )
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN, HazardFacts, hazard_facts
@@ -132,7 +133,12 @@ class ExperimentSentences:
             return _where_stopped(row)
         has_hazard = bool(hazards)
         clauses = (
-            [] if _is_after_hazard(row, hazards) else [self._actuator_clause(row, has_hazard=has_hazard)]
+            []
+            if _is_after_hazard(row, hazards)
+            else [
+                self._actuator_clause(row, has_hazard=has_hazard),
+                self._speed_clause(row, has_hazard=has_hazard),
+            ]
         )
         before = _number(row, "t_activation")
         for hazard, time in hazards:
@@ -171,6 +177,16 @@ class ExperimentSentences:
         is_contrary = then != self._change_clause(name, opposite, {})  # the car's speed changed that way
         return f"{clause} at first" if is_contrary else clause
 
+    def _speed_clause(self, row: Row, *, has_hazard: bool) -> str:
+        """Say how the speed changed if the first actuator's phrases cannot: `the car slows to 5 m/s`."""
+        speeds = _speed_texts(row, has_hazard=has_hazard)
+        first_phrase = self.phrases.actuators.get(row.get("first_actuator") or "", {})
+        if len(speeds) != 1 or not first_phrase or any(map(holes_of, _texts_of(first_phrase))):
+            return ""
+        [name] = speeds
+        texts = [text for phrase in self.phrases.actuators.values() for text in _texts_of(phrase)]
+        return fill_phrase([text for text in texts if name in holes_of(text)], speeds)
+
     def _change_clause(self, name: str, change: str, speeds: Mapping[str, str]) -> str:
         phrase = self.phrases.actuators.get(name, {}).get(change, ())
         return fill_phrase(phrase, speeds) or f"`{name}` is {change} than in the golden run"
@@ -194,6 +210,10 @@ class ExperimentSentences:
 
     def _consequences(self, row: Row) -> list[str]:
         return [_alert(row, self._hazard_times(row))] if self.has_alerts else []
+
+
+def _texts_of(phrase: PhraseByCase) -> list[str]:
+    return [text for texts in phrase.values() for text in texts]
 
 
 def _number(row: Row, name: str) -> float | None:

@@ -35,6 +35,7 @@ PHRASES = Phrases(
             "higher": ("the car accelerates to {highest_speed}", "the car gives more gas"),
             "lower": ("the car slows to {lowest_speed}", "the car gives less gas"),
         },
+        "steer": {"higher": ("the car steers further left",), "lower": ("the car steers further right",)},
     },
 )
 SENTENCES = ExperimentSentences(
@@ -152,6 +153,10 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
     "a first change that the speed contradicts": (
         NO_HAZARD | {"first_change": "lower", "first_change_share": 1.0},
         f"{START} The car gives less gas at first. No hazard follows. No alert.",
+    ),
+    "a speed that follows although another actuator came first": (
+        NO_HAZARD | {"first_actuator": "steer", "highest_speed": 26.8, "lowest_speed": 11.73},
+        f"{START} The car steers further left and slows to 11.73 m/s. No hazard follows. No alert.",
     ),
     "two changes of an actuator without a phrase": (
         NO_HAZARD | {"first_actuator": "horn", "first_change": "lower", "first_change_share": 0.5},
