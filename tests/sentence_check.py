@@ -1,4 +1,4 @@
-"""Recomputes what sentences about the shipped target say from traces alone.
+"""Recomputes from traces alone what sentences say.
 
 It shares no code with `mutator`: the sentence is read with patterns, and each number and direction is
 computed anew from the channels of the faulty and the golden run.
@@ -6,32 +6,46 @@ computed anew from the channels of the faulty and the golden run.
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 Channels = Mapping[str, np.ndarray]
 _SLACK = 1e-6
 _NUMBER = r"(-?[0-9.]+(?:e-?[0-9]+)?)"
-# what the actuators do first, and the channel and the sign that this means
-_DIRECTIONS = {
-    "gives more gas": ("gas", 1), "gives less gas": ("gas", -1),
-    "brakes harder": ("brake", 1), "brakes less": ("brake", -1), "brakes to": ("brake", 1),
-    "steers further left": ("steer_torque", 1), "steers further right": ("steer_torque", -1),
-}  # fmt: skip
+_LEAST_SPEED_CHANGE = 0.5  # m/s
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loop:
+    """The words of a library, and what they mean in the channels of its loop."""
+
+    directions: Mapping[str, tuple[str, int]]  # what the car or controller does, by actuator and sign
+    actuators: Sequence[str]  # in the manifest's order
+    faster: Sequence[tuple[str, int]] = ()  # the differences that make the car faster
+    slower: Sequence[tuple[str, int]] = ()
+    speed: str = ""  # the channel
+    hazards: Mapping[str, Callable[[Channels], np.ndarray]]  # in which steps they hold, by the words
+    terminal: Sequence[str]  # the hazards that end the drive
+    # the number in a hazard's words, from the run up to the end of the drive; the time since its begin
+    numbers: Mapping[str, tuple[str, Callable[[Channels], float]]]
+    situation: Callable[[Channels], Mapping[str, np.ndarray]]  # what conditions name
+    has_alerts: bool = False
+    clauses: Mapping[str, Callable[[float], str]] = field(default_factory=dict)  # by variant, of its value
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
     """The traces of an experiment, when its fault was first active (s; None: never), its alerts, its plan."""
 
+    loop: Loop
     faulty: Channels
     golden: Channels
     activation_s: float | None
     alerts: Sequence[tuple[str, float]]
     value: float | None  # of the fault
+    variant: str
     condition: str
     is_ok: bool = True
 
@@ -42,7 +56,10 @@ def wrong_claims(sentence: str, drive: Drive) -> list[str]:
 
 
 def _wrong_claims(sentence: str, drive: Drive) -> Iterator[str]:
-    if drive.value is not None:
+    written = drive.loop.clauses.get(drive.variant)
+    if written and drive.value is not None and not sentence.startswith(f"{written(drive.value)} from "):
+        yield f"not {written(drive.value)}"
+    elif not written and drive.value is not None:
         clause = re.split(" from | while | once ", sentence)[0]
         said_values = [float(text) for text in re.findall(_NUMBER, clause)]
         if not any(math.isclose(said, abs(drive.value)) for said in said_values):
@@ -69,12 +86,7 @@ def _wrong_claims(sentence: str, drive: Drive) -> Iterator[str]:
 def _hazard_times(drive: Drive, start: float) -> dict[str, float]:
     """Return the hazards and their times from `start` on, earliest first."""
     run = drive.faulty
-    aside, moved = np.abs(run["lateral_offset"]), np.maximum.accumulate(run["v_ego"] >= 0.3)
-    holds = {
-        "touches": (run["d_rel"] <= 0.0) & (aside <= 2.75),
-        "stops": moved & (run["v_ego"] < 0.3) & (run["d_rel"] >= 100.0),
-        "leaves": aside > 0.95,
-    }
+    holds = {words: held(run) for words, held in drive.loop.hazards.items()}
     times = {name: float(run["t"][steps.argmax()]) for name, steps in holds.items() if steps.any()}
     later = {name: time for name, time in times.items() if time >= start - _SLACK}
     return dict(sorted(later.items(), key=lambda item: item[1]))
@@ -83,8 +95,7 @@ def _hazard_times(drive: Drive, start: float) -> dict[str, float]:
 def _wrong_hazards(sentence: str, drive: Drive, start: float) -> Iterator[str]:
     times, run = _hazard_times(drive, start), drive.faulty
     gap = rf"(?:{_NUMBER} s (?:later|after that)|at once|at the same time)"
-    said = {name: re.search(rf"{name}(?: the vehicle ahead| its lane)? {gap}", sentence)
-            for name in ("touches", "stops", "leaves")}  # fmt: skip
+    said = {words: re.search(f"{words} {gap}", sentence) for words in drive.loop.hazards}
     if (spoken := [name for name, match in said.items() if match]) != [n for n in said if n in times]:
         yield f"hazards {spoken}, not {list(times)}"
         return
@@ -96,14 +107,10 @@ def _wrong_hazards(sentence: str, drive: Drive, start: float) -> Iterator[str]:
         if match and not _is_time(float(match[1] or 0.0), time - before):
             yield f"{name} {time - before} later"
         before = time
-    end = times.get("touches", math.inf)
-    at_end = run["t"] <= end + _SLACK
-    if "touches" in times:
-        closing = float((run["v_ego"] - run["v_lead"])[at_end][-1])
-        yield from _compare(rf"at {_NUMBER} m/s", sentence, closing)
-    if "leaves" in times:
-        excursion = float(np.abs(run["lateral_offset"])[at_end].max()) - 0.95
-        yield from _compare(rf"by up to {_NUMBER} m", sentence, max(excursion, 0.0))
+    end = min((times[words] for words in drive.loop.terminal if words in times), default=math.inf)
+    for words, (pattern, number) in drive.loop.numbers.items():
+        if words in times and not (words in drive.loop.terminal and times[words] > end):
+            yield from _compare(pattern, sentence, number(_between(run, -math.inf, end)))
 
 
 def _wrong_reaction(sentence: str, drive: Drive, start: float) -> Iterator[str]:
@@ -112,32 +119,53 @@ def _wrong_reaction(sentence: str, drive: Drive, start: float) -> Iterator[str]:
     change = _first_difference(drive, first_hazard)
     if ("changes no actuator" in sentence) != (change is None and not times):
         yield f"whether an actuator changes: {change}"
-    later = change and (change[0], -change[1])
-    for words, expected in _DIRECTIONS.items():
-        if words == "brakes to" and change and change[0] == "steer_torque":
-            continue  # its speed is checked below
+    for words, expected in drive.loop.directions.items():
+        if words.endswith(" to") and not _drives_speed(drive.loop, change):
+            continue  # only `_wrong_speeds` can tell
         for match in re.finditer(f"(then )?{words}", sentence):
-            if expected != (later if match[1] else change):
+            if expected != (_reverse(change) if match[1] else change):
                 yield f"{match[0]}, but the first difference is {change}"
     if change:
         yield from _wrong_whole(sentence, drive, change, first_hazard)
-    between = (drive.faulty["t"] >= start - _SLACK) & (drive.faulty["t"] <= first_hazard + _SLACK)
-    speeds = drive.faulty["v_ego"][between]
-    golden_between = (drive.golden["t"] >= start - _SLACK) & (drive.golden["t"] <= first_hazard + _SLACK)
-    golden_speeds = drive.golden["v_ego"][golden_between]
-    faster, slower = re.search(r"accelerates to", sentence), re.search(r"(?:slows|brakes) to", sentence)
-    if faster:
-        yield from _compare(rf"accelerates to {_NUMBER} m/s", sentence, float(speeds.max()))
-        named = later if "then accelerates" in sentence else change
-        is_named = (named or ("", 0))[0] == "steer_torque" or named in (("gas", 1), ("brake", -1))
-        if not is_named or speeds.max() <= max(speeds[0], golden_speeds.max()):
-            yield f"accelerates, but {named}"
-    if slower:
-        yield from _compare(rf"(?:slows|brakes) to {_NUMBER} m/s", sentence, float(speeds.min()))
-        named = later if re.search("then (?:slows|brakes) to", sentence) else change
-        is_named = (named or ("", 0))[0] == "steer_torque" or named in (("gas", -1), ("brake", 1))
-        if not is_named or speeds.min() >= min(speeds[0], golden_speeds.min()):
-            yield f"slows, but {named}"
+    if drive.loop.speed:
+        yield from _wrong_speeds(sentence, drive, change, (start, first_hazard))
+
+
+def _wrong_speeds(
+    sentence: str, drive: Drive, change: tuple[str, int] | None, times: tuple[float, float]
+) -> Iterator[str]:
+    """Check the speeds in a sentence between two times (s), and that none is missing that follows from the
+    first difference.
+    """
+    loop = drive.loop
+    speeds, golden = (_between(run, *times)[loop.speed] for run in (drive.faulty, drive.golden))
+    highest, lowest = float(speeds.max()), float(speeds.min())
+    rise = highest - max(speeds[0], golden.max())
+    fall = min(speeds[0], golden.min()) - lowest
+    is_standing = times[1] < math.inf and lowest < _LEAST_SPEED_CHANGE
+    is_rise_larger = rise >= fall or is_standing
+    for words, speed, gain, causes, is_due in (
+        ("accelerates to", highest, rise, loop.faster, is_rise_larger),
+        ("(?:slows|brakes) to", lowest, fall, loop.slower, not is_rise_larger),
+    ):
+        is_cause = _drives_speed(loop, change)  # or the speed follows another actuator's difference
+        if match := re.search(f"(then )?{words}", sentence):
+            named = _reverse(change) if match[1] else change
+            if not change or gain < _LEAST_SPEED_CHANGE or (is_cause and named not in causes):
+                yield f"{words}, but {named}, and a change by {gain} m/s"
+            yield from _compare(f"{words} {_NUMBER} m/s", sentence, speed)
+        elif gain < _LEAST_SPEED_CHANGE or (is_standing and speed == lowest):
+            continue
+        elif change and (change in causes if is_cause else is_due):
+            yield f"not {words} {speed}"
+
+
+def _drives_speed(loop: Loop, change: tuple[str, int] | None) -> bool:
+    return change in loop.faster or change in loop.slower
+
+
+def _reverse(change: tuple[str, int] | None) -> tuple[str, int] | None:
+    return change and (change[0], -change[1])
 
 
 def _wrong_whole(sentence: str, drive: Drive, change: tuple[str, int], until: float) -> Iterator[str]:
@@ -147,7 +175,8 @@ def _wrong_whole(sentence: str, drive: Drive, change: tuple[str, int], until: fl
     difference = (run[change[0]][:rows] - golden[change[0]][:rows])[:-1]  # the last one holds for no time
     size = np.abs(difference).sum()
     same = np.abs(difference[np.sign(difference) == change[1]]).sum() / size if size else 1.0
-    is_named = bool(re.search(r"(?<!then )(?:gives|brakes (?:harder|less)|steers further)", sentence))
+    words = "|".join(words for words in drive.loop.directions if not words.endswith(" to"))
+    is_named = bool(re.search(f"(?<!then )(?:{words})", sentence))
     if "at first, then" in sentence:
         if same > 0.75 + _SLACK:
             yield f"at first, but {same} of the difference is like the first"
@@ -159,18 +188,23 @@ def _wrong_whole(sentence: str, drive: Drive, change: tuple[str, int], until: fl
 
 def _is_contrary(drive: Drive, change: tuple[str, int], until: float) -> bool:
     """Whether the car became only slower although the first difference makes it faster, or the reverse."""
-    first = int(np.argmax(drive.faulty["t"] >= (drive.activation_s or 0.0) - _SLACK))
-    speeds, golden_speeds = (
-        run["v_ego"][first : int(np.searchsorted(run["t"], until + _SLACK))]
-        for run in (drive.faulty, drive.golden)
-    )
-    is_faster = change in (("gas", 1), ("brake", -1))
-    if is_faster:
-        return bool(speeds.min() < min(speeds[0], golden_speeds.min()))
-    return bool(speeds.max() > max(speeds[0], golden_speeds.max()))
+    start = drive.activation_s or 0.0
+    speeds, golden = (_between(run, start, until)[drive.loop.speed] for run in (drive.faulty, drive.golden))
+    if change in drive.loop.faster:
+        return bool(speeds.min() < min(speeds[0], golden.min()))
+    return bool(speeds.max() > max(speeds[0], golden.max()))
+
+
+def _between(run: Channels, start: float, end: float) -> Channels:
+    steps = (run["t"] >= start - _SLACK) & (run["t"] <= end + _SLACK)
+    return {name: values[steps] for name, values in run.items()}
 
 
 def _wrong_alert(sentence: str, drive: Drive, start: float) -> Iterator[str]:
+    if not drive.loop.has_alerts:
+        if "lert" in sentence:
+            yield "alerts, which the loop does not have"
+        return
     alerts = sorted((time, name) for name, time in drive.alerts if time >= start - _SLACK)
     if not alerts or "No alert." in sentence:
         if bool(alerts) == ("No alert." in sentence):
@@ -193,7 +227,7 @@ def _first_difference(drive: Drive, until: float) -> tuple[str, int] | None:
     """Return the actuator that first differs from golden up to `until`, and the sign of its difference."""
     rows = min(len(drive.faulty["t"]), len(drive.golden["t"]))
     firsts = []
-    for order, name in enumerate(("gas", "brake", "steer_torque")):
+    for order, name in enumerate(drive.loop.actuators):
         difference = drive.faulty[name][:rows] - drive.golden[name][:rows]
         if difference.any():
             first = int((difference != 0.0).argmax())
@@ -207,9 +241,7 @@ def _first_difference(drive: Drive, until: float) -> tuple[str, int] | None:
 def _holds(drive: Drive, time: float) -> bool:
     """Whether the trigger's condition holds at the step of the activation, or has held before it."""
     run = drive.golden
-    with np.errstate(divide="ignore", invalid="ignore"):
-        hwt = np.where(run["v_ego"] > 0.0, run["d_rel"] / run["v_ego"], np.inf)
-    values: dict[str, Any] = {"t": run["t"], "hwt": hwt, "rs": run["v_ego"] - run["v_lead"], "True": True}
+    values = {"t": run["t"], **drive.loop.situation(run)}
     steps = np.ones(len(run["t"]), dtype=bool)
     for part in drive.condition.split(" and "):
         if part != "True":

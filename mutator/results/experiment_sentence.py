@@ -160,7 +160,11 @@ class ExperimentSentences:
         return sorted(((h, t) for h, t in times if t is not None), key=lambda item: item[1])
 
     def _actuator_clause(self, row: Row, *, has_hazard: bool) -> str:
-        """Say what the first actuator did. A direction that does not hold for the whole is only the first."""
+        """Say what the first actuator did. A direction that does not hold for the whole is only the first.
+
+        What follows it is a speed if there is one, even of a car that then stands: another actuator may have
+        stopped it.
+        """
         name, change = row.get("first_actuator") or "", row.get("first_change") or ""
         if not (name and change):
             return ""
@@ -170,7 +174,7 @@ class ExperimentSentences:
         clause = self._change_clause(name, change, {})
         if (with_speed := self._change_clause(name, change, speeds)) != clause:
             return with_speed
-        then = self._change_clause(name, opposite, speeds)
+        then = self._change_clause(name, opposite, _speed_texts(row, has_hazard=False))
         share = _number(row, FIRST_CHANGE_SHARE)
         if share is not None and share < _LEAST_SHARE_OF_WHOLE:
             return f"{clause} at first, then {_without_subject(then, clause)}"
@@ -178,12 +182,14 @@ class ExperimentSentences:
         return f"{clause} at first" if is_contrary else clause
 
     def _speed_clause(self, row: Row, *, has_hazard: bool) -> str:
-        """Say how the speed changed if the first actuator's phrases cannot: `the car slows to 5 m/s`."""
+        """Say how the speed changed if the first actuator's phrases cannot: `the car slows to 5 m/s`. If it
+        changed both ways, the larger change.
+        """
         speeds = _speed_texts(row, has_hazard=has_hazard)
         first_phrase = self.phrases.actuators.get(row.get("first_actuator") or "", {})
-        if len(speeds) != 1 or not first_phrase or any(map(holes_of, _texts_of(first_phrase))):
+        if not speeds or not first_phrase or any(map(holes_of, _texts_of(first_phrase))):
             return ""
-        [name] = speeds
+        name = next(iter(speeds))
         texts = [text for phrase in self.phrases.actuators.values() for text in _texts_of(phrase)]
         return fill_phrase([text for text in texts if name in holes_of(text)], speeds)
 
@@ -261,25 +267,28 @@ def _is_after_hazard(row: Row, hazards: Sequence[tuple[HazardFacts, float]]) -> 
 
 
 def _speed_texts(row: Row, *, has_hazard: bool) -> dict[str, str]:
-    """Return the highest speed if the fault made the car faster, the lowest if it made it slower.
+    """Return the highest speed if the fault made the car faster, the lowest if it made it slower; the larger
+    change first.
 
     The lowest speed before a hazard is left out if the car then stands: `slows to 0.29 m/s and stops`.
     """
-    texts = {}
     start = _number(row, SPEED_AT_ACTIVATION)
+    changes = {}
     for name, golden_name, sign in (
         (HIGHEST_SPEED, GOLDEN_HIGHEST_SPEED, 1.0),
         (LOWEST_SPEED, GOLDEN_LOWEST_SPEED, -1.0),
     ):
         speed, golden = _number(row, name), _number(row, golden_name)
-        if None not in (start, speed, golden) and all(
-            sign * (speed - other) >= _LEAST_SPEED_CHANGE_MPS  # type: ignore[operator]
-            for other in (start, golden)
-        ):
-            texts[name] = measured_number(speed, "m/s")  # type: ignore[arg-type]
+        if start is not None and speed is not None and golden is not None:
+            changes[name] = min(sign * (speed - start), sign * (speed - golden)), speed
     if has_hazard and (_number(row, LOWEST_SPEED) or 0.0) < _LEAST_SPEED_CHANGE_MPS:
-        texts.pop(LOWEST_SPEED, None)
-    return texts
+        changes.pop(LOWEST_SPEED, None)
+    larger_first = sorted(changes.items(), key=lambda change: -change[1][0])
+    return {
+        name: measured_number(speed, "m/s")
+        for name, (gain, speed) in larger_first
+        if gain >= _LEAST_SPEED_CHANGE_MPS
+    }
 
 
 def _later(time: float, before: float | None, *, is_first: bool) -> str:

@@ -146,6 +146,11 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
         f"{START} The car gives less gas at first, then accelerates to 37.02 m/s and touches the lead "
         "4.46 s later at 19.60 m/s (severe). No alert.",
     ),
+    "a first change, and then a speed of a car that stands": (
+        HAZARD | {"lowest_speed": 0.29, "highest_speed": 26.8, "first_change_share": 0.01},
+        f"{START} The car gives more gas at first, then slows to 0.29 m/s and touches the lead 4.46 s later "
+        "at 19.60 m/s (severe). No alert.",
+    ),
     "a first change that the speed confirms": (
         NO_HAZARD | {"first_change_share": 0.5},
         f"{START} The car accelerates to 37.02 m/s. No hazard follows. No alert.",
@@ -157,6 +162,14 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
     "a speed that follows although another actuator came first": (
         NO_HAZARD | {"first_actuator": "steer", "highest_speed": 26.8, "lowest_speed": 11.73},
         f"{START} The car steers further left and slows to 11.73 m/s. No hazard follows. No alert.",
+    ),
+    "the larger one of two speeds, of which the lowest changed less": (
+        NO_HAZARD | {"first_actuator": "steer", "highest_speed": 37.02, "lowest_speed": 17.0},
+        f"{START} The car steers further left and accelerates to 37.02 m/s. No hazard follows. No alert.",
+    ),
+    "the larger one of two speeds, of which the highest changed less": (
+        NO_HAZARD | {"first_actuator": "steer", "highest_speed": 37.02, "lowest_speed": 2.0},
+        f"{START} The car steers further left and slows to 2.00 m/s. No hazard follows. No alert.",
     ),
     "two changes of an actuator without a phrase": (
         NO_HAZARD | {"first_actuator": "horn", "first_change": "lower", "first_change_share": 0.5},
