@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.scene_json import scene_as_json
+from mutator.targets.overhead_view_json import scene_as_json
 from mutator.web import asset_text, load_order
 from mutator.workspace import Workspace
 

@@ -48,7 +48,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series
 from mutator.store.time_series_folder import TimeSeriesFolder
-from mutator.targets.scene_json import scene_as_json
+from mutator.targets.overhead_view_json import scene_as_json
 from mutator.web import json_script_element, packed_script_element
 from mutator.workspace import Workspace
 

@@ -36,11 +36,11 @@ from mutator.stpa.analysis_files import (
 )
 from mutator.stpa.context_tables import ContextTable, load_context_table
 from mutator.stpa.hazard_list import HazardList, load_hazard_list
-from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
-from mutator.targets.manifest_names import manifest_path_by_name
-from mutator.targets.severity_model import load_severity_scale, scale_for_target
+from mutator.targets.manifests_by_name import manifest_path_by_name
+from mutator.targets.severity_yaml import load_severity_scale, scale_for_target
 
 _SANDBOX_MODULE = "mutator.engines.sandbox"
 

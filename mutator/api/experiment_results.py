@@ -24,7 +24,7 @@ from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.finished_experiment import FinishedExperiment, ResultColumn
 from mutator.results.plan_columns import PlanColumn
 from mutator.results.table_columns import row_of
-from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import ChannelFacts
 

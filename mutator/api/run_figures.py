@@ -9,7 +9,7 @@ from mutator.errors import MutatorError
 from mutator.figures.values_and_times import draw_times_to_hazard, draw_values
 from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.sheet_selection import DEFAULT_DRIVER_REACTION_S
-from mutator.targets.contact_severity import DELTA_V_NAME
+from mutator.targets.hazard_severity import DELTA_V_NAME
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN
 
 if TYPE_CHECKING:

@@ -41,7 +41,7 @@ from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import run_deletion
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_progress import ProgressCallback
-from mutator.targets.scene_json import scene_as_json
+from mutator.targets.overhead_view_json import scene_as_json
 
 if TYPE_CHECKING:
     import pandas as pd

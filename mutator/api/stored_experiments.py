@@ -24,7 +24,7 @@ from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.session_environments import SessionEnvironment
 from mutator.store.time_series_folder import TimeSeriesFolder, rerun_command
-from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import ChannelFacts
 from mutator.workspace import Workspace

@@ -24,7 +24,7 @@ from mutator.results.plan_columns import PlanColumn
 from mutator.results.severity_and_sentence_columns import severity_and_time_columns
 from mutator.results.table_columns import result_columns
 from mutator.store.trial_file import StoredTrial
-from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import Phrases
 from mutator.targets.stored_target_facts import ChannelFacts, channel_facts, metric_facts

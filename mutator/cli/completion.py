@@ -38,7 +38,7 @@ specs = build_completer("faults")
 
 def targets(ctx: typer.Context, incomplete: str) -> list[str]:
     """Complete the names in the manifests."""
-    from mutator.targets.manifest_names import manifest_path_by_name
+    from mutator.targets.manifests_by_name import manifest_path_by_name
 
     try:
         names = manifest_path_by_name(library_yaml_files(_library_folder(ctx), "targets"))

@@ -13,7 +13,7 @@ from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import frame_of_experiments
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN
 
 

@@ -12,7 +12,7 @@ from mutator.statistics.median_intervals import median_difference
 from mutator.statistics.metric_tables import describe_classes
 from mutator.statistics.paired_statistics import wilcoxon_p
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
-from mutator.targets.contact_severity import SEVERITY_CLASSES, SeverityScale
+from mutator.targets.hazard_severity import SEVERITY_CLASSES, SeverityScale
 
 NO_CLASS = "no class"
 

@@ -11,7 +11,7 @@ from mutator.errors import NotForkable
 from mutator.model import Limits
 from mutator.mutants.probe import probe_attributes_after, probe_module
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stop_function import stop_function_source
+from mutator.targets.stop_at_hazard_code import stop_function_source
 
 
 def fork_request(

@@ -42,7 +42,7 @@ from mutator.model import Limits, Status
 from mutator.mutants.anchors import parsed_file
 from mutator.mutants.probe import probe_attributes_after, probe_module
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stop_function import stop_function_source
+from mutator.targets.stop_at_hazard_code import stop_function_source
 
 _CHILD_SCRIPT = Path(__file__).parent / "in_target" / "run_once.py"
 _PARENT_CHECK_INTERVAL_S = 0.5  # interval between two checks that the parent is alive

@@ -13,8 +13,8 @@ from pathlib import Path
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import checked_path_inside
 from mutator.errors import MutatorError, UnsafePath
+from mutator.targets.root_package_and_overlay_search import INSTALLED_PREFIX, find_installed_package
 from mutator.targets.source_tree import MOST_SOURCE_BYTES, matches_any_glob
-from mutator.targets.target_roots import INSTALLED_PREFIX, find_installed_package
 
 _MOST_FILES = 5000  # a controller has hundreds; more are a home folder or an environment, passed by mistake
 _SKIPPED_FOLDERS_AND_MODULES = {

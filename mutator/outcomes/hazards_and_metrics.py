@@ -17,8 +17,8 @@ from mutator.outcomes.trace_loading import (
     values_at_other_steps,
     values_on_steps,
 )
-from mutator.targets.contact_severity import DELTA_V_NAME
-from mutator.targets.criteria import Hazard, Metric
+from mutator.targets.hazard_and_metric_definitions import Hazard, Metric
+from mutator.targets.hazard_severity import DELTA_V_NAME
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers import temporal_logic, trace_formulas
 from mutator.triggers.conditions import GOLDEN_PREFIX, TIME, names_in

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from mutator.model import AfterHazard, Experiment, Fault, Hold, ObservedActivation, Outcome, Record
-from mutator.targets.contact_severity import DELTA_V_NAME, ClassifiedHazard, SeverityScale
+from mutator.targets.hazard_severity import DELTA_V_NAME, ClassifiedHazard, SeverityScale
 
 EventTimes = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
 

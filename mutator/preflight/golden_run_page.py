@@ -15,7 +15,7 @@ from mutator.outcomes.trace_loading import Trace, values_on_steps
 from mutator.store.preflight_results import check_results
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.scene_json import scene_as_json
+from mutator.targets.overhead_view_json import scene_as_json
 from mutator.targets.stored_target_facts import channel_facts, hazard_facts
 from mutator.web import asset_text, load_order, packed_script_element
 from mutator.workspace import Workspace

@@ -20,7 +20,7 @@ from mutator.faults.fault_models import (
 )
 from mutator.faults.library_readings import SpecReadings
 from mutator.stpa import analysis_files, context_tables, hazard_list
-from mutator.targets import manifest_files, severity_model
+from mutator.targets import manifest_files, severity_yaml
 
 SCHEMA_DRAFT = "http://json-schema.org/draft-07/schema#"  # best supported by editors
 _MODEL_NAME_PATTERN = re.compile(r"^_?(\w+?)Model$")
@@ -54,7 +54,7 @@ _FIXED_FORMATS: tuple[tuple[type[StrictModel], str, str], ...] = (
     (library_readings.ReadingsModel, library_readings.SCHEMA, "readings.yaml"),
     (campaign_model.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
     (manifest_files.ManifestModel, manifest_files.SCHEMA, "targets/*.yaml"),
-    (severity_model.SeverityScaleModel, severity_model.SCHEMA, "severity/*.yaml"),
+    (severity_yaml.SeverityScaleModel, severity_yaml.SCHEMA, "severity/*.yaml"),
     (hazard_list.HazardsModel, hazard_list.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
     (context_tables.ContextTableModel, context_tables.CONTEXT_TABLE_SCHEMA, "stpa/contexts/*.yaml"),
     (analysis_files.ControlStructureModel, "control_structure/1", "stpa/control_structure.yaml"),

@@ -10,8 +10,8 @@ from mutator.results.severity_and_sentence_columns import severity_and_time_colu
 from mutator.results.table_columns import TIMING_COLUMNS, result_columns
 from mutator.results.table_writers import ARROW_TYPE_BY_COLUMN_TYPE, TableColumn
 from mutator.targets.channels import Channel
-from mutator.targets.contact_severity import DELTA_V_NAME
-from mutator.targets.criteria import Hazard, Metric
+from mutator.targets.hazard_and_metric_definitions import Hazard, Metric
+from mutator.targets.hazard_severity import DELTA_V_NAME
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.observed_values import unit_and_meaning_by_name
 from mutator.targets.stored_target_facts import metric_facts

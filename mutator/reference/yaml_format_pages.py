@@ -11,7 +11,7 @@ from mutator.faults.library_readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.library_readings import ReadingsModel
 from mutator.reference.yaml_key_tables import generated_page_head, model_sections
 from mutator.stpa import analysis_files, context_tables, hazard_list
-from mutator.targets import manifest_files, severity_model
+from mutator.targets import manifest_files, severity_yaml
 from mutator.workspace import Workspace
 
 STRICT_YAML_NOTE = """\
@@ -75,8 +75,8 @@ def render_manifests_page(workspace: Workspace) -> str:
         "## Scales of severity\n",
         "The files in `fault_library/severity/` map a delta-v to a class; see [Verdicts](../explanation/"
         "verdicts.md#severity).\nA manifest names one of them in `severity.scale`. The first key is `schema: "
-        f"{severity_model.SCHEMA}`.\n",
-        *model_sections("target-manifest.md", severity_model.SeverityScaleModel, parent_level=2),
+        f"{severity_yaml.SCHEMA}`.\n",
+        *model_sections("target-manifest.md", severity_yaml.SeverityScaleModel, parent_level=2),
     )
 
 

@@ -43,7 +43,7 @@ from mutator.statistics.sheet_selection import DEFAULT_DRIVER_REACTION_S
 from mutator.store.embedded_series import EMBEDDED_SERIES_ELEMENT, embed_worst
 from mutator.store.run_folder import RunFolder
 from mutator.store.time_series_folder import TimeSeriesFolder
-from mutator.targets.scene_json import scene_as_json
+from mutator.targets.overhead_view_json import scene_as_json
 from mutator.triggers.trigger_kinds import ALWAYS_NAME
 from mutator.web import json_script_element, packed_script_element
 

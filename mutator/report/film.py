@@ -21,8 +21,8 @@ from mutator.execution.single_run import is_same_record, manifest_of_unchanged_t
 from mutator.figures.golden_and_faulty_plot import event_marks
 from mutator.model import Experiment, Limits, MeasuredLimits, Record
 from mutator.store.run_folder import RunFolder
+from mutator.targets.command_placeholders import fill_placeholders
 from mutator.targets.manifest import FILM_FOLDER, TargetManifest
-from mutator.targets.placeholders import fill_placeholders
 from mutator.workspace import Workspace
 
 EVENTS_SCHEMA = "film-events/1"

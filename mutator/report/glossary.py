@@ -6,7 +6,7 @@ from mutator.config.yaml_files import load_yaml
 from mutator.errors import MutatorError
 from mutator.model import Method
 from mutator.report.reported_run import ReportedRun
-from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.hazard_severity import SeverityScale
 
 Glossary = Mapping[str, Mapping[str, str]]  # heading -> term -> meaning
 

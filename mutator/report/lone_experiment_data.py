@@ -20,9 +20,9 @@ from mutator.results.table_reader import frame_of_finished
 from mutator.review.patch_shapes import shapes_of_patches
 from mutator.store.embedded_series import EmbeddedSeries
 from mutator.store.run_head import RunHead
-from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.scene_json import scene_as_json
+from mutator.targets.overhead_view_json import scene_as_json
 from mutator.targets.stored_phrases import Phrases
 from mutator.targets.stored_target_facts import HazardFacts, MetricFacts, hazard_facts, metric_facts
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from mutator._common.phrase_texts import fill_phrase, holes_of, measured_number, measured_time, planned_number
 from mutator.model import Fault, Hold, Outcome, Status
 from mutator.results.fault_phrases import describe_fault
-from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import (
     FIRST_CHANGE_SHARE,

@@ -16,7 +16,7 @@ from mutator.results.outcome_counting import (
 )
 from mutator.results.plan_columns import numeric_value_of
 from mutator.results.table_columns import alert_names_in
-from mutator.targets.contact_severity import DELTA_V_NAME
+from mutator.targets.hazard_severity import DELTA_V_NAME
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN
 
 if TYPE_CHECKING:

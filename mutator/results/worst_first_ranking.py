@@ -9,7 +9,7 @@ from mutator.results.outcome_counting import (
     hazard_margins,
     outcome_or_status_of_rows,
 )
-from mutator.targets.contact_severity import DELTA_V_NAME, SEVERITY_CLASSES
+from mutator.targets.hazard_severity import DELTA_V_NAME, SEVERITY_CLASSES
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN
 
 if TYPE_CHECKING:

@@ -28,7 +28,7 @@ from mutator.serve.served_runs import ServedRuns, open_served_file, report_addre
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import read_script, script_bytes
 from mutator.store.time_series_folder import TimeSeriesFolder
-from mutator.targets.scene_json import scene_as_json
+from mutator.targets.overhead_view_json import scene_as_json
 from mutator.web import load_order
 from mutator.workspace import Workspace
 

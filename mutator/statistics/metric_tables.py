@@ -9,7 +9,7 @@ from mutator.statistics.median_intervals import median_interval
 from mutator.statistics.results_frame import select_common_columns
 from mutator.statistics.shares import share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
-from mutator.targets.contact_severity import SEVERITY_CLASSES, SeverityScale
+from mutator.targets.hazard_severity import SEVERITY_CLASSES, SeverityScale
 from mutator.targets.stored_target_facts import MetricFacts
 
 HIGHER_IS_WORSE = "higher"

@@ -27,7 +27,7 @@ from mutator.store.run_head import HEAD, RunHead, StoredGolden, load_head
 from mutator.store.session_environments import SessionEnvironment
 from mutator.store.shards import Shard
 from mutator.store.timings import load_timings
-from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.hazard_severity import SeverityScale
 
 STOP_AT_HAZARD_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
 DEFAULT_SERIES_BUDGET_MB = 500  # budget of a run's series, unless the plan sets another: some 80,000 of 6 kB

@@ -2,8 +2,8 @@
 
 from mutator.errors import MutatorError
 from mutator.model import FaultLocation
+from mutator.targets.confined_relative_paths import clean_relative_path
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.relative_paths import clean_relative_path
 from mutator.targets.source_tree import matches_any_glob
 
 

@@ -14,12 +14,12 @@ from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metad
 from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
-from mutator.targets.contact_severity import DELTA_V_NAME, ContactSettings, SeveritySettings
-from mutator.targets.criteria import Hazard, Metric
+from mutator.targets.command_placeholders import fill_placeholders
+from mutator.targets.hazard_and_metric_definitions import Hazard, Metric
+from mutator.targets.hazard_severity import DELTA_V_NAME, ContactSettings, SeveritySettings
 from mutator.targets.message_readers import MessageReader
 from mutator.targets.observed_values import Observation
 from mutator.targets.overhead_view import OverheadView
-from mutator.targets.placeholders import fill_placeholders
 from mutator.targets.source_tree import SourceTree, matches_any_glob, read_tree
 from mutator.triggers import temporal_logic
 from mutator.triggers.conditions import GOLDEN_PREFIX, names_in

@@ -9,25 +9,25 @@ from mutator._common.confined_files import checked_relative_path
 from mutator._common.shipped_files import SHIPPED_TARGET_ROOT
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
-from mutator.targets.channel_model import ChannelModel, TraceModel, build_channels
-from mutator.targets.criteria_model import HazardModel, MetricModel, build_hazards, build_metrics
-from mutator.targets.entry_model import EntryModel, ScenarioChangeModel, check_commands
+from mutator.targets.confined_relative_paths import clean_relative_path
+from mutator.targets.hazards_and_metrics_yaml import HazardModel, MetricModel, build_hazards, build_metrics
 from mutator.targets.manifest import FilmCommands, TargetManifest
 from mutator.targets.manifest_formulas import manifest_formula
-from mutator.targets.message_readers_model import MessageReaderModel, build_message_readers
-from mutator.targets.observation_model import ObservationModel, build_observation
-from mutator.targets.overhead_view_model import OverheadViewModel, build_overhead_view
+from mutator.targets.message_readers_yaml import MessageReaderModel, build_message_readers
+from mutator.targets.observation_yaml import ObservationModel, build_observation
+from mutator.targets.overhead_view_yaml import OverheadViewModel, build_overhead_view
 from mutator.targets.process_environment import check_environment
-from mutator.targets.relative_paths import clean_relative_path
 from mutator.targets.required_packages import parse_requirements
-from mutator.targets.severity_model import SeverityModel, build_severity
-from mutator.targets.target_roots import (
+from mutator.targets.root_package_and_overlay_search import (
     INSTALLED_PREFIX,
     check_only_installed_package,
     checked_package_names,
     find_overlay,
     find_root,
 )
+from mutator.targets.run_and_film_commands_yaml import EntryModel, ScenarioChangeModel, check_commands
+from mutator.targets.severity_yaml import SeverityModel, build_severity
+from mutator.targets.trace_and_channels_yaml import ChannelModel, TraceModel, build_channels
 from mutator.triggers import temporal_logic
 
 SCHEMA = "target/2"

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from mutator._common.hashing import added_field
 from mutator.targets.channels import Role
-from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 
 DRIVE_END_COLUMN = "t_end"  # the metric column with the end of the drive

@@ -199,7 +199,7 @@ SHOWN_BY_THE_COMMAND_LINE = {
     "mutator.results.plan_columns",
     "mutator.review.group_columns",
     "mutator.review.group_display",
-    "mutator.targets.manifest_names",
+    "mutator.targets.manifests_by_name",
 }
 
 

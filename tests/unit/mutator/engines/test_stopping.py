@@ -19,7 +19,7 @@ from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens,
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.trace_loading import trace_until
-from mutator.targets.stop_function import stop_function_source
+from mutator.targets.stop_at_hazard_code import stop_function_source
 from mutator.triggers import trace_formulas
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 

@@ -12,7 +12,7 @@ from mutator.errors import MutatorError
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note, fault_free_table, load_fault_free_runs
 from mutator.store.run_folder import RunFolder
 from mutator.targets.channels import Channel
-from mutator.targets.criteria import Hazard
+from mutator.targets.hazard_and_metric_definitions import Hazard
 from tests.made_head import made_head
 
 MANIFEST: Any = SimpleNamespace(

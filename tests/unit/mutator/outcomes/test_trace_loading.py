@@ -20,7 +20,7 @@ from mutator.outcomes.trace_loading import (
     trace_digest,
 )
 from mutator.targets.channels import Channel
-from mutator.targets.criteria import Hazard
+from mutator.targets.hazard_and_metric_definitions import Hazard
 
 T = np.arange(5) * 0.1
 GAS = Channel(name="gas", unit="-")

@@ -11,7 +11,7 @@ from mutator.model import Experiment, Method, Outcome, Record, Status
 from mutator.results.finished_experiment import FinishedExperiment
 from mutator.results.severity_and_sentence_columns import severity_and_time_columns
 from mutator.results.table_columns import cells_by_column, result_columns
-from mutator.targets.contact_severity import SeverityScale
+from mutator.targets.hazard_severity import SeverityScale
 
 HAZARDS = ("H1", "H2", "H3")
 COLUMNS = result_columns(

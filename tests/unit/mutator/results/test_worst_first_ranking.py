@@ -19,7 +19,7 @@ from mutator.results.worst_first_ranking import (
     worst_first_ranks,
     worst_of_each_cause,
 )
-from mutator.targets.contact_severity import SEVERITY_CLASSES
+from mutator.targets.hazard_severity import SEVERITY_CLASSES
 from mutator.targets.stored_target_facts import MetricFacts
 from tests.made_head import made_head
 from tests.made_up_results import write_results

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.targets.contact_severity import ClassifiedHazard
-from mutator.targets.severity_model import load_severity_scale
+from mutator.targets.hazard_severity import ClassifiedHazard
+from mutator.targets.severity_yaml import load_severity_scale
 from mutator.workspace import Workspace
 
 from .test_contact_severity import SCALE

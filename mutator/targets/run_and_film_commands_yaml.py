@@ -7,13 +7,13 @@ from pydantic import Field
 from mutator._common.message_text import describe_choices
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import YamlSource
-from mutator.targets.manifest import FilmCommands
-from mutator.targets.placeholders import (
+from mutator.targets.command_placeholders import (
     FILM_PLACEHOLDERS,
     FILMED_RUN_PLACEHOLDERS,
     RUN_PLACEHOLDERS,
     check_placeholders,
 )
+from mutator.targets.manifest import FilmCommands
 
 
 class ScenarioChangeModel(StrictModel, title="A change"):

@@ -10,7 +10,7 @@ from mutator.config.phrases import build_phrase
 from mutator.config.unit_fields import UnitSymbol
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import KeyPath, YamlSource
-from mutator.targets.criteria import Aggregate, Hazard, Metric, WorseDirection
+from mutator.targets.hazard_and_metric_definitions import Aggregate, Hazard, Metric, WorseDirection
 from mutator.targets.manifest_formulas import manifest_condition, manifest_formula
 from mutator.targets.stored_phrases import LATER_HOLE
 from mutator.triggers import temporal_logic

@@ -9,7 +9,8 @@ from pydantic import Field
 from mutator.config.units import UNITS
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_sources import YamlSource
-from mutator.targets.contact_severity import (
+from mutator.targets.hazard_and_metric_definitions import Hazard, Metric
+from mutator.targets.hazard_severity import (
     SEVERITY_CLASSES,
     ContactSettings,
     HazardSeverity,
@@ -17,7 +18,6 @@ from mutator.targets.contact_severity import (
     SeverityScale,
     SeveritySettings,
 )
-from mutator.targets.criteria import Hazard, Metric
 
 SCHEMA = "severity/1"
 _CONTACT_KEYS = ("contact", "contact_speed", "mass_kg", "other_mass_kg")

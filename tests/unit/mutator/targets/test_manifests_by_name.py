@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.targets.manifest_names import manifest_path_by_name
+from mutator.targets.manifests_by_name import manifest_path_by_name
 from mutator.workspace import Workspace
 
 

@@ -5,7 +5,7 @@ from inspect import getsource
 
 from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
-from mutator.targets.criteria import Hazard
+from mutator.targets.hazard_and_metric_definitions import Hazard
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import TIME, divide, names_in, parse_expression, to_python_source
 

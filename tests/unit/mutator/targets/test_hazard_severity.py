@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.targets.severity_model import load_severity_scale
+from mutator.targets.severity_yaml import load_severity_scale
 from mutator.workspace import Workspace
 
 KPH = 1 / 3.6

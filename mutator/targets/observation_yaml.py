@@ -12,8 +12,8 @@ from mutator.config.unit_fields import UnitSymbol
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_sources import YamlSource
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS
+from mutator.targets.confined_relative_paths import clean_relative_path
 from mutator.targets.observed_values import Observation, ObservedValue
-from mutator.targets.relative_paths import clean_relative_path
 from mutator.triggers.conditions import RESERVED_NAMES, TIME, canonical_formula
 
 _MOST_LENGTH = 1000  # characters in an expression, at most

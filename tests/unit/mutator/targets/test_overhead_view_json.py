@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from mutator.targets.scene_json import scene_as_json
+from mutator.targets.overhead_view_json import scene_as_json
 from mutator.triggers.formula_json import JsonTree
 from mutator.workspace import Workspace
 
