@@ -28,14 +28,14 @@ from mutator.faults.library_readings import SpecReadings, load_readings
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
 from mutator.results.table_columns import check_column_names
-from mutator.stpa.analysis_files import (
+from mutator.stpa.accidents_and_hazards import HazardList, load_hazard_list
+from mutator.stpa.context_tables import ContextTable, load_context_table
+from mutator.stpa.hazard_analysis_yaml import (
     ControlStructureModel,
     HazardAnalysis,
     load_control_structure,
     load_hazard_analysis,
 )
-from mutator.stpa.context_tables import ContextTable, load_context_table
-from mutator.stpa.hazard_list import HazardList, load_hazard_list
 from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest

@@ -11,7 +11,7 @@ import pytest
 
 from mutator.checks import library_check
 from mutator.config import yaml_files
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults import fault_model_files
 from mutator.faults.fault_models import FaultModel, FaultModelExample, FaultModels

@@ -18,9 +18,9 @@ from mutator.onboarding.first_library import write_first_library
 from mutator.onboarding.library_import import ImportedLibrary, import_into_new_library
 from mutator.onboarding.source_survey import survey_source
 from mutator.onboarding.todo_marks import unfilled_mark_errors
-from mutator.stpa.analysis_checks import list_analysis_problems
-from mutator.stpa.analysis_files import HazardAnalysis
-from mutator.stpa.structure_drawing import render_structure
+from mutator.stpa.control_structure_svg import render_structure
+from mutator.stpa.hazard_analysis_checks import list_analysis_problems
+from mutator.stpa.hazard_analysis_yaml import HazardAnalysis
 from mutator.workspace import Workspace
 
 

@@ -17,7 +17,7 @@ from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.campaigns.operator_faults import OperatorFault, OperatorFaultFinder
 from mutator.campaigns.operator_selection import MutantActivity
 from mutator.campaigns.sampling import evenly_spread_indices
-from mutator.config.yaml_sources import KeyPath
+from mutator.config.yaml_source_lines import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.spec_expansion import expand_spec

@@ -16,7 +16,7 @@ from mutator.campaigns.campaign_triggers import (
 from mutator.campaigns.installed_studies import CheckableStudy, load_installed_study
 from mutator.campaigns.operator_selection import MutantActivity, OperatorSelection
 from mutator.config.yaml_files import load_yaml_model
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_measuring
 from mutator.errors import MutatorError
 from mutator.faults.library_readings import SpecReadings

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.config.yaml_files import StrictModel, YamlRecord
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.model import MOST_LIMIT_OR_TIME, Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import canonical_condition

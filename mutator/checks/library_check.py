@@ -8,7 +8,7 @@ from typing import TypeVar
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_campaign_study
 from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.campaigns.installed_studies import study_problems
-from mutator.config.yaml_sources import KeyPath
+from mutator.config.yaml_source_lines import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModelExample, FaultModels
 from mutator.faults.fault_specs import FaultSpec, Variant
@@ -21,8 +21,8 @@ from mutator.mutants.injection_edits import edits_of, injection_edit
 from mutator.mutants.mutant_building import build
 from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, unsplice
 from mutator.onboarding.todo_marks import unfilled_mark_errors
-from mutator.stpa.analysis_checks import list_analysis_problems
 from mutator.stpa.context_tables import ContextTable
+from mutator.stpa.hazard_analysis_checks import list_analysis_problems
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.required_packages import check_requirements
 from mutator.triggers.trigger_kinds import always_trigger

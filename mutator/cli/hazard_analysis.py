@@ -13,8 +13,8 @@ from mutator.cli.options import Json, Manifest, Wide, WorkspaceOptions, with_wor
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
-    from mutator.stpa.analysis_files import HazardAnalysis
     from mutator.stpa.context_tables import ContextTable
+    from mutator.stpa.hazard_analysis_yaml import HazardAnalysis
 
 EXAMPLES = """\b
 Examples:

@@ -16,8 +16,8 @@ from pydantic_core import CoreSchema
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import check_schema
 from mutator._common.message_text import counted, shortened_repr
-from mutator.config import validation_messages
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config import pydantic_error_messages
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.errors import MutatorError
 
 M = TypeVar("M", bound="StrictModel")
@@ -238,8 +238,8 @@ def load_yaml_model(
         return model.model_validate(body), source
     except ValidationError as error:
         errors = error.errors(include_url=False)
-        got, expected, remedy, keys = validation_messages.explain_error(
-            validation_messages.choose_error_to_report(errors), model
+        got, expected, remedy, keys = pydantic_error_messages.explain_error(
+            pydantic_error_messages.choose_error_to_report(errors), model
         )
         if len(errors) > 1:
             remedy += f" ({counted(len(errors) - 1, 'more mistake')} after this one)"

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from mutator.config import units
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 
 _MOST_RANGES = 1000  # of a sweep; more mean a mistyped step, and each range is a fault
 _MOST_DRAWN_NUMBER = 1e15  # limit of a drawn number: whole numbers up to it are exact

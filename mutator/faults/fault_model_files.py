@@ -11,9 +11,9 @@ from mutator._common import hashing
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import checked_path_inside
 from mutator.config import units
-from mutator.config.phrases import build_phrase
+from mutator.config.phrases_yaml import build_phrase
 from mutator.config.yaml_files import MOST_YAML_BYTES, StrictModel, YamlRecord, load_yaml_model
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults import probe_template_parts
 from mutator.faults.fault_models import (

@@ -9,7 +9,7 @@ from typing import Literal
 
 from mutator._common.message_text import spelling_suggestion
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.faults.probe_template_parts import ProbeTemplates

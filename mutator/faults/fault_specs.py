@@ -8,9 +8,9 @@ from typing import Any, Literal
 
 from pydantic import Field, create_model
 
-from mutator.config.phrases import SignedPhraseModel, build_phrase
+from mutator.config.phrases_yaml import SignedPhraseModel, build_phrase
 from mutator.config.yaml_files import StrictModel, load_yaml_model
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.faults.draw_specs import DrawModel, DrawSpec, build_draws, check_name
 from mutator.faults.injection_model import InjectionModel
 from mutator.faults.injection_specs import InjectionSpec

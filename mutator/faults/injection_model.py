@@ -8,9 +8,9 @@ from pydantic import Field
 from mutator._common.message_text import shortened_repr
 from mutator.config import units
 from mutator.config.instance_conditions import canonical_instance_condition
-from mutator.config.location_model import LocationModel
+from mutator.config.location_yaml import LocationModel
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.faults.injection_specs import (
     InjectionSpec,
     MessagePlace,

@@ -7,7 +7,7 @@ from mutator._common.message_text import describe_choices, shortened_repr, spell
 from mutator._common.random_streams import random_generator
 from mutator.config import units
 from mutator.config.location_syntax import is_assignable, is_dotted_name, is_message_expression
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.draw_specs import DrawSpec
 from mutator.faults.fault_models import NAME_PARAM_TYPES, UNIT_OF_CHANGED_VARIABLE, FaultModel, ParamSchema

@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 
 from mutator.config import units
-from mutator.config.yaml_sources import KeyPath
+from mutator.config.yaml_source_lines import KeyPath
 from mutator.model import FaultLocation
 
 _DRAW_REFERENCE_PATTERN = re.compile(r"(-?)([a-z][a-z0-9_]*)\Z")

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from mutator._common.message_text import describe_choices, spelling_suggestion
 from mutator.config.instance_conditions import canonical_instance_condition
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels
 from mutator.faults.injection_specs import InjectionSpec, ParamSpec

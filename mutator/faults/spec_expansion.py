@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from mutator._common.message_text import describe_choices
 from mutator._common.random_streams import random_generator
 from mutator.config import units
-from mutator.config.phrases import check_holes
-from mutator.config.yaml_sources import KeyPath
+from mutator.config.phrases_yaml import check_holes
+from mutator.config.yaml_source_lines import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.draw_specs import DrawSpec
 from mutator.faults.fault_models import FaultModels

@@ -14,7 +14,7 @@ from mutator._common.confined_files import write_below
 from mutator._common.doors import LIBRARY_IMPORTERS
 from mutator._common.shipped_files import write_new_library
 from mutator.errors import MutatorError
-from mutator.stpa.analysis_checks import injection_places
+from mutator.stpa.hazard_analysis_checks import injection_places
 from mutator.workspace import Workspace
 
 REPORT_NAME = "imported.csv"

@@ -24,7 +24,7 @@ from mutator.outcomes.fault_routes import (
 )
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import DAMAGED_RUN_REMEDY, HEAD
-from mutator.stpa.analysis_files import ComponentKind, ControlStructureModel
+from mutator.stpa.hazard_analysis_yaml import ComponentKind, ControlStructureModel
 from mutator.targets.channels import Role
 from mutator.targets.stored_target_facts import ChannelFacts
 

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from mutator.stpa.analysis_files import ComponentKind, ControlStructureModel
+from mutator.stpa.hazard_analysis_yaml import ComponentKind, ControlStructureModel
 from mutator.targets.channels import Role
 
 

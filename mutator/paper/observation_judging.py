@@ -13,7 +13,7 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from mutator.config.yaml_files import StrictModel, load_yaml_model
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.paper.measures import MEASURES, Estimate, estimate_of_difference, estimate_of_share
 from mutator.statistics.shares import share
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator.config.yaml_files import StrictModel, load_yaml_model
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.tallies import Tally
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator.config.yaml_files import load_yaml
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.paper.published_numbers import FILE_NAMES, PublishedNumbers, load_published_numbers
 from mutator.statistics.tallies import Tally, sum_tallies

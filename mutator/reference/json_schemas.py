@@ -19,7 +19,7 @@ from mutator.faults.fault_models import (
     ParamSchema,
 )
 from mutator.faults.library_readings import SpecReadings
-from mutator.stpa import analysis_files, context_tables, hazard_list
+from mutator.stpa import accidents_and_hazards, context_tables, hazard_analysis_yaml
 from mutator.targets import manifest_files, severity_yaml
 
 SCHEMA_DRAFT = "http://json-schema.org/draft-07/schema#"  # best supported by editors
@@ -55,11 +55,11 @@ _FIXED_FORMATS: tuple[tuple[type[StrictModel], str, str], ...] = (
     (campaign_model.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
     (manifest_files.ManifestModel, manifest_files.SCHEMA, "targets/*.yaml"),
     (severity_yaml.SeverityScaleModel, severity_yaml.SCHEMA, "severity/*.yaml"),
-    (hazard_list.HazardsModel, hazard_list.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
+    (accidents_and_hazards.HazardsModel, accidents_and_hazards.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
     (context_tables.ContextTableModel, context_tables.CONTEXT_TABLE_SCHEMA, "stpa/contexts/*.yaml"),
-    (analysis_files.ControlStructureModel, "control_structure/1", "stpa/control_structure.yaml"),
-    (analysis_files.UnsafeActionsModel, "unsafe_control_actions/1", "stpa/unsafe_control_actions.yaml"),
-    (analysis_files.CausalFactorsModel, "causal_factors/1", "stpa/causal_factors.yaml"),
+    (hazard_analysis_yaml.ControlStructureModel, "control_structure/1", "stpa/control_structure.yaml"),
+    (hazard_analysis_yaml.UnsafeActionsModel, "unsafe_control_actions/1", "stpa/unsafe_control_actions.yaml"),
+    (hazard_analysis_yaml.CausalFactorsModel, "causal_factors/1", "stpa/causal_factors.yaml"),
 )
 
 

@@ -10,7 +10,7 @@ from mutator.faults import fault_specs
 from mutator.faults.library_readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.library_readings import ReadingsModel
 from mutator.reference.yaml_key_tables import generated_page_head, model_sections
-from mutator.stpa import analysis_files, context_tables, hazard_list
+from mutator.stpa import accidents_and_hazards, context_tables, hazard_analysis_yaml
 from mutator.targets import manifest_files, severity_yaml
 from mutator.workspace import Workspace
 
@@ -88,15 +88,15 @@ def render_hazard_analysis_page(workspace: Workspace) -> str:
         "analysis](../how-to/change-the-hazard-analysis.md) shows how to write "
         "them. `mutator stpa` prints and checks them.\n",
         f"{_STRICT_YAML_LINKS} The first key of each file is `schema`: "
-        f"`{hazard_list.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_TABLE_SCHEMA}`,\n`control_structure/1`, "
+        f"`{accidents_and_hazards.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_TABLE_SCHEMA}`,\n`control_structure/1`, "
         "`unsafe_control_actions/1`, `causal_factors/1`.\n",
         *model_sections(
             "hazard-analysis.md",
-            hazard_list.HazardsModel,
+            accidents_and_hazards.HazardsModel,
             context_tables.ContextTableModel,
-            analysis_files.ControlStructureModel,
-            analysis_files.UnsafeActionsModel,
-            analysis_files.CausalFactorsModel,
+            hazard_analysis_yaml.ControlStructureModel,
+            hazard_analysis_yaml.UnsafeActionsModel,
+            hazard_analysis_yaml.CausalFactorsModel,
         ),
     )
 

@@ -9,10 +9,10 @@ from urllib.parse import quote
 
 from mutator.report.fault_path_data import PathCounts, link_name
 from mutator.statistics.shares import share
-from mutator.stpa import svg_shapes
-from mutator.stpa.analysis_files import ControlStructureModel, LinkModel
-from mutator.stpa.structure_layout import ComponentBox, LinkArrow, lay_out_structure
-from mutator.stpa.svg_shapes import path_data
+from mutator.stpa import arrow_and_box_svg
+from mutator.stpa.arrow_and_box_svg import path_data
+from mutator.stpa.control_structure_layout import ComponentBox, LinkArrow, lay_out_structure
+from mutator.stpa.hazard_analysis_yaml import ControlStructureModel, LinkModel
 
 _WIDEST_LINE_PX = 7.0  # px, width of a link that passed all its faults
 _THINNEST_LINE_PX = 1.8
@@ -44,7 +44,9 @@ def draw_path_counts(structure: ControlStructureModel, counts: PathCounts, links
         'aria-label="Control structure with the share of faults that got through each link">',
         "<defs>",
         *(
-            svg_shapes.tip_marker(f"path-tip-{name}", 14, f'class="tip {name}" d="{svg_shapes.TIP_OUTLINE}"')
+            arrow_and_box_svg.tip_marker(
+                f"path-tip-{name}", 14, f'class="tip {name}" d="{arrow_and_box_svg.TIP_OUTLINE}"'
+            )
             for name in ("quiet", "through", "stopped")
         ),
         "</defs>",
@@ -92,7 +94,7 @@ def _is_short(arrow: LinkArrow) -> bool:
 def _idle_link_svg(arrow: LinkArrow, link: LinkModel) -> Iterator[str]:
     yield (
         f'<g class="idle"><path d="{path_data(arrow.points)}" stroke-dasharray="3 4" '
-        f'marker-end="url(#path-tip-quiet)"/>{svg_shapes.label_line(arrow, escape(link.label))}</g>'
+        f'marker-end="url(#path-tip-quiet)"/>{arrow_and_box_svg.label_line(arrow, escape(link.label))}</g>'
     )
 
 
@@ -106,9 +108,9 @@ def _link_svg(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) 
         f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}\n{interval}</title>"
         f'<path class="hit" d="{path_data(arrow.points)}"/><path class="line" d="{path_data(arrow.points)}" '
         f'style="stroke-width: {width}" marker-end="url(#path-tip-{kind})"/>'
-        f"{svg_shapes.label_line(arrow, escape(link.label))}"
-        f"{svg_shapes.label_line(arrow, first, 1, 'count')}"
-        f"{svg_shapes.label_line(arrow, last, 2, 'count')}</a>"
+        f"{arrow_and_box_svg.label_line(arrow, escape(link.label))}"
+        f"{arrow_and_box_svg.label_line(arrow, first, 1, 'count')}"
+        f"{arrow_and_box_svg.label_line(arrow, last, 2, 'count')}</a>"
     )
 
 
@@ -141,7 +143,7 @@ def _box_svg(name: str, box: ComponentBox, label: str, about: str, counts: PathC
     yield (
         f'<a class="{classes}" data-component="{escape(name)}" href="#stopped_at={quote(name)}">'
         f"<title>{escape(about)}</title>"
-        f"{svg_shapes.box_rectangle(box)}"
+        f"{arrow_and_box_svg.box_rectangle(box)}"
         f'<text class="name" x="{middle:.1f}" y="{top - 11:.1f}" text-anchor="middle">{escape(label)}</text>'
         f'<text class="count" x="{middle:.1f}" y="{top + 6:.1f}" text-anchor="middle">{first}</text>'
         f'<text class="count" x="{middle:.1f}" y="{top + 23:.1f}" text-anchor="middle">{last}</text></a>'

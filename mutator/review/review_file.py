@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.review.review_entries import (
     TIME_PATTERN,
     BasisDigests,

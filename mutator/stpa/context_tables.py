@@ -8,12 +8,12 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
-from mutator.config.phrases import build_phrase
+from mutator.config.phrases_yaml import build_phrase
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
-from mutator.stpa.context_coverage import TableCoverage, measure_coverage
+from mutator.stpa.context_coverage_proof import TableCoverage, measure_coverage
 from mutator.targets.stored_phrases import PhraseByCase
 from mutator.triggers.conditions import TIME, canonical_condition, names_in
 

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 
 RUN_PLACEHOLDERS = ("scenario", "seed", "out", "cache", "root")
 FILMED_RUN_PLACEHOLDERS = (*RUN_PLACEHOLDERS, "film")

@@ -6,10 +6,10 @@ from typing import get_args
 
 from pydantic import Field
 
-from mutator.config.phrases import build_phrase
-from mutator.config.unit_fields import UnitSymbol
+from mutator.config.phrases_yaml import build_phrase
+from mutator.config.unit_symbol_field import UnitSymbol
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.targets.hazard_and_metric_definitions import Aggregate, Hazard, Metric, WorseDirection
 from mutator.targets.manifest_formulas import manifest_condition, manifest_formula
 from mutator.targets.stored_phrases import LATER_HOLE

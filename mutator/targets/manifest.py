@@ -11,7 +11,7 @@ from mutator._common import cache_layout_and_pruning
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import digest
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
 from mutator.targets.command_placeholders import fill_placeholders

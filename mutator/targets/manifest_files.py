@@ -8,7 +8,7 @@ from pydantic import Field
 from mutator._common.confined_files import checked_relative_path
 from mutator._common.shipped_files import SHIPPED_TARGET_ROOT
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.targets.confined_relative_paths import clean_relative_path
 from mutator.targets.hazards_and_metrics_yaml import HazardModel, MetricModel, build_hazards, build_metrics
 from mutator.targets.manifest import FilmCommands, TargetManifest

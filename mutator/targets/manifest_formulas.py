@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.triggers.conditions import canonical_condition, canonical_formula
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import checked_relative_path
 from mutator.config.yaml_files import MOST_YAML_BYTES, load_yaml, parse_yaml
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 
 _NAME_KEY_PATTERN = re.compile(r"^name\b", re.MULTILINE)

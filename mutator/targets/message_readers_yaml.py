@@ -5,10 +5,10 @@ import ast
 from pydantic import Field
 
 from mutator.config.instance_conditions import canonical_instance_condition
-from mutator.config.location_model import LocationModel
 from mutator.config.location_syntax import is_assignable, is_message_expression
+from mutator.config.location_yaml import LocationModel
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS
 from mutator.targets.message_readers import MessageReader
 

@@ -6,11 +6,11 @@ import keyword
 from pydantic import Field
 
 from mutator._common.message_text import shortened_repr
-from mutator.config.location_model import LocationModel
 from mutator.config.location_syntax import PROBE_MODULE_NAME, is_dotted_name
-from mutator.config.unit_fields import UnitSymbol
+from mutator.config.location_yaml import LocationModel
+from mutator.config.unit_symbol_field import UnitSymbol
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS
 from mutator.targets.confined_relative_paths import clean_relative_path
 from mutator.targets.observed_values import Observation, ObservedValue

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from pydantic import Field
 
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.targets.manifest_formulas import manifest_condition, manifest_formula
 from mutator.targets.overhead_view import ActorShape, GroundLine, OverheadView, ViewedActor
 

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 
 # Sums in another order differ in their last digits, so the libraries of linear algebra use one thread.
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")

@@ -9,7 +9,7 @@ from packaging.requirements import Requirement
 from mutator._common.confined_files import is_inside
 from mutator._common.shipped_files import SHIPPED_TARGET_ROOT, shipped_folder
 from mutator.config.location_syntax import PROBE_MODULE_NAME
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.targets.required_packages import pip_install_command
 
 INSTALLED_PREFIX = "installed:"  # prefix of an import package's name, as `root` of a manifest

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from mutator._common.message_text import describe_choices
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.targets.command_placeholders import (
     FILM_PLACEHOLDERS,
     FILMED_RUN_PLACEHOLDERS,

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from mutator.config.units import UNITS
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.targets.hazard_and_metric_definitions import Hazard, Metric
 from mutator.targets.hazard_severity import (
     SEVERITY_CLASSES,

@@ -3,7 +3,7 @@
 import ast
 from inspect import getsource
 
-from mutator.config.yaml_sources import KeyPath
+from mutator.config.yaml_source_lines import KeyPath
 from mutator.errors import MutatorError
 from mutator.targets.hazard_and_metric_definitions import Hazard
 from mutator.targets.manifest import TargetManifest

@@ -5,10 +5,10 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator._common.doors import IMPORTERS
-from mutator.config.phrases import ChangePhraseModel, build_phrase
-from mutator.config.unit_fields import UnitSymbol
+from mutator.config.phrases_yaml import ChangePhraseModel, build_phrase
+from mutator.config.unit_symbol_field import UnitSymbol
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.targets.channels import ROUNDING_TOLERANCE, Channel, Role
 from mutator.targets.stored_phrases import HIGHEST_SPEED, LOWEST_SPEED
 from mutator.triggers.conditions import RESERVED_NAMES

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mutator.stpa.context_coverage import measure_coverage
+from mutator.stpa.context_coverage_proof import measure_coverage
 from mutator.triggers.conditions import canonical_condition, evaluate_condition
 
 NUMBERS = st.sampled_from([-1.0, 0.0, 0.5, 2.0])

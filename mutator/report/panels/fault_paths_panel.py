@@ -22,7 +22,7 @@ from mutator.report.path_drawing import (
 )
 from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import fault_types_of
-from mutator.stpa.analysis_files import ControlStructureModel
+from mutator.stpa.hazard_analysis_yaml import ControlStructureModel
 from mutator.web import json_script_element
 
 _INTRODUCTION = (

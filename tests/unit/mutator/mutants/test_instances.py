@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mutator.config.instance_conditions import canonical_instance_condition
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.injection_model import InjectionModel
 from mutator.faults.injection_specs import InjectionSpec

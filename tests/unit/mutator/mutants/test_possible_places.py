@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.config.location_model import LocationModel
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.location_yaml import LocationModel
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import ParamSchema
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection, Value

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, ParamSchema, SnippetKind
 from mutator.model import Hold, Value

@@ -14,7 +14,7 @@ from mutator.onboarding.library_import import (
     LibraryImporter,
     import_into_new_library,
 )
-from mutator.stpa.analysis_checks import list_analysis_problems
+from mutator.stpa.hazard_analysis_checks import list_analysis_problems
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[4]

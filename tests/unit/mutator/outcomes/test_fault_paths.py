@@ -25,7 +25,7 @@ from mutator.model import (
 )
 from mutator.outcomes.fault_paths import ComponentState, FaultPath, FaultPathFinder, LinkState, fault_paths_of
 from mutator.store.run_folder import RunFolder
-from mutator.stpa.analysis_files import ControlStructureModel
+from mutator.stpa.hazard_analysis_yaml import ControlStructureModel
 from mutator.targets.stored_target_facts import ChannelFacts
 from tests.made_head import made_head
 

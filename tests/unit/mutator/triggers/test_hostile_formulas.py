@@ -8,7 +8,7 @@ import pytest
 
 from mutator.campaigns.row_filters import compile_filter
 from mutator.errors import MutatorError
-from mutator.stpa.context_coverage import measure_coverage
+from mutator.stpa.context_coverage_proof import measure_coverage
 from mutator.triggers import temporal_logic
 from mutator.triggers.conditions import canonical_condition, canonical_formula
 from tests.costs import is_cheap, is_refused

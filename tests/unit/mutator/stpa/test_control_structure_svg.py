@@ -7,20 +7,20 @@ from xml.etree import ElementTree
 import pytest
 
 import mutator
-from mutator.stpa.analysis_files import HazardAnalysis, load_hazard_analysis
-from mutator.stpa.structure_drawing import (
-    FAULT_COLOUR,
-    factors_with_faults_by_place,
-    join_with_common_prefix,
-    render_structure,
-)
-from mutator.stpa.structure_layout import (
+from mutator.stpa.control_structure_layout import (
     MIN_ARROW_DISTANCE,
     ComponentBox,
     Point,
     StructureLayout,
     lay_out_structure,
 )
+from mutator.stpa.control_structure_svg import (
+    FAULT_COLOUR,
+    factors_with_faults_by_place,
+    join_with_common_prefix,
+    render_structure,
+)
+from mutator.stpa.hazard_analysis_yaml import HazardAnalysis, load_hazard_analysis
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mutator.stpa.context_coverage import measure_coverage
+from mutator.stpa.context_coverage_proof import measure_coverage
 from mutator.triggers.conditions import canonical_condition
 
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable
 
-from mutator.stpa.arrow_labels import Point
-from mutator.stpa.structure_layout import ComponentBox, LinkArrow
+from mutator.stpa.arrow_label_placement import Point
+from mutator.stpa.control_structure_layout import ComponentBox, LinkArrow
 
 TIP_OUTLINE = "M0,0 L10,5 L0,10 z"  # outline of an arrow's tip
 _LINE_SPACING = 15  # line spacing of a label's second text

@@ -8,8 +8,8 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from mutator.stpa.analysis_files import ComponentModel, ControlStructureModel, LinkModel
-from mutator.stpa.arrow_labels import PlacedLabel, Point, place_labels
+from mutator.stpa.arrow_label_placement import PlacedLabel, Point, place_labels
+from mutator.stpa.hazard_analysis_yaml import ComponentModel, ControlStructureModel, LinkModel
 
 COLUMN_PITCH = 212  # distance between columns
 BOX_GAP = 88  # distance between adjacent boxes

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.config.phrases import ChangePhraseModel, PhraseModel, SignedPhraseModel, build_phrase
-from mutator.config.yaml_sources import YamlSource
+from mutator.config.phrases_yaml import ChangePhraseModel, PhraseModel, SignedPhraseModel, build_phrase
+from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 
 SOURCE = YamlSource(path=Path("spec.yaml"), data={}, lines={(): 1, ("phrase",): 4, ("phrase", "lower"): 6})

@@ -8,8 +8,8 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
-from mutator.stpa.analysis_checks import injection_places, list_analysis_problems
-from mutator.stpa.analysis_files import HazardAnalysis, load_hazard_analysis
+from mutator.stpa.hazard_analysis_checks import injection_places, list_analysis_problems
+from mutator.stpa.hazard_analysis_yaml import HazardAnalysis, load_hazard_analysis
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from mutator._common.phrase_texts import PhraseTexts, has_single_brace, holes_of
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 
 PhraseByCase = Mapping[str, PhraseTexts]  # `positive` and `negative`, `higher` and `lower`; '' for all cases
 PhraseModel = str | list[str]

@@ -4,7 +4,7 @@ from pydantic import Field
 
 from mutator.config.location_syntax import is_assignable, is_dotted_name, is_expression
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 
 # a function has one entry, and an empty name matches any return or condition

@@ -1,6 +1,6 @@
 """The hazard analysis as data: control structure, unsafe control actions, causal factors.
 
-Loading checks all references between the files. `mutator.stpa.analysis_checks` compares the analysis with the
+Loading checks all references between the files. `mutator.stpa.hazard_analysis_checks` compares the analysis with the
 fault specs and the target.
 """
 
@@ -14,9 +14,9 @@ from pydantic import Field
 from mutator._common.confined_files import path_below
 from mutator._common.message_text import describe_choices, spelling_suggestion
 from mutator.config.yaml_files import StrictModel, load_yaml_model
-from mutator.config.yaml_sources import KeyPath, YamlSource
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
+from mutator.stpa.accidents_and_hazards import HazardList, load_hazard_list
 from mutator.stpa.context_tables import ContextTable, load_context_table
-from mutator.stpa.hazard_list import HazardList, load_hazard_list
 
 _MOST_GRID_SIZE = 100  # most rows and columns of the drawing
 

@@ -4,12 +4,17 @@ import ast
 from collections.abc import Iterator
 
 from mutator._common.message_text import spelling_suggestion
-from mutator.config.yaml_sources import KeyPath
+from mutator.config.yaml_source_lines import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.message_places import location_of
-from mutator.stpa.analysis_files import CausalFactorModel, HazardAnalysis, UnsafeActionModel, UnsafeCategory
 from mutator.stpa.context_tables import ContextRow
+from mutator.stpa.hazard_analysis_yaml import (
+    CausalFactorModel,
+    HazardAnalysis,
+    UnsafeActionModel,
+    UnsafeCategory,
+)
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import names_in
 

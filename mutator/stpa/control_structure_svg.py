@@ -3,10 +3,15 @@
 from collections.abc import Iterable, Iterator
 from html import escape
 
-from mutator.stpa import svg_shapes
-from mutator.stpa.analysis_files import ComponentKind, HazardAnalysis
-from mutator.stpa.arrow_labels import Point
-from mutator.stpa.structure_layout import DRAWING_EDGE, ComponentBox, StructureLayout, lay_out_structure
+from mutator.stpa import arrow_and_box_svg
+from mutator.stpa.arrow_label_placement import Point
+from mutator.stpa.control_structure_layout import (
+    DRAWING_EDGE,
+    ComponentBox,
+    StructureLayout,
+    lay_out_structure,
+)
+from mutator.stpa.hazard_analysis_yaml import ComponentKind, HazardAnalysis
 
 FILL_BY_KIND = {
     ComponentKind.HUMAN: "#ececec",
@@ -39,7 +44,9 @@ def render_structure(analysis: HazardAnalysis) -> str:
         f"<style>{STYLE_SHEET}</style>",
         "<defs>",
         *(
-            svg_shapes.tip_marker(f"tip-{colour[1:]}", 9, f'd="{svg_shapes.TIP_OUTLINE}" fill="{colour}"')
+            arrow_and_box_svg.tip_marker(
+                f"tip-{colour[1:]}", 9, f'd="{arrow_and_box_svg.TIP_OUTLINE}" fill="{colour}"'
+            )
             for colour in (ACTION_COLOUR, FEEDBACK_COLOUR, FAULT_COLOUR)
         ),
         "</defs>",
@@ -78,7 +85,7 @@ def _link_arrows(analysis: HazardAnalysis, layout: StructureLayout) -> Iterator[
 def _arrow_path(points: Iterable[Point], colour: str, width: float, *, dashed: bool = False) -> str:
     dashes = ' stroke-dasharray="6 4"' if dashed else ""
     return (
-        f'<path d="{svg_shapes.path_data(points)}" fill="none" stroke="{colour}" stroke-width="{width}"'
+        f'<path d="{arrow_and_box_svg.path_data(points)}" fill="none" stroke="{colour}" stroke-width="{width}"'
         f'{dashes} marker-end="url(#tip-{colour[1:]})"/>'
     )
 
@@ -89,7 +96,7 @@ def _component_boxes(analysis: HazardAnalysis, layout: StructureLayout) -> Itera
         box = layout.boxes[name]
         edge, width = (FAULT_COLOUR, 3) if name in faulty else (INK_COLOUR, 1.2)
         look = f' fill="{FILL_BY_KIND[component.kind]}" stroke="{edge}" stroke-width="{width}"'
-        yield f"<g><title>{_escaped_line(component.about)}</title>{svg_shapes.box_rectangle(box, look)}"
+        yield f"<g><title>{_escaped_line(component.about)}</title>{arrow_and_box_svg.box_rectangle(box, look)}"
         yield from _box_text(box)
         yield "</g>"
 
@@ -108,9 +115,9 @@ def _link_labels(analysis: HazardAnalysis, layout: StructureLayout) -> Iterator[
     faulty = factors_with_faults_by_place(analysis)
     for name, link in analysis.structure.links.items():
         arrow = layout.arrows[name]
-        yield svg_shapes.label_line(arrow, _escaped_line(link.label))
+        yield arrow_and_box_svg.label_line(arrow, _escaped_line(link.label))
         if name in faulty:
-            yield svg_shapes.label_line(
+            yield arrow_and_box_svg.label_line(
                 arrow, _escaped_line(join_with_common_prefix(faulty[name])), 1, "label factor"
             )
 
