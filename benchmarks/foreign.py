@@ -24,8 +24,8 @@ from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import AnchorKind, Injection
-from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.mutants.possible_places import ListedPlace, places_of
 from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, probe_import_edit, unsplice
 from mutator.operators.equal_code_filter import drop_equal_code

@@ -21,8 +21,8 @@ from mutator._common.doors import OPERATORS
 from mutator.campaigns.plan import build_plan
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment
-from mutator.mutants.anchors import parse_file
 from mutator.mutants.mutant_building import build, build_without_reusing_changed_files
+from mutator.mutants.parsed_files_and_anchors import parse_file
 from mutator.operators.mutation_selection import sample_mutations, select_mutations
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger

@@ -18,8 +18,8 @@ from pathlib import Path
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
-from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parse_file
 from mutator.targets.source_tree import SourceTree, read_tree
 from mutator.workspace import Workspace
 

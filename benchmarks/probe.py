@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT))
 
 from mutator.engines.job_tree_pool import JobTreePool  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
-from mutator.mutants.probe import probe_path  # noqa: E402
+from mutator.mutants.probe_contract import probe_path  # noqa: E402
 from mutator.triggers.trigger_kinds import always_trigger  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 

@@ -25,8 +25,8 @@ from markupsafe import Markup
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Experiment, Record, Trigger
-from mutator.mutants.file_patches import patch_without_new_files
 from mutator.mutants.mutant_building import build
+from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.report import experiment_list as report_browse
 from mutator.report import markdown_and_html as report_page

@@ -30,7 +30,7 @@ from mutator.model import (
     Status,
     Trigger,
 )
-from mutator.mutants.anchors import ParsedFile, parsed_file
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter, read_segment
 from mutator.store.file_digests import FileDigest

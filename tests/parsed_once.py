@@ -15,8 +15,8 @@ from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults import fault_model_files
 from mutator.faults.fault_models import FaultModel, FaultModelExample, FaultModels
-from mutator.mutants import anchors
-from mutator.mutants.anchors import ParsedFile
+from mutator.mutants import parsed_files_and_anchors
+from mutator.mutants.parsed_files_and_anchors import ParsedFile
 
 _SMALL = 1 << 20  # bytes
 
@@ -30,7 +30,7 @@ def parsed_once() -> Iterator[None]:
     """
     parse_yaml, parse_python, load_model = (
         yaml_files.parse_yaml,
-        anchors.parse_file,
+        parsed_files_and_anchors.parse_file,
         fault_model_files._load_model,
     )
     models: dict[tuple[str, bytes, bytes], FaultModel] = {}
@@ -74,7 +74,7 @@ def parsed_once() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(yaml_files, "parse_yaml", yaml)
-        patch.setattr(anchors, "parse_file", python)
+        patch.setattr(parsed_files_and_anchors, "parse_file", python)
         patch.setattr(fault_model_files, "_load_model", model)
         patch.setattr(library_check, "apply_example", example_of)
         yield

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mutator.api.notebook_html import diff_html, facts_html, text_html
 from mutator.figures.golden_and_faulty_plot import draw_golden_and_faulty, event_marks
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
-from mutator.mutants.file_patches import patch_without_new_files
+from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.outcomes.fault_paths import FaultPathFinder
 from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.trace_loading import Trace, values_on_steps

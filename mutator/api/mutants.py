@@ -8,8 +8,8 @@ from mutator.api.notebook_html import diff_html, text_html
 from mutator.api.target_and_fault_selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
-from mutator.mutants.file_patches import patch_without_new_files
 from mutator.mutants.mutant_building import Mutant, build, write_mutated_tree
+from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.targets.manifest import TargetManifest
 
 

@@ -1,7 +1,7 @@
 """List where faults can be injected."""
 
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
-from mutator.mutants.anchors import parsed_file
+from mutator.mutants.parsed_files_and_anchors import parsed_file
 from mutator.mutants.possible_places import ListedPlace, places_of
 from mutator.mutants.refused_places import PlaceNote, split_by_refusal
 from mutator.targets.allowed_locations import check_file_allowed

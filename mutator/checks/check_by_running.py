@@ -32,9 +32,9 @@ from mutator.engines.run_limits import limits_before_measuring, measure_limits
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import NotForkable
 from mutator.model import Experiment, Limits
-from mutator.mutants.injected_lines import target_line_of
+from mutator.mutants.injected_line_syntax import target_line_of
 from mutator.mutants.mutant_building import build
-from mutator.mutants.probe import is_probe_path
+from mutator.mutants.probe_contract import is_probe_path
 from mutator.preflight import canary
 from mutator.preflight.check_run_problems import (
     CheckRun,

@@ -16,9 +16,9 @@ from mutator.faults.injection_parameters import resolve_injection
 from mutator.faults.library_readings import SpecReadings
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
-from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import edits_of, injection_edit
 from mutator.mutants.mutant_building import build
+from mutator.mutants.parsed_files_and_anchors import parse_file
 from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, unsplice
 from mutator.onboarding.todo_marks import unfilled_mark_errors
 from mutator.stpa.context_tables import ContextTable

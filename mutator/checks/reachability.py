@@ -17,7 +17,7 @@ from mutator.checks.findings import CheckState, Finding, FindingPlace
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.faults.message_places import location_of
 from mutator.model import FaultLocation, Method, Trigger
-from mutator.mutants.counting_mutant import build_counting_mutant
+from mutator.mutants.execution_counting_mutant import build_counting_mutant
 from mutator.outcomes.inactivity_reasons import PlaceReach, Reach, reach_of_place
 from mutator.preflight.unreached_triggers import armed_condition_of, is_ever_active
 from mutator.targets.manifest import TargetManifest

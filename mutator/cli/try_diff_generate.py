@@ -25,7 +25,7 @@ from mutator.cli.options import (
     with_workspace_options,
 )
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
-from mutator.mutants.file_patches import patch_without_new_files
+from mutator.mutants.patches_by_file import patch_without_new_files
 
 _DEFAULT_OUT = Path("runs/try")
 EXPERIMENT_ID_PATTERN = re.compile(r"[0-9a-f]{4,16}")  # an id, or enough of its start

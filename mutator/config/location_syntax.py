@@ -7,7 +7,7 @@ from typing import Any
 
 from mutator.model import AnchorKind, FaultLocation
 
-PROBE_MODULE_NAME = "_fi"  # reserved for the probe's module in every mutant (mutants/probe.py)
+PROBE_MODULE_NAME = "_fi"  # reserved for the probe's module in every mutant (mutants/probe_contract.py)
 
 # what `ast` raises for invalid or too deeply nested source
 _INVALID_SOURCE_ERRORS = (SyntaxError, ValueError, RecursionError, MemoryError)

@@ -14,9 +14,9 @@ from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_OPTIMIZED
 from types import CodeType
 
 from mutator.errors import MutantNotSwappable
-from mutator.mutants.constant_imports import module_name
-from mutator.mutants.injected_lines import has_constant_or_default_settings, tag_of
-from mutator.mutants.probe import ProbeSource, probe_path
+from mutator.mutants.injected_line_syntax import has_constant_or_default_settings, tag_of
+from mutator.mutants.modules_importing_constants import module_name
+from mutator.mutants.probe_contract import ProbeSource, probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches_any_glob

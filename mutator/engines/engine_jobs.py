@@ -10,8 +10,8 @@ from typing import Any, Protocol
 
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Limits, Status
-from mutator.mutants.injected_lines import place_in_target
-from mutator.mutants.probe import ProbeSource, is_probe_path, report_problem
+from mutator.mutants.injected_line_syntax import place_in_target
+from mutator.mutants.probe_contract import ProbeSource, is_probe_path, report_problem
 from mutator.targets.manifest import TargetManifest
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mutator.mutants.probe import ProbeSource
+from mutator.mutants.probe_contract import ProbeSource
 from mutator.triggers.trace_formulas import ARITHMETIC_FUNCTIONS, COMPARISON_FUNCTIONS
 
 

@@ -48,7 +48,7 @@ from mutator.engines.thread_messages import describe_too_many_threads, remedy_fo
 from mutator.errors import ForkServerLost, MutantNotSwappable, NotForkable
 from mutator.model import Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
-from mutator.mutants.probe import ProbeSource, untriggered_report
+from mutator.mutants.probe_contract import ProbeSource, untriggered_report
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 

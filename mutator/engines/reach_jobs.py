@@ -6,7 +6,7 @@ from dataclasses import replace
 from mutator.engines.engine_jobs import Job
 from mutator.engines.in_target import reach_watch
 from mutator.model import FaultLocation
-from mutator.mutants.probe import is_probe_path
+from mutator.mutants.probe_contract import is_probe_path
 
 
 def watched_job(job: Job, location_by_id: Mapping[str, FaultLocation]) -> Job:

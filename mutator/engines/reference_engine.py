@@ -39,8 +39,8 @@ from mutator.engines.process_endings import (
 )
 from mutator.engines.sandbox import Sandbox
 from mutator.model import Limits, Status
-from mutator.mutants.anchors import parsed_file
-from mutator.mutants.probe import probe_attributes_after, probe_module
+from mutator.mutants.parsed_files_and_anchors import parsed_file
+from mutator.mutants.probe_contract import probe_attributes_after, probe_module
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_at_hazard_code import stop_function_source
 

@@ -18,7 +18,7 @@ from mutator.execution.inactivity_check import InactivityCheck
 from mutator.faults.fault_models import FaultModels
 from mutator.model import AfterHazard, Experiment, ObservedActivation, Record, Status
 from mutator.mutants.mutant_building import Mutant, build
-from mutator.mutants.probe import activation_of
+from mutator.mutants.probe_contract import activation_of
 from mutator.outcomes import golden_comparison, trace_loading
 from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.failure_cause import judge_failure, run_error

@@ -12,8 +12,8 @@ from mutator.engines.reach_jobs import watched_job
 from mutator.engines.reference_engine import ReferenceEngine, make_reference_engine
 from mutator.errors import MutatorError
 from mutator.model import Experiment, FaultLocation, Status
-from mutator.mutants.counting_mutant import build_counting_mutant
-from mutator.mutants.probe import was_triggered
+from mutator.mutants.execution_counting_mutant import build_counting_mutant
+from mutator.mutants.probe_contract import was_triggered
 from mutator.outcomes.inactivity_reasons import UNTRIGGERED_REASON, Reach, reach_of_place
 
 _UNKNOWN = ((Reach.NEVER, "its code did not run while the trigger held"),)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
-from mutator.mutants.anchors import ParsedFile
-from mutator.mutants.injected_lines import tag_of
+from mutator.mutants.injected_line_syntax import tag_of
 from mutator.mutants.normalized_source import compiles, normalize_numbers_and_ids
+from mutator.mutants.parsed_files_and_anchors import ParsedFile
 from mutator.mutants.splicing import LineEdit, sort_edits
 from mutator.targets.source_tree import SourceTree
 

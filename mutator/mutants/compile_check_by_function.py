@@ -4,10 +4,10 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import replace
 
-from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.changed_file_reuse import ReuseKey
+from mutator.mutants.parsed_files_and_anchors import ParsedFile
 from mutator.mutants.splicing import EditRank, LineEdit, apply_edits, mutated_bytes, sort_edits
-from mutator.mutants.standalone_compilation import compile_standalone
+from mutator.mutants.standalone_function_compilation import compile_standalone
 
 
 def certainly_compiles_for_key(file: ParsedFile, edits: Iterable[LineEdit], key: ReuseKey) -> bool:

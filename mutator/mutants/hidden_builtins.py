@@ -14,8 +14,8 @@ from jinja2 import Environment, nodes
 
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel
-from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.name_scopes import bound_names, names_of_module
+from mutator.mutants.parsed_files_and_anchors import ParsedFile
 
 _TEMPLATE_TAG_PATTERN = re.compile(r"\{\{.*?\}\}|\{%.*?%\}|\{#.*?#\}", re.DOTALL)
 _WORD_PATTERN = re.compile(r"\w+")

@@ -9,20 +9,20 @@ from mutator.config.location_syntax import base_variable
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind, TemplateNeed
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
-from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, parsed_file
+from mutator.mutants.changeable_expressions import NO_TEMPLATE_PARTS, Expression, template_parts
 from mutator.mutants.changed_file_reuse import reuse_key
-from mutator.mutants.constant_imports import dotted_names_importing_constant
-from mutator.mutants.expressions import NO_TEMPLATE_PARTS, Expression, template_parts
 from mutator.mutants.hidden_builtins import check_calls_builtins
-from mutator.mutants.injected_lines import (
+from mutator.mutants.injected_line_syntax import (
     ORIGINAL_VALUE_NAME,
     activation_condition,
     active_check_source,
     constant_setting_line,
     default_setting_line,
 )
+from mutator.mutants.modules_importing_constants import dotted_names_importing_constant
 from mutator.mutants.name_scopes import bound_names, normalize_identifier, rescoped_names
-from mutator.mutants.probe import injection_id
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, ResolvedAnchor, parsed_file
+from mutator.mutants.probe_contract import injection_id
 from mutator.mutants.refused_places import check_place_can_be_hit
 from mutator.mutants.splicing import (
     ExpressionEdit,
@@ -34,7 +34,7 @@ from mutator.mutants.splicing import (
     insertion_edit,
     mutated_bytes,
 )
-from mutator.mutants.statement_texts import one_line_texts
+from mutator.mutants.statement_template_texts import one_line_texts
 from mutator.mutants.template_rendering import render_changed_value, render_snippet
 from mutator.targets.allowed_locations import check_location_allowed
 from mutator.targets.manifest import TargetManifest

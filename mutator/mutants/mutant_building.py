@@ -11,7 +11,6 @@ from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.probe_template_parts import CODE_TEMPLATE_FILE as PROBE_CODE
 from mutator.model import LOAD_TIME_ANCHORS, Fault, Hold, Trigger
-from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.mutants.changed_file_reuse import (
     ChangedFile,
     ReusableChangedFile,
@@ -21,11 +20,12 @@ from mutator.mutants.changed_file_reuse import (
     reuse_key,
 )
 from mutator.mutants.compile_check_by_function import certainly_compiles_for_key
-from mutator.mutants.injected_lines import OBSERVATION_TAG, observe_call
+from mutator.mutants.injected_line_syntax import OBSERVATION_TAG, observe_call
 from mutator.mutants.injection_edits import InjectionEdit, edits_of
 from mutator.mutants.normalized_source import compiles, normalize_numbers_and_ids
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.mutants.patch_rendering import render_changed_file, render_new_file
-from mutator.mutants.probe import ProbeSource, build_probe_settings, probe_path, render_probe
+from mutator.mutants.probe_contract import ProbeSource, build_probe_settings, probe_path, render_probe
 from mutator.mutants.splicing import (
     EditRank,
     ExpressionEdit,

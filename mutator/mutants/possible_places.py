@@ -9,10 +9,15 @@ from mutator.config.location_syntax import is_assignable, is_dotted_name, locati
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind, TemplateNeed
 from mutator.model import Anchor, AnchorKind, FaultLocation
-from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, functions_named, normalized_function_name
-from mutator.mutants.expressions import NO_TEMPLATE_PARTS, Expression, template_parts
+from mutator.mutants.changeable_expressions import NO_TEMPLATE_PARTS, Expression, template_parts
 from mutator.mutants.hidden_builtins import HiddenBuiltins, builtins_always_called
-from mutator.mutants.statement_texts import one_line_texts
+from mutator.mutants.parsed_files_and_anchors import (
+    ParsedFile,
+    ResolvedAnchor,
+    functions_named,
+    normalized_function_name,
+)
+from mutator.mutants.statement_template_texts import one_line_texts
 
 _OPERATOR_MODEL_PREFIX = "operator_"  # models of mutation operators, which find their own places
 # nothing after a `return` runs, so it has no anchor behind it

@@ -9,14 +9,14 @@ from importlib.machinery import EXTENSION_SUFFIXES
 
 from mutator.errors import MutatorError
 from mutator.model import AnchorKind, FaultLocation
-from mutator.mutants.anchors import ParsedFile, normalized_function_name, parsed_file
-from mutator.mutants.compiled_functions import (
+from mutator.mutants.classes_copying_defaults import copying_ancestor
+from mutator.mutants.jit_compiled_code_in_tree import (
     compiler_of_constant,
     compiler_of_function,
     switch_of_compiler,
     tracer_of_function,
 )
-from mutator.mutants.copied_defaults import copying_ancestor
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, normalized_function_name, parsed_file
 from mutator.mutants.possible_places import ListedPlace
 from mutator.targets.manifest import TargetManifest
 

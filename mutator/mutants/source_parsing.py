@@ -19,10 +19,10 @@ from libcst.metadata import MetadataWrapper, PositionProvider
 
 from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.errors import MutatorError
-from mutator.mutants.injected_lines import find_tagged_line
+from mutator.mutants.injected_line_syntax import find_tagged_line
+from mutator.mutants.libcst_position_realignment import align_positions
 from mutator.mutants.logical_lines import LogicalLines
 from mutator.mutants.positions_of_both_parsers import RangeByNode, line_after_statements
-from mutator.mutants.realigned_positions import align_positions
 
 MOST_SYNTAX_NODES = 50_000  # of a file's syntax tree; LibCST takes about 0.1 ms and 4 kB for each
 MOST_CHAIN_LINKS = 500  # LibCST recurses once for each link, and thousands would end the process

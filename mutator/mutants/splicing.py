@@ -13,10 +13,9 @@ from enum import IntEnum
 from itertools import pairwise
 
 from mutator.errors import MutatorError
-from mutator.mutants.anchors import ParsedFile, ResolvedAnchor
+from mutator.mutants.changeable_expressions import Expression
 from mutator.mutants.constants_and_defaults import ConstantOrDefault
-from mutator.mutants.expressions import Expression
-from mutator.mutants.injected_lines import (
+from mutator.mutants.injected_line_syntax import (
     active_check_source,
     changed_value_prefix,
     probe_import_line,
@@ -24,6 +23,7 @@ from mutator.mutants.injected_lines import (
     tag_of,
     tagged_line,
 )
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, ResolvedAnchor
 
 
 class EditRank(IntEnum):

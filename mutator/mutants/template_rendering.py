@@ -22,7 +22,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAME_PARAM_TYPES, FaultModel, ParamSchema, SnippetKind
 from mutator.model import Value
 from mutator.mutants.normalized_source import normalize_numbers_and_ids
-from mutator.mutants.template_language import TemplateEnvironment
+from mutator.mutants.restricted_template_language import TemplateEnvironment
 
 _MOST_INTEGER_EXACT_AS_FLOAT = 2.0**53  # every integer up to this is exact as a double
 _EXPECTED_BY_PARAM_TYPE = {  # by parameter type

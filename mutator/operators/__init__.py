@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from mutator.model import Value
 
 if TYPE_CHECKING:
-    from mutator.mutants.expressions import Expression
-    from mutator.mutants.statements import Statement
+    from mutator.mutants.changeable_expressions import Expression
+    from mutator.mutants.function_statements import Statement
     from mutator.operators.statement_facts import StatementFacts
 
 

@@ -17,8 +17,8 @@ from dis import get_instructions
 from types import CodeType
 
 from mutator.engines.code_swap_planning import behaviour_key, nested_code
-from mutator.mutants.anchors import ParsedFile
-from mutator.mutants.expressions import Expression
+from mutator.mutants.changeable_expressions import Expression
+from mutator.mutants.parsed_files_and_anchors import ParsedFile
 from mutator.operators.mutations import Mutation
 
 _FEWEST_LONG_ELEMENTS = 9  # shorter displays and calls are compiled whole

@@ -8,9 +8,9 @@ from mutator._common.doors import OPERATORS
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Anchor, AnchorKind, FaultLocation
-from mutator.mutants.anchors import ParsedFile
-from mutator.mutants.expressions import Expression, template_parts
-from mutator.mutants.statements import Statement
+from mutator.mutants.changeable_expressions import Expression, template_parts
+from mutator.mutants.function_statements import Statement
+from mutator.mutants.parsed_files_and_anchors import ParsedFile
 from mutator.mutants.template_rendering import render_changed_value
 from mutator.operators import MutationRule, Operator
 from mutator.operators.mutations import Mutation

@@ -9,7 +9,7 @@ from mutator._common.message_text import counted, spelling_suggestion
 from mutator._common.random_streams import random_generator
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.mutants.anchors import ParsedFile, parsed_file
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.mutants.refused_places import refusal_reason_of_function
 from mutator.operators.equal_code_filter import drop_equal_code
 from mutator.operators.executed_lines import TypesByFile

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from mutator.model import OPERATOR_FAULTS_MODULE, Fault, FaultLocation, Injection, Value
-from mutator.mutants.expressions import Expression
-from mutator.mutants.statements import Statement
+from mutator.mutants.changeable_expressions import Expression
+from mutator.mutants.function_statements import Statement
 
 _MOST_CHARACTERS = 60  # characters; longer texts are abbreviated
 _CONTEXT_CHARACTERS = 20  # unchanged characters kept before and after the change

@@ -11,8 +11,8 @@ from itertools import dropwhile
 
 from mutator.engines.engine_jobs import JobResult, RaisedException, TargetStack
 from mutator.model import RunError, Status
-from mutator.mutants.injected_lines import Tag, changed_value_positions, place_in_target, tag_of
-from mutator.mutants.probe import is_probe_path
+from mutator.mutants.injected_line_syntax import Tag, changed_value_positions, place_in_target, tag_of
+from mutator.mutants.probe_contract import is_probe_path
 
 _Position = tuple[str, int, int]  # file, line, column
 

@@ -10,7 +10,7 @@ from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import JobResult
 from mutator.errors import BadOutput
 from mutator.model import Status
-from mutator.mutants.probe import was_triggered
+from mutator.mutants.probe_contract import was_triggered
 from mutator.outcomes import trace_loading
 from mutator.outcomes.hazards_and_metrics import load_judged_run
 from mutator.outcomes.lost_values import find_value_lost_for_good

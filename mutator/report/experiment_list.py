@@ -17,7 +17,7 @@ from mutator._common.hashing import as_json_types
 from mutator.config.location_syntax import location_as_yaml
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
-from mutator.mutants.file_patches import patch_without_new_files
+from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.report.answer_parts import warning_filter_values
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
 from mutator.report.fault_path_data import RunFaultPaths

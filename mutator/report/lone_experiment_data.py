@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mutator._common.hashing import as_json_types
-from mutator.mutants.file_patches import patch_without_new_files
+from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.report.experiment_facts import RANK_COLUMN
 from mutator.report.experiment_list import details_data, results_table_data
 from mutator.results.experiment_sentence import ExperimentSentences

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from mutator._common.message_text import counted
 from mutator.model import Outcome
-from mutator.mutants.injected_lines import tags_for_page_scripts
+from mutator.mutants.injected_line_syntax import tags_for_page_scripts
 from mutator.report.experiment_list import ExperimentListData
 from mutator.report.glossary import Glossary
 from mutator.report.panel import Panel, ReportPage, rendered

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
 from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Outcome, Status
-from mutator.mutants.anchors import ParsedFile, parsed_file
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.results.outcome_counting import outcome_or_status_of_rows
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder

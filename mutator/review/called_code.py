@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from mutator.config.location_syntax import PROBE_MODULE_NAME
-from mutator.mutants.injected_lines import changed_value_positions, tag_of
+from mutator.mutants.injected_line_syntax import changed_value_positions, tag_of
 from mutator.review import source_names
 from mutator.review.source_names import SUPER, NameUse, SourceImport, SourceModule, uses_in
 from mutator.targets.source_tree import SourceTree

@@ -8,8 +8,8 @@ from functools import lru_cache
 
 from mutator._common.hashing import content_id
 from mutator.model import FaultLocation
-from mutator.mutants.file_patches import adds_file, split_into_file_patches
-from mutator.mutants.injected_lines import adds_fault
+from mutator.mutants.injected_line_syntax import adds_fault
+from mutator.mutants.patches_by_file import adds_file, split_into_file_patches
 from mutator.review.patch_shapes import HOLE_CHARACTER, without_values
 from mutator.review.review_entries import BasisDigests
 from mutator.targets.source_tree import SourceTree

@@ -30,7 +30,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, FaultLocation, Injection, Limits, Status
 from mutator.mutants.mutant_building import build
-from mutator.mutants.probe import probe_path
+from mutator.mutants.probe_contract import probe_path
 from mutator.mutants.template_rendering import render_snippet
 from mutator.review.mutant_groups import Group
 from mutator.review.patch_shapes import parameter_values

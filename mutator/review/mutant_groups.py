@@ -19,8 +19,8 @@ from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault, Injection, Trigger
-from mutator.mutants.anchors import parsed_file
 from mutator.mutants.mutant_building import build
+from mutator.mutants.parsed_files_and_anchors import parsed_file
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.operator_lookup import OPERATOR_MODELS, operator_name_of
 from mutator.operators.statement_facts import statement_facts_of

@@ -13,8 +13,12 @@ from itertools import chain
 
 from mutator._common.hashing import content_id
 from mutator.model import Fault, FaultLocation, Hold, Injection, Trigger, Value
-from mutator.mutants.file_patches import adds_file, split_into_file_patches
-from mutator.mutants.injected_lines import INJECTION_ID_PATTERN, probe_setting_spans, tagged_addition_spans
+from mutator.mutants.injected_line_syntax import (
+    INJECTION_ID_PATTERN,
+    probe_setting_spans,
+    tagged_addition_spans,
+)
+from mutator.mutants.patches_by_file import adds_file, split_into_file_patches
 from mutator.operators.operator_lookup import operator_name_of
 from mutator.triggers.conditions import TIME, names_in
 

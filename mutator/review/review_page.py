@@ -10,7 +10,7 @@ from markupsafe import Markup
 from mutator._common.files import write_atomic
 from mutator._common.hashing import as_json_types, content_id
 from mutator.errors import MutatorError
-from mutator.mutants.injected_lines import tags_for_page_scripts
+from mutator.mutants.injected_line_syntax import tags_for_page_scripts
 from mutator.review.decisions import Review, ReviewState
 from mutator.review.effect_pictures import can_have_pictures
 from mutator.review.group_display import fault_value_table, title_lines, trigger_condition_lines

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from mutator.config.yaml_files import load_yaml
 from mutator.errors import MutatorError
-from mutator.mutants.injected_lines import tags_for_page_scripts
+from mutator.mutants.injected_line_syntax import tags_for_page_scripts
 from mutator.serve.served_trials import range_as_json
 from mutator.web import asset_text, json_script_element, load_order
 from mutator.web.html_templates import html_environment

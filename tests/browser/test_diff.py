@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from mutator.mutants.injected_lines import tags_for_page_scripts
+from mutator.mutants.injected_line_syntax import tags_for_page_scripts
 from mutator.web import asset_text
 
 CHANGED = 'x = (1 if _fi.active("a0") else "a\u2028b")  '

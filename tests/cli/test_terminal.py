@@ -13,7 +13,7 @@ from mutator._common.message_text import wrap_text
 from mutator.cli.console import Terminal
 from mutator.cli.progress_display import campaign_progress
 from mutator.execution.progress_text import describe_duration
-from mutator.mutants.file_patches import patch_without_new_files
+from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.store.run_progress import Progress
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json

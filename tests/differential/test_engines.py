@@ -24,8 +24,8 @@ from mutator.model import (
     Trigger,
     Value,
 )
-from mutator.mutants.anchors import parsed_file
 from mutator.mutants.mutant_building import build
+from mutator.mutants.parsed_files_and_anchors import parsed_file
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
 

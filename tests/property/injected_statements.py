@@ -5,7 +5,7 @@ from collections.abc import Container
 from dataclasses import dataclass
 from typing import Any
 
-from mutator.mutants.injected_lines import tag_of
+from mutator.mutants.injected_line_syntax import tag_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,8 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import SnippetKind
 from mutator.model import AnchorKind, Injection
 from mutator.mutants import splicing
-from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, parse_file
 from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, ResolvedAnchor, parse_file
 from mutator.mutants.template_rendering import render_snippet
 from mutator.workspace import Workspace
 

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger
-from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.constants_and_defaults import ConstantOrDefault
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.probe import build_probe_settings, render_probe
+from mutator.mutants.parsed_files_and_anchors import ParsedFile
+from mutator.mutants.probe_contract import build_probe_settings, render_probe
 from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, probe_import_edit, unsplice
 from mutator.targets.observed_values import Observation
 

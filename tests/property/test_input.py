@@ -17,7 +17,7 @@ from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import load_spec
 from mutator.faults.library_readings import NO_READINGS
-from mutator.mutants.anchors import parse_file
+from mutator.mutants.parsed_files_and_anchors import parse_file
 from mutator.mutants.template_rendering import python_literal, signed_term
 from mutator.triggers.conditions import canonical_condition, evaluate_condition
 

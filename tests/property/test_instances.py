@@ -11,9 +11,9 @@ import pytest
 from mutator.config.instance_conditions import canonical_instance_condition
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
-from mutator.mutants.anchors import ParsedFile
-from mutator.mutants.injected_lines import tag_of
+from mutator.mutants.injected_line_syntax import tag_of
 from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.parsed_files_and_anchors import ParsedFile
 from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, unsplice
 
 from .test_value_anchors import FEW, MANY, anchors, models, module

@@ -14,8 +14,8 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
-from mutator.mutants.anchors import parsed_file
 from mutator.mutants.mutant_building import Mutant, build, build_without_reusing_changed_files
+from mutator.mutants.parsed_files_and_anchors import parsed_file
 from mutator.store.plan_choices import Choices
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants import splicing
-from mutator.mutants.anchors import parse_file
+from mutator.mutants.parsed_files_and_anchors import parse_file
 
 INSERTED = ('if _fi.active("ab12"):', "    hit = hit - 35.0", "    hit = max(hit, 0.0)")
 GUARD = ('if not _fi.active("cd34"):',)

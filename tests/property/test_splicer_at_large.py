@@ -12,7 +12,7 @@ import libcst as cst
 import pytest
 from libcst.metadata import MetadataWrapper, PositionProvider
 
-from mutator.mutants import anchors, injection_edits, splicing, statements
+from mutator.mutants import function_statements, injection_edits, parsed_files_and_anchors, splicing
 
 from .behaviour import behaviour
 from .generated_modules import ModuleWriter
@@ -118,8 +118,8 @@ READS = b"def f(a):\n    b = T(1, abs(a) + max(a, 1))\n    return b\ncall(f, 2)\
 @pytest.mark.parametrize(
     ("place", "name", "source"),
     [
-        (anchors, "parse_with_libcst", SHIFTED),
-        (statements, "line_after_statements", CONTINUED),
+        (parsed_files_and_anchors, "parse_with_libcst", SHIFTED),
+        (function_statements, "line_after_statements", CONTINUED),
         (injection_edits, "_check_keeps_name_scopes", READS),
         (splicing, "_indent_unit_of", READS),
     ],
@@ -135,7 +135,7 @@ def test_a_broken_splicer_is_found(
         "_indent_unit_of": lambda *given: b"",
     }
     monkeypatch.setattr(place, name, broken[name])
-    monkeypatch.setattr(anchors, "_check_position_matches_ast", lambda *given: None)
+    monkeypatch.setattr(parsed_files_and_anchors, "_check_position_matches_ast", lambda *given: None)
     assert proved([("", source)], behaviour, 20).wrong
 
 

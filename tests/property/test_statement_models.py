@@ -9,8 +9,8 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
-from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parse_file
 from mutator.mutants.splicing import apply_edits, mutated_bytes, unsplice
 from mutator.workspace import Workspace
 

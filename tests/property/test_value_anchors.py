@@ -15,9 +15,9 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
-from mutator.mutants.anchors import ParsedFile, parse_file
-from mutator.mutants.expressions import Expression
+from mutator.mutants.changeable_expressions import Expression
 from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parse_file
 from mutator.mutants.splicing import (
     ExpressionEdit,
     LineEdit,

@@ -36,8 +36,8 @@ ALLOWED = {  # joins of names that no file contains
     "campaigns/git_clone.py: folder / within": "names from os.scandir",
     "execution/cluster/piece_process.py: bundle.folder / f'work-{os.getpid()}'": "a process id",
     "faults/import_checks.py: root / path": "only shown",
-    "mutants/anchors.py: root / path": "only shown",
-    "mutants/constant_imports.py: tree.root / path": "only shown",
+    "mutants/parsed_files_and_anchors.py: root / path": "only shown",
+    "mutants/modules_importing_constants.py: tree.root / path": "only shown",
     "onboarding/first_library.py: folder / form.format(name=variables['name'], entry=variables['entry'])": (
         "letters, digits and _"
     ),

@@ -195,7 +195,7 @@ SHOWN_BY_THE_COMMAND_LINE = {
     "mutator.engines.engine_kinds",
     "mutator.execution.progress_text",
     "mutator.exports",
-    "mutator.mutants.file_patches",
+    "mutator.mutants.patches_by_file",
     "mutator.results.plan_columns",
     "mutator.review.group_columns",
     "mutator.review.group_display",

@@ -16,9 +16,9 @@ from mutator.execution import single_run
 from mutator.exports import Export, ExportRequest
 from mutator.faults.fault_models import FaultModels, SnippetKind
 from mutator.model import OPERATOR_FAULTS_MODULE, Experiment, Fault, Injection, Outcome, Record, Status
-from mutator.mutants.anchors import ParsedFile, parsed_file
-from mutator.mutants.expressions import parenthesized_if_splittable
+from mutator.mutants.changeable_expressions import parenthesized_if_splittable
 from mutator.mutants.injection_edits import edits_of
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.mutants.splicing import EditRank, ExpressionEdit, LineEdit, sort_edits
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder

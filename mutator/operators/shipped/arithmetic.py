@@ -3,8 +3,8 @@
 import ast
 from collections.abc import Iterator
 
+from mutator.mutants.changeable_expressions import Expression
 from mutator.mutants.expression_roles import FORMATTED_STRING_NODES
-from mutator.mutants.expressions import Expression
 from mutator.operators import MutationRule, Operator, mutation_rule
 from mutator.operators.statement_facts import StatementFacts, extent_of
 

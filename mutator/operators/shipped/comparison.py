@@ -3,7 +3,7 @@
 import ast
 from collections.abc import Iterator
 
-from mutator.mutants.expressions import Expression
+from mutator.mutants.changeable_expressions import Expression
 from mutator.operators import MutationRule, Operator, mutation_rule
 from mutator.operators.statement_facts import StatementFacts
 

@@ -1,6 +1,6 @@
 """Leave out a statement."""
 
-from mutator.mutants.statements import Statement
+from mutator.mutants.function_statements import Statement
 from mutator.operators import Operator
 from mutator.operators.statement_facts import StatementFacts
 

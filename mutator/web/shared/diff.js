@@ -3,7 +3,7 @@
 // Renders unified diffs in one column or two, with Python coloured and the tags of injected lines dimmed.
 //
 // renderDiff(element, patchText, {mode: "unified" | "split"}) replaces the content of `element`. The page's
-// element `tags` has the patterns of tags (mutants/probe.py: tag_words).
+// element `tags` has the patterns of tags (mutants/probe_contract.py: tag_words).
 
 const Diff = (() => {
   const { el } = Dom;

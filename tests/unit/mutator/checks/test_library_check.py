@@ -10,7 +10,7 @@ from mutator.checks.library_check import library_problems
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault, Hold
 from mutator.mutants.mutant_building import build
-from mutator.mutants.probe import probe_path
+from mutator.mutants.probe_contract import probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import matches_any_glob
 from mutator.triggers.trigger_kinds import always_trigger

@@ -8,7 +8,7 @@ import pytest
 
 from mutator.engines.code_swap_planning import CodeSwap, plan_swap
 from mutator.errors import MutantNotSwappable
-from mutator.mutants.probe import ProbeSource
+from mutator.mutants.probe_contract import ProbeSource
 from mutator.targets.source_tree import SourceTree
 
 PROBE = ProbeSource(settings_parts=("",), code_parts=("def observe(): pass\n",), armed_after_s=0.0)

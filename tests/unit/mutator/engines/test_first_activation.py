@@ -9,7 +9,7 @@ import pytest
 from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
 from mutator.model import Hold, Trigger
 from mutator.mutants.mutant_building import build
-from mutator.mutants.probe import ProbeSource, probe_attributes_after
+from mutator.mutants.probe_contract import ProbeSource, probe_attributes_after
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
 

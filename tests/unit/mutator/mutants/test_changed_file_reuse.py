@@ -8,7 +8,6 @@ import pytest
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Value
 from mutator.mutants import splicing
-from mutator.mutants.anchors import parse_file
 from mutator.mutants.changed_file_reuse import (
     ChangedFile,
     ReusableChangedFile,
@@ -18,6 +17,7 @@ from mutator.mutants.changed_file_reuse import (
     reuse_key,
 )
 from mutator.mutants.mutant_building import build, build_without_reusing_changed_files
+from mutator.mutants.parsed_files_and_anchors import parse_file
 from mutator.mutants.patch_rendering import render_changed_file
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace

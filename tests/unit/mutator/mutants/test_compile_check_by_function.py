@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.changed_file_reuse import reuse_key
 from mutator.mutants.compile_check_by_function import certainly_compiles_for_key
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parse_file
 from mutator.mutants.splicing import EditRank, LineEdit, probe_import_edit
 
 SOURCE = b"""\

@@ -10,10 +10,10 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger
-from mutator.mutants import probe as contract
-from mutator.mutants.anchors import parse_file
-from mutator.mutants.constant_imports import dotted_names_importing_constant
+from mutator.mutants import probe_contract as contract
 from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.modules_importing_constants import dotted_names_importing_constant
+from mutator.mutants.parsed_files_and_anchors import parse_file
 from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, probe_import_edit, unsplice
 from mutator.targets.observed_values import Observation
 from mutator.targets.source_tree import read_tree

@@ -6,9 +6,9 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection, Value
-from mutator.mutants.anchors import parse_file
 from mutator.mutants.hidden_builtins import builtins_always_called
 from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.parsed_files_and_anchors import parse_file
 from mutator.workspace import Workspace
 
 MODELS = Workspace.find(root=Path(__file__).parents[4]).fault_models()

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator.faults.fault_models import SnippetKind
-from mutator.mutants.template_language import MOST_TEMPLATE_OR_RESULT_CHARACTERS
+from mutator.mutants.restricted_template_language import MOST_TEMPLATE_OR_RESULT_CHARACTERS
 from mutator.mutants.template_rendering import render_snippet, render_template
 from tests.costs import is_cheap, is_refused
 from tests.unit.mutator.mutants.test_template_rendering import model

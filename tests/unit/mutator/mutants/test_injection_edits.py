@@ -10,8 +10,8 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection, Value
-from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.parsed_files_and_anchors import parse_file
 from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes
 from mutator.workspace import Workspace
 

@@ -12,10 +12,10 @@ from mutator.errors import MutatorError
 from mutator.faults.injection_model import InjectionModel
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger
-from mutator.mutants import injected_lines
-from mutator.mutants import probe as contract
-from mutator.mutants.anchors import parse_file
+from mutator.mutants import injected_line_syntax
+from mutator.mutants import probe_contract as contract
 from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.parsed_files_and_anchors import parse_file
 from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, probe_import_edit, unsplice
 from mutator.targets.observed_values import Observation
 from mutator.workspace import Workspace
@@ -112,14 +112,18 @@ def test_the_injected_line_checks_the_fault_first(clone: Workspace) -> None:
 def test_lines_with_a_selection_are_recognized_as_checking_the_probe(clone: Workspace) -> None:
     for anchor, model in ((AFTER, "offset"), (SENT, "omission")):
         data = mutant(clone, anchor, model, where="lane['gap'] == 2 or (index == 1)", call=2)
-        tags = [tag for line in data.splitlines() if (tag := injected_lines.tag_of(line)) and tag.id == "a"]
+        tags = [
+            tag for line in data.splitlines() if (tag := injected_line_syntax.tag_of(line)) and tag.id == "a"
+        ]
         assert tags[0].is_guard
     data = mutant(clone, VALUE, where="lane['gap'] == 2", every=3)
     (tag,) = [
-        t for line in data.splitlines() if (t := injected_lines.tag_of(line)) and t.replaced_line is not None
+        t
+        for line in data.splitlines()
+        if (t := injected_line_syntax.tag_of(line)) and t.replaced_line is not None
     ]
     assert tag.changed_value_ids == ["a"]
-    ((name, line, first, end),) = injected_lines.changed_value_positions(data)
+    ((name, line, first, end),) = injected_line_syntax.changed_value_positions(data)
     assert name == "a"
     assert data.splitlines()[line - 1][first:end].endswith(
         b"""lane["gap"] + 10 if _fi.on() and (lane['gap'] == 2) and """

@@ -11,9 +11,9 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger, Value
-from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.probe import build_probe_settings, render_probe
+from mutator.mutants.parsed_files_and_anchors import parse_file
+from mutator.mutants.probe_contract import build_probe_settings, render_probe
 from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, unsplice
 from mutator.triggers.conditions import canonical_condition
 from mutator.workspace import Workspace

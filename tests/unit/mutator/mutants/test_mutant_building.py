@@ -14,7 +14,7 @@ from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Trigger
 from mutator.mutants import mutant_building
 from mutator.mutants.mutant_building import Mutant, write_mutated_tree
-from mutator.mutants.probe import probe_path
+from mutator.mutants.probe_contract import probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import read_tree
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time

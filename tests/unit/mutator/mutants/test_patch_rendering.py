@@ -8,7 +8,7 @@ import pytest
 
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants import patch_rendering, splicing
-from mutator.mutants.anchors import parse_file
+from mutator.mutants.parsed_files_and_anchors import parse_file
 
 LONG = "".join(f"y{i} = {i}\n" for i in range(20))
 BODY = "".join(f"    y{i} = {i}\n" for i in range(10))

@@ -9,7 +9,7 @@ from libcst.metadata import MetadataWrapper, PositionProvider
 
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
-from mutator.mutants.anchors import ParsedFile, parse_file
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parse_file
 from mutator.mutants.positions_of_both_parsers import NodePosition, ast_node_positions, line_after_statements
 
 SOURCE = '''\
@@ -55,7 +55,7 @@ def test_a_statement_that_the_parsers_place_on_different_lines_is_refused(
 ) -> None:
     """The test makes `ast` find the anchored statement one line further down."""
     later = ast_node_positions(ast.parse("\ndef f(x):\n    x = 1\n    return x\n"))
-    monkeypatch.setattr("mutator.mutants.anchors.ast_node_positions", lambda tree: later)
+    monkeypatch.setattr("mutator.mutants.parsed_files_and_anchors.ast_node_positions", lambda tree: later)
     file = parsed("def f(x):\n    x = 1\n    return x\n")
     name = "" if kind is AnchorKind.ENTRY else "x"
     location = FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name=name))
@@ -71,7 +71,7 @@ def test_comparing_places_detects_a_line_that_libcst_loses(monkeypatch: pytest.M
         module = cst.parse_module(data)
         return module, MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
 
-    monkeypatch.setattr("mutator.mutants.anchors.parse_with_libcst", unchecked)
+    monkeypatch.setattr("mutator.mutants.parsed_files_and_anchors.parse_with_libcst", unchecked)
     file = parsed("x = 0\n\\\ndef f(x):\n    x = 1\n    y = 2\n")
     location = FaultLocation(path="m.py", function="f", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x"))
     with pytest.raises(MutatorError, match=r"LibCST and Python's own parser"):

@@ -10,8 +10,8 @@ from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import ParamSchema
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection, Value
-from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.parsed_files_and_anchors import parse_file
 from mutator.mutants.possible_places import ListedPlace, places_of
 from mutator.workspace import Workspace
 

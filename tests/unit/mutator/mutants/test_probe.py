@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from mutator.model import Hold, Trigger
-from mutator.mutants import probe as contract
+from mutator.mutants import probe_contract as contract
 from mutator.targets.observed_values import Observation, ObservedValue
 from mutator.triggers.conditions import canonical_condition, evaluate_condition
 from mutator.workspace import Workspace

@@ -16,8 +16,8 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.probe_template_parts import CODE_TEMPLATE_FILE, SETTINGS_TEMPLATE_FILE
 from mutator.model import Hold, ObservedActivation, Trigger
-from mutator.mutants import probe as contract
-from mutator.mutants.injected_lines import probe_setting_spans
+from mutator.mutants import probe_contract as contract
+from mutator.mutants.injected_line_syntax import probe_setting_spans
 from mutator.mutants.mutant_building import build
 from mutator.mutants.template_rendering import render_template
 from mutator.workspace import Workspace

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.mutants.anchors import parse_file
+from mutator.mutants.parsed_files_and_anchors import parse_file
 
 BODY = "def f(x):\n    x = 1\n    return x\n"
 

@@ -7,7 +7,7 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants import splicing
-from mutator.mutants.anchors import ParsedFile, parse_file
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parse_file
 
 CODE = ('if _fi.active("ab12"):', "    x = x + 1.0")
 GUARD = ('if not _fi.active("ab12"):',)

@@ -14,7 +14,7 @@ from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, ParamSchema, SnippetKind
 from mutator.model import Hold, Value
-from mutator.mutants.probe import build_probe_settings, render_probe
+from mutator.mutants.probe_contract import build_probe_settings, render_probe
 from mutator.mutants.template_rendering import render_changed_value, render_snippet
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace

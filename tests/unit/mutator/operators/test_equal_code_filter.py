@@ -12,8 +12,8 @@ from mutator._common.doors import OPERATORS
 from mutator.engines.code_swap_planning import behaviour_key
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.mutants.anchors import ParsedFile, parsed_file
-from mutator.mutants.standalone_compilation import compile_standalone
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
+from mutator.mutants.standalone_function_compilation import compile_standalone
 from mutator.operators import equal_code_filter
 from mutator.operators.equal_code_filter import drop_equal_code, mutated_function_lines
 from mutator.operators.mutation_listing import mutations_of

@@ -9,8 +9,8 @@ import pytest
 
 from mutator._common.doors import OPERATORS
 from mutator.errors import MutatorError
-from mutator.mutants.anchors import parsed_file
 from mutator.mutants.mutant_building import build, build_without_reusing_changed_files
+from mutator.mutants.parsed_files_and_anchors import parsed_file
 from mutator.operators.equal_code_filter import drop_equal_code
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutation_selection import SelectedMutations, sample_mutations, select_mutations

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.mutants.anchors import parse_file
+from mutator.mutants.parsed_files_and_anchors import parse_file
 from mutator.targets.source_tree import MOST_SOURCE_BYTES, read_tree
 from tests.costs import is_cheap, is_refused
 

@@ -10,17 +10,18 @@ from mutator._common.interrupts import delaying_interrupts
 from mutator._common.message_text import counted, spelling_suggestion
 from mutator.errors import MutatorError
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
-from mutator.mutants.anchor_resolution import (
-    choose_expression,
-    describe_valid_nth,
-    normalized_anchor_name,
-)
+from mutator.mutants.changeable_expressions import Expression, list_expressions
 from mutator.mutants.constants_and_defaults import (
     ConstantOrDefault,
     choose_constant_or_default,
     list_constants_and_defaults,
 )
-from mutator.mutants.expressions import Expression, list_expressions
+from mutator.mutants.expression_anchor_resolution import (
+    choose_expression,
+    describe_valid_nth,
+    normalized_anchor_name,
+)
+from mutator.mutants.function_statements import Function, Statement, collect_functions
 from mutator.mutants.logical_lines import LogicalLines
 from mutator.mutants.name_scopes import normalize_identifier, used_names_by_function
 from mutator.mutants.positions_of_both_parsers import NodePosition, ast_node_positions
@@ -31,8 +32,7 @@ from mutator.mutants.source_parsing import (
     parse_with_python,
     translate_libcst_errors,
 )
-from mutator.mutants.standalone_compilation import list_outermost_function_lines
-from mutator.mutants.statements import Function, Statement, collect_functions
+from mutator.mutants.standalone_function_compilation import list_outermost_function_lines
 from mutator.targets.source_tree import SourceTree
 
 

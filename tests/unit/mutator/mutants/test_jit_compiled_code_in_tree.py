@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.mutants import imported_names
-from mutator.mutants.compiled_functions import (
+from mutator.mutants.jit_compiled_code_in_tree import (
     compiler_of_constant,
     compiler_of_function,
     tracer_of_function,

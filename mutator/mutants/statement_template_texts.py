@@ -7,8 +7,8 @@ from functools import lru_cache
 
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import TemplateNeed
-from mutator.mutants.anchors import ParsedFile, ResolvedAnchor
 from mutator.mutants.expression_roles import FORMATTED_STRING_NODES
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, ResolvedAnchor
 
 # statements without a block: only these can be repeated or moved as one line
 _SMALL_STATEMENTS = (

@@ -8,14 +8,14 @@ import ast
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from mutator.mutants.compiler_search import (
+from mutator.mutants.jit_compiled_code_in_file import (
     COMPILER_PACKAGES,
     SWITCH_BY_COMPILER,
     CompiledCode,
     can_import,
     find_compiled_code,
 )
-from mutator.mutants.constant_imports import module_name
+from mutator.mutants.modules_importing_constants import module_name
 from mutator.targets.source_tree import SourceTree
 
 

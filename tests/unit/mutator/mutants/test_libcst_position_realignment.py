@@ -6,7 +6,7 @@ import libcst as cst
 import pytest
 from libcst.metadata import MetadataWrapper, PositionProvider
 
-from mutator.mutants.realigned_positions import align_positions
+from mutator.mutants.libcst_position_realignment import align_positions
 
 SOURCES = [
     "x = f'{a !r }' + f'{b  !s :>{c }}' + d\n",  # valid since Python 3.12

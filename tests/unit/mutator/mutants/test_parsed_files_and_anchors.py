@@ -6,7 +6,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
-from mutator.mutants.anchors import ParsedFile, parse_file
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parse_file
 
 SOURCE = '''\
 """Doc."""

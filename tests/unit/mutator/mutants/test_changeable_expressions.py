@@ -8,7 +8,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
-from mutator.mutants.anchors import ParsedFile, parse_file
+from mutator.mutants.parsed_files_and_anchors import ParsedFile, parse_file
 from mutator.mutants.splicing import apply_edits, as_line_edits, expression_edit, mutated_bytes, unsplice
 
 SOURCE = '''\

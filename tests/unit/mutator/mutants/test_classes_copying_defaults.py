@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.mutants.copied_defaults import copying_ancestor
+from mutator.mutants.classes_copying_defaults import copying_ancestor
 from mutator.targets.source_tree import read_tree
 
 FIELD = "    gain: float = -2.0\n"

@@ -9,9 +9,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator.mutants.constant_imports import module_name
 from mutator.mutants.expression_roles import blocks_of
 from mutator.mutants.imported_names import ImportedNames
+from mutator.mutants.modules_importing_constants import module_name
 from mutator.targets.source_tree import SourceTree
 
 # bases whose classes copy defaults, or read them in a way of their own; by package

@@ -8,7 +8,7 @@ from pathlib import Path
 from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
-from mutator.mutants.expressions import Expression
+from mutator.mutants.changeable_expressions import Expression
 
 _MOST_CANDIDATES = 12  # candidates listed in an error
 
