@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from mutator.model import Record, Status  # noqa: E402
-from mutator.outcomes.trace_loading import trace_digest  # noqa: E402
+from mutator.outcomes.trace_and_record_loading import trace_digest  # noqa: E402
 from mutator.store import plan_file  # noqa: E402
 from mutator.store.run_folder import RunFolder  # noqa: E402
 from mutator.store.series_format import Series  # noqa: E402

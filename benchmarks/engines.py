@@ -27,7 +27,7 @@ from mutator.engines.reference_engine import ReferenceEngine  # noqa: E402
 from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
-from mutator.outcomes import trace_loading  # noqa: E402
+from mutator.outcomes import trace_and_record_loading  # noqa: E402
 from mutator.store.plan_choices import Choices  # noqa: E402
 from mutator.store.run_folder import GoldenRun  # noqa: E402
 from mutator.triggers.trigger_kinds import always_trigger  # noqa: E402
@@ -69,7 +69,7 @@ class Bench:
 
     def steps(self, experiment: Experiment) -> int:
         """Return the number of steps of every run that ends normally."""
-        trace = trace_loading.load_trace(self.manifest, self.golden(experiment))
+        trace = trace_and_record_loading.load_trace(self.manifest, self.golden(experiment))
         return len(trace[self.manifest.time_channel])
 
     def _drive_goldens(self, engine: ReferenceEngine) -> None:

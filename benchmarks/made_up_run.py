@@ -31,7 +31,7 @@ from mutator.execution.single_run import run_golden
 from mutator.model import Experiment, Record
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.series_sampling import SeriesSampler
-from mutator.outcomes.trace_loading import load_trace
+from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.preflight import equivalence_check
 from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store import file_digests, plan_file

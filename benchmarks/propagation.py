@@ -13,9 +13,9 @@ from time import process_time
 
 import mutator
 from mutator.outcomes.channel_departures import departures_from_golden
-from mutator.outcomes.golden_comparison import compare_traces
-from mutator.outcomes.hazards_and_metrics import load_manifest_channels
-from mutator.outcomes.trace_loading import load_trace
+from mutator.outcomes.golden_trace_comparison import compare_traces
+from mutator.outcomes.hazard_and_metric_judgement import load_manifest_channels
+from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from pyarrow import parquet
 
-from mutator.results.table_writers import (
+from mutator.results.csv_and_parquet_writers import (
     CsvTableWriter,
     ParquetTableWriter,
     TableColumn,

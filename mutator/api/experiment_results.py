@@ -10,8 +10,8 @@ from mutator.figures.golden_and_faulty_plot import draw_golden_and_faulty, event
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.outcomes.fault_paths import FaultPathFinder
-from mutator.outcomes.trace_files import own_times
-from mutator.outcomes.trace_loading import Trace, values_on_steps
+from mutator.outcomes.trace_and_record_loading import Trace, values_on_steps
+from mutator.outcomes.trace_reading_by_suffix import own_times
 from mutator.outcomes.verdict_rules import (
     classified_hazard_of,
     manifestation_to_hazard_time,
@@ -21,7 +21,7 @@ from mutator.outcomes.verdict_rules import (
     time_to_hazard,
 )
 from mutator.results.experiment_sentence import ExperimentSentences
-from mutator.results.finished_experiment import FinishedExperiment, ResultColumn
+from mutator.results.finished_experiments_and_columns import FinishedExperiment, ResultColumn
 from mutator.results.plan_columns import PlanColumn
 from mutator.results.table_columns import row_of
 from mutator.targets.hazard_severity import SeverityScale

@@ -9,7 +9,11 @@ from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.engines.run_limits import limits_before_measuring
 from mutator.errors import MutatorError
 from mutator.model import Fault, Limits
-from mutator.operators.executed_lines import GoldenRunInputs, measure_executed_lines, measure_variable_types
+from mutator.operators.executed_lines_and_types import (
+    GoldenRunInputs,
+    measure_executed_lines,
+    measure_variable_types,
+)
 from mutator.operators.mutation_selection import sample_mutations, select_mutations
 from mutator.operators.operator_lookup import any_needs_types, unique_operator_names
 

@@ -12,7 +12,7 @@ from mutator.api.trials import Trial, build_trial
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun_experiment
 from mutator.outcomes.series_sampling import write_sampled_series
-from mutator.outcomes.trace_loading import Trace, load_trace
+from mutator.outcomes.trace_and_record_loading import Trace, load_trace
 from mutator.report.film import ExperimentFilmer, Shot
 
 

@@ -28,13 +28,13 @@ from mutator.outcomes.fault_free_runs import (
     fault_free_alerts_note,
     load_fault_free_runs,
 )
-from mutator.outcomes.trace_loading import load_trace
+from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.preflight import equivalence_check
 from mutator.report import report_builder
 from mutator.report.stills import take_stills
 from mutator.results import outcome_counting
 from mutator.results import table_building as results_table
-from mutator.results.hazards_without_canary import no_canary_note
+from mutator.results.note_without_canary import no_canary_note
 from mutator.statistics.mutation_score import mutation_score_sheet, totals_table
 from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet

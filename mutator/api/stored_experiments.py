@@ -15,9 +15,9 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Record
 from mutator.outcomes.fault_paths import FaultPath, FaultPathFinder, fault_paths_of
 from mutator.outcomes.series_sampling import traces_of_series
-from mutator.outcomes.trace_loading import Trace
+from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.results.experiment_sentence import ExperimentSentences
-from mutator.results.finished_experiment import ResultColumn
+from mutator.results.finished_experiments_and_columns import ResultColumn
 from mutator.results.plan_columns import PlanColumn
 from mutator.results.table_columns import result_columns_of
 from mutator.store import plan_file

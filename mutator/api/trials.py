@@ -16,10 +16,10 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import SingleRun, run_single
 from mutator.figures.golden_and_faulty_plot import save_figure
 from mutator.model import Experiment, Method, Record
-from mutator.outcomes.hazards_and_metrics import load_judged_run
-from mutator.outcomes.trace_loading import Trace, load_trace
+from mutator.outcomes.hazard_and_metric_judgement import load_judged_run
+from mutator.outcomes.trace_and_record_loading import Trace, load_trace
 from mutator.results.experiment_sentence import ExperimentSentences
-from mutator.results.finished_experiment import ResultColumn
+from mutator.results.finished_experiments_and_columns import ResultColumn
 from mutator.results.plan_columns import PlanColumn
 from mutator.results.severity_and_sentence_columns import severity_and_time_columns
 from mutator.results.table_columns import result_columns

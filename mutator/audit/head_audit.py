@@ -13,7 +13,7 @@ from mutator.campaigns.plan_freezing import collect_target_facts
 from mutator.campaigns.shared_runs import run_key
 from mutator.errors import MutatorError
 from mutator.model import Outcome
-from mutator.outcomes.trace_loading import trace_digest
+from mutator.outcomes.trace_and_record_loading import trace_digest
 from mutator.store import file_digests, plan_file
 from mutator.store.checks_file import CHECKS_FILE as CHECKS
 from mutator.store.checks_file import CHECKS_SCHEMA

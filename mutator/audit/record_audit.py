@@ -13,7 +13,7 @@ from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, ObservedActivation, Record, Status, Trigger
 from mutator.mutants.mutant_building import build
-from mutator.outcomes.lost_values import LOST_VALUE_PREFIX
+from mutator.outcomes.lost_observed_values import LOST_VALUE_PREFIX
 from mutator.outcomes.verdict_rules import EventTimes, outcome_of
 from mutator.preflight import equivalence_check
 from mutator.store import plan_file

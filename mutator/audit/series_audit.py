@@ -6,7 +6,7 @@ import numpy as np
 
 from mutator._common.confined_files import path_below
 from mutator.errors import MutatorError
-from mutator.outcomes.hazards_and_metrics import load_manifest_channels
+from mutator.outcomes.hazard_and_metric_judgement import load_manifest_channels
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.store import plan_file
 from mutator.store.checksummed_blocks import read_blocks

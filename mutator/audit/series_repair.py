@@ -10,7 +10,7 @@ from pathlib import Path
 from mutator._common.confined_files import checked_relative_path, path_below, unlink_below, write_below
 from mutator.audit.series_audit import audit_series
 from mutator.errors import MutatorError
-from mutator.outcomes.hazards_and_metrics import load_manifest_channels
+from mutator.outcomes.hazard_and_metric_judgement import load_manifest_channels
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import WORKER_FILE_SUFFIX, repack_series

@@ -22,7 +22,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Experiment, Fault, Method, Trigger
-from mutator.operators.executed_lines import GoldenRunInputs
+from mutator.operators.executed_lines_and_types import GoldenRunInputs
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger, draw_trigger_time, trigger_at_time
 from mutator.workspace import Workspace

@@ -9,7 +9,7 @@ from mutator.campaigns.operator_selection import MutantActivity, OperatorSelecti
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, Limits
-from mutator.operators.executed_lines import (
+from mutator.operators.executed_lines_and_types import (
     ExecutedLines,
     GoldenRunInputs,
     measure_executed_lines,

@@ -9,7 +9,7 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
 from mutator._common.message_text import shortened_repr
 from mutator.errors import BadOutput
-from mutator.outcomes import trace_loading
+from mutator.outcomes import trace_and_record_loading
 from mutator.targets.manifest import TargetManifest
 
 
@@ -33,7 +33,7 @@ def describe_first_difference(manifest: TargetManifest, first_folder: Path, seco
 def _describe_trace_difference(manifest: TargetManifest, first_folder: Path, second_folder: Path) -> str:
     try:
         first, second = (
-            trace_loading.load_trace(manifest, out, manifest.channels)
+            trace_and_record_loading.load_trace(manifest, out, manifest.channels)
             for out in (first_folder, second_folder)
         )
     except BadOutput as error:
@@ -47,7 +47,7 @@ def _describe_trace_difference(manifest: TargetManifest, first_folder: Path, sec
         differing_rows = np.flatnonzero((a != b) & ((a == a) | (b == b)))  # NaN equals NaN
         if differing_rows.size:
             step = int(differing_rows[0])
-            t = float(trace_loading.times_of(first, name, time)[step])
+            t = float(trace_and_record_loading.times_of(first, name, time)[step])
             earliest = (t, step, name) if earliest is None or t < earliest[0] else earliest
     if earliest is None:
         return "" if steps[0] == steps[1] else f"in their length: {steps[0]} and {steps[1]} steps"

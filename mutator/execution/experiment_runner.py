@@ -19,14 +19,18 @@ from mutator.faults.fault_models import FaultModels
 from mutator.model import AfterHazard, Experiment, ObservedActivation, Record, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe_contract import activation_of
-from mutator.outcomes import golden_comparison, trace_loading
+from mutator.outcomes import golden_trace_comparison, trace_and_record_loading
+from mutator.outcomes.actuator_change_and_speeds import (
+    change_share,
+    first_actuator_change,
+    speeds_after_activation,
+)
 from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.failure_cause import judge_failure, run_error
-from mutator.outcomes.hazards_and_metrics import RunJudgement, load_judged_run, load_manifest_channels
-from mutator.outcomes.lost_values import find_lost_value
-from mutator.outcomes.reaction_and_speeds import change_share, first_actuator_change, speeds_after_activation
+from mutator.outcomes.hazard_and_metric_judgement import RunJudgement, load_judged_run, load_manifest_channels
+from mutator.outcomes.lost_observed_values import find_lost_value
 from mutator.outcomes.series_sampling import SeriesSampler
-from mutator.outcomes.trace_loading import Trace
+from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.outcomes.verdict_rules import first_events_after, outcome_of
 from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store.run_folder import GoldenRun
@@ -285,8 +289,8 @@ class ExperimentRunner:
             if judged.t_end is None:
                 why = "was stopped, but no terminal hazard is in its trace"
                 return _record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, why, mutant)
-            reference = trace_loading.trace_until(reference, faulty[time][-1], time)
-        faulty = trace_loading.with_golden_times(reference, faulty, time)
+            reference = trace_and_record_loading.trace_until(reference, faulty[time][-1], time)
+        faulty = trace_and_record_loading.with_golden_times(reference, faulty, time)
         if lost := find_lost_value(self.manifest, reference, faulty, judged.t_end):
             problem = _reason_not_by_fault(lost.time_s, activation)
             status, detail = (
@@ -294,7 +298,7 @@ class ExperimentRunner:
             )
             bare = _record_of_mutant_without_outcome(experiment, status, detail, mutant, activation)
             return bare if problem else replace(bare, t_end=lost.time_s)
-        difference = golden_comparison.compare_traces(
+        difference = golden_trace_comparison.compare_traces(
             reference, faulty, self.manifest.compared_channels, time, judged.t_end
         )
         if problem := _reason_not_by_fault(difference.t_first, activation):
@@ -315,7 +319,7 @@ class ExperimentRunner:
             max_dev=difference.max_dev,
             hazards=tuple(hazards),
             alerts=tuple(first_events_after(judged.alerts, activation)),
-            trace_digest=trace_loading.trace_digest(self.manifest, execution.out),
+            trace_digest=trace_and_record_loading.trace_digest(self.manifest, execution.out),
             patch=digest(mutant.patch_bytes),
             t_end=judged.t_end,
             dev=() if judged.t_end is None else difference.max_dev_in_drive,

@@ -9,7 +9,7 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun_experiment
 from mutator.model import Experiment, Record
 from mutator.outcomes.series_sampling import traces_of_series, write_sampled_series
-from mutator.outcomes.trace_loading import Trace, load_trace, trace_digest
+from mutator.outcomes.trace_and_record_loading import Trace, load_trace, trace_digest
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.time_series_folder import TimeSeriesFolder, rerun_command

@@ -16,7 +16,7 @@ from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
 from mutator.figures.style import PNG_DPI, figure_type, shipped_style
 from mutator.model import Record
-from mutator.outcomes.trace_loading import Trace, times_of
+from mutator.outcomes.trace_and_record_loading import Trace, times_of
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 

@@ -8,7 +8,7 @@ from mutator.engines.code_swap_planning import behaviour_key
 from mutator.mutants.changeable_expressions import Expression
 from mutator.mutants.parsed_files_and_anchors import ParsedFile
 from mutator.mutants.standalone_function_compilation import compile_standalone
-from mutator.operators.changeable_parts import ChangeableParts
+from mutator.operators.changed_part_compilation import ChangeableParts
 from mutator.operators.mutations import Mutation
 
 

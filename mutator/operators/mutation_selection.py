@@ -12,7 +12,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.mutants.refused_places import refusal_reason_of_function
 from mutator.operators.equal_code_filter import drop_equal_code
-from mutator.operators.executed_lines import TypesByFile
+from mutator.operators.executed_lines_and_types import TypesByFile
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutations import Mutation
 from mutator.operators.statement_facts import statement_facts_of

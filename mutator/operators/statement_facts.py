@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator.mutants.expression_roles import blocks_of
-from mutator.operators.variable_kinds import FunctionNames, TypesByName, names_of_functions
+from mutator.operators.interchangeable_variables import FunctionNames, TypesByName, names_of_functions
 from mutator.targets.source_tree import SourceTree
 
 _LOGGER_METHODS = frozenset(

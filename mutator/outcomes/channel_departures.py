@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mutator.outcomes.golden_comparison import channel_deviation, end_of_shorter
-from mutator.outcomes.trace_loading import Trace
+from mutator.outcomes.golden_trace_comparison import channel_deviation, end_of_shorter
+from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.targets.channels import Channel
 
 Departure = tuple[str, float, float]  # channel, first time (s), largest deviation

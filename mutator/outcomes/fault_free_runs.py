@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mutator._common.table_rendering import TextTable
-from mutator.outcomes.hazards_and_metrics import judge_run
-from mutator.outcomes.trace_loading import load_target_record, load_trace
+from mutator.outcomes.hazard_and_metric_judgement import judge_run
+from mutator.outcomes.trace_and_record_loading import load_target_record, load_trace
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
 

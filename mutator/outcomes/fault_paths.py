@@ -15,7 +15,7 @@ from typing import NamedTuple
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Outcome, Record
 from mutator.outcomes.channel_departures import Departure
-from mutator.outcomes.fault_routes import (
+from mutator.outcomes.fault_routes_to_process import (
     PossibleRoute,
     chain_route,
     distances_from,

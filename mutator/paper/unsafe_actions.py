@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mutator.model import Record
-from mutator.outcomes.trace_loading import Trace
+from mutator.outcomes.trace_and_record_loading import Trace
 
 StepFlags = np.ndarray[tuple[int], np.dtype[np.bool_]]  # one flag per step
 

@@ -11,9 +11,9 @@ from mutator.engines.engine_jobs import JobResult
 from mutator.errors import BadOutput
 from mutator.model import Status
 from mutator.mutants.probe_contract import was_triggered
-from mutator.outcomes import trace_loading
-from mutator.outcomes.hazards_and_metrics import load_judged_run
-from mutator.outcomes.lost_values import find_value_lost_for_good
+from mutator.outcomes import trace_and_record_loading
+from mutator.outcomes.hazard_and_metric_judgement import load_judged_run
+from mutator.outcomes.lost_observed_values import find_value_lost_for_good
 from mutator.targets.manifest import TargetManifest
 
 
@@ -49,7 +49,7 @@ def read_check_run(manifest: TargetManifest, execution: JobResult) -> CheckRun:
     return CheckRun(
         problem="",
         output_digest=output_digest_of(manifest, execution.out),
-        trace_digest=trace_loading.trace_digest(manifest, execution.out),
+        trace_digest=trace_and_record_loading.trace_digest(manifest, execution.out),
         alerts=judged.alerts,
         hazards=judged.hazards,
         has_triggered=was_triggered(execution.probe_report),

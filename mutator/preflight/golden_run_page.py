@@ -10,8 +10,8 @@ from typing import Any
 from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
 from mutator.errors import CheckFailed, MutatorError
-from mutator.outcomes.hazards_and_metrics import RunJudgement, load_judged_run
-from mutator.outcomes.trace_loading import Trace, values_on_steps
+from mutator.outcomes.hazard_and_metric_judgement import RunJudgement, load_judged_run
+from mutator.outcomes.trace_and_record_loading import Trace, values_on_steps
 from mutator.store.preflight_results import check_results
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest

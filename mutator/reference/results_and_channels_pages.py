@@ -4,11 +4,11 @@ from collections.abc import Iterable, Iterator
 
 from mutator._common.table_rendering import TextTable
 from mutator.reference.yaml_key_tables import generated_page_head
+from mutator.results.csv_and_parquet_writers import ARROW_TYPE_BY_COLUMN_TYPE, TableColumn
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES
 from mutator.results.propagation_columns import PROPAGATION_COLUMNS as PROPAGATION
 from mutator.results.severity_and_sentence_columns import severity_and_time_columns
 from mutator.results.table_columns import TIMING_COLUMNS, result_columns
-from mutator.results.table_writers import ARROW_TYPE_BY_COLUMN_TYPE, TableColumn
 from mutator.targets.channels import Channel
 from mutator.targets.hazard_and_metric_definitions import Hazard, Metric
 from mutator.targets.hazard_severity import DELTA_V_NAME

@@ -12,7 +12,7 @@ from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.report.experiment_facts import RANK_COLUMN
 from mutator.report.experiment_list import details_data, results_table_data
 from mutator.results.experiment_sentence import ExperimentSentences
-from mutator.results.finished_experiment import FinishedExperiment, ResultColumn
+from mutator.results.finished_experiments_and_columns import FinishedExperiment, ResultColumn
 from mutator.results.plan_columns import PlanColumn
 from mutator.results.severity_and_sentence_columns import severity_and_time_columns
 from mutator.results.table_columns import deviation_column_by_channel, result_columns, result_columns_of

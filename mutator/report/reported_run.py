@@ -10,7 +10,7 @@ from mutator.figures.drawings import Drawing
 from mutator.model import Experiment, Fault, Record, Status
 from mutator.outcomes.fault_free_runs import FaultFreeRun, load_fault_free_runs
 from mutator.outcomes.fault_paths import fault_paths_of
-from mutator.outcomes.trace_loading import load_trace
+from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.report.engine_summary import EngineSummary, summarize_engines
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN, ExperimentFacts
 from mutator.report.fault_path_data import RunFaultPaths

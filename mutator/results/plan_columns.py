@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from mutator.model import Experiment, Fault, Hold, Value, fault_label
-from mutator.results.table_writers import TableColumn
+from mutator.results.csv_and_parquet_writers import TableColumn
 
 
 @dataclass(frozen=True, slots=True)

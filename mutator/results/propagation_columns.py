@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mutator.model import Record
-from mutator.results.table_writers import TableColumn
+from mutator.results.csv_and_parquet_writers import TableColumn
 from mutator.targets.stored_target_facts import ChannelFacts
 
 PROPAGATION_COLUMNS = (

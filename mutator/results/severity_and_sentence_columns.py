@@ -9,7 +9,7 @@ from mutator.outcomes.verdict_rules import (
     missing_severity_reason,
     time_to_hazard,
 )
-from mutator.results.finished_experiment import FinishedExperiment, ResultColumn, rounded_time
+from mutator.results.finished_experiments_and_columns import FinishedExperiment, ResultColumn, rounded_time
 from mutator.targets.stored_phrases import (
     FIRST_CHANGE_SHARE,
     GOLDEN_HIGHEST_SPEED,

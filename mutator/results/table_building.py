@@ -15,10 +15,15 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.results import propagation_columns
-from mutator.results.finished_experiment import FinishedExperiment
+from mutator.results.csv_and_parquet_writers import (
+    CsvTableWriter,
+    ParquetTableWriter,
+    csv_lines,
+    parquet_batch,
+)
+from mutator.results.finished_experiments_and_columns import FinishedExperiment
 from mutator.results.renamed_columns import renamed_columns_in
 from mutator.results.table_columns import TIMING_COLUMNS, cells_by_column, result_columns_of
-from mutator.results.table_writers import CsvTableWriter, ParquetTableWriter, csv_lines, parquet_batch
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import FileDigest
 from mutator.store.planned_experiments import PlannedExperiments

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
 from mutator.outcomes.verdict_rules import reaction_time
-from mutator.results.finished_experiment import FinishedExperiment, ResultColumn, rounded_time
+from mutator.results.csv_and_parquet_writers import TableColumn
+from mutator.results.finished_experiments_and_columns import FinishedExperiment, ResultColumn, rounded_time
 from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, HOLD_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
 from mutator.results.severity_and_sentence_columns import (
     FIRST_CHANGE_COLUMNS,
     SPEED_COLUMNS,
     severity_and_time_columns,
 )
-from mutator.results.table_writers import TableColumn
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN, MetricFacts
 

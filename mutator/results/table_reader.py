@@ -14,12 +14,12 @@ from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bou
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
 from mutator.results import table_building
+from mutator.results.csv_and_parquet_writers import TableColumn, parquet_batch, parquet_schema
 from mutator.results.experiment_sentence import ExperimentSentences
-from mutator.results.finished_experiment import FinishedExperiment, ResultColumn
+from mutator.results.finished_experiments_and_columns import FinishedExperiment, ResultColumn
 from mutator.results.plan_columns import PlanColumn
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_columns import cells_by_column, result_columns_of
-from mutator.results.table_writers import TableColumn, parquet_batch, parquet_schema
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import load_head

@@ -18,7 +18,7 @@ from mutator.execution.progress_text import describe_duration, describe_rate
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.outcomes.verdict_rules import reaction_time
 from mutator.results.experiment_sentence import ExperimentSentences
-from mutator.results.finished_experiment import FinishedExperiment
+from mutator.results.finished_experiments_and_columns import FinishedExperiment
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_columns import result_columns_of
 from mutator.results.table_reader import frame_of_finished

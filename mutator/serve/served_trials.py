@@ -13,9 +13,9 @@ from mutator.errors import MutatorError, NotServed
 from mutator.faults.fault_specs import FaultSpec, Variant
 from mutator.model import Experiment, Status, Trigger
 from mutator.outcomes.series_sampling import SeriesSampler
-from mutator.outcomes.trace_loading import load_trace, trace_digest
+from mutator.outcomes.trace_and_record_loading import load_trace, trace_digest
 from mutator.report.lone_experiment_data import ViewedTarget, experiment_view_data
-from mutator.results.finished_experiment import FinishedExperiment
+from mutator.results.finished_experiments_and_columns import FinishedExperiment
 from mutator.store.series_format import encode_series
 from mutator.store.trial_file import StoredTrial
 from mutator.targets.manifest import TargetManifest

@@ -11,7 +11,7 @@ from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Re
 
 from mutator.errors import MutatorError, NotServed
 from mutator.report.lone_experiment_data import ViewedTarget, experiment_view_data
-from mutator.results.finished_experiment import FinishedExperiment
+from mutator.results.finished_experiments_and_columns import FinishedExperiment
 from mutator.serve.home_and_error_pages import live_page, trial_page
 from mutator.serve.jobs import ServeJob, ServeJobs
 from mutator.serve.live_runs import WatchedRuns, state_as_json

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from selfdrive.sim.hazards import HazardMonitor
 from selfdrive.sim.truth import GroundTruth
 
-from mutator.outcomes.hazards_and_metrics import judge_run
+from mutator.outcomes.hazard_and_metric_judgement import judge_run
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

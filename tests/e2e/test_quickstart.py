@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from mutator.execution.campaign_running import run_campaign
-from mutator.outcomes.hazards_and_metrics import formula_variables
-from mutator.outcomes.trace_loading import load_trace
+from mutator.outcomes.hazard_and_metric_judgement import formula_variables
+from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.triggers.trace_formulas import condition_at_each_step
 from mutator.workspace import Workspace
 

@@ -43,7 +43,7 @@ ALLOWED = {  # joins of names that no file contains
     ),
     "onboarding/source_survey.py: Path(place, name)": "names from os.walk",
     "onboarding/source_survey.py: root / name": "names from a folder's listing",
-    "operators/executed_lines.py: scratch / 'work' / f'lines-{i}'": "a number",
+    "operators/executed_lines_and_types.py: scratch / 'work' / f'lines-{i}'": "a number",
     "review/called_code.py: folder / constant.value": "only compared with the tree's paths",
     "review/effect_pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
     "store/run_deletion.py: Path(folder, name)": "names from os.walk",

@@ -8,7 +8,7 @@ from mutator.execution.cluster.piece_messages import Piece, PieceKind, PieceResu
 from mutator.execution.experiment_runner import record_without_outcome
 from mutator.execution.written_files import FileDigests
 from mutator.model import Status
-from mutator.outcomes.hazards_and_metrics import load_manifest_channels
+from mutator.outcomes.hazard_and_metric_judgement import load_manifest_channels
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 from mutator.mutants.changeable_expressions import Expression
 from mutator.operators import MutationRule, Operator, mutation_rule
+from mutator.operators.interchangeable_variables import replacements_of_name
 from mutator.operators.statement_facts import StatementFacts, extent_of
-from mutator.operators.variable_kinds import replacements_of_name
 
 
 def _rules(expression: Expression, facts: StatementFacts) -> Iterator[MutationRule]:

@@ -4,7 +4,7 @@ from mutator.report.answer_parts import warning_filter_values
 from mutator.report.first_screen import describe_change, key_numbers, sample_note, worst_row
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
-from mutator.results.hazards_without_canary import no_canary_note
+from mutator.results.note_without_canary import no_canary_note
 from mutator.results.result_rows import ResultRow
 
 _HTML_TEMPLATE = """\

@@ -9,11 +9,11 @@ import pytest
 
 import mutator
 from mutator.model import Experiment, Method, Record, Value, fault_label
-from mutator.results.finished_experiment import FinishedExperiment
+from mutator.results.csv_and_parquet_writers import parquet_batch
+from mutator.results.finished_experiments_and_columns import FinishedExperiment
 from mutator.results.result_rows import rows_of
 from mutator.results.table_columns import cells_by_column, result_columns
 from mutator.results.table_reader import typed_frame
-from mutator.results.table_writers import parquet_batch
 
 SOURCES = Path(mutator.__file__).parent
 

@@ -18,7 +18,7 @@ from mutator.errors import MutatorError
 from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
-from mutator.outcomes.trace_loading import trace_until
+from mutator.outcomes.trace_and_record_loading import trace_until
 from mutator.targets.stop_at_hazard_code import stop_function_source
 from mutator.triggers import trace_formulas
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time

@@ -6,7 +6,7 @@ import pytest
 from mutator._common.typed_json import from_json_types
 from mutator.model import ObservedActivation, Outcome, Record, Status
 from mutator.outcomes.channel_departures import departures_from_golden
-from mutator.outcomes.golden_comparison import compare_traces
+from mutator.outcomes.golden_trace_comparison import compare_traces
 from mutator.results.propagation_columns import PROPAGATION_COLUMNS, propagation_cells
 from mutator.targets.channels import Channel
 from mutator.targets.stored_target_facts import ChannelFacts

@@ -11,9 +11,9 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.model import Record
 from mutator.outcomes.channel_departures import departures_from_golden
-from mutator.outcomes.golden_comparison import compare_traces
+from mutator.outcomes.golden_trace_comparison import compare_traces
 from mutator.outcomes.series_sampling import SeriesSampler, write_sampled_series
-from mutator.outcomes.trace_loading import Trace
+from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.store.series_format import Series, decode_series, encode_series
 from mutator.store.time_series_folder import TimeSeriesFolder, write_rerun_series
 from mutator.targets.channels import Role

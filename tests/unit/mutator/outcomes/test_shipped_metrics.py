@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mutator.outcomes.hazards_and_metrics import RunJudgement, judge_run
+from mutator.outcomes.hazard_and_metric_judgement import RunJudgement, judge_run
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.outcomes.hazards_and_metrics import load_judged_run
-from mutator.outcomes.trace_loading import load_target_record, load_trace
+from mutator.outcomes.hazard_and_metric_judgement import load_judged_run
+from mutator.outcomes.trace_and_record_loading import load_target_record, load_trace
 from mutator.targets.manifest_files import load_manifest
 
 from .cart import GAP, HEAD, SPEED, T, write_manifest

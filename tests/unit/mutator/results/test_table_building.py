@@ -20,10 +20,10 @@ from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Record
 from mutator.outcomes.fault_paths import fault_paths_of
-from mutator.results import propagation_columns, table_building, table_writers
-from mutator.results.finished_experiment import FinishedExperiment
+from mutator.results import csv_and_parquet_writers, propagation_columns, table_building
+from mutator.results.csv_and_parquet_writers import TableColumn
+from mutator.results.finished_experiments_and_columns import FinishedExperiment
 from mutator.results.table_columns import TIMING_COLUMNS, cells_by_column, result_columns_of
-from mutator.results.table_writers import TableColumn
 from mutator.store import plan_file
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import RECORDS_SCHEMA
@@ -158,14 +158,14 @@ def test_tables_built_in_batches_have_the_same_bytes(
 def test_row_groups_of_a_long_table_have_the_same_size(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(table_writers, "_MOST_GROUP_ROWS", 4)
+    monkeypatch.setattr(csv_and_parquet_writers, "_MOST_GROUP_ROWS", 4)
     columns = (TableColumn("n", "count", "", ""),)
     for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
         for batch in (1, 3, 20):
-            with table_writers.ParquetTableWriter(tmp_path / "t.parquet", columns) as file:
+            with csv_and_parquet_writers.ParquetTableWriter(tmp_path / "t.parquet", columns) as file:
                 for first in range(0, size, batch):
                     some = range(first, min(size, first + batch))
-                    file.append(table_writers.parquet_batch(columns, [some]))
+                    file.append(csv_and_parquet_writers.parquet_batch(columns, [some]))
             found = pq.ParquetFile(tmp_path / "t.parquet")
             assert [found.metadata.row_group(i).num_rows for i in range(found.num_row_groups)] == groups
             assert found.read()["n"].to_pylist() == list(range(size))

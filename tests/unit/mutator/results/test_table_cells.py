@@ -8,7 +8,7 @@ import pytest
 from mutator._common.hashing import as_json_types
 from mutator._common.typed_json import from_json_types
 from mutator.model import Experiment, Method, Outcome, Record, Status
-from mutator.results.finished_experiment import FinishedExperiment
+from mutator.results.finished_experiments_and_columns import FinishedExperiment
 from mutator.results.severity_and_sentence_columns import severity_and_time_columns
 from mutator.results.table_columns import cells_by_column, result_columns
 from mutator.targets.hazard_severity import SeverityScale

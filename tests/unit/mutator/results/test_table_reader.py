@@ -23,7 +23,7 @@ from mutator.exports.run_export import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.report import report_builder
 from mutator.results import table_building
-from mutator.results.finished_experiment import FinishedExperiment
+from mutator.results.finished_experiments_and_columns import FinishedExperiment
 from mutator.results.outcome_counting import checked_hazard_names as checked_hazards
 from mutator.results.severity_and_sentence_columns import SEVERITY_COLUMN, TIME_TO_HAZARD_COLUMNS
 from mutator.results.table_columns import (

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mutator.outcomes.trace_loading import Trace, newest_values, times_of
+from mutator.outcomes.trace_and_record_loading import Trace, newest_values, times_of
 from mutator.targets.channels import Channel
 
 _TIME_SLACK_S = 1e-9  # times are sums of steps, which round

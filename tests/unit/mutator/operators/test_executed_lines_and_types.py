@@ -9,8 +9,8 @@ from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.model import Limits, Status
-from mutator.operators import executed_lines
-from mutator.operators.executed_lines import GoldenRunInputs, measure_executed_lines
+from mutator.operators import executed_lines_and_types
+from mutator.operators.executed_lines_and_types import GoldenRunInputs, measure_executed_lines
 from mutator.workspace import Workspace
 
 LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
@@ -47,9 +47,9 @@ def test_executed_lines_are_cached(
     manifest = toycar.manifest("toycar")
     drive = GoldenRunInputs(scenario=toycar.scenario("A"), changes=(), seed=7)
     runs: list[str] = []
-    measured = executed_lines._run_and_note
+    measured = executed_lines_and_types._run_and_note
     monkeypatch.setattr(
-        executed_lines, "_run_and_note", lambda *given: (runs.append("run"), measured(*given))[1]
+        executed_lines_and_types, "_run_and_note", lambda *given: (runs.append("run"), measured(*given))[1]
     )
     [first] = measure_executed_lines(manifest, [drive], LIMITS)
     assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 1

@@ -20,7 +20,7 @@ from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.model import Limits, Status
-from mutator.operators.variable_kinds import TypesByName
+from mutator.operators.interchangeable_variables import TypesByName
 from mutator.targets.manifest import TargetManifest
 
 # part of each entry's key: a new schema ignores the old entries instead of misreading them

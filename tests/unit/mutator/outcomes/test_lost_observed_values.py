@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mutator.outcomes.lost_values import find_lost_value, find_value_lost_for_good
-from mutator.outcomes.trace_loading import Trace
+from mutator.outcomes.lost_observed_values import find_lost_value, find_value_lost_for_good
+from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from mutator.model import ObservedActivation
-from mutator.outcomes.reaction_and_speeds import change_share, first_actuator_change, speeds_after_activation
-from mutator.outcomes.trace_loading import Trace
+from mutator.outcomes.actuator_change_and_speeds import (
+    change_share,
+    first_actuator_change,
+    speeds_after_activation,
+)
+from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.targets.channels import Channel, Role
 from mutator.workspace import Workspace
 

@@ -7,10 +7,10 @@ import pytest
 
 import mutator
 from mutator.model import Limits, Status
-from mutator.operators.executed_lines import GoldenRunInputs, measure_variable_types
+from mutator.operators.executed_lines_and_types import GoldenRunInputs, measure_variable_types
+from mutator.operators.interchangeable_variables import names_of_functions, replacements_of_name
 from mutator.operators.mutation_selection import select_mutations
 from mutator.operators.operator_lookup import names_in_all
-from mutator.operators.variable_kinds import names_of_functions, replacements_of_name
 from mutator.workspace import Workspace
 from tests.small_loop import small_loop
 

@@ -13,7 +13,7 @@ import pytest
 
 from mutator.errors import BadOutput, ResourceShortage
 from mutator.outcomes.importers import npz
-from mutator.outcomes.trace_loading import (
+from mutator.outcomes.trace_and_record_loading import (
     alert_times,
     load_target_record,
     load_trace,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from mutator.model import Experiment, Record, Status
 from mutator.outcomes.verdict_rules import classified_hazard_of
-from mutator.results.table_writers import TableColumn
+from mutator.results.csv_and_parquet_writers import TableColumn
 from mutator.targets.hazard_severity import SeverityScale
 
 if TYPE_CHECKING:

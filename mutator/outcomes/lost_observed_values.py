@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mutator.outcomes.trace_loading import Trace, newest_values, values_on_steps
+from mutator.outcomes.trace_and_record_loading import Trace, newest_values, values_on_steps
 from mutator.targets.manifest import TargetManifest
 
 LOST_VALUE_PREFIX = "truth: "  # begins the detail of a crash by a lost value

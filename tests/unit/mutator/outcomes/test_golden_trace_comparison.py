@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mutator.outcomes.golden_comparison import compare_traces
-from mutator.outcomes.trace_loading import with_golden_times
+from mutator.outcomes.golden_trace_comparison import compare_traces
+from mutator.outcomes.trace_and_record_loading import with_golden_times
 from mutator.store.run_folder import GoldenRun
 from mutator.targets.channels import Channel, Role
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mutator.errors import BadOutput, MutatorError
-from mutator.outcomes.trace_loading import (
+from mutator.outcomes.trace_and_record_loading import (
     Trace,
     alert_times,
     load_target_record,

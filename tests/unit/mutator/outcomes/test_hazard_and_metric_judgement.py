@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from mutator.errors import BadOutput, MutatorError
-from mutator.outcomes.hazards_and_metrics import RunJudgement, judge_run, load_judged_run
-from mutator.outcomes.trace_loading import Trace
+from mutator.outcomes.hazard_and_metric_judgement import RunJudgement, judge_run, load_judged_run
+from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.targets.manifest import TargetManifest
 
 from .cart import GAP, SPEED, T, write_manifest

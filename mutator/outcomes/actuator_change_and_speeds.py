@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from mutator.model import ObservedActivation
-from mutator.outcomes.golden_comparison import (
+from mutator.outcomes.golden_trace_comparison import (
     channel_deviation,
     signed_differences,
     values_at_common_time,
 )
-from mutator.outcomes.hazards_and_metrics import formula_variables
-from mutator.outcomes.trace_loading import Trace
+from mutator.outcomes.hazard_and_metric_judgement import formula_variables
+from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import (

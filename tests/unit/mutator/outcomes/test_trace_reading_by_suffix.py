@@ -8,7 +8,7 @@ import pytest
 
 from mutator._common.doors import IMPORTERS
 from mutator.errors import BadOutput
-from mutator.outcomes.trace_loading import load_trace
+from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.targets.channels import Channel
 
 GAP = Channel(name="gap", unit="m", other_trace_name="distance")
