@@ -39,7 +39,7 @@ NAMES_BY_MODULE = {
     "mutator.api.target_places": ("find_place_notes", "find_places"),
     "mutator.api.trials": ("Trial", "try_fault"),
     "mutator.campaigns.plan": ("Plan",),
-    "mutator.comparison.run_comparison": ("Gate",),
+    "mutator.comparison.run_comparison_and_gates": ("Gate",),
     "mutator.errors": ("CheckFailed", "IncompleteRun", "MutatorError", "MutatorWarning"),
     "mutator.execution.session_summary": ("Summary",),
     "mutator.exports": ("Format",),

@@ -107,7 +107,7 @@ class ReviewConflict(CheckFailed):
     * When: another review of these groups was stored after the caller had read it.
     * To do: read the review again, then decide again.
 
-    `groups` are their ids, `review` is the current `mutator.review.decisions.Review`.
+    `groups` are their ids, `review` is the current `mutator.review.review_state_and_actions.Review`.
     """
 
     groups: tuple[str, ...] = ()

@@ -11,9 +11,9 @@ from mutator._common.table_rendering import TextTable
 from mutator.api.notebook_html import text_html
 from mutator.api.runs import Run, alerts_note_if_any, load_run, scene_if_any
 from mutator.comparison import comparison_files
-from mutator.comparison import run_comparison as comparing
-from mutator.comparison.pairs import ExperimentPair, ResultChangeKind
-from mutator.comparison.run_comparison import Comparison, Gate, GateFinding
+from mutator.comparison import run_comparison_and_gates as comparing
+from mutator.comparison.experiment_matching import ExperimentPair, ResultChangeKind
+from mutator.comparison.run_comparison_and_gates import Comparison, Gate, GateFinding
 from mutator.errors import MutatorError
 from mutator.report import run_history
 from mutator.report.run_history import History

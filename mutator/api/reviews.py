@@ -13,12 +13,18 @@ from mutator.campaigns.row_filters import matching_items
 from mutator.errors import MutatorError
 from mutator.review import mutant_groups
 from mutator.review.approval_gate import describe_experiment_count, unapproved_reason
-from mutator.review.decisions import Review, ReviewAction, ReviewActionKind, ReviewState, record_actions
-from mutator.review.decisions import load_review as load_decisions
-from mutator.review.effect_pictures import pictures_of_groups
-from mutator.review.group_columns import GROUP_FILTER_COLUMNS
+from mutator.review.group_filter_columns import GROUP_FILTER_COLUMNS
+from mutator.review.image_effect_pictures import pictures_of_groups
 from mutator.review.mutant_groups import Group
 from mutator.review.review_page import write_review_page
+from mutator.review.review_state_and_actions import (
+    Review,
+    ReviewAction,
+    ReviewActionKind,
+    ReviewState,
+    record_actions,
+)
+from mutator.review.review_state_and_actions import load_review as load_decisions
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 

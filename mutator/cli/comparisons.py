@@ -13,7 +13,7 @@ from mutator.cli.options import Json, Only, Wide
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 
 if TYPE_CHECKING:
-    from mutator.comparison.run_comparison import Comparison, GateFinding
+    from mutator.comparison.run_comparison_and_gates import Comparison, GateFinding
 
 MOST_LISTED_FINDINGS = 20  # experiments listed in the terminal; the written comparison lists all of them
 GATES_HELP = (

@@ -98,7 +98,7 @@ def result_columns(ctx: typer.Context, incomplete: str) -> list[str]:
 
 
 def group_columns(ctx: typer.Context, incomplete: str) -> list[str]:
-    from mutator.review.group_columns import GROUP_FILTER_COLUMNS
+    from mutator.review.group_filter_columns import GROUP_FILTER_COLUMNS
 
     return _expressions_with_column(GROUP_FILTER_COLUMNS, incomplete)
 

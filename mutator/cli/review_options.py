@@ -11,7 +11,7 @@ from mutator.cli import completion
 from mutator.cli.console import Terminal
 from mutator.cli.options import Manifest, Reading, Seed, WorkspaceOptions
 from mutator.errors import MutatorError
-from mutator.review.group_columns import GROUP_FILTER_COLUMNS
+from mutator.review.group_filter_columns import GROUP_FILTER_COLUMNS
 
 Campaign = Annotated[
     str | None,

@@ -9,8 +9,8 @@ from mutator._common.message_text import counted
 from mutator.cli.console import Terminal
 
 if TYPE_CHECKING:
-    from mutator.review.decisions import Review
     from mutator.review.mutant_groups import Group
+    from mutator.review.review_state_and_actions import Review
 
 STYLE_BY_STATE = {"new": "yellow", "changed": "bold yellow", "rejected": "bold red", "approved": "green"}
 MOST_VALUE_ROWS = 24  # rows of values shown in a terminal
@@ -21,7 +21,7 @@ MOST_CONDITIONS = 6  # conditions shown in a terminal; a group can have one for 
 def group_as_json(review: "Review", group: "Group", *, with_diff_and_values: bool = False) -> dict[str, Any]:
     """Return a group as JSON data, on request also its diff and values."""
     from mutator.api.reviews import group_facts as group_facts
-    from mutator.review.group_display import fault_value_table, title_lines
+    from mutator.review.group_display_texts import fault_value_table, title_lines
 
     decision, flag = review.decision(group.id), review.flag(group.id)
     facts = {
@@ -86,7 +86,7 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
 
 def _describe_group(group: "Group", *, in_terminal: bool) -> str:
     """Return what the group's faults are, and where; outside a terminal, each group is one line."""
-    from mutator.review.group_display import title_lines
+    from mutator.review.group_display_texts import title_lines
 
     titles, injections = title_lines(group), list(map(_shorten_injection, group.injection_labels))
     return "\n".join([*titles, *injections]) if in_terminal else " ".join([*titles, "; ".join(injections)])
@@ -103,7 +103,7 @@ def _describe_trigger(group: "Group") -> str:
 
 
 def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
-    from mutator.review.group_display import title_lines
+    from mutator.review.group_display_texts import title_lines
 
     state, flag = review.state(group).value, review.flag(group.id)
     terminal.print_text(f"group {group.id}: {state}", style=STYLE_BY_STATE[state])
@@ -133,7 +133,11 @@ def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
 
 
 def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
-    from mutator.review.group_display import describe_value_ranges, fault_value_table, trigger_condition_lines
+    from mutator.review.group_display_texts import (
+        describe_value_ranges,
+        fault_value_table,
+        trigger_condition_lines,
+    )
 
     _print_head(terminal, review, group)
     for injection in group.injection_labels:

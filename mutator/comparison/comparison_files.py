@@ -12,9 +12,9 @@ from mutator._common.files import make_folder, write_atomic
 from mutator._common.message_text import bind_numbers, counted
 from mutator._common.table_rendering import TextTable, markdown_line
 from mutator.comparison.comparison_replays import ReportAddresses, addresses_from, replay_elements
-from mutator.comparison.input_differences import InputFact
-from mutator.comparison.pairs import ExperimentPair, ResultChangeKind, time_to_hazard
-from mutator.comparison.run_comparison import Comparison, Gate, describe_ending_change
+from mutator.comparison.experiment_matching import ExperimentPair, ResultChangeKind, time_to_hazard
+from mutator.comparison.input_differences_and_remarks import InputFact
+from mutator.comparison.run_comparison_and_gates import Comparison, Gate, describe_ending_change
 from mutator.results.plan_columns import plan_row
 from mutator.results.result_rows import ResultRow
 from mutator.web import asset_text, load_order

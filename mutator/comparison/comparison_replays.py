@@ -11,8 +11,8 @@ from urllib.parse import quote
 
 from mutator._common.hashing import as_json_types
 from mutator._common.message_text import counted
-from mutator.comparison.pairs import ExperimentPair
-from mutator.comparison.run_comparison import Comparison
+from mutator.comparison.experiment_matching import ExperimentPair
+from mutator.comparison.run_comparison_and_gates import Comparison
 from mutator.store.embedded_series import (
     EMBEDDED_SERIES_ELEMENT,
     MOST_EMBEDDED_SERIES_BYTES,

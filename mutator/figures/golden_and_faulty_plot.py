@@ -14,7 +14,7 @@ import numpy as np
 
 from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
-from mutator.figures.style import PNG_DPI, figure_type, shipped_style
+from mutator.figures.figure_style import PNG_DPI, figure_type, shipped_style
 from mutator.model import Record
 from mutator.outcomes.trace_and_record_loading import Trace, times_of
 from mutator.targets.channels import Channel

@@ -1,11 +1,11 @@
 """Measures for published observations: numbers computed from a frame of results, each with an interval.
 
-`runs` comes from `mutator.statistics.results_frame.load_usable_results`. `of`, `part` and `against` are
+`runs` comes from `mutator.statistics.usable_results_frame.load_usable_results`. `of`, `part` and `against` are
 pandas queries on it; an empty query selects all runs. Reports show the call for each claim, which you can
 repeat in Python:
 
     from mutator.paper.measures import *
-    from mutator.statistics.results_frame import load_usable_results
+    from mutator.statistics.usable_results_frame import load_usable_results
     runs = load_usable_results(Path("results.csv"))
 """
 
@@ -17,10 +17,10 @@ from pathlib import Path
 import pandas as pd
 
 from mutator._common.message_text import counted
-from mutator.statistics import event_times, guided_against_random
-from mutator.statistics.shares import CONFIDENCE, Share
-from mutator.statistics.shares import share as wilson
-from mutator.statistics.tallies import tally_by_fault_type
+from mutator.statistics import event_time_statistics, guided_against_random
+from mutator.statistics.experiment_tallies import tally_by_fault_type
+from mutator.statistics.shares_with_intervals import CONFIDENCE, Share
+from mutator.statistics.shares_with_intervals import share as wilson
 
 __all__ = [
     "Path",
@@ -166,7 +166,7 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
     ends = {
         str(scenario): float(group["t_end"].iloc[0]) for scenario, group in selected_runs.groupby("scenario")
     }
-    reaction = event_times.alert_to_hazard_times(selected_runs, ends, 0.0)
+    reaction = event_time_statistics.alert_to_hazard_times(selected_runs, ends, 0.0)
     median, low, high = reaction.median_s, reaction.median_low_s, reaction.median_high_s
     if reaction.runs_alerted_first and math.isnan(low):  # the curve stays above one half or jumps past it
         median = math.inf if math.isnan(median) else median

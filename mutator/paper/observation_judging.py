@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_source_lines import YamlSource
 from mutator.paper.measures import MEASURES, Estimate, estimate_of_difference, estimate_of_share
-from mutator.statistics.shares import share
+from mutator.statistics.shares_with_intervals import share
 
 FILE_NAME = "paper_observations.yaml"
 SCHEMA = "paper_observations/1"

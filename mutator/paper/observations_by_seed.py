@@ -7,7 +7,7 @@ import pandas as pd
 
 from mutator._common.table_rendering import TextTable
 from mutator.paper.observation_judging import ClaimVerdict, JudgedObservation, judge_observations
-from mutator.statistics.seed_spread import seeds_of
+from mutator.statistics.seed_spread_tables import seeds_of
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 
 JudgedBySeed = Mapping[str, Sequence[JudgedObservation]]

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mutator.figures import style
+from mutator.figures import figure_style
 from mutator.figures.golden_and_faulty_plot import (
     FAULTY_COLOUR,
     GOLDEN_COLOUR,
@@ -28,7 +28,7 @@ MIN_AXIS_RANGE = 0.1  # minimum range of a vertical axis; less would magnify noi
 LABEL_WIDTH_SHARE = 0.12  # width of a mark's label as a share of the time axis
 
 
-@style.shipped_style()
+@figure_style.shipped_style()
 def plot_run_pair(
     pair: RunPair,
     steps: StepFlags,
@@ -45,18 +45,18 @@ def plot_run_pair(
     first_s = max(float(pair.times_s[0]), pair.start_s - SHOWN_BEFORE_S)
     last_s = min(float(pair.times_s[-1]), pair.end_s + SHOWN_AFTER_S)
     # inches: legend and time axis, then each panel
-    figure, axes = style.blank_figure(1.1 + 1.35 * len(panels), len(panels), 1)
+    figure, axes = figure_style.blank_figure(1.1 + 1.35 * len(panels), len(panels), 1)
     is_visible = (pair.times_s >= first_s) & (pair.times_s <= last_s)
     for axis, (channel, what) in zip(axes, panels, strict=True):
         _plot_channel(axis, pair, channel, is_visible)
-        axis.set_ylabel(f"{what} [{units.get(channel) or '-'}]", fontsize=style.TEXT_POINTS)
+        axis.set_ylabel(f"{what} [{units.get(channel) or '-'}]", fontsize=figure_style.TEXT_POINTS)
         axis.set_xlim(first_s, last_s)
         if channel in figure_spec.action_channels:
             _shade_steps(axis, pair.times_s, steps)
         low, high = axis.get_ylim()
         axis.set_ylim(low, max(high, low + MIN_AXIS_RANGE))
         axis.tick_params(labelbottom=axis is axes[-1])
-    axes[-1].set_xlabel("time [s]", fontsize=style.TEXT_POINTS)
+    axes[-1].set_xlabel("time [s]", fontsize=figure_style.TEXT_POINTS)
     _draw_marks(
         axes,
         [mark for mark in with_first_alert_only(marks) if first_s <= mark.t_s <= last_s],
@@ -64,7 +64,12 @@ def plot_run_pair(
     )
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(
-        handles, labels, loc="outside lower left", ncols=2, fontsize=style.SMALL_TEXT_POINTS, frameon=False
+        handles,
+        labels,
+        loc="outside lower left",
+        ncols=2,
+        fontsize=figure_style.SMALL_TEXT_POINTS,
+        frameon=False,
     )
     figure.align_ylabels(axes)
     return figure
@@ -132,6 +137,6 @@ def _draw_marks(axes: Sequence["Axes"], marks: Sequence[EventMark], time_span_s:
             xytext=(0, 3 + 11 * level),  # points; a line of text is 11 high
             textcoords="offset points",
             ha="left" if fits else "right",
-            fontsize=style.SMALL_TEXT_POINTS,
+            fontsize=figure_style.SMALL_TEXT_POINTS,
             color=MARK_COLOURS[mark.kind],
         )

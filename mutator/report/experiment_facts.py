@@ -11,7 +11,7 @@ from mutator.model import Experiment, Fault, Record
 from mutator.outcomes.fault_paths import FaultPathFinder, UntimedPath, UntimedPathInputs
 from mutator.outcomes.verdict_rules import was_active_at_hazard
 from mutator.results.worst_first_ranking import worst_first_ranks
-from mutator.statistics.event_times import FirstAlertsByHazardRun
+from mutator.statistics.event_time_statistics import FirstAlertsByHazardRun
 from mutator.store.run_folder import RunFolder
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ from mutator.report.answer_parts import ALERT_BEFORE_HAZARD, SILENT_HAZARD_WARNI
 from mutator.report.reported_run import ReportedRun
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.result_rows import ResultRow, rows_of
-from mutator.statistics.median_intervals import median_interval
-from mutator.statistics.shares import share
+from mutator.statistics.bootstrap_median_intervals import median_interval
+from mutator.statistics.shares_with_intervals import share
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
 

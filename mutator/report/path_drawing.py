@@ -8,7 +8,7 @@ from typing import Any
 from urllib.parse import quote
 
 from mutator.report.fault_path_data import PathCounts, link_name
-from mutator.statistics.shares import share
+from mutator.statistics.shares_with_intervals import share
 from mutator.stpa import arrow_and_box_svg
 from mutator.stpa.arrow_and_box_svg import path_data
 from mutator.stpa.control_structure_layout import ComponentBox, LinkArrow, lay_out_structure

@@ -8,8 +8,8 @@ from mutator._common.hashing import as_json_types
 from mutator._common.message_text import counted
 from mutator.campaigns.plan import Plan
 from mutator.errors import CheckFailed
-from mutator.review.decisions import Review, ReviewState, load_review
 from mutator.review.mutant_groups import Group, groups_of_plan
+from mutator.review.review_state_and_actions import Review, ReviewState, load_review
 from mutator.store.recorded_approvals import APPROVALS_SCHEMA
 from mutator.workspace import Workspace
 

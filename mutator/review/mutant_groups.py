@@ -25,13 +25,13 @@ from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.operator_lookup import OPERATOR_MODELS, operator_name_of
 from mutator.operators.statement_facts import statement_facts_of
 from mutator.review import patch_shapes
-from mutator.review.called_code import CalledCode
-from mutator.review.decision_basis import BasisTexts, distinct_diffs, fault_hunks, function_sources
-from mutator.review.fault_words import words_of_faults
+from mutator.review.code_called_by_injections import CalledCode
+from mutator.review.decision_basis_texts import BasisTexts, distinct_diffs, fault_hunks, function_sources
+from mutator.review.fault_descriptions import words_of_faults
+from mutator.review.parameter_ranges_and_units import find_variant, units_of_parameters, value_ranges_of
 from mutator.review.patch_shapes import PatchShape
 from mutator.review.review_entries import BasisDigests, ValueRanges
 from mutator.review.reviewed_texts import render_reviewed_text
-from mutator.review.value_ranges import find_variant, units_of_parameters, value_ranges_of
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace

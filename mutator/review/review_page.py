@@ -11,10 +11,10 @@ from mutator._common.files import write_atomic
 from mutator._common.hashing import as_json_types, content_id
 from mutator.errors import MutatorError
 from mutator.mutants.injected_line_syntax import tags_for_page_scripts
-from mutator.review.decisions import Review, ReviewState
-from mutator.review.effect_pictures import can_have_pictures
-from mutator.review.group_display import fault_value_table, title_lines, trigger_condition_lines
+from mutator.review.group_display_texts import fault_value_table, title_lines, trigger_condition_lines
+from mutator.review.image_effect_pictures import can_have_pictures
 from mutator.review.mutant_groups import Group
+from mutator.review.review_state_and_actions import Review, ReviewState
 from mutator.web import asset_text, json_script_element, load_order, packed_script_element
 from mutator.web.html_templates import html_environment
 

@@ -12,7 +12,7 @@ from mutator._common.confined_files import check_only_plain_files
 from mutator._common.hashing import as_json_types, digest
 from mutator.audit.table_audit import audit_tables
 from mutator.comparison import comparison_files
-from mutator.comparison import run_comparison as comparing
+from mutator.comparison import run_comparison_and_gates as comparing
 from mutator.comparison.comparison_replays import ReportAddresses
 from mutator.errors import MutatorError, NotServed
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note, load_fault_free_runs

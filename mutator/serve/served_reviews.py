@@ -14,10 +14,16 @@ from mutator.campaigns.git_clone import find_user_name
 from mutator.campaigns.plan import build_plan
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import GroupsChanged, MutatorError, NotServed, ReviewConflict
-from mutator.review import effect_pictures, group_results, mutant_groups
-from mutator.review.decisions import Review, ReviewAction, ReviewActionKind, load_review, record_actions
+from mutator.review import group_results, image_effect_pictures, mutant_groups
 from mutator.review.mutant_groups import Group
 from mutator.review.review_page import group_review_as_json, review_page_html
+from mutator.review.review_state_and_actions import (
+    Review,
+    ReviewAction,
+    ReviewActionKind,
+    load_review,
+    record_actions,
+)
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -174,20 +180,22 @@ class ServedReviews:
     def picture(self, selection: GroupSelection, name: str, level: str, *, after: bool) -> bytes:
         """Return a frame before or after the group's effect, as a JPEG file; NotServed if there is none."""
         manifest = self.workspace.manifest(selection.target)
-        before_and_after = effect_pictures.jpegs_before_and_after(
+        before_and_after = image_effect_pictures.jpegs_before_and_after(
             self.workspace, manifest, self.group(selection, name), level
         )
         if before_and_after is None:
             raise NotServed(
                 "no such picture",
-                expected=f"one of the group's levels ({', '.join(effect_pictures.LEVEL_NAMES)})",
+                expected=f"one of the group's levels ({', '.join(image_effect_pictures.LEVEL_NAMES)})",
             )
         return before_and_after[after]
 
     def picture_levels(self, selection: GroupSelection, name: str) -> list[dict[str, str]]:
         """Return the levels that have frames, with their values as text."""
         manifest, group = self.workspace.manifest(selection.target), self.group(selection, name)
-        pictures_of_group = effect_pictures.pictures_of_groups(self.workspace, manifest, [group]).get(name)
+        pictures_of_group = image_effect_pictures.pictures_of_groups(self.workspace, manifest, [group]).get(
+            name
+        )
         return (
             [{"name": level.name, "label": level.label} for level in pictures_of_group.levels]
             if pictures_of_group

@@ -15,7 +15,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Status
 from mutator.results.table_columns import alert_names_in
 from mutator.statistics.paired_statistics import resampled_interval
-from mutator.statistics.shares import Share, share
+from mutator.statistics.shares_with_intervals import Share, share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell, cell_text
 from mutator.triggers.trigger_kinds import ALWAYS_NAME
 

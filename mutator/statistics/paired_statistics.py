@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mutator.statistics.shares import CONFIDENCE
+from mutator.statistics.shares_with_intervals import CONFIDENCE
 
 RESAMPLES = 9999  # a draw only adds up one number for each cluster
 _RESAMPLING_SEED = 1  # fixed, so that resampling is deterministic

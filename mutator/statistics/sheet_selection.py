@@ -4,13 +4,13 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from mutator.statistics import event_time_tables, guided_against_random_tables, summary_tables
-from mutator.statistics.event_times import FirstAlertsByHazardRun
+from mutator.statistics import event_time_and_order_tables, guided_against_random_tables, summary_tables
+from mutator.statistics.event_time_statistics import FirstAlertsByHazardRun
+from mutator.statistics.experiment_tallies import tally_by_fault_type, tally_by_scenario
 from mutator.statistics.guided_against_random import GUIDED, RANDOM
 from mutator.statistics.published_counts import PublishedCounts
-from mutator.statistics.results_frame import select_common_columns
 from mutator.statistics.statistics_sheet import Sheet
-from mutator.statistics.tallies import tally_by_fault_type, tally_by_scenario
+from mutator.statistics.usable_results_frame import select_common_columns
 
 DEFAULT_DRIVER_REACTION_S = (
     1.8  # a driver's reaction time to a visible warning; used if no publication states one
@@ -47,13 +47,15 @@ def run_sheets(
             guided_against_random_tables.hazards_by_fault_type_sheet(frame, published),
             guided_against_random_tables.matched_pairs_sheet(frame),
         ]
-    sheets.append(event_time_tables.propagation_sheet(frame, published, has_alerts=has_alerts))
+    sheets.append(event_time_and_order_tables.propagation_sheet(frame, published, has_alerts=has_alerts))
     if end_by_scenario is not None and has_alerts:
         driver_s = published.driver_reaction_s if published else DEFAULT_DRIVER_REACTION_S
-        sheets.append(event_time_tables.alert_to_hazard_sheet(frame, end_by_scenario, driver_s))
+        sheets.append(event_time_and_order_tables.alert_to_hazard_sheet(frame, end_by_scenario, driver_s))
     if first_alerts_by_hazard_run is not None and first_alerts_by_hazard_run.keys() >= set(
         frame.loc[frame["is_hazard"], "experiment_id"]
     ):
-        sheets.append(event_time_tables.alerts_before_hazards_sheet(frame, first_alerts_by_hazard_run))
-    sheets.append(event_time_tables.hazard_orders_sheet(frame))
+        sheets.append(
+            event_time_and_order_tables.alerts_before_hazards_sheet(frame, first_alerts_by_hazard_run)
+        )
+    sheets.append(event_time_and_order_tables.hazard_orders_sheet(frame))
     return tuple(sheet for sheet in sheets if sheet.lines)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mutator._common.table_rendering import TextTable
-from mutator.statistics.shares import Share
+from mutator.statistics.shares_with_intervals import Share
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mutator.comparison import comparison_files
-from mutator.comparison.run_comparison import Comparison, compare_runs
+from mutator.comparison.run_comparison_and_gates import Comparison, compare_runs
 from mutator.model import Experiment, Outcome
 from mutator.workspace import Workspace
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mutator.comparison import comparison_files, comparison_replays
-from mutator.comparison.run_comparison import Comparison, compare_runs
+from mutator.comparison.run_comparison_and_gates import Comparison, compare_runs
 from mutator.model import Experiment, Outcome
 from mutator.outcomes.series_sampling import write_sampled_series
 from mutator.store.run_folder import RunFolder

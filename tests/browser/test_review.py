@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from mutator.review.decisions import ReviewAction, ReviewActionKind, record_actions
 from mutator.review.mutant_groups import groups_of_library
 from mutator.review.review_page import write_review_page
+from mutator.review.review_state_and_actions import ReviewAction, ReviewActionKind, record_actions
 from mutator.workspace import Workspace
 
 

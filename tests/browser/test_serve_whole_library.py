@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from mutator.review.decisions import load_review
+from mutator.review.review_state_and_actions import load_review
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]

@@ -5,7 +5,7 @@ import dataclasses
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mutator.comparison.pairs import ExperimentPair, ResultChangeKind
+from mutator.comparison.experiment_matching import ExperimentPair, ResultChangeKind
 from mutator.model import Outcome, Status
 from mutator.results.result_rows import ResultRow
 

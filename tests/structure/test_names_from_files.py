@@ -44,8 +44,8 @@ ALLOWED = {  # joins of names that no file contains
     "onboarding/source_survey.py: Path(place, name)": "names from os.walk",
     "onboarding/source_survey.py: root / name": "names from a folder's listing",
     "operators/executed_lines_and_types.py: scratch / 'work' / f'lines-{i}'": "a number",
-    "review/called_code.py: folder / constant.value": "only compared with the tree's paths",
-    "review/effect_pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
+    "review/code_called_by_injections.py: folder / constant.value": "only compared with the tree's paths",
+    "review/image_effect_pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
     "store/run_deletion.py: Path(folder, name)": "names from os.walk",
     "store/run_deletion.py: Path(name).with_name(final_name_of_half_written(Path(name).name))": (
         "only compared with patterns"

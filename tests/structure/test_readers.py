@@ -15,8 +15,8 @@ ALLOWED = {
     "execution/cluster/piece_process.py: read": "a file of its parent",
     "glue.py: read_text": "runs in the target's process",
     "results/table_reader.py: read": "checks the number of cells before",
-    "review/effect_pictures.py: read_bytes": "installed with the harness",
-    "review/effect_pictures.py: read_text": "installed with the harness",
+    "review/image_effect_pictures.py: read_bytes": "installed with the harness",
+    "review/image_effect_pictures.py: read_text": "installed with the harness",
     "store/series_packing.py: read": "calls a function of its own",
     "web/__init__.py: read_text": "installed with the harness",
 }

@@ -197,8 +197,8 @@ SHOWN_BY_THE_COMMAND_LINE = {
     "mutator.exports",
     "mutator.mutants.patches_by_file",
     "mutator.results.plan_columns",
-    "mutator.review.group_columns",
-    "mutator.review.group_display",
+    "mutator.review.group_filter_columns",
+    "mutator.review.group_display_texts",
     "mutator.targets.manifests_by_name",
 }
 

@@ -4,7 +4,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import sheet_csv_and_markdown_files
 from mutator.report.reported_run import ReportedRun
-from mutator.statistics.seed_spread import ALL_FAULTS, seeds_by_fault_type_sheet, seeds_of, seeds_sheet
+from mutator.statistics.seed_spread_tables import ALL_FAULTS, seeds_by_fault_type_sheet, seeds_of, seeds_sheet
 from mutator.statistics.statistics_sheet import Sheet, cell_text
 
 _HTML_TEMPLATE = """\

@@ -14,7 +14,7 @@ from mutator.results.outcome_counting import (
     count_table,
     fault_types_of,
 )
-from mutator.statistics.metric_tables import (
+from mutator.statistics.metric_and_severity_tables import (
     metrics_sheet,
     severity_by_fault_type_sheet,
     times_to_hazard_sheet,

@@ -3,8 +3,8 @@
 from mutator._common.table_rendering import TextTable
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
-from mutator.statistics.event_times import share_of_hazards_within
-from mutator.statistics.shares import Share
+from mutator.statistics.event_time_statistics import share_of_hazards_within
+from mutator.statistics.shares_with_intervals import Share
 from mutator.statistics.sheet_selection import DEFAULT_DRIVER_REACTION_S
 
 _INTRODUCTION = (

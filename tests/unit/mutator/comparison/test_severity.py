@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from mutator.comparison.comparison_files import pair_cells, summary_text
-from mutator.comparison.pairs import ResultChangeKind
-from mutator.comparison.run_comparison import Comparison, Gate, compare_runs, findings_of_gates
+from mutator.comparison.experiment_matching import ResultChangeKind
+from mutator.comparison.run_comparison_and_gates import Comparison, Gate, compare_runs, findings_of_gates
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Method, Outcome
 from mutator.workspace import Workspace

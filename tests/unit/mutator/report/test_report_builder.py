@@ -12,7 +12,7 @@ import pytest
 
 from mutator._common.files import write_json
 from mutator.errors import MutatorError, UnsafePath
-from mutator.figures.style import with_page_theme
+from mutator.figures.figure_style import with_page_theme
 from mutator.report import report_builder
 from mutator.report.panels import failed_runs_panel
 from mutator.report.report_digests import inputs_digest

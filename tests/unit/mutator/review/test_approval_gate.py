@@ -10,8 +10,13 @@ from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import CheckFailed
 from mutator.execution.campaign_running import run_campaign
 from mutator.review import approval_gate
-from mutator.review.decisions import ReviewAction, ReviewActionKind, load_review, record_actions
 from mutator.review.mutant_groups import groups_of_plan
+from mutator.review.review_state_and_actions import (
+    ReviewAction,
+    ReviewActionKind,
+    load_review,
+    record_actions,
+)
 from mutator.store.plan_choices import Choices
 from mutator.store.recorded_approvals import approval_summary, write_approvals
 from mutator.workspace import Workspace

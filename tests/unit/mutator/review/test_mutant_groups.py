@@ -8,7 +8,7 @@ import pytest
 
 from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
-from mutator.review.decision_basis import fault_hunks
+from mutator.review.decision_basis_texts import fault_hunks
 from mutator.review.mutant_groups import Group, groups_of_library, groups_of_plan
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace

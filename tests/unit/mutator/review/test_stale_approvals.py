@@ -7,8 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from mutator.review.decisions import ReviewAction, ReviewActionKind, ReviewState, load_review, record_actions
 from mutator.review.mutant_groups import Group, groups_of_library
+from mutator.review.review_state_and_actions import (
+    ReviewAction,
+    ReviewActionKind,
+    ReviewState,
+    load_review,
+    record_actions,
+)
 from mutator.workspace import Workspace
 
 EFFECTS = """\

@@ -7,8 +7,13 @@ from typing import Any
 
 import pytest
 
-from mutator.review.decisions import ReviewAction, ReviewActionKind, load_review, record_actions
 from mutator.review.mutant_groups import groups_of_library
+from mutator.review.review_state_and_actions import (
+    ReviewAction,
+    ReviewActionKind,
+    load_review,
+    record_actions,
+)
 from mutator.workspace import Workspace
 
 from .conftest import SECRET, Client

@@ -8,7 +8,7 @@ import pytest
 
 from mutator.model import OPERATOR_FAULTS_MODULE, Experiment, Fault
 from mutator.statistics.mutation_score import mutant_effect_flags, mutation_score_sheet
-from mutator.statistics.shares import share
+from mutator.statistics.shares_with_intervals import share
 
 from .results_frame import results
 

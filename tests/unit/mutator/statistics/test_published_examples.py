@@ -9,7 +9,7 @@ from mutator.paper.measures import estimate_of_difference, mean_time, paired
 from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random import FaultTypeStratum
 from mutator.statistics.paired_statistics import mcnemar, paired_times
-from mutator.statistics.shares import share
+from mutator.statistics.shares_with_intervals import share
 
 from . import by_hand
 from .results_frame import results

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 from scipy.stats import CensoredData, ecdf
 
-from mutator.statistics import event_times
-from mutator.statistics.event_times import AlertToHazardTimes
+from mutator.statistics import event_time_statistics
+from mutator.statistics.event_time_statistics import AlertToHazardTimes
 
 from .results_frame import results
 
@@ -29,7 +29,7 @@ def reaction(sample: dict[str, Any], driver_s: float = 1.8) -> AlertToHazardTime
         ends[f"S{i}"] = ALERT_S + time
         row = {"scenario": f"S{i}", "t_activation": 1.0, "t_alert": ALERT_S, "alerts": "fcw"}
         rows.append(row | ({"t_h1": ALERT_S + time} if event else {}))
-    return event_times.alert_to_hazard_times(results(*rows), ends, driver_s)
+    return event_time_statistics.alert_to_hazard_times(results(*rows), ends, driver_s)
 
 
 @pytest.mark.parametrize("sample", LIFELINES.values(), ids=LIFELINES)

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mutator.statistics.shares import Share
+from mutator.statistics.shares_with_intervals import Share
 from mutator.statistics.sheet_selection import run_sheets
 from mutator.statistics.statistics_sheet import Sheet
 

@@ -6,7 +6,7 @@ import pytest
 
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault, Value
-from mutator.review.value_ranges import units_of_parameters, value_ranges_of
+from mutator.review.parameter_ranges_and_units import units_of_parameters, value_ranges_of
 from mutator.serve.served_trials import range_as_json
 from mutator.workspace import Workspace
 

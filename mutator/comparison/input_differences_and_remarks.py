@@ -6,7 +6,7 @@ from typing import Any
 
 from mutator._common.hashing import as_json_types
 from mutator.comparison.compared_runs import ComparedRun
-from mutator.comparison.pairs import ExperimentMatching, ExperimentPair
+from mutator.comparison.experiment_matching import ExperimentMatching, ExperimentPair
 from mutator.store.run_folder import RunFolder
 from mutator.store.session_environments import describe_environments as ran_with
 from mutator.store.session_environments import version_texts_by_package

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from mutator.statistics.paired_statistics import PairedDifference
-from mutator.statistics.shares import CONFIDENCE
+from mutator.statistics.shares_with_intervals import CONFIDENCE
 
 RESAMPLES = 999  # fewer than for rates, because each draw of a median goes through all runs
 _RESAMPLING_SEED = 1  # fixed, so that equal results give equal tables

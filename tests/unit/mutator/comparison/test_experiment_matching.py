@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mutator.comparison.compared_runs import ComparedRun
-from mutator.comparison.pairs import ExperimentPair, ResultChangeKind, match_experiments
+from mutator.comparison.experiment_matching import ExperimentPair, ResultChangeKind, match_experiments
 from mutator.model import Experiment, Method, Outcome, Status
 from mutator.results.result_rows import ResultRow
 from mutator.store.run_folder import RunFolder

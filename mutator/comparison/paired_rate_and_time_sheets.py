@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from mutator.comparison.pairs import ExperimentPair, ResultChangeKind, time_to_hazard
+from mutator.comparison.experiment_matching import ExperimentPair, ResultChangeKind, time_to_hazard
 from mutator.model import Outcome, Status
 from mutator.results.result_rows import ResultRow
 from mutator.statistics.guided_against_random import holm_adjusted
 from mutator.statistics.paired_statistics import mcnemar, paired_times, rate_difference
-from mutator.statistics.shares import share
+from mutator.statistics.shares_with_intervals import share
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
 
 TIME_COLUMN_BY_EVENT = {

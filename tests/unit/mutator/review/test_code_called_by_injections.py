@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.review.called_code import CalledCode
+from mutator.review.code_called_by_injections import CalledCode
 from mutator.targets.source_tree import SourceTree
 
 TAG = "  # fi:01234567"

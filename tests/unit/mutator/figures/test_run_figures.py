@@ -5,8 +5,8 @@ import xml.etree.ElementTree as ET
 import pandas as pd
 import pytest
 
-from mutator.figures import propagation_times
-from mutator.figures.drawings import draw_figures, drawing_files
+from mutator.figures import propagation_time_figure
+from mutator.figures.run_figures import draw_figures, drawing_files
 
 from ..statistics.results_frame import results
 
@@ -32,7 +32,7 @@ def texts(svg: bytes) -> list[str]:
 
 
 def test_time_panels_include_only_runs_with_both_events(frame: pd.DataFrame) -> None:
-    panels = {axis.get_title(loc="left"): axis for axis in propagation_times.draw(frame).axes}
+    panels = {axis.get_title(loc="left"): axis for axis in propagation_time_figure.draw(frame).axes}
     assert [t.get_text() for t in panels["activation to manifest"].texts] == ["3", "1"]
     assert [t.get_text() for t in panels["alert to hazard"].texts] == ["2", "1"]
     means = {line.get_label(): list(line.get_ydata()) for line in panels["alert to hazard"].lines}

@@ -8,8 +8,9 @@ import pytest
 
 from mutator.campaigns.git_clone import find_user_name
 from mutator.errors import MutatorError
-from mutator.review.commit_authors import library_commit
-from mutator.review.decisions import (
+from mutator.review.commits_and_four_eyes import library_commit
+from mutator.review.mutant_groups import Group, groups_of_library
+from mutator.review.review_state_and_actions import (
     Review,
     ReviewAction,
     ReviewActionKind,
@@ -17,7 +18,6 @@ from mutator.review.decisions import (
     load_review,
     record_actions,
 )
-from mutator.review.mutant_groups import Group, groups_of_library
 from mutator.workspace import Workspace
 
 HEAD = 'schema: review/2\ntarget: "toycar"\nfour_eyes: true\ndecisions: []\n'

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.statistics.seed_spread import seeds_by_fault_type_sheet, seeds_of, seeds_sheet
+from mutator.statistics.seed_spread_tables import seeds_by_fault_type_sheet, seeds_of, seeds_sheet
 from mutator.statistics.statistics_sheet import Sheet
 
 from .results_frame import results

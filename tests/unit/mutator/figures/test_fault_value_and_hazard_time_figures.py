@@ -4,8 +4,8 @@ import math
 
 import pandas as pd
 
+from mutator.figures.fault_value_and_hazard_time_figures import draw_times_to_hazard, draw_values
 from mutator.figures.golden_and_faulty_plot import render_images
-from mutator.figures.values_and_times import draw_times_to_hazard, draw_values
 
 POINTS = pd.DataFrame(
     {

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from mutator.review.group_display import describe_value_ranges, title_lines
+from mutator.review.group_display_texts import describe_value_ranges, title_lines
 from mutator.review.mutant_groups import Group, groups_of_library
 from mutator.workspace import Workspace
 

@@ -9,7 +9,14 @@ from typing import Any
 
 from mutator._common.phrase_texts import measured_number
 from mutator.comparison.compared_runs import ComparedRun, load_compared_run
-from mutator.comparison.input_differences import (
+from mutator.comparison.experiment_matching import (
+    ExperimentMatching,
+    ExperimentPair,
+    ResultChangeKind,
+    match_experiments,
+    time_to_hazard,
+)
+from mutator.comparison.input_differences_and_remarks import (
     DifferingTargetFiles,
     InputFact,
     campaign_parts_remark,
@@ -19,21 +26,14 @@ from mutator.comparison.input_differences import (
     input_facts,
     severity_remarks,
 )
-from mutator.comparison.metric_sheets import metrics_sheets, severity_cross_table
-from mutator.comparison.pair_sheets import (
+from mutator.comparison.metric_and_severity_sheets import metrics_sheets, severity_cross_table
+from mutator.comparison.paired_rate_and_time_sheets import (
     RunDisplayNames,
     change_counts_sheet,
     endings_cross_table,
     rates_sheets,
     times_sheets,
     usable_pair_events,
-)
-from mutator.comparison.pairs import (
-    ExperimentMatching,
-    ExperimentPair,
-    ResultChangeKind,
-    match_experiments,
-    time_to_hazard,
 )
 from mutator.errors import MutatorError
 from mutator.model import Experiment

@@ -6,10 +6,14 @@ from collections.abc import Sequence
 import pandas as pd
 
 from mutator.comparison.compared_runs import ComparedRun
-from mutator.comparison.pair_sheets import RunDisplayNames, lines_with_holm_p, total_and_type_sheets
-from mutator.comparison.pairs import ExperimentPair
-from mutator.statistics.median_intervals import median_difference
-from mutator.statistics.metric_tables import describe_classes
+from mutator.comparison.experiment_matching import ExperimentPair
+from mutator.comparison.paired_rate_and_time_sheets import (
+    RunDisplayNames,
+    lines_with_holm_p,
+    total_and_type_sheets,
+)
+from mutator.statistics.bootstrap_median_intervals import median_difference
+from mutator.statistics.metric_and_severity_tables import describe_classes
 from mutator.statistics.paired_statistics import wilcoxon_p
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
 from mutator.targets.hazard_severity import SEVERITY_CLASSES, SeverityScale

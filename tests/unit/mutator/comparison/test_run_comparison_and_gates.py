@@ -12,8 +12,8 @@ import pytest
 
 from mutator.comparison import comparison_files
 from mutator.comparison.compared_runs import load_compared_run
-from mutator.comparison.input_differences import differing_pairs_remarks, input_facts
-from mutator.comparison.run_comparison import Comparison, Gate, compare_runs, findings_of_gates
+from mutator.comparison.input_differences_and_remarks import differing_pairs_remarks, input_facts
+from mutator.comparison.run_comparison_and_gates import Comparison, Gate, compare_runs, findings_of_gates
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import AfterHazard, Experiment, Outcome, Status
 from mutator.store.session_environments import SessionEnvironment

@@ -9,9 +9,9 @@ import matplotlib
 import pandas as pd
 import pytest
 
-from mutator.figures import propagation_times
+from mutator.figures import propagation_time_figure
+from mutator.figures.figure_style import with_page_theme
 from mutator.figures.golden_and_faulty_plot import save_figure
-from mutator.figures.style import with_page_theme
 
 _HOSTILE = "axes.facecolor: red\nfont.size: 30\nlines.linewidth: 9\nsvg.fonttype: path\ntext.usetex: True\n"
 _DRAW = """
@@ -31,7 +31,7 @@ def _draw(path: Path) -> bytes:
     line = {"kind": "a/b", "scenario": "S1", "method": "guided", "is_activated": True, "is_hazard": True}
     times = dict.fromkeys(("t_activation", "t_manifest", "t_alert", "t_hazard"), 1.0)
     flags = {"is_manifested": True, "is_alert": False}
-    save_figure(propagation_times.draw(pd.DataFrame([line | times | flags])), [path])
+    save_figure(propagation_time_figure.draw(pd.DataFrame([line | times | flags])), [path])
     return path.read_bytes()
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mutator.statistics import median_intervals
-from mutator.statistics.median_intervals import median_difference, median_interval
-from mutator.statistics.metric_tables import (
+from mutator.statistics import bootstrap_median_intervals
+from mutator.statistics.bootstrap_median_intervals import median_difference, median_interval
+from mutator.statistics.metric_and_severity_tables import (
     metrics_sheet,
     severity_by_fault_type_sheet,
     times_to_hazard_sheet,
@@ -95,8 +95,10 @@ def test_the_interval_of_a_median_resamples_whole_faults(
     pairs: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A simple loop that copies the runs of each drawn fault gives the same interval."""
-    monkeypatch.setattr(median_intervals, "RESAMPLES", 40)
-    monkeypatch.setattr(median_intervals, "_MOST_BATCH_CELLS", 300)  # the draws need several batches
+    monkeypatch.setattr(bootstrap_median_intervals, "RESAMPLES", 40)
+    monkeypatch.setattr(
+        bootstrap_median_intervals, "_MOST_BATCH_CELLS", 300
+    )  # the draws need several batches
     rng = np.random.default_rng(3)
     cluster = pd.Series(rng.integers(0, 6, 30))
     first, second = pd.Series(rng.normal(0, 1, 30)), pd.Series(rng.normal(1, 1, 30).round(1))

@@ -13,8 +13,8 @@ from pathlib import Path, PurePosixPath
 
 from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.mutants.injected_line_syntax import changed_value_positions, tag_of
-from mutator.review import source_names
-from mutator.review.source_names import SUPER, NameUse, SourceImport, SourceModule, uses_in
+from mutator.review import source_definitions_and_uses
+from mutator.review.source_definitions_and_uses import SUPER, NameUse, SourceImport, SourceModule, uses_in
 from mutator.targets.source_tree import SourceTree
 
 _ClassKey = tuple[str, str]  # its file, its name
@@ -41,7 +41,7 @@ class CalledCode:
         `car/weather.py Rain`. `mutated_file` is the content of the file at `path`. Files other than Python
         are included whole.
         """
-        module = source_names.parse_module(path, mutated_file, Path())
+        module = source_definitions_and_uses.parse_module(path, mutated_file, Path())
         return self._sources_with_callees(path, uses_in(module.tree, selection=_InjectedNodes(mutated_file)))
 
     def called_by_expressions(self, path: str, function: str, texts: Iterable[str]) -> dict[str, str]:
@@ -50,7 +50,9 @@ class CalledCode:
         uses: list[NameUse] = []
         for text in texts:
             with suppress(SyntaxError):
-                uses += source_names.uses_inside_function(node, owner, ast.parse(text, mode="eval"))
+                uses += source_definitions_and_uses.uses_inside_function(
+                    node, owner, ast.parse(text, mode="eval")
+                )
         return self._sources_with_callees(path, uses)
 
     def _sources_with_callees(self, path: str, uses: Iterable[NameUse]) -> dict[str, str]:
@@ -170,7 +172,7 @@ class CalledCode:
                 yield from self._methods_of_self((base.path, base.name), name, self_class, depth + 1)
 
     def _module(self, path: str) -> SourceModule:
-        return self._tree.derive_once(path, source_names.parse_module)
+        return self._tree.derive_once(path, source_definitions_and_uses.parse_module)
 
     def _path_of_module(self, module: str) -> str | None:
         stem = module.replace(".", "/")

@@ -2,7 +2,7 @@
 
 import ast
 
-from mutator.review.source_names import uses_in
+from mutator.review.source_definitions_and_uses import uses_in
 
 SOURCE = """\
 import tools

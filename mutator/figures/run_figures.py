@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from mutator.figures import propagation_times
+from mutator.figures import propagation_time_figure
 from mutator.figures.golden_and_faulty_plot import render_images
-from mutator.statistics.results_frame import select_common_columns
+from mutator.statistics.usable_results_frame import select_common_columns
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,5 +54,5 @@ def _draw_propagation_times(frame: pd.DataFrame) -> Drawing:
         title="Propagation times by scenario",
         note="Times between two events, in runs with both (number above). Alert to hazard: "
         "only if the alert came first. Runs that ended before the second event are not shown.",
-        figure=propagation_times.draw(frame),
+        figure=propagation_time_figure.draw(frame),
     )

@@ -12,7 +12,9 @@ import pytest
 from mutator._common import shipped_files
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, ReviewConflict, UnsafePath
-from mutator.review.decisions import (
+from mutator.review.mutant_groups import Group
+from mutator.review.review_entries import BasisDigests
+from mutator.review.review_state_and_actions import (
     Review,
     ReviewAction,
     ReviewActionKind,
@@ -20,8 +22,6 @@ from mutator.review.decisions import (
     load_review,
     record_actions,
 )
-from mutator.review.mutant_groups import Group
-from mutator.review.review_entries import BasisDigests
 from mutator.review.reviewed_texts import diff_from_reviewed_text, render_reviewed_text, write_reviewed_text
 from mutator.workspace import Workspace
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from mutator.figures import style
-from mutator.statistics.event_times import share_of_hazards_within
+from mutator.figures import figure_style
+from mutator.statistics.event_time_statistics import share_of_hazards_within
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,12 +19,12 @@ _LIMIT_COLOUR = "#b00020"
 Limits = Sequence[tuple[float, str]]
 
 
-@style.shipped_style()
+@figure_style.shipped_style()
 def draw_values(points: pd.DataFrame, *, title: str, x_label: str, y_label: str, limits: Limits) -> "Figure":
     """Draw a mark for each row of `points`: `value` and `y`, with `scenario` as colour and shape, filled if
     `is_hazard`. Each of the `limits` is a height and its words.
     """
-    figure, [axis] = style.blank_figure(4.5, 1, 1)
+    figure, [axis] = figure_style.blank_figure(4.5, 1, 1)
     for number, (scenario, group) in enumerate(points.groupby("scenario", sort=True, observed=True)):
         colour, marker = _COLOURS[number % len(_COLOURS)], _MARKERS[number % len(_MARKERS)]
         for is_hazard, part in group.groupby("is_hazard"):
@@ -47,18 +47,18 @@ def draw_values(points: pd.DataFrame, *, title: str, x_label: str, y_label: str,
             textcoords="offset points",
             ha="right",
             color=_LIMIT_COLOUR,
-            fontsize=style.SMALL_TEXT_POINTS,
+            fontsize=figure_style.SMALL_TEXT_POINTS,
         )
     _finish(figure, axis, title, x_label, y_label)
     return figure
 
 
-@style.shipped_style()
+@figure_style.shipped_style()
 def draw_times_to_hazard(frame: pd.DataFrame, fault: pd.DataFrame | None, reaction_time_s: float) -> "Figure":
     """Draw the share of hazards that have come by each time from the activation: of all runs of a frame and,
     if given, of those of one `fault`; with a line at a reaction time and the shares there.
     """
-    figure, [axis] = style.blank_figure(4.0, 1, 1)
+    figure, [axis] = figure_style.blank_figure(4.0, 1, 1)
     parts = [("all faults", frame, "#5c6672", 2.5)]
     if fault is not None:
         parts.append(("this fault", fault, _COLOURS[1], 1.6))
@@ -75,7 +75,7 @@ def draw_times_to_hazard(frame: pd.DataFrame, fault: pd.DataFrame | None, reacti
             linewidth=width,
             label=label,
         )
-    axis.axvline(reaction_time_s, color=style.INK_COLOUR, linestyle="--", linewidth=1.2)
+    axis.axvline(reaction_time_s, color=figure_style.INK_COLOUR, linestyle="--", linewidth=1.2)
     axis.set_ylim(0, 104)
     axis.set_xlim(0, 1.05 * latest)
     _finish(
@@ -85,10 +85,12 @@ def draw_times_to_hazard(frame: pd.DataFrame, fault: pd.DataFrame | None, reacti
 
 
 def _finish(figure: "Figure", axis: "Axes", title: str, x_label: str, y_label: str) -> None:
-    axis.set_title(title, fontsize=style.TEXT_POINTS, loc="left")
-    axis.set_xlabel(x_label, fontsize=style.TEXT_POINTS)
-    axis.set_ylabel(y_label, fontsize=style.TEXT_POINTS)
+    axis.set_title(title, fontsize=figure_style.TEXT_POINTS, loc="left")
+    axis.set_xlabel(x_label, fontsize=figure_style.TEXT_POINTS)
+    axis.set_ylabel(y_label, fontsize=figure_style.TEXT_POINTS)
     axis.grid(visible=True, linewidth=0.4, alpha=0.5)
     axis.set_axisbelow(True)
     if axis.get_legend_handles_labels()[0]:
-        figure.legend(loc="outside lower center", ncols=4, fontsize=style.SMALL_TEXT_POINTS, frameon=False)
+        figure.legend(
+            loc="outside lower center", ncols=4, fontsize=figure_style.SMALL_TEXT_POINTS, frameon=False
+        )

@@ -13,8 +13,8 @@ from mutator._common import cache_layout_and_pruning
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
-from mutator.review import effect_pictures
-from mutator.review.effect_pictures import LEVEL_NAMES, EffectPictures
+from mutator.review import image_effect_pictures
+from mutator.review.image_effect_pictures import LEVEL_NAMES, EffectPictures
 from mutator.review.mutant_groups import Group, groups_of_library
 from mutator.workspace import Workspace
 
@@ -50,7 +50,9 @@ def groups_of(workspace: Workspace) -> tuple[Group, ...]:
 
 
 def drawn(workspace: Workspace, group: Group) -> EffectPictures:
-    return effect_pictures.pictures_of_groups(workspace, workspace.manifest("toycar"), [group])[group.id]
+    return image_effect_pictures.pictures_of_groups(workspace, workspace.manifest("toycar"), [group])[
+        group.id
+    ]
 
 
 def grey(jpeg: bytes) -> float:
@@ -73,13 +75,13 @@ def test_each_level_has_a_pair_of_images(lit: Lit) -> None:
     workspace, group = lit(values="[10, 50]")
     manifest = workspace.manifest("toycar")
     pairs = [
-        effect_pictures.jpegs_before_and_after(workspace, manifest, group, level)
+        image_effect_pictures.jpegs_before_and_after(workspace, manifest, group, level)
         for level in (*LEVEL_NAMES, "utmost")
     ]
     assert [pair and round(grey(pair[1])) for pair in pairs] == [100, None, 140, None]
     probe = groups_of(workspace)[-1]
-    assert not effect_pictures.can_have_pictures(probe)
-    assert effect_pictures.jpegs_before_and_after(workspace, manifest, probe, "most") is None
+    assert not image_effect_pictures.can_have_pictures(probe)
+    assert image_effect_pictures.jpegs_before_and_after(workspace, manifest, probe, "most") is None
 
 
 def test_images_are_cached_until_an_effect_changes(lit: Lit, runs: list[str]) -> None:
@@ -103,7 +105,7 @@ def test_one_run_of_the_target_draws_all_groups_of_a_place(lit: Lit, runs: list[
         replace(group, id=name, faults=faults)
         for name, faults in (("a", group.faults[:2]), ("b", group.faults[2:5]))
     ]
-    found = effect_pictures.pictures_of_groups(workspace, workspace.manifest("toycar"), halves)
+    found = image_effect_pictures.pictures_of_groups(workspace, workspace.manifest("toycar"), halves)
     assert {name: [one.label for one in made.levels] for name, made in found.items()} == {
         "a": ["amount 10", "amount 20"],
         "b": ["amount 40", "amount 80", "amount 160"],
@@ -117,17 +119,17 @@ def test_each_value_is_applied_to_the_original_image(lit: Lit) -> None:
 
 
 def test_amounts_are_ordered_by_their_effect_on_the_image() -> None:
-    assert effect_pictures._indices_by_severity([1.0, 2.0, 4.0]) == [0, 1, 2]
-    assert effect_pictures._indices_by_severity([90.0, 40.0, 20.0]) == [2, 1, 0]
-    assert effect_pictures._indices_by_severity([90.0, 40.0, 1.0, 30.0, 80.0]) == [2, 3, 1, 4, 0]
-    assert effect_pictures._indices_by_severity([7.0]) == [0]
+    assert image_effect_pictures._indices_by_severity([1.0, 2.0, 4.0]) == [0, 1, 2]
+    assert image_effect_pictures._indices_by_severity([90.0, 40.0, 20.0]) == [2, 1, 0]
+    assert image_effect_pictures._indices_by_severity([90.0, 40.0, 1.0, 30.0, 80.0]) == [2, 3, 1, 4, 0]
+    assert image_effect_pictures._indices_by_severity([7.0]) == [0]
 
 
 def test_more_blobs_are_more_severe() -> None:
     """Nine blobs are less severe than ten, even if they cover a larger area."""
-    assert effect_pictures._indices_by_severity([1.0, 3.0, 2.0, 5.0, 4.0]) == [0, 1, 2, 3, 4]
-    assert effect_pictures._indices_by_severity([5.0, 3.0, 4.0, 1.0]) == [3, 2, 1, 0]
-    assert effect_pictures._indices_by_severity([2.0, 2.0]) == [0, 1]
+    assert image_effect_pictures._indices_by_severity([1.0, 3.0, 2.0, 5.0, 4.0]) == [0, 1, 2, 3, 4]
+    assert image_effect_pictures._indices_by_severity([5.0, 3.0, 4.0, 1.0]) == [3, 2, 1, 0]
+    assert image_effect_pictures._indices_by_severity([2.0, 2.0]) == [0, 1]
 
 
 @pytest.mark.parametrize(
@@ -157,8 +159,8 @@ def test_every_image_effect_of_the_library_has_pictures(clone: Workspace, tmp_pa
     wanted = [
         g
         for g in groups_of_library(clone, manifest, specs=["vision_*/*"])
-        if effect_pictures.can_have_pictures(g)
+        if image_effect_pictures.can_have_pictures(g)
     ]
-    found = effect_pictures.pictures_of_groups(clone, manifest, wanted)
+    found = image_effect_pictures.pictures_of_groups(clone, manifest, wanted)
     assert len(found) == len(wanted) >= 20
     assert all(level.after_jpeg != made.before_jpeg for made in found.values() for level in made.levels)

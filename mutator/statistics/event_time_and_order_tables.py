@@ -5,7 +5,7 @@ from dataclasses import astuple
 
 import pandas as pd
 
-from mutator.statistics import event_times
+from mutator.statistics import event_time_statistics
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 
@@ -20,7 +20,7 @@ def propagation_sheet(
 ) -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for method, scenario, group in _groups_with_totals(frame):
-        for step, spread in event_times.propagation_spreads_by_step(group).items():
+        for step, spread in event_time_statistics.propagation_spreads_by_step(group).items():
             if has_alerts or "alert" not in step:
                 lines.append((method, scenario, step, *astuple(spread)))
     return Sheet(
@@ -49,7 +49,7 @@ def alert_to_hazard_sheet(
 ) -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for method, scenario, group in _groups_with_totals(frame):
-        reaction = event_times.alert_to_hazard_times(group, end_by_scenario, driver_reaction_s)
+        reaction = event_time_statistics.alert_to_hazard_times(group, end_by_scenario, driver_reaction_s)
         median: tuple[SheetCell, ...] = (reaction.median_s, reaction.median_low_s, reaction.median_high_s)
         counts = (
             reaction.runs_alerted_first,
@@ -80,11 +80,13 @@ def alert_to_hazard_sheet(
 
 
 def alerts_before_hazards_sheet(
-    frame: pd.DataFrame, first_alerts_by_hazard_run: event_times.FirstAlertsByHazardRun
+    frame: pd.DataFrame, first_alerts_by_hazard_run: event_time_statistics.FirstAlertsByHazardRun
 ) -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for method, group in frame.groupby("method"):
-        shares = event_times.alert_first_share_by_hazard_and_alert(group, first_alerts_by_hazard_run)
+        shares = event_time_statistics.alert_first_share_by_hazard_and_alert(
+            group, first_alerts_by_hazard_run
+        )
         lines += [(str(method), hazard, alert, share) for (hazard, alert), share in shares.items()]
     return Sheet(
         name="alerts_before_hazards",
@@ -101,7 +103,7 @@ def hazard_orders_sheet(frame: pd.DataFrame) -> Sheet:
     for (method, module), group in frame.groupby(["method", "module"]):
         lines += [
             (str(method), str(module), order, n)
-            for order, n in event_times.run_count_by_hazard_order(group).items()
+            for order, n in event_time_statistics.run_count_by_hazard_order(group).items()
         ]
     return Sheet(
         name="hazard_orders",

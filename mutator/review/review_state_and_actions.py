@@ -18,7 +18,7 @@ from mutator._common.shipped_files import check_not_shipped
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, ReviewConflict
 from mutator.review import review_file, reviewed_texts
-from mutator.review.commit_authors import check_four_eyes, library_commit
+from mutator.review.commits_and_four_eyes import check_four_eyes, library_commit
 from mutator.review.mutant_groups import Group
 from mutator.review.review_entries import DecisionVerdict, Flag, GroupDecision, Remark, ReviewEntry
 from mutator.workspace import Workspace
