@@ -9,8 +9,8 @@ from pathlib import Path
 
 from mutator.paper.published_numbers import load_published_numbers
 from mutator.paper.rank_agreement import GUIDED, measure_agreement
-from mutator.statistics.experiment_tallies import Tally, tally_by_fault_type
-from mutator.statistics.usable_results_frame import load_usable_results
+from mutator.statistics.results_frame import load_usable_results
+from mutator.statistics.tallies import Tally, tally_by_fault_type
 
 REFERENCES = Path(__file__).resolve().parents[1] / "fault_library/references"
 

@@ -24,7 +24,7 @@ from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Experiment, ObservedActivation, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.results import table_building
-from mutator.statistics.usable_results_frame import load_usable_results
+from mutator.statistics.results_frame import load_usable_results
 from mutator.store import file_digests, plan_file
 from mutator.store.checks_file import CHECKS_FILE as CHECKS
 from mutator.store.checksummed_lines import LineWriter

@@ -198,7 +198,7 @@ EXPORTS = Door(
 IMPORTERS = Door(
     addition="importer",
     group="mutator.importers",
-    type_path="mutator.outcomes.trace_reading_by_suffix:Importer",
+    type_path="mutator.outcomes.trace_files:Importer",
     shipped_package="mutator.outcomes.importers",
     api_argument="trace",
 )

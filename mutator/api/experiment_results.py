@@ -11,7 +11,7 @@ from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.outcomes.fault_paths import FaultPathFinder
 from mutator.outcomes.trace_and_record_loading import Trace, values_on_steps
-from mutator.outcomes.trace_reading_by_suffix import own_times
+from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.verdict_rules import (
     classified_hazard_of,
     manifestation_to_hazard_time,

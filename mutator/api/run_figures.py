@@ -7,8 +7,8 @@ from mutator._common.message_text import describe_choices
 from mutator.api.run_contents import RunContents
 from mutator.errors import MutatorError
 from mutator.figures.fault_value_and_hazard_time_figures import draw_times_to_hazard, draw_values
+from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.sheet_selection import DEFAULT_DRIVER_REACTION_S
-from mutator.statistics.usable_results_frame import prepare_results
 from mutator.targets.hazard_severity import DELTA_V_NAME
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN
 

@@ -36,8 +36,8 @@ from mutator.results import outcome_counting
 from mutator.results import table_building as results_table
 from mutator.results.note_without_canary import no_canary_note
 from mutator.statistics.mutation_score import mutation_score_sheet, totals_table
+from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet
-from mutator.statistics.usable_results_frame import prepare_results
 from mutator.store import run_deletion
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_progress import ProgressCallback

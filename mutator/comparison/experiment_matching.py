@@ -17,8 +17,8 @@ _TIME_DECIMALS = 6  # decimals of a time from activation; absorbs rounding error
 
 
 class ResultChangeKind(StrEnum):
-    """A change in the second run of a pair, relative to the first. `run_comparison.Gate` explains the changes
-    for the worse.
+    """A change in the second run of a pair, relative to the first. `run_comparison_and_gates.Gate` explains
+    the changes for the worse.
     """
 
     NEW_SILENT_HAZARD = "new-silent-hazard"

@@ -14,7 +14,7 @@ import numpy as np
 
 from mutator.model import Record
 from mutator.outcomes.trace_and_record_loading import Trace, values_on_steps
-from mutator.outcomes.trace_reading_by_suffix import own_times
+from mutator.outcomes.trace_files import own_times
 from mutator.store.series_format import ExtraPoints, Series, encode_series
 from mutator.store.time_series_folder import TimeSeriesFolder, run_facts_for_series, write_rerun_series
 from mutator.targets.channels import Channel, Role

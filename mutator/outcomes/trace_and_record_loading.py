@@ -15,8 +15,8 @@ from mutator._common.doors import IMPORTERS
 from mutator._common.hashing import digest
 from mutator._common.resource_shortages import find_shortage
 from mutator.errors import BadOutput, BadTrace, MutatorError
-from mutator.outcomes import trace_reading_by_suffix
-from mutator.outcomes.trace_reading_by_suffix import own_times
+from mutator.outcomes import trace_files
+from mutator.outcomes.trace_files import own_times
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 
@@ -44,7 +44,7 @@ def load_trace(
     path = path_below(out, manifest.trace_file)
     expected_file = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
     try:
-        trace = trace_reading_by_suffix.read_trace(path, manifest, channels, optional)
+        trace = trace_files.read_trace(path, manifest, channels, optional)
     except BadTrace as err:
         raise BadOutput(err.got, where=path, expected=err.expected) from None
     except KeyError as err:

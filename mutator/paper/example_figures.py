@@ -8,8 +8,8 @@ import pandas as pd
 from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.execution.run_traces import RunTraces
+from mutator.figures.drawings import Drawing
 from mutator.figures.golden_and_faulty_plot import event_marks
-from mutator.figures.run_figures import Drawing
 from mutator.outcomes.series_sampling import MOST_SAMPLES_PER_S
 from mutator.paper.run_pair_plot import plot_run_pair
 from mutator.paper.unsafe_actions import ACTION_FIGURES, ActionFigure, RunPair

@@ -1,11 +1,11 @@
 """Measures for published observations: numbers computed from a frame of results, each with an interval.
 
-`runs` comes from `mutator.statistics.usable_results_frame.load_usable_results`. `of`, `part` and `against` are
+`runs` comes from `mutator.statistics.results_frame.load_usable_results`. `of`, `part` and `against` are
 pandas queries on it; an empty query selects all runs. Reports show the call for each claim, which you can
 repeat in Python:
 
     from mutator.paper.measures import *
-    from mutator.statistics.usable_results_frame import load_usable_results
+    from mutator.statistics.results_frame import load_usable_results
     runs = load_usable_results(Path("results.csv"))
 """
 
@@ -18,9 +18,9 @@ import pandas as pd
 
 from mutator._common.message_text import counted
 from mutator.statistics import event_time_statistics, guided_against_random
-from mutator.statistics.experiment_tallies import tally_by_fault_type
 from mutator.statistics.shares_with_intervals import CONFIDENCE, Share
 from mutator.statistics.shares_with_intervals import share as wilson
+from mutator.statistics.tallies import tally_by_fault_type
 
 __all__ = [
     "Path",

@@ -19,7 +19,7 @@ are resampled, so the true uncertainty is at least as large."""
 
 SESSION_SETUP_CODE = """\
 from mutator.paper.measures import *
-from mutator.statistics.usable_results_frame import load_usable_results
+from mutator.statistics.results_frame import load_usable_results
 
 runs = load_usable_results(Path("results.csv"))"""
 

@@ -14,7 +14,7 @@ from mutator.paper.published_numbers import has_published_numbers, load_publishe
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import sheet_csv_files
 from mutator.report.reported_run import ReportedRun
-from mutator.statistics.usable_results_frame import select_common_columns
+from mutator.statistics.results_frame import select_common_columns
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,8 +7,8 @@ from pydantic import Field
 
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_source_lines import YamlSource
-from mutator.statistics.experiment_tallies import Tally
 from mutator.statistics.published_counts import PublishedCounts
+from mutator.statistics.tallies import Tally
 
 FILE_NAMES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
 

@@ -9,7 +9,7 @@ from mutator.config.yaml_files import load_yaml
 from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.paper.published_numbers import FILE_NAMES, PublishedNumbers, load_published_numbers
-from mutator.statistics.experiment_tallies import Tally, sum_tallies
+from mutator.statistics.tallies import Tally, sum_tallies
 from mutator.workspace import Workspace
 
 _METHODS = ("guided", "random")

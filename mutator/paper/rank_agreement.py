@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 
 from mutator.paper.published_numbers import PublishedNumbers
-from mutator.statistics.experiment_tallies import tally_by_fault_type
 from mutator.statistics.paired_statistics import resampled_interval
+from mutator.statistics.tallies import tally_by_fault_type
 
 GUIDED = "guided"
 

@@ -88,8 +88,8 @@ def render_hazard_analysis_page(workspace: Workspace) -> str:
         "analysis](../how-to/change-the-hazard-analysis.md) shows how to write "
         "them. `mutator stpa` prints and checks them.\n",
         f"{_STRICT_YAML_LINKS} The first key of each file is `schema`: "
-        f"`{accidents_and_hazards.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_TABLE_SCHEMA}`,\n`control_structure/1`, "
-        "`unsafe_control_actions/1`, `causal_factors/1`.\n",
+        f"`{accidents_and_hazards.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_TABLE_SCHEMA}`,\n"
+        "`control_structure/1`, `unsafe_control_actions/1`, `causal_factors/1`.\n",
         *model_sections(
             "hazard-analysis.md",
             accidents_and_hazards.HazardsModel,

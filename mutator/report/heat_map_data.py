@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from mutator.report.reported_run import ReportedRun
+from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares_with_intervals import CONFIDENCE
-from mutator.statistics.usable_results_frame import hazard_names
 from mutator.targets.hazard_severity import SEVERITY_CLASSES
 
 HeatMapCells = list[list[Any]]  # by row; each cell has a count or value, and its base (the number of runs)

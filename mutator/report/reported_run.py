@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 from mutator.campaigns.installed_studies import load_installed_study
 from mutator.errors import MutatorError
-from mutator.figures.run_figures import Drawing
+from mutator.figures.drawings import Drawing
 from mutator.model import Experiment, Fault, Record, Status
 from mutator.outcomes.fault_free_runs import FaultFreeRun, load_fault_free_runs
 from mutator.outcomes.fault_paths import fault_paths_of
@@ -20,7 +20,7 @@ from mutator.report.source_lines import SourceLines
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import Results
 from mutator.statistics.published_counts import PublishedCounts
-from mutator.statistics.usable_results_frame import prepare_results
+from mutator.statistics.results_frame import prepare_results
 from mutator.store import plan_file
 from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import RunFolder

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares_with_intervals import CONFIDENCE, Share, share
-from mutator.statistics.usable_results_frame import hazard_names
 
 FirstAlertsByHazardRun = Mapping[str, tuple[tuple[str, float], ...]]
 _SHARE_TOLERANCE = (

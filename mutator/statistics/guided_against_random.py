@@ -12,10 +12,10 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from mutator.statistics.experiment_tallies import Tally
 from mutator.statistics.paired_statistics import PairCounts, resampled_interval
 from mutator.statistics.paired_statistics import mcnemar as exact_mcnemar
 from mutator.statistics.shares_with_intervals import CONFIDENCE
+from mutator.statistics.tallies import Tally
 
 RateBase = Literal["activated", "injected"]
 RATE_BASES: tuple[RateBase, ...] = ("activated", "injected")

@@ -3,12 +3,12 @@
 import pandas as pd
 
 from mutator.statistics import guided_against_random
-from mutator.statistics.experiment_tallies import tally_by_fault_type
 from mutator.statistics.guided_against_random import RATE_BASES, RateBase
 from mutator.statistics.paired_statistics import PairCounts
 from mutator.statistics.published_counts import THIS_RUN, PublishedCounts, counts_by_source
 from mutator.statistics.shares_with_intervals import share
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
+from mutator.statistics.tallies import tally_by_fault_type
 
 
 def hazard_odds_sheet(frame: pd.DataFrame, published: PublishedCounts | None) -> Sheet:

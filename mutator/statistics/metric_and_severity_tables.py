@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 import pandas as pd
 
 from mutator.statistics.bootstrap_median_intervals import median_interval
+from mutator.statistics.results_frame import select_common_columns
 from mutator.statistics.shares_with_intervals import share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
-from mutator.statistics.usable_results_frame import select_common_columns
 from mutator.targets.hazard_severity import SEVERITY_CLASSES, SeverityScale
 from mutator.targets.stored_target_facts import MetricFacts
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from mutator.statistics.experiment_tallies import Tally
+from mutator.statistics.tallies import Tally
 
 THIS_RUN = "here"  # label of a run's rows next to published rows
 TallyByGroup = Mapping[tuple[str, str], Tally]

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 
 from mutator.statistics.paired_statistics import resampled_interval
+from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares_with_intervals import share
 from mutator.statistics.statistics_sheet import PercentRate, Sheet, SheetCell
-from mutator.statistics.usable_results_frame import hazard_names
 
 ALL_FAULTS = "all"  # label of the lines for all faults
 _NOTE = (

@@ -6,11 +6,11 @@ import pandas as pd
 
 from mutator.statistics import event_time_and_order_tables, guided_against_random_tables, summary_tables
 from mutator.statistics.event_time_statistics import FirstAlertsByHazardRun
-from mutator.statistics.experiment_tallies import tally_by_fault_type, tally_by_scenario
 from mutator.statistics.guided_against_random import GUIDED, RANDOM
 from mutator.statistics.published_counts import PublishedCounts
+from mutator.statistics.results_frame import select_common_columns
 from mutator.statistics.statistics_sheet import Sheet
-from mutator.statistics.usable_results_frame import select_common_columns
+from mutator.statistics.tallies import tally_by_fault_type, tally_by_scenario
 
 DEFAULT_DRIVER_REACTION_S = (
     1.8  # a driver's reaction time to a visible warning; used if no publication states one

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable
 
-from mutator.statistics.experiment_tallies import Tally, sum_tallies
 from mutator.statistics.published_counts import THIS_RUN, PublishedCounts, TallyByGroup
 from mutator.statistics.shares_with_intervals import Share, share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
+from mutator.statistics.tallies import Tally, sum_tallies
 
 _MEASURES = (
     ("activated", "injected"),

@@ -85,8 +85,8 @@ def _link_arrows(analysis: HazardAnalysis, layout: StructureLayout) -> Iterator[
 def _arrow_path(points: Iterable[Point], colour: str, width: float, *, dashed: bool = False) -> str:
     dashes = ' stroke-dasharray="6 4"' if dashed else ""
     return (
-        f'<path d="{arrow_and_box_svg.path_data(points)}" fill="none" stroke="{colour}" stroke-width="{width}"'
-        f'{dashes} marker-end="url(#tip-{colour[1:]})"/>'
+        f'<path d="{arrow_and_box_svg.path_data(points)}" fill="none" stroke="{colour}" '
+        f'stroke-width="{width}"{dashes} marker-end="url(#tip-{colour[1:]})"/>'
     )
 
 
@@ -96,7 +96,8 @@ def _component_boxes(analysis: HazardAnalysis, layout: StructureLayout) -> Itera
         box = layout.boxes[name]
         edge, width = (FAULT_COLOUR, 3) if name in faulty else (INK_COLOUR, 1.2)
         look = f' fill="{FILL_BY_KIND[component.kind]}" stroke="{edge}" stroke-width="{width}"'
-        yield f"<g><title>{_escaped_line(component.about)}</title>{arrow_and_box_svg.box_rectangle(box, look)}"
+        yield f"<g><title>{_escaped_line(component.about)}</title>"
+        yield arrow_and_box_svg.box_rectangle(box, look)
         yield from _box_text(box)
         yield "</g>"
 

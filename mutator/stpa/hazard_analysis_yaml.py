@@ -1,7 +1,7 @@
 """The hazard analysis as data: control structure, unsafe control actions, causal factors.
 
-Loading checks all references between the files. `mutator.stpa.hazard_analysis_checks` compares the analysis with the
-fault specs and the target.
+Loading checks all references between the files. `mutator.stpa.hazard_analysis_checks` compares the analysis
+with the fault specs and the target.
 """
 
 from collections.abc import Collection, Mapping

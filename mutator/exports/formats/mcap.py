@@ -25,7 +25,7 @@ from mutator.execution.run_traces import RunTraces
 from mutator.exports import Export, ExportRequest
 from mutator.model import Experiment, Record
 from mutator.outcomes.trace_and_record_loading import Trace
-from mutator.outcomes.trace_reading_by_suffix import own_times
+from mutator.outcomes.trace_files import own_times
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder

@@ -4,7 +4,7 @@ import io
 
 from mutator._common.bounded_reading import read_bounded
 from mutator.errors import BadTrace
-from mutator.outcomes.trace_reading_by_suffix import (
+from mutator.outcomes.trace_files import (
     MOST_COLUMNS,
     Arrays,
     Importer,

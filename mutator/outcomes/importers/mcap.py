@@ -3,7 +3,7 @@
 import numpy as np
 
 from mutator.outcomes.mcap_reader import read_topics
-from mutator.outcomes.trace_reading_by_suffix import Arrays, Importer, TraceRequest, own_times
+from mutator.outcomes.trace_files import Arrays, Importer, TraceRequest, own_times
 
 
 def _read_mcap(request: TraceRequest) -> Arrays:

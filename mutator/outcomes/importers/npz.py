@@ -7,7 +7,7 @@ import numpy as np
 from mutator._common.bounded_reading import read_bounded
 from mutator.errors import BadTrace
 from mutator.outcomes import npz_reader
-from mutator.outcomes.trace_reading_by_suffix import (
+from mutator.outcomes.trace_files import (
     MOST_COLUMNS,
     MOST_TRACE_BYTES,
     Arrays,

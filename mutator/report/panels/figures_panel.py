@@ -2,8 +2,8 @@
 
 import base64
 
+from mutator.figures.drawings import Drawing, draw_figures, drawing_files
 from mutator.figures.figure_style import with_page_theme
-from mutator.figures.run_figures import Drawing, draw_figures, drawing_files
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 

@@ -31,7 +31,7 @@ from mutator.model import (
     Status,
 )
 from mutator.mutants.mutant_building import build
-from mutator.outcomes import trace_reading_by_suffix
+from mutator.outcomes import trace_files
 from mutator.preflight.check_run_problems import output_digest_of
 from mutator.store.plan_choices import Choices
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
@@ -174,7 +174,7 @@ def test_a_run_without_usable_outputs_is_a_crash_only_if_its_fault_was_active(
 IMPORTER = """\
 from mutator._common.doors import IMPORTERS
 from mutator.errors import BadTrace
-from mutator.outcomes.trace_reading_by_suffix import Importer
+from mutator.outcomes.trace_files import Importer
 
 def read(request):
     arrays = IMPORTERS.load("npz").read(request)
@@ -200,7 +200,7 @@ def boom(
         text = '[project]\nname = "rvtraces"\nversion = "0.3"\n[project.entry-points."mutator.importers"]\n'
         (tmp_path / "pyproject.toml").write_text(f'{text}boom = "rvtraces:boom"\n')
         monkeypatch.delitem(sys.modules, "rvtraces", raising=False)
-        trace_reading_by_suffix._importer_for.cache_clear()
+        trace_files._importer_for.cache_clear()
         install(tmp_path)
 
     return installed

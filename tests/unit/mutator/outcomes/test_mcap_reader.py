@@ -8,7 +8,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.outcomes.importers import mcap
-from mutator.outcomes.trace_reading_by_suffix import TraceRequest
+from mutator.outcomes.trace_files import TraceRequest
 from mutator.targets.channels import Channel
 from tests.costs import is_refused
 

@@ -21,8 +21,8 @@ from mutator.paper.observation_judging import (
     judge_observations,
 )
 from mutator.paper.published_numbers import load_published_numbers
-from mutator.statistics.experiment_tallies import Tally
 from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.tallies import Tally
 
 from ..statistics.results_frame import results
 

@@ -9,10 +9,10 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.paper.published_numbers import PublishedNumbers, load_published_numbers
 from mutator.statistics import guided_against_random
-from mutator.statistics.experiment_tallies import Tally, sum_tallies, tally_by_fault_type, tally_by_scenario
 from mutator.statistics.guided_against_random_tables import hazard_odds_sheet, hazards_by_fault_type_sheet
 from mutator.statistics.shares_with_intervals import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
+from mutator.statistics.tallies import Tally, sum_tallies, tally_by_fault_type, tally_by_scenario
 
 from ..statistics.results_frame import results
 

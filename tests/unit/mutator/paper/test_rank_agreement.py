@@ -9,7 +9,7 @@ from scipy.stats import spearmanr
 
 from mutator.paper.published_numbers import load_published_numbers
 from mutator.paper.rank_agreement import GUIDED, measure_agreement, rank_correlation
-from mutator.statistics.experiment_tallies import Tally
+from mutator.statistics.tallies import Tally
 
 REFERENCES = Path(__file__).parents[4] / "fault_library/references"
 

@@ -33,7 +33,7 @@ from mutator.results.table_columns import (
     result_columns_of,
 )
 from mutator.results.table_reader import Results, _load_columns, frame_of_experiments, is_same_parquet
-from mutator.statistics.usable_results_frame import hazard_names, load_usable_results, prepare_results
+from mutator.statistics.results_frame import hazard_names, load_usable_results, prepare_results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import load_head

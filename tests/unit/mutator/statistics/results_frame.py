@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from mutator.statistics.usable_results_frame import prepare_results
+from mutator.statistics.results_frame import prepare_results
 
 _EMPTY = ("t_activation", "t_manifest", "h1", "t_h1", "h2", "t_h2", "h3", "t_h3", "t_alert")
 _ROW = {

@@ -7,10 +7,10 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.results.table_columns import result_columns
-from mutator.statistics.experiment_tallies import Tally, tally_by_fault_type, tally_by_scenario
+from mutator.statistics.results_frame import load_usable_results
 from mutator.statistics.shares_with_intervals import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
-from mutator.statistics.usable_results_frame import load_usable_results
+from mutator.statistics.tallies import Tally, tally_by_fault_type, tally_by_scenario
 from tests.made_head import made_head
 from tests.made_up_results import write_results
 

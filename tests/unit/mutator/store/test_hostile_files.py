@@ -13,7 +13,7 @@ import pytest
 from mutator._common.files import read_json
 from mutator.errors import MutatorError
 from mutator.outcomes.importers import npz
-from mutator.outcomes.trace_reading_by_suffix import TraceRequest
+from mutator.outcomes.trace_files import TraceRequest
 from mutator.store import series_format
 from mutator.store.checksummed_blocks import block_bytes, read_blocks
 from mutator.store.checksummed_lines import read_segment, verified_lines

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from mutator.figures import propagation_time_figure
-from mutator.figures.run_figures import draw_figures, drawing_files
+from mutator.figures.drawings import draw_figures, drawing_files
 
 from ..statistics.results_frame import results
 

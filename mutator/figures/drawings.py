@@ -8,7 +8,7 @@ import pandas as pd
 
 from mutator.figures import propagation_time_figure
 from mutator.figures.golden_and_faulty_plot import render_images
-from mutator.statistics.usable_results_frame import select_common_columns
+from mutator.statistics.results_frame import select_common_columns
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
