@@ -96,8 +96,8 @@ def _component_boxes(analysis: HazardAnalysis, layout: StructureLayout) -> Itera
         box = layout.boxes[name]
         edge, width = (FAULT_COLOUR, 3) if name in faulty else (INK_COLOUR, 1.2)
         look = f' fill="{FILL_BY_KIND[component.kind]}" stroke="{edge}" stroke-width="{width}"'
-        yield f"<g><title>{_escaped_line(component.about)}</title>"
-        yield arrow_and_box_svg.box_rectangle(box, look)
+        rectangle = arrow_and_box_svg.box_rectangle(box, look)
+        yield f"<g><title>{_escaped_line(component.about)}</title>{rectangle}"
         yield from _box_text(box)
         yield "</g>"
 
