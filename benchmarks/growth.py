@@ -18,7 +18,7 @@ from pathlib import Path
 from time import process_time
 
 from mutator._common.hashing import digest
-from mutator.audit.seal import seals_of
+from mutator.audit.run_digests_and_seal import seals_of
 from mutator.campaigns.plan import Plan, build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Experiment, ObservedActivation, Outcome, Record, Status

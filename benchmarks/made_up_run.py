@@ -22,7 +22,7 @@ import numpy as np
 from growth import record
 
 from mutator._common.hashing import canonical_json, digest
-from mutator.audit.seal import seals_of
+from mutator.audit.run_digests_and_seal import seals_of
 from mutator.campaigns import run_environment
 from mutator.campaigns.plan import SeedBySeedPlan
 from mutator.campaigns.plan_freezing import freeze_plan

@@ -28,15 +28,15 @@ from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.outcomes.series_sampling import SeriesSampler
-from mutator.report import experiment_list as report_browse
-from mutator.report import markdown_and_html as report_page
+from mutator.report import experiment_list_data as report_browse
+from mutator.report import report_markdown_and_html as report_page
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
-from mutator.report.experiment_list import ExperimentListData
-from mutator.report.glossary import glossary_of
-from mutator.report.markdown_and_html import ReportContent
+from mutator.report.experiment_list_data import ExperimentListData
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.panels.fault_paths_panel import build_fault_paths_panel
 from mutator.report.panels.first_screen_panel import build_first_screen_panel
+from mutator.report.report_glossary import glossary_of
+from mutator.report.report_markdown_and_html import ReportContent
 from mutator.report.reported_run import ReportedRun
 from mutator.results import table_building
 from mutator.results.outcome_counting import count_by_outcome_or_status

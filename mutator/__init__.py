@@ -45,11 +45,11 @@ NAMES_BY_MODULE = {
     "mutator.exports": ("Format",),
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),
     "mutator.onboarding.library_import": ("EntryOutcome", "ImportedEntry", "ImportedLibrary"),
-    "mutator.report.film": ("Shot",),
+    "mutator.report.experiment_filming": ("Shot",),
     "mutator.report.run_history": ("History",),
     "mutator.store.plan_choices": ("Choices",),
     "mutator.store.run_progress": ("Progress",),
-    "mutator.audit.seal": ("Seals",),
+    "mutator.audit.run_digests_and_seal": ("Seals",),
     "mutator.workspace": ("Workspace",),
 }
 _MODULE_BY_NAME = {name: home for home, names in NAMES_BY_MODULE.items() for name in names}

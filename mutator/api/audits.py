@@ -12,10 +12,10 @@ from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.audit.run_audit import AuditCheck, run_audit_checks
+from mutator.audit.run_digests_and_seal import Seals, seals_of, unsealed_facts
 from mutator.audit.run_repair import repair_run as put_aside
-from mutator.audit.seal import Seals, seals_of, unsealed_facts
-from mutator.audit.signatures import sign_seal as write_signature
-from mutator.audit.signatures import verified_signer
+from mutator.audit.seal_signatures import sign_seal as write_signature
+from mutator.audit.seal_signatures import verified_signer
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import draw_experiment_ids, rerun_and_compare
 from mutator.report.report_audit import audit_report

@@ -9,8 +9,8 @@ from mutator._common.shipped_files import write_new_library
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.checks import fast_engine_check, library_check
 from mutator.checks.check_by_running import findings_from_running
-from mutator.checks.doctor import examine_machine
-from mutator.checks.findings import Finding
+from mutator.checks.check_findings import Finding
+from mutator.checks.machine_check import examine_machine
 from mutator.checks.unrecorded_values import unrecorded_values_finding
 from mutator.checks.unused_draws_and_parameters import unused_draws_and_parameters_finding
 from mutator.errors import MutatorError

@@ -13,7 +13,7 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun_experiment
 from mutator.outcomes.series_sampling import write_sampled_series
 from mutator.outcomes.trace_and_record_loading import Trace, load_trace
-from mutator.report.film import ExperimentFilmer, Shot
+from mutator.report.experiment_filming import ExperimentFilmer, Shot
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

@@ -14,7 +14,7 @@ from mutator.api.notebook_html import facts_html, text_html
 from mutator.api.run_experiments import RunExperiment
 from mutator.api.run_figures import RunFigures
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
-from mutator.audit.seal import Seals, seals_of
+from mutator.audit.run_digests_and_seal import Seals, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.session_summary import Summary
 from mutator.execution.shard_merging import merge_shards
@@ -31,7 +31,7 @@ from mutator.outcomes.fault_free_runs import (
 from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.preflight import equivalence_check
 from mutator.report import report_builder
-from mutator.report.stills import take_stills
+from mutator.report.experiment_stills import take_stills
 from mutator.results import outcome_counting
 from mutator.results import table_building as results_table
 from mutator.results.note_without_canary import no_canary_note

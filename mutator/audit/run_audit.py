@@ -8,8 +8,8 @@ from pathlib import Path
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator._common.hashing import digest
-from mutator.audit.head_audit import check_result_problems as checks_of
-from mutator.audit.head_audit import (
+from mutator.audit.head_and_checks_audit import check_result_problems as checks_of
+from mutator.audit.head_and_checks_audit import (
     not_activated_run_problems,
     recomputed_chunks,
     seed_and_session_problems,
@@ -18,7 +18,7 @@ from mutator.audit.head_audit import (
     unknown_engine_problem,
 )
 from mutator.audit.record_audit import load_stored_records, mutant_problems, proof_problems, verdict_problems
-from mutator.audit.seal import golden_digests
+from mutator.audit.run_digests_and_seal import golden_digests
 from mutator.audit.series_audit import audit_series
 from mutator.audit.table_audit import audit_tables
 from mutator.campaigns.plan import load_plan

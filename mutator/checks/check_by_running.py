@@ -18,9 +18,9 @@ from mutator._common.files import ScratchFolder
 from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.checks import fast_engine_check, nondeterminism_suspects
-from mutator.checks.findings import CheckState, Finding
-from mutator.checks.first_difference import describe_first_difference
-from mutator.checks.reachability import ReachTracker
+from mutator.checks.check_findings import CheckState, Finding
+from mutator.checks.first_run_difference import describe_first_difference
+from mutator.checks.reached_statements_and_triggers import ReachTracker
 from mutator.checks.unloaded_files import unloaded_files_findings
 from mutator.engines import forkable
 from mutator.engines.engine_jobs import Job, JobResult
@@ -35,7 +35,7 @@ from mutator.model import Experiment, Limits
 from mutator.mutants.injected_line_syntax import target_line_of
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe_contract import is_probe_path
-from mutator.preflight import canary
+from mutator.preflight import canary_check
 from mutator.preflight.check_run_problems import (
     CheckRun,
     golden_pair_problem,
@@ -367,11 +367,11 @@ class _RunningCheck:
         engine = ReferenceEngine(self.manifest, self.engine.work_folder, canary_to_try.limits)
 
         def run(tried: Experiment) -> CheckRun:
-            job = canary.build_canary_job(self.workspace, self.manifest, tried)
+            job = canary_check.build_canary_job(self.workspace, self.manifest, tried)
             return self._check_run(engine.execute(job, self._new_run_folder(job)))
 
-        verdict = canary.run_until_hazard(
-            canary.canary_with_other_values(self.workspace, self.manifest, experiment),
+        verdict = canary_check.run_until_hazard(
+            canary_check.canary_with_other_values(self.workspace, self.manifest, experiment),
             run,
             canary_to_try.hazard,
         )

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from mutator._common.files import ScratchFolder
 from mutator._common.message_text import counted
-from mutator.checks.findings import CheckState, Finding
+from mutator.checks.check_findings import CheckState, Finding
 from mutator.engines.forkable import find_obstacle_by_loading, reasons_by_unforkable_variant
 from mutator.errors import MutatorError, NotForkable
 from mutator.faults.spec_expansion import expand_spec

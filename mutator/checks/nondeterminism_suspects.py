@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mutator.checks import set_iteration_order
-from mutator.checks.findings import FindingPlace
+from mutator.checks.check_findings import FindingPlace
 from mutator.engines.in_target.nondeterminism_watch import CLOCK, DRAW, HASH, PROCESS, THREAD
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches_any_glob

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator
 
-from mutator.checks.findings import CheckState, Finding
+from mutator.checks.check_findings import CheckState, Finding
 
 _MIN_FILES = 200  # copying fewer takes no noticeable time
 _MOST_GLOBS = 12  # more are no simplification

@@ -1,6 +1,6 @@
 """Finds observed values that no channel records, so that nobody sees when a fault makes one NaN."""
 
-from mutator.checks.findings import CheckState, Finding
+from mutator.checks.check_findings import CheckState, Finding
 from mutator.targets.manifest import TargetManifest
 
 _FINDING_NAME = "observed values"

@@ -9,7 +9,7 @@ from jinja2 import TemplateError
 from jinja2.meta import find_undeclared_variables
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
-from mutator.checks.findings import CheckState, Finding, FindingPlace
+from mutator.checks.check_findings import CheckState, Finding, FindingPlace
 from mutator.faults.fault_models import NAME_PARAM_TYPES, FaultModels, SnippetKind
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.injection_specs import DrawReference, InjectionSpec, parse_draw_reference

@@ -16,7 +16,7 @@ from mutator.cli.options import Json, Manifest, Wide, WorkspaceOptions, with_wor
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
-    from mutator.checks.findings import Finding
+    from mutator.checks.check_findings import Finding
     from mutator.workspace import Workspace
 
 

@@ -3,7 +3,7 @@
 from collections import Counter
 from dataclasses import asdict, dataclass
 
-from mutator.audit.seal import Seals
+from mutator.audit.run_digests_and_seal import Seals
 from mutator.preflight.equivalence_check import EquivalenceResult
 from mutator.store import integrity, verified_runs_cache
 from mutator.store.run_folder import RunFolder

@@ -20,7 +20,7 @@ from typing import Any
 from mutator._common.files import is_half_written, remove_anything_at
 from mutator._common.folder_locks import lock_run_folder, wait_for_workers
 from mutator._common.interrupts import raising_keyboard_interrupts
-from mutator.audit.seal import seals_of
+from mutator.audit.run_digests_and_seal import seals_of
 from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
 from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.run_inputs import RunInputs
@@ -50,7 +50,7 @@ from mutator.execution.watched_progress import writing_progress
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Outcome, Record
 from mutator.preflight import equivalence_check
-from mutator.preflight.golden_run_page import with_golden_run_pages
+from mutator.preflight.failed_golden_run_pages import with_golden_run_pages
 from mutator.preflight.preflight_checks import (
     checks_and_goldens_exist,
     describe_unreached_triggers,

@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator.audit.seal import Seals
+from mutator.audit.run_digests_and_seal import Seals
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, EXIT_OK
 from mutator.preflight import equivalence_check
 

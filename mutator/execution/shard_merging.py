@@ -11,7 +11,7 @@ from mutator._common.confined_files import open_below, path_below
 from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic, writing_atomic
 from mutator._common.folder_locks import lock_run_folder
 from mutator._common.message_text import counted
-from mutator.audit.seal import UNSEALED_KEYS_BY_FILE, without_keys
+from mutator.audit.run_digests_and_seal import UNSEALED_KEYS_BY_FILE, without_keys
 from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.run_provenance import version_error
 from mutator.errors import CheckFailed, MutatorError

@@ -20,7 +20,7 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Experiment, Fault
 from mutator.preflight import preflight_cache
 from mutator.preflight.check_run_problems import output_digest_of
-from mutator.preflight.check_runner import GOLDEN, CheckRunner
+from mutator.preflight.preflight_check_runner import GOLDEN, CheckRunner
 from mutator.preflight.preflight_checks import (
     anchor_problem,
     anchor_result,

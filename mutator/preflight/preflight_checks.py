@@ -28,7 +28,7 @@ from mutator.preflight.check_run_problems import (
     null_mutant_problem,
     output_digest_of,
 )
-from mutator.preflight.check_runner import (
+from mutator.preflight.preflight_check_runner import (
     GOLDEN,
     GOLDEN_AGAIN,
     NULL_MUTANT,

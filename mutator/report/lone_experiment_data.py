@@ -10,7 +10,7 @@ from typing import Any
 from mutator._common.hashing import as_json_types
 from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.report.experiment_facts import RANK_COLUMN
-from mutator.report.experiment_list import details_data, results_table_data
+from mutator.report.experiment_list_data import details_data, results_table_data
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.finished_experiments_and_columns import FinishedExperiment, ResultColumn
 from mutator.results.plan_columns import PlanColumn

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 from mutator._common.confined_files import path_below, read_below
 from mutator.errors import MutatorError
+from mutator.report.change_since_run_before import stored_change
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.report_builder import build_report
 from mutator.report.report_digests import STAMP_FILE
-from mutator.report.run_before import stored_change
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

@@ -12,24 +12,24 @@ from mutator._common.confined_files import path_below, write_below
 from mutator._common.helper_processes import computing_in_background, process_count_for
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
-from mutator.report.experiment_list import ExperimentListData, build_list_data
-from mutator.report.glossary import glossary_of
-from mutator.report.markdown_and_html import (
+from mutator.report.change_since_run_before import RUN_BEFORE_FILE, ChangeSinceRunBefore, find_change
+from mutator.report.experiment_list_data import ExperimentListData, build_list_data
+from mutator.report.panel import REPORT_FOLDER, ReportPage
+from mutator.report.panels import build_pages, build_panels, build_study_page
+from mutator.report.panels.answers_panel import build_answers_panel
+from mutator.report.panels.first_screen_panel import build_first_screen_panel
+from mutator.report.report_digests import inputs_digest, is_current, write_report_files
+from mutator.report.report_glossary import glossary_of
+from mutator.report.report_markdown_and_html import (
     ReportContent,
     page_html,
     page_markdown,
     report_html,
     report_markdown,
 )
-from mutator.report.page_series import write_missing_series_of_traces
-from mutator.report.panel import REPORT_FOLDER, ReportPage
-from mutator.report.panels import build_pages, build_panels, build_study_page
-from mutator.report.panels.answers_panel import build_answers_panel
-from mutator.report.panels.first_screen_panel import build_first_screen_panel
-from mutator.report.report_digests import inputs_digest, is_current, write_report_files
 from mutator.report.reported_run import ReportedRun
-from mutator.report.run_before import RUN_BEFORE_FILE, ChangeSinceRunBefore, find_change
-from mutator.report.single_file import single_file_html, single_file_name
+from mutator.report.series_for_report_page import write_missing_series_of_traces
+from mutator.report.single_file_report import single_file_html, single_file_name
 from mutator.results.outcome_counting import count_by_outcome_or_status
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder

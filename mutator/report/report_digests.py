@@ -16,8 +16,8 @@ from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
-from mutator.report.page_series import series_facts_for_page
 from mutator.report.panel import REPORT_FOLDER
+from mutator.report.series_for_report_page import series_facts_for_page
 from mutator.store import file_digests
 from mutator.store import time_series_folder as series_store
 from mutator.store.allowed_contents import (

@@ -11,12 +11,12 @@ from mutator.model import Experiment, Fault, Record, Status
 from mutator.outcomes.fault_free_runs import FaultFreeRun, load_fault_free_runs
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.outcomes.trace_and_record_loading import load_trace
+from mutator.report.change_since_run_before import ChangeSinceRunBefore
 from mutator.report.engine_summary import EngineSummary, summarize_engines
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN, ExperimentFacts
-from mutator.report.fault_path_data import RunFaultPaths
+from mutator.report.fault_path_page_data import RunFaultPaths
 from mutator.report.panel import Panel
-from mutator.report.run_before import ChangeSinceRunBefore
-from mutator.report.source_lines import SourceLines
+from mutator.report.source_lines_with_outcomes import SourceLines
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import Results
 from mutator.statistics.published_counts import PublishedCounts

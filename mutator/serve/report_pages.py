@@ -17,9 +17,9 @@ from mutator.comparison.comparison_replays import ReportAddresses
 from mutator.errors import MutatorError, NotServed
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note, load_fault_free_runs
 from mutator.report import report_builder
+from mutator.report.change_since_run_before import ChangeSinceRunBefore, find_change
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.report_digests import inputs_digest
-from mutator.report.run_before import ChangeSinceRunBefore, find_change
 from mutator.results.table_reader import Results
 from mutator.serve.page_tokens import PageTokens, run_page_name
 from mutator.serve.report_cache import ReportCache

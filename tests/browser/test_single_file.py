@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mutator.outcomes.series_sampling import write_sampled_series
-from mutator.report import report_builder, single_file
+from mutator.report import report_builder, single_file_report
 from mutator.report.panels import figures_panel
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
@@ -110,7 +110,7 @@ def test_the_file_says_which_experiments_have_no_replay_inside(
     opened: Callable[[Path, str], Any],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(single_file, "MOST_EMBEDDED_SERIES_BYTES", 100)
+    monkeypatch.setattr(single_file_report, "MOST_EMBEDDED_SERIES_BYTES", 100)
     page = opened(written(), f"e={ids(run)[0]}")
     page.wait_for_selector("#experiment .replay p:text('replays of the worst experiments only')")
     assert page.locator("#experiment .replay button").count() == 0

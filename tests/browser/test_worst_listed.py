@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from mutator.report import experiment_list, report_builder
+from mutator.report import experiment_list_data, report_builder
 from mutator.report.panels import figures_panel
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ LISTED = 10
 @pytest.fixture
 def large(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copytree(run, tmp_path / "run")
-    monkeypatch.setattr(experiment_list, "MOST_LISTED_EXPERIMENTS", LISTED)
+    monkeypatch.setattr(experiment_list_data, "MOST_LISTED_EXPERIMENTS", LISTED)
     monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())
     report_builder.write_report(tmp_path / "run", None)
     return tmp_path / "run"

@@ -12,7 +12,7 @@ import pytest
 
 from mutator.api.runs import load_run
 from mutator.cli.app import main
-from mutator.report import stills
+from mutator.report import experiment_stills
 from mutator.workspace import Workspace
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
@@ -83,7 +83,7 @@ def test_a_run_takes_stills_of_its_worst_experiments(
 ) -> None:
     manifest = root / "fault_library/targets/toycar.yaml"
     manifest.write_text(manifest.read_text().replace("still: [", "pictures: [alone]\n  still: ["))
-    monkeypatch.setattr(stills, "PLANNED_PER_FILMED_EXPERIMENT", 2)
+    monkeypatch.setattr(experiment_stills, "PLANNED_PER_FILMED_EXPERIMENT", 2)
     words = ("run", "toy", "--only", "fault_type == 'distance'", "-n", "0", "--out", "runs/a")
     without = cli(*words, "--no-stills")
     assert without.code == 0 and "pictures" not in without.err

@@ -17,7 +17,7 @@ import pytest
 import mutator
 from mutator._common.cache_layout_and_pruning import CacheEntry
 from mutator.api.run_experiments import RunExperiment
-from mutator.checks.findings import CheckState, Finding, FindingPlace
+from mutator.checks.check_findings import CheckState, Finding, FindingPlace
 from mutator.cli.console import Terminal
 from mutator.cli.progress_display import campaign_progress
 from mutator.model import Experiment, ObservedActivation, Outcome, Status

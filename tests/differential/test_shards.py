@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from mutator.audit.seal import seals_of
+from mutator.audit.run_digests_and_seal import seals_of
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines import engine_choice

@@ -16,7 +16,7 @@ import pytest
 
 import mutator
 from mutator._common.hashing import canonical_json
-from mutator.audit.seal import Seals, seals_of
+from mutator.audit.run_digests_and_seal import Seals, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.report import report_builder

@@ -14,7 +14,7 @@ import pytest
 
 import mutator
 from mutator._common.hashing import canonical_json, digest
-from mutator.audit.seal import golden_digests, seals_of
+from mutator.audit.run_digests_and_seal import golden_digests, seals_of
 from mutator.campaigns.plan import load_plan
 from mutator.campaigns.plan_freezing import plan_csv_bytes
 from mutator.campaigns.plan_tally import plan_digest

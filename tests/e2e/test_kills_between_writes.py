@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mutator.audit.seal import seals_of
+from mutator.audit.run_digests_and_seal import seals_of
 from mutator.execution.campaign_running import run_campaign
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder

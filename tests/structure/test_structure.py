@@ -170,8 +170,11 @@ VIOLATIONS = {
     "stranger in the glue": ("mutator/glue.py", "import yaml"),
     "harness in the glue": ("mutator/glue.py", "from mutator.errors import MutatorError"),
     "glue in the harness": ("mutator/engines/engine_jobs.py", "from mutator import glue"),
-    "hidden import": ("mutator/report/film.py", "def f():\n    from mutator.report import panel"),
-    "namesake": ("mutator/report/film.py", "def film():\n    pass"),
+    "hidden import": (
+        "mutator/report/experiment_filming.py",
+        "def f():\n    from mutator.report import panel",
+    ),
+    "namesake": ("mutator/report/experiment_filming.py", "def film():\n    pass"),
 }
 
 

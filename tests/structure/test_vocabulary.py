@@ -22,7 +22,7 @@ EXCEPTIONS: dict[str, str] = {
     "mutator/model.py::Record.left": "a key of stored records",
     **dict.fromkeys(
         (
-            "mutator/checks/findings.py::Finding.found",
+            "mutator/checks/check_findings.py::Finding.found",
             "mutator/execution/session_summary.py::Summary.done",
             "mutator/glue.py::Run.done",
             "mutator/store/run_progress.py::Progress.done",

@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from types import FrameType
 
-from mutator.audit.seal import seals_of
+from mutator.audit.run_digests_and_seal import seals_of
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
 

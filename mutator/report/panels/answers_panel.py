@@ -7,9 +7,9 @@ from markupsafe import Markup
 
 from mutator._common.table_rendering import TextTable
 from mutator.report.answer_parts import AnswerCell, AnswerTable, ExplainedCodes, PageLink, ShareBar
-from mutator.report.answers import build_answers
-from mutator.report.glossary import Glossary, code_meanings_by_column
 from mutator.report.panel import Panel, rendered
+from mutator.report.report_answers import build_answers
+from mutator.report.report_glossary import Glossary, code_meanings_by_column
 from mutator.report.reported_run import ReportedRun
 
 _HTML_TEMPLATE = """\

@@ -6,20 +6,20 @@ from typing import NamedTuple
 from markupsafe import Markup
 
 from mutator._common.table_rendering import TextTable
-from mutator.report.fault_path_data import (
-    ALL_FAULT_TYPES,
-    PathCounts,
-    RunFaultPaths,
-    path_counts_by_fault_type,
-)
-from mutator.report.panel import Panel, rendered
-from mutator.report.path_drawing import (
+from mutator.report.fault_path_drawing import (
     counts_for_drawing,
     describe_interval,
     describe_passed_share,
     draw_path_counts,
     structure_with_paths,
 )
+from mutator.report.fault_path_page_data import (
+    ALL_FAULT_TYPES,
+    PathCounts,
+    RunFaultPaths,
+    path_counts_by_fault_type,
+)
+from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import fault_types_of
 from mutator.stpa.hazard_analysis_yaml import ControlStructureModel

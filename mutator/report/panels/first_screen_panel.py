@@ -1,7 +1,7 @@
 """The first part of a report: the worst experiment in words, with its replay, and four numbers."""
 
 from mutator.report.answer_parts import warning_filter_values
-from mutator.report.first_screen import describe_change, key_numbers, sample_note, worst_row
+from mutator.report.first_screen_facts import describe_change, key_numbers, sample_note, worst_row
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.results.note_without_canary import no_canary_note

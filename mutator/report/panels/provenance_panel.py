@@ -1,7 +1,12 @@
 """The provenance panel: how the experiments were executed, and what is needed to reproduce them."""
 
 from mutator._common.table_rendering import TextTable
-from mutator.audit.seal import UNSEALED_KEYS_BY_FILE, digests_or_why_no_seal, unsealed_facts, without_keys
+from mutator.audit.run_digests_and_seal import (
+    UNSEALED_KEYS_BY_FILE,
+    digests_or_why_no_seal,
+    unsealed_facts,
+    without_keys,
+)
 from mutator.campaigns.installed_studies import study_problems
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun

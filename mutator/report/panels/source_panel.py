@@ -14,7 +14,12 @@ from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
-from mutator.report.source_lines import ENDINGS_WORST_FIRST, LASTING_VALUES, LineMark, MarkedFile
+from mutator.report.source_lines_with_outcomes import (
+    ENDINGS_WORST_FIRST,
+    LASTING_VALUES,
+    LineMark,
+    MarkedFile,
+)
 
 _ENDING_SIGNS = dict(zip(ENDINGS_WORST_FIRST, "HCTAMN", strict=True))  # sign shown with a mark's colour
 _ENDING_MEANINGS = dict(

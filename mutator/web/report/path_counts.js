@@ -1,6 +1,6 @@
 // @ts-check
 "use strict";
-// Shows the counts of the chosen fault type in the control structure, which report/path_drawing.py draws.
+// Shows the counts of the chosen fault type in the control structure, which report/fault_path_drawing.py draws.
 
 const PathCounts = (() => {
   const ALL = "all fault types";

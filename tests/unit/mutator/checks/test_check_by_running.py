@@ -7,9 +7,9 @@ import pytest
 
 from mutator.checks import check_by_running
 from mutator.checks.check_by_running import findings_from_running
+from mutator.checks.check_findings import CheckState, Finding
 from mutator.checks.fast_engine_check import import_and_fork_finding
-from mutator.checks.findings import CheckState, Finding
-from mutator.checks.reachability import ReachTracker
+from mutator.checks.reached_statements_and_triggers import ReachTracker
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 

@@ -1,6 +1,6 @@
 """What `check` says about observed values that no channel records."""
 
-from mutator.checks.findings import CheckState
+from mutator.checks.check_findings import CheckState
 from mutator.checks.unrecorded_values import unrecorded_values_finding
 from mutator.workspace import Workspace
 

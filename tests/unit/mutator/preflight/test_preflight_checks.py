@@ -13,7 +13,7 @@ from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Limits, MeasuredLimits
-from mutator.preflight.canary import CanaryVerdict, run_until_hazard
+from mutator.preflight.canary_check import CanaryVerdict, run_until_hazard
 from mutator.preflight.check_run_problems import CheckRun
 from mutator.preflight.preflight_checks import run_checks
 from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA

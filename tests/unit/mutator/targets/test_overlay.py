@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from mutator.api.trials import try_fault
-from mutator.checks.doctor import examine_machine
+from mutator.checks.machine_check import examine_machine
 from mutator.errors import MutatorError
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Outcome
 from mutator.mutants.mutant_building import build
-from mutator.report.film import Shot, _write_shot
+from mutator.report.experiment_filming import Shot, _write_shot
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 

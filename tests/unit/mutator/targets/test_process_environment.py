@@ -7,7 +7,7 @@ import pytest
 from mutator.engines.engine_jobs import RunMode
 from mutator.errors import MutatorError
 from mutator.model import Status
-from mutator.report.film import Shot, _write_shot
+from mutator.report.experiment_filming import Shot, _write_shot
 from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 

@@ -10,9 +10,9 @@ from mutator.api.trials import try_fault
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.campaigns.run_provenance import accepted_version_differences, begin_session_environment
-from mutator.checks.doctor import examine_machine
-from mutator.checks.findings import CheckState
+from mutator.checks.check_findings import CheckState
 from mutator.checks.library_check import library_problems
+from mutator.checks.machine_check import examine_machine
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

@@ -8,11 +8,11 @@ import pytest
 
 from mutator.api.runs import load_run
 from mutator.model import Experiment, Outcome, Status
-from mutator.report.experiment_list import _list_table_data, _listed_results
+from mutator.report.experiment_list_data import _list_table_data, _listed_results
 from mutator.report.panels.mutation_score_panel import build_mutation_score_panel
 from mutator.report.panels.source_panel import build_source_panel
 from mutator.report.reported_run import ReportedRun
-from mutator.report.source_lines import LineMark
+from mutator.report.source_lines_with_outcomes import LineMark
 from mutator.results import table_building
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

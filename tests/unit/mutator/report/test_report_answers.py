@@ -18,12 +18,12 @@ from mutator.report.answer_parts import (
     ShareBar,
     filtered_list_fragment,
 )
-from mutator.report.answers import build_answers
-from mutator.report.fault_path_data import RunFaultPaths
-from mutator.report.most_dangerous_experiments import most_dangerous_answer
+from mutator.report.fault_path_page_data import RunFaultPaths
+from mutator.report.fix_first_answers import fix_first_answer
+from mutator.report.most_dangerous_answer import most_dangerous_answer
 from mutator.report.panels.answers_panel import build_answers_panel
+from mutator.report.report_answers import build_answers
 from mutator.report.reported_run import ReportedRun
-from mutator.report.what_to_fix_first import fix_first_answer
 from mutator.results.severity_and_sentence_columns import TIME_TO_HAZARD_COLUMNS
 from mutator.results.table_columns import result_columns
 from mutator.store.checksummed_lines import line_file_bytes

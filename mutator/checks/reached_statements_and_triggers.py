@@ -13,7 +13,7 @@ import numpy as np
 from mutator._common.message_text import counted
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_triggers import build_listed_triggers
-from mutator.checks.findings import CheckState, Finding, FindingPlace
+from mutator.checks.check_findings import CheckState, Finding, FindingPlace
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.faults.message_places import location_of
 from mutator.model import FaultLocation, Method, Trigger

@@ -8,9 +8,14 @@ import pytest
 
 from mutator._common.files import write_json
 from mutator.model import Experiment
-from mutator.report import experiment_list
+from mutator.report import experiment_list_data
 from mutator.report.experiment_facts import RANK_COLUMN
-from mutator.report.experiment_list import column_data, details_data, media_by_experiment, results_table_data
+from mutator.report.experiment_list_data import (
+    column_data,
+    details_data,
+    media_by_experiment,
+    results_table_data,
+)
 from mutator.review.patch_shapes import shapes_of_patches
 from mutator.store.run_folder import RunFolder
 from tests.made_head import made_head
@@ -96,5 +101,5 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
 
 def test_the_list_does_not_depend_on_the_order_of_results() -> None:
     frame = results({"experiment_id": "b"}, {"experiment_id": "a"}, {"module": "car"})
-    listed = frame.sort_values(experiment_list.LIST_ORDER)
+    listed = frame.sort_values(experiment_list_data.LIST_ORDER)
     assert list(listed["experiment_id"]) == ["2", "a", "b"]

@@ -7,7 +7,7 @@ import pytest
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
-from mutator.preflight.canary import run_until_hazard
+from mutator.preflight.canary_check import run_until_hazard
 from mutator.preflight.check_run_problems import CheckRun
 from mutator.results.note_without_canary import no_canary_note
 from mutator.store.run_folder import RunFolder

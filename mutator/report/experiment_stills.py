@@ -10,7 +10,7 @@ from mutator._common.confined_files import path_below
 from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
-from mutator.report.film import ExperimentFilmer, Shot
+from mutator.report.experiment_filming import ExperimentFilmer, Shot
 from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.store.planned_experiments import PlannedExperiments

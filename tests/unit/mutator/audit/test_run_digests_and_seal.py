@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common.hashing import canonical_json
-from mutator.audit.seal import digests_or_why_no_seal, seals_of, unsealed_facts
+from mutator.audit.run_digests_and_seal import digests_or_why_no_seal, seals_of, unsealed_facts
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import line_file_bytes
 from mutator.store.recorded_approvals import write_approvals

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from mutator._common.message_text import counted
 from mutator.model import Outcome
 from mutator.mutants.injected_line_syntax import tags_for_page_scripts
-from mutator.report.experiment_list import ExperimentListData
-from mutator.report.glossary import Glossary
+from mutator.report.experiment_list_data import ExperimentListData
 from mutator.report.panel import Panel, ReportPage, rendered
+from mutator.report.report_glossary import Glossary
 from mutator.web import asset_text, csp_hash, json_script_element, load_order
 
 

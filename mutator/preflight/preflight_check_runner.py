@@ -16,7 +16,7 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import measure_limits
 from mutator.model import Experiment, Limits
 from mutator.mutants.mutant_building import build
-from mutator.preflight import canary, unreached_triggers
+from mutator.preflight import canary_check, unreached_triggers
 from mutator.preflight.check_run_problems import CheckRun, read_check_run
 from mutator.store.run_folder import GoldenRun
 from mutator.store.run_progress import Progress, StagePace
@@ -45,7 +45,9 @@ class CheckRunner:
     scratch_folder: Path
     pending_folder: Path
 
-    def run_all(self, workers: int, notify: OnProgress) -> tuple[CheckRunByName, canary.CanaryVerdict | None]:
+    def run_all(
+        self, workers: int, notify: OnProgress
+    ) -> tuple[CheckRunByName, canary_check.CanaryVerdict | None]:
         """Do all runs of all checks, `workers` at a time. Return them with the verdict on a canary."""
         with self._engine_and_pool(workers) as (engine, pool):
             futures = {
@@ -94,7 +96,7 @@ class CheckRunner:
 
     def _judge_canary(
         self, engine: ReferenceEngine, futures: Mapping[tuple[str, Any], Future[CheckRun]]
-    ) -> canary.CanaryVerdict | None:
+    ) -> canary_check.CanaryVerdict | None:
         experiment, facts = self.canary_experiment, self.campaign.canary
         if experiment is None or facts is None:
             return None
@@ -105,11 +107,13 @@ class CheckRunner:
             return self._run_job(
                 canary_engine,
                 (_CANARY, None),
-                canary.build_canary_job(self.workspace, self.manifest, experiment),
+                canary_check.build_canary_job(self.workspace, self.manifest, experiment),
             )
 
-        return canary.run_until_hazard(
-            canary.canary_with_other_values(self.workspace, self.manifest, experiment), run, facts.hazard
+        return canary_check.run_until_hazard(
+            canary_check.canary_with_other_values(self.workspace, self.manifest, experiment),
+            run,
+            facts.hazard,
         )
 
     def _jobs_by_name(self) -> dict[tuple[str, Any], Job]:

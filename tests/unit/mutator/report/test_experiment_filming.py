@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mutator.report.film import describe_hazards
+from mutator.report.experiment_filming import describe_hazards
 from mutator.workspace import Workspace
 
 

@@ -14,7 +14,7 @@ from tempfile import NamedTemporaryFile
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import open_below, write_below
 from mutator._common.hashing import canonical_json
-from mutator.audit.seal import Seals
+from mutator.audit.run_digests_and_seal import Seals
 from mutator.errors import CheckFailed, MutatorError
 from mutator.store.run_folder import RunFolder
 

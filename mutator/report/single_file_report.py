@@ -11,14 +11,14 @@ from markupsafe import Markup
 
 from mutator._common.message_text import counted
 from mutator.errors import MutatorError
-from mutator.report.experiment_list import (
+from mutator.report.experiment_list_data import (
     MOST_EMBEDDED_STILL_BYTES,
     MOST_LISTED_EXPERIMENTS,
     ExperimentListData,
     media_by_experiment,
 )
-from mutator.report.markdown_and_html import ReportContent, report_html
 from mutator.report.panel import REPORT_FOLDER
+from mutator.report.report_markdown_and_html import ReportContent, report_html
 from mutator.report.reported_run import ReportedRun
 from mutator.store.embedded_series import (
     EMBEDDED_SERIES_ELEMENT,

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.audit.seal import Seals, seals_of
-from mutator.audit.signatures import sign_seal, verified_signer
+from mutator.audit.run_digests_and_seal import Seals, seals_of
+from mutator.audit.seal_signatures import sign_seal, verified_signer
 from mutator.errors import CheckFailed
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

@@ -20,14 +20,14 @@ from mutator.model import Experiment, Fault
 from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.report.answer_parts import warning_filter_values
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
-from mutator.report.fault_path_data import RunFaultPaths
-from mutator.report.first_screen import worst_record
-from mutator.report.glossary import code_meanings_by_column
+from mutator.report.fault_path_page_data import RunFaultPaths
+from mutator.report.first_screen_facts import worst_record
 from mutator.report.heat_map_data import build_heat_map
-from mutator.report.page_series import series_facts_for_page
 from mutator.report.panel import REPORT_FOLDER
+from mutator.report.report_glossary import code_meanings_by_column
 from mutator.report.reported_run import ReportedRun
-from mutator.report.source_lines import SourceLines
+from mutator.report.series_for_report_page import series_facts_for_page
+from mutator.report.source_lines_with_outcomes import SourceLines
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.outcome_counting import (
     checked_hazard_names,

@@ -8,8 +8,8 @@ import pytest
 
 from mutator._common.message_text import bind_numbers
 from mutator.report import report_builder
+from mutator.report.change_since_run_before import ChangeSinceRunBefore, find_change, stored_change
 from mutator.report.report_audit import audit_report
-from mutator.report.run_before import ChangeSinceRunBefore, find_change, stored_change
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 

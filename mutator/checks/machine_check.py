@@ -18,8 +18,8 @@ from packaging.requirements import Requirement
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.message_text import counted
 from mutator._common.version import DISTRIBUTION, EARLIER_DISTRIBUTION
+from mutator.checks.check_findings import CheckState, Finding
 from mutator.checks.fast_engine_check import import_and_fork_finding
-from mutator.checks.findings import CheckState, Finding
 from mutator.engines.sandbox import reason_sandbox_unavailable as shortcoming_of_sandbox
 from mutator.errors import MutatorError
 from mutator.targets.required_packages import NOT_INSTALLED, check_requirements, installation_problem

@@ -7,7 +7,7 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
-from mutator.report.fault_path_data import PathCounts, link_name
+from mutator.report.fault_path_page_data import PathCounts, link_name
 from mutator.statistics.shares_with_intervals import share
 from mutator.stpa import arrow_and_box_svg
 from mutator.stpa.arrow_and_box_svg import path_data

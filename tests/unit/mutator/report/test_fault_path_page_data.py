@@ -15,8 +15,8 @@ from mutator.outcomes.fault_paths import (
     PathLink,
     UntimedPath,
 )
-from mutator.report.fault_path_data import PathCounts, RunFaultPaths
-from mutator.report.path_drawing import counts_for_drawing, draw_path_counts, structure_with_paths
+from mutator.report.fault_path_drawing import counts_for_drawing, draw_path_counts, structure_with_paths
+from mutator.report.fault_path_page_data import PathCounts, RunFaultPaths
 from mutator.stpa.hazard_analysis_yaml import load_hazard_analysis
 from mutator.targets.stored_target_facts import ChannelFacts
 from mutator.workspace import Workspace

@@ -10,7 +10,7 @@ import yaml
 from mutator._common.hashing import as_json_types
 from mutator._common.message_text import bind_numbers
 from mutator.model import Status
-from mutator.report.first_screen import key_numbers, sample_note, worst_record, worst_row
+from mutator.report.first_screen_facts import key_numbers, sample_note, worst_record, worst_row
 from mutator.report.panels.first_screen_panel import build_first_screen_panel
 from mutator.report.reported_run import ReportedRun
 from mutator.store.plan_choices import Choices

@@ -25,9 +25,9 @@ from mutator.report.answer_parts import (
     was_or_were,
 )
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
-from mutator.report.most_dangerous_experiments import most_dangerous_answer, worst_hazard_ids
+from mutator.report.fix_first_answers import fix_first_answer
+from mutator.report.most_dangerous_answer import most_dangerous_answer, worst_hazard_ids
 from mutator.report.reported_run import ReportedRun
-from mutator.report.what_to_fix_first import fix_first_answer
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.result_rows import ResultRow, rows_of
 
