@@ -23,25 +23,25 @@ from mutator._common.message_text import spelling_suggestion
 from mutator._common.resource_shortages import find_shortage
 from mutator._common.version import VERSION
 from mutator.cli import (
-    audits,
-    caches,
-    campaigns,
-    comparisons,
-    exports,
-    hazard_analysis,
-    imports,
-    list_check_doctor,
-    merge_report_clean,
-    new_library,
-    places,
-    reviews,
-    serving,
-    show_and_rerun,
-    try_diff_generate,
+    cache_command,
+    compare_command,
+    export_command,
+    import_command,
+    init_command,
+    list_check_doctor_commands,
+    merge_report_clean_commands,
+    places_command,
+    plan_and_run_commands,
+    review_command,
+    serve_command,
+    show_and_rerun_commands,
+    stpa_command,
+    try_diff_generate_commands,
+    verify_and_seal_commands,
 )
-from mutator.cli.console import Terminal, discard_output, ignoring_stderr_errors, show_error
-from mutator.cli.help_pages import NamedValuesCommand
-from mutator.cli.options import Library, Root, Sandbox, Target, Templates, WorkspaceOptions
+from mutator.cli.shared_options import Library, Root, Sandbox, Target, Templates, WorkspaceOptions
+from mutator.cli.subcommand_help import NamedValuesCommand
+from mutator.cli.terminal_output import Terminal, discard_output, ignoring_stderr_errors, show_error
 from mutator.errors import (
     EXIT_CHECK_FAILED,
     EXIT_HARNESS_ERRORS,
@@ -132,21 +132,21 @@ def store_workspace_options(
 
 
 for module in (
-    list_check_doctor,
-    new_library,
-    imports,
-    hazard_analysis,
-    places,
-    try_diff_generate,
-    reviews,
-    campaigns,
-    merge_report_clean,
-    audits,
-    comparisons,
-    exports,
-    show_and_rerun,
-    serving,
-    caches,
+    list_check_doctor_commands,
+    init_command,
+    import_command,
+    stpa_command,
+    places_command,
+    try_diff_generate_commands,
+    review_command,
+    plan_and_run_commands,
+    merge_report_clean_commands,
+    verify_and_seal_commands,
+    compare_command,
+    export_command,
+    show_and_rerun_commands,
+    serve_command,
+    cache_command,
 ):
     module.register(app)
 for subcommand in app.registered_commands:

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mutator._common import progress_events
-from mutator.cli.console import Terminal
+from mutator.cli.terminal_output import Terminal
 from mutator.execution.progress_text import (
     ProgressLines,
     describe_count,

@@ -7,9 +7,9 @@ import typer
 
 import mutator
 from mutator._common.garbage_collection import without_garbage_collection
-from mutator.cli import completion
-from mutator.cli.console import Terminal
-from mutator.cli.options import Manifest, Reading, Seed, WorkspaceOptions
+from mutator.cli import shell_completion
+from mutator.cli.shared_options import Manifest, Reading, Seed, WorkspaceOptions
+from mutator.cli.terminal_output import Terminal
 from mutator.errors import MutatorError
 from mutator.review.group_filter_columns import GROUP_FILTER_COLUMNS
 
@@ -27,7 +27,7 @@ OnlyGroups = Annotated[
         "--only",
         metavar="EXPR",
         help=f"Only groups that match. Columns: {', '.join(GROUP_FILTER_COLUMNS)}.",
-        autocompletion=completion.group_columns,
+        autocompletion=shell_completion.group_columns,
     ),
 ]
 ExcludeGroups = Annotated[
@@ -36,7 +36,7 @@ ExcludeGroups = Annotated[
         "--exclude",
         metavar="EXPR",
         help="Leave out groups that match.",
-        autocompletion=completion.group_columns,
+        autocompletion=shell_completion.group_columns,
     ),
 ]
 Groups = Annotated[

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mutator.cli import review_view
-from mutator.cli.console import Terminal, short_path, show_error
+from mutator.cli import review_group_printing
+from mutator.cli.terminal_output import Terminal, short_path, show_error
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def walk_through(
     count = len(waiting)
     while waiting:
         number, group = waiting.pop(0)
-        review_view.print_group(terminal, reviewed.review, group)
+        review_group_printing.print_group(terminal, reviewed.review, group)
         key = _ask_for_key(terminal, f"{number} of {count}")
         if key == "q":
             break
@@ -52,10 +52,12 @@ def walk_through(
             reviewed = reviewed.reread()
             waiting.insert(0, (number, group))  # shown again, with what the other reviewer decided
             continue
-        style = review_view.STYLE_BY_STATE[reviewed.review.state(group).value]
+        style = review_group_printing.STYLE_BY_STATE[reviewed.review.state(group).value]
         terminal.print_text(f"{group.id} {reviewed.review.describe_decision(group)}", style=style)
     review = reviewed.review
-    terminal.print_text(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")
+    terminal.print_text(
+        f"{short_path(review.path)}: {review_group_printing.describe_counts(review, reviewed.groups)}"
+    )
 
 
 def _ask_for_key(terminal: Terminal, position: str) -> str:

@@ -10,8 +10,8 @@ from typer.main import get_command
 
 from mutator._common.table_rendering import TextTable
 from mutator.cli.app import EXIT_CODES, SUBCOMMAND_GROUPS, app
-from mutator.cli.help_pages import help_record
-from mutator.cli.options import WorkspaceOptions
+from mutator.cli.shared_options import WorkspaceOptions
+from mutator.cli.subcommand_help import help_record
 from mutator.execution import pytest_plugin
 from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.workspace import Workspace

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from mutator.cli import campaigns
+from mutator.cli import plan_and_run_commands
 from mutator.errors import MutatorError
 from mutator.store import recorded_approvals
 from mutator.store.allowed_contents import ALLOWED_FILE_GLOBS
@@ -28,7 +28,7 @@ Reseal = Callable[..., None]  # recomputes every checksum and digest of a run fo
 def test_a_run_has_a_worker_for_each_usable_core(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(campaigns, "usable_cores", lambda: 3)
+    monkeypatch.setattr(plan_and_run_commands, "usable_cores", lambda: 3)
     started: list[int] = []
 
     def run(*_: object, workers: int, **__: object) -> None:

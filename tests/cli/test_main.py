@@ -11,7 +11,7 @@ import pytest
 from typer.main import get_command
 
 from mutator import __version__
-from mutator.cli import list_check_doctor
+from mutator.cli import list_check_doctor_commands
 from mutator.cli.app import SUBCOMMAND_GROUPS, app, main
 from mutator.errors import EXIT_CHECK_FAILED, CheckFailed, MutatorError
 
@@ -135,7 +135,9 @@ def fail_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     def broken(_: object) -> None:
         raise error
 
-    monkeypatch.setitem(list_check_doctor.LIST_BY_KIND, list_check_doctor.EntryKind.SPECS, broken)
+    monkeypatch.setitem(
+        list_check_doctor_commands.LIST_BY_KIND, list_check_doctor_commands.EntryKind.SPECS, broken
+    )
 
 
 def test_an_error_shows_place_expectation_and_remedy(

@@ -18,8 +18,8 @@ import mutator
 from mutator._common.cache_layout_and_pruning import CacheEntry
 from mutator.api.run_experiments import RunExperiment
 from mutator.checks.check_findings import CheckState, Finding, FindingPlace
-from mutator.cli.console import Terminal
 from mutator.cli.progress_display import campaign_progress
+from mutator.cli.terminal_output import Terminal
 from mutator.model import Experiment, ObservedActivation, Outcome, Status
 from mutator.report.report_builder import WrittenReport
 from mutator.store.run_progress import Progress

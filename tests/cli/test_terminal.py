@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from mutator._common.message_text import wrap_text
-from mutator.cli.console import Terminal
 from mutator.cli.progress_display import campaign_progress
+from mutator.cli.terminal_output import Terminal
 from mutator.execution.progress_text import describe_duration
 from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.store.run_progress import Progress

@@ -11,8 +11,8 @@ from typing import Any, cast
 
 import pytest
 
-from mutator.cli import experiment_view
-from mutator.cli.console import Terminal
+from mutator.cli import experiment_printing
+from mutator.cli.terminal_output import Terminal
 from mutator.model import Record
 from mutator.outcomes.verdict_rules import reaction_time
 from mutator.workspace import Workspace
@@ -83,7 +83,7 @@ def test_the_note_on_alerts_agrees_with_the_reaction_time(
         hazards=() if hazard is None else (("H3", hazard),),
     )
     reaction = reaction_time(made.hazards, made.alerts)
-    assert experiment_view._missing_alert_note(made, toycar.manifest("toycar"), reaction) == note
+    assert experiment_printing._missing_alert_note(made, toycar.manifest("toycar"), reaction) == note
 
 
 @pytest.mark.parametrize("width", range(20, 60))
@@ -96,7 +96,7 @@ def test_a_sentence_is_not_folded_between_a_number_and_its_unit(
     result = SimpleNamespace(
         record=record(), sentence=sentence, verdict={"reaction_time_s": None}, _manifest=lambda: None
     )
-    experiment_view.print_answer(Terminal(), cast(Any, result))
+    experiment_printing.print_answer(Terminal(), cast(Any, result))
     out = capsys.readouterr().out
     assert sentence in " ".join(out.split())
     assert all(value in out for value in ("11.7 m/s", "9.5 s", "20 mph"))

@@ -14,8 +14,8 @@ import pytest
 from typer.main import get_command
 
 from mutator.cli.app import app
-from mutator.cli.options import WorkspaceOptions
 from mutator.cli.review_options import MutantOptions
+from mutator.cli.shared_options import WorkspaceOptions
 
 CLONE = Path(__file__).parents[2]
 TOP_MODULES = 12
@@ -227,7 +227,7 @@ def test_options_of_every_review_verb_are_declared_once() -> None:
     shared = {*signature(MutantOptions).parameters, *signature(WorkspaceOptions).parameters}
     functions = [
         node
-        for name in ("reviews", "review_actions")
+        for name in ("review_command", "review_decision_commands")
         for node in ast.walk(ast.parse((CLONE / f"mutator/cli/{name}.py").read_bytes()))
         if isinstance(node, ast.FunctionDef)
     ]

@@ -65,10 +65,6 @@ EXCEPTIONS: dict[str, str] = {
 NAMESAKES: dict[str, str] = {
     "__main__": "Python's name of what `python -m` runs",
     "errors": "each of the two trees has exceptions of its own",
-    **dict.fromkeys(
-        ("audits", "caches", "campaigns", "comparisons", "reviews", "serving"),
-        "one topic, in Python (api) and on the command line (cli)",
-    ),
     **dict.fromkeys(("csv", "mcap", "parquet"), "one format, written (exports) and read (importers)"),
 }
 MOST_EXCEPTIONS = 60

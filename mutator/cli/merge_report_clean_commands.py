@@ -11,9 +11,8 @@ import typer
 
 import mutator
 from mutator._common.message_text import counted
-from mutator.cli import completion
-from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import (
+from mutator.cli import shell_completion
+from mutator.cli.shared_options import (
     AcceptVersions,
     Json,
     OutRunFolder,
@@ -21,6 +20,7 @@ from mutator.cli.options import (
     WorkspaceOptions,
     with_workspace_options,
 )
+from mutator.cli.terminal_output import Terminal, short_path
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -68,7 +68,9 @@ Examples:
 def merge(
     shards: Annotated[
         list[Path],
-        typer.Argument(metavar="DIR", help="The run folder of each shard.", autocompletion=completion.runs),
+        typer.Argument(
+            metavar="DIR", help="The run folder of each shard.", autocompletion=shell_completion.runs
+        ),
     ],
     out: OutRunFolder,
     accept_versions: AcceptVersions = False,
@@ -107,7 +109,7 @@ def report(
     run: Annotated[
         Path,
         typer.Argument(
-            metavar="DIR", help="A run folder, or a folder of runs.", autocompletion=completion.runs
+            metavar="DIR", help="A run folder, or a folder of runs.", autocompletion=shell_completion.runs
         ),
     ],
     wide: Wide = False,
@@ -191,7 +193,7 @@ Examples:
 
 def clean(
     runs: Annotated[
-        list[Path], typer.Argument(metavar="DIR", help="Run folders.", autocompletion=completion.runs)
+        list[Path], typer.Argument(metavar="DIR", help="Run folders.", autocompletion=shell_completion.runs)
     ],
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Delete without asking.")] = False,
 ) -> None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mutator._common.message_text import counted
-from mutator.cli.console import Terminal
-from mutator.cli.options import Json, Manifest, Wide, WorkspaceOptions, with_workspace_options
+from mutator.cli.shared_options import Json, Manifest, Wide, WorkspaceOptions, with_workspace_options
+from mutator.cli.terminal_output import Terminal
 
 if TYPE_CHECKING:
     from mutator.mutants.possible_places import ListedPlace

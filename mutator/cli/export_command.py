@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 import mutator
-from mutator.cli import completion
-from mutator.cli.console import Terminal, short_path
-from mutator.cli.merge_report_clean import workspace_if_any
-from mutator.cli.options import Json, WorkspaceOptions, with_workspace_options
+from mutator.cli import shell_completion
+from mutator.cli.merge_report_clean_commands import workspace_if_any
+from mutator.cli.shared_options import Json, WorkspaceOptions, with_workspace_options
+from mutator.cli.terminal_output import Terminal, short_path
 from mutator.exports import ExportTable, Format, find_export
 
 
@@ -30,13 +30,15 @@ Examples:
 
 @with_workspace_options
 def export(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.", autocompletion=completion.runs)],
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN", help="A run folder.", autocompletion=shell_completion.runs)
+    ],
     format: Annotated[
         str,
         typer.Option(
             metavar=f"[{'|'.join(Format)}]",
             help="What to write. Other packages can add formats.",
-            autocompletion=completion.formats,
+            autocompletion=shell_completion.formats,
         ),
     ],
     out: Annotated[
@@ -58,7 +60,7 @@ def export(
         typer.Option(
             metavar="EXPR",
             help="MCAP: only experiments whose result columns match, e.g. 'outcome == \"hazard\"'.",
-            autocompletion=completion.result_columns,
+            autocompletion=shell_completion.result_columns,
         ),
     ] = None,
     table: Annotated[ExportTable, typer.Option(help="CSV and Parquet: which table.")] = ExportTable.RESULTS,

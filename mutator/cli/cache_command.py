@@ -8,8 +8,8 @@ import typer
 
 import mutator
 from mutator._common.message_text import counted
-from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, Wide
+from mutator.cli.shared_options import Json, Wide
+from mutator.cli.terminal_output import Terminal, short_path
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:

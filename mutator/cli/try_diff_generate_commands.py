@@ -10,9 +10,8 @@ import mutator
 from mutator._common.confined_files import is_inside
 from mutator._common.doors import OPERATORS
 from mutator._common.message_text import counted
-from mutator.cli import completion
-from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import (
+from mutator.cli import shell_completion
+from mutator.cli.shared_options import (
     Json,
     Manifest,
     Reading,
@@ -24,6 +23,7 @@ from mutator.cli.options import (
     WorkspaceOptions,
     with_workspace_options,
 )
+from mutator.cli.terminal_output import Terminal, short_path
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 from mutator.mutants.patches_by_file import patch_without_new_files
 
@@ -33,7 +33,9 @@ EXPERIMENT_ID_PATTERN = re.compile(r"[0-9a-f]{4,16}")  # an id, or enough of its
 SpecName = Annotated[
     str,
     typer.Argument(
-        metavar="SPEC", help="Name of a spec in the library, or a spec file.", autocompletion=completion.specs
+        metavar="SPEC",
+        help="Name of a spec in the library, or a spec file.",
+        autocompletion=shell_completion.specs,
     ),
 ]
 TriggerText = Annotated[
@@ -42,7 +44,7 @@ TriggerText = Annotated[
         "--trigger",
         metavar="WHEN",
         help="A context (C1), a time in s (10), `always`, or a condition on observed values.",
-        autocompletion=completion.triggers,
+        autocompletion=shell_completion.triggers,
     ),
 ]
 
@@ -70,7 +72,7 @@ def try_spec(
             "--scenario",
             "-s",
             help="Name or file of a driving scenario.",
-            autocompletion=completion.scenarios,
+            autocompletion=shell_completion.scenarios,
         ),
     ],
     trigger: TriggerText = "always",
@@ -100,7 +102,7 @@ def try_spec(
 ) -> None:
     """Inject one fault and run it once: diff and verdict."""
     from mutator.api.target_and_fault_selection import FaultChoice, SelectedTarget, middle_of_each_variant
-    from mutator.cli.experiment_view import print_trial
+    from mutator.cli.experiment_printing import print_trial
 
     terminal = Terminal(as_json, wide)
     if out == _DEFAULT_OUT and not is_inside(Path(), out):  # the current folder can be somebody's library
@@ -147,7 +149,7 @@ def diff(
         typer.Argument(
             metavar="SPEC|EXPERIMENT",
             help="A spec, a spec file, or an experiment's id.",
-            autocompletion=completion.specs_and_experiments,
+            autocompletion=shell_completion.specs_and_experiments,
         ),
     ],
     trigger: TriggerText = "always",
@@ -174,7 +176,7 @@ def diff(
     terminal = Terminal(as_json)
     workspace = workspace_options.workspace()
     if EXPERIMENT_ID_PATTERN.fullmatch(spec_or_experiment) and not Path(spec_or_experiment).exists():
-        from mutator.cli.experiment_view import find_stored_experiment
+        from mutator.cli.experiment_printing import find_stored_experiment
 
         experiment = find_stored_experiment(workspace, run, spec_or_experiment)
         _print_diffs(terminal, [(experiment.fault.label, experiment.id, experiment.patch)], whole_patch=patch)
@@ -222,7 +224,9 @@ def generate(
     specs: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="SPEC", help="Specs, globs of specs, or spec files.", autocompletion=completion.specs
+            metavar="SPEC",
+            help="Specs, globs of specs, or spec files.",
+            autocompletion=shell_completion.specs,
         ),
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="A new or empty folder.")] = ...,  # type: ignore[assignment]
@@ -236,7 +240,7 @@ def generate(
             "--trigger",
             metavar="WHEN",
             help="As for `try`; repeatable. Default: every context.",
-            autocompletion=completion.triggers,
+            autocompletion=shell_completion.triggers,
         ),
     ] = None,
     operators: Annotated[
@@ -261,7 +265,7 @@ def generate(
             "--scenario",
             "-s",
             help="With --operators: only lines that this scenario's golden run executes.",
-            autocompletion=completion.scenarios,
+            autocompletion=shell_completion.scenarios,
         ),
     ] = None,
     all_lines: Annotated[

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mutator._common.message_text import unbreakable_parts
-from mutator.cli.terminal_tables import TableLayout, TerminalTable
+from mutator.cli.terminal_table_layout import TableLayout, TerminalTable
 
 WORDS = st.text("abcdefgh/_0123456789.", min_size=1, max_size=24)
 CELLS = st.lists(WORDS, max_size=9).map(" ".join)

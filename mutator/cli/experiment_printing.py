@@ -11,7 +11,7 @@ from mutator._common.phrase_texts import measured_number
 from mutator.api.experiment_results import experiment_facts
 from mutator.api.results_worst_first import worst_causes, worst_results
 from mutator.api.stored_experiments import StoredExperiment, find_newest_run, open_stored_run
-from mutator.cli.console import STYLE_BY_ENDING, Terminal, short_path
+from mutator.cli.terminal_output import STYLE_BY_ENDING, Terminal, short_path
 from mutator.errors import MutatorError
 from mutator.mutants.patches_by_file import patch_without_new_files
 

@@ -8,8 +8,8 @@ import typer
 
 import mutator
 from mutator._common.message_text import counted
-from mutator.cli.console import Terminal, error_text, short_path
-from mutator.cli.options import Json, Manifest, Wide, WorkspaceOptions, with_workspace_options
+from mutator.cli.shared_options import Json, Manifest, Wide, WorkspaceOptions, with_workspace_options
+from mutator.cli.terminal_output import Terminal, error_text, short_path
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from mutator._common.version import extra_install_command
-from mutator.cli import completion
-from mutator.cli.console import Terminal
-from mutator.cli.options import WorkspaceOptions, with_workspace_options
+from mutator.cli import shell_completion
+from mutator.cli.shared_options import WorkspaceOptions, with_workspace_options
+from mutator.cli.terminal_output import Terminal
 from mutator.errors import MutatorError
 
 EXAMPLES = """\b
@@ -35,7 +35,7 @@ def serve(
         typer.Argument(
             metavar="RUNS",
             help="Run folders, or folders of run folders. Default: runs/.",
-            autocompletion=completion.runs,
+            autocompletion=shell_completion.runs,
         ),
     ] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="The port; 0: any free port.")] = 0,

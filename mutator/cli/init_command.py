@@ -7,8 +7,8 @@ import typer
 
 import mutator
 from mutator._common.message_text import counted
-from mutator.cli.console import Terminal, short_path, with_option_names
-from mutator.cli.options import Json
+from mutator.cli.shared_options import Json
+from mutator.cli.terminal_output import Terminal, short_path, with_option_names
 from mutator.errors import MutatorError
 
 EXAMPLES = """\b

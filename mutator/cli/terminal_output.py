@@ -21,7 +21,7 @@ from mutator._common import progress_events
 from mutator._common.hashing import as_json_types
 from mutator._common.message_text import NO_BREAK_SPACE, bind_units, short_id_length, wrap_text
 from mutator._common.table_rendering import TextTable
-from mutator.cli.terminal_tables import TerminalTable
+from mutator.cli.terminal_table_layout import TerminalTable
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:

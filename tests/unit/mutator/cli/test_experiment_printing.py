@@ -1,6 +1,6 @@
 """The table of the worst experiments."""
 
-from mutator.cli.experiment_view import without_unused_columns
+from mutator.cli.experiment_printing import without_unused_columns
 
 
 def test_a_target_without_classes_or_alerts_has_no_columns_for_them() -> None:

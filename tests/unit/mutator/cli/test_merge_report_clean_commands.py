@@ -8,8 +8,8 @@ import pytest
 
 import mutator
 from mutator.campaigns.plan import Plan
-from mutator.cli.console import Terminal
-from mutator.cli.merge_report_clean import print_outcome_counts
+from mutator.cli.merge_report_clean_commands import print_outcome_counts
+from mutator.cli.terminal_output import Terminal
 from mutator.workspace import Workspace
 
 NOTE = "**: 2 mutants of operators; left out: all in 1 file that cannot be changed (old.py:2: why)"

@@ -10,9 +10,9 @@ import typer
 
 import mutator
 from mutator._common.message_text import counted
-from mutator.cli import completion
-from mutator.cli.console import Terminal, error_text, short_path, with_option_names
-from mutator.cli.options import Json, Manifest, Wide, WorkspaceOptions, with_workspace_options
+from mutator.cli import shell_completion
+from mutator.cli.shared_options import Json, Manifest, Wide, WorkspaceOptions, with_workspace_options
+from mutator.cli.terminal_output import Terminal, error_text, short_path, with_option_names
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ def check(
         list[str] | None,
         typer.Option(
             help="With --drive: only this scenario; repeatable. Default: the scenarios of the campaigns.",
-            autocompletion=completion.scenarios,
+            autocompletion=shell_completion.scenarios,
         ),
     ] = None,
     as_json: Json = False,

@@ -9,10 +9,7 @@ from typer.core import TyperGroup
 
 import mutator
 from mutator._common.message_text import counted
-from mutator.cli import review_actions, review_view
-from mutator.cli.console import Terminal, short_path
-from mutator.cli.help_pages import NamedValuesCommand
-from mutator.cli.options import Json, Wide, WorkspaceOptions, with_workspace_options
+from mutator.cli import review_decision_commands, review_group_printing
 from mutator.cli.review_options import (
     By,
     ExcludeGroups,
@@ -21,6 +18,9 @@ from mutator.cli.review_options import (
     OnlyGroups,
     reviewer_or_git_user,
 )
+from mutator.cli.shared_options import Json, Wide, WorkspaceOptions, with_workspace_options
+from mutator.cli.subcommand_help import NamedValuesCommand
+from mutator.cli.terminal_output import Terminal, short_path
 
 if TYPE_CHECKING:
     from mutator.review.mutant_groups import Group
@@ -69,12 +69,12 @@ def register(app: typer.Typer) -> None:
         ("list", list_groups),
         ("show", show),
         ("status", status),
-        ("approve", review_actions.approve),
-        ("reject", review_actions.reject),
-        ("clear", review_actions.clear),
-        ("remark", review_actions.remark),
-        ("flag", review_actions.flag),
-        ("unflag", review_actions.unflag),
+        ("approve", review_decision_commands.approve),
+        ("reject", review_decision_commands.reject),
+        ("clear", review_decision_commands.clear),
+        ("remark", review_decision_commands.remark),
+        ("flag", review_decision_commands.flag),
+        ("unflag", review_decision_commands.unflag),
         ("walk", walk),
         ("page", page),
     ):
@@ -99,7 +99,7 @@ def list_groups(
     """List groups, new and changed ones first (the default)."""
     terminal = Terminal(as_json, wide)
     reviewed = mutant_options.load(terminal, workspace_options).matching(only, exclude)
-    review_view.print_list(terminal, reviewed.review, reviewed.groups)
+    review_group_printing.print_list(terminal, reviewed.review, reviewed.groups)
 
 
 @with_workspace_options
@@ -123,7 +123,9 @@ def show(
     reviewed = mutant_options.load(terminal, workspace_options)
     selected = reviewed.find(groups)
     for group in () if as_json else selected:
-        (review_view.print_changes if changes else review_view.print_group)(terminal, reviewed.review, group)
+        (review_group_printing.print_changes if changes else review_group_printing.print_group)(
+            terminal, reviewed.review, group
+        )
     pictures_by_group: dict[str, dict[str, str]] = {}
     if pictures:
         pictures_by_group = _write_pictures(
@@ -131,7 +133,8 @@ def show(
         )
     if as_json:
         facts = [
-            review_view.group_as_json(reviewed.review, group, with_diff_and_values=True) for group in selected
+            review_group_printing.group_as_json(reviewed.review, group, with_diff_and_values=True)
+            for group in selected
         ]
         terminal.print_json(
             [
@@ -173,7 +176,7 @@ def status(
     """Show the review's progress: groups by state, changes since the decision, flags. With --campaign, also
     the approvals that the campaign lacks.
     """
-    from mutator.cli.review_status import print_status
+    from mutator.cli.review_status_printing import print_status
 
     terminal = Terminal(as_json, wide)
     reviewed = mutant_options.load(terminal, workspace_options)

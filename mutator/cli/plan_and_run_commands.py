@@ -12,10 +12,9 @@ import typer
 import mutator
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.message_text import counted, describe_seeds
-from mutator.cli import completion
-from mutator.cli.console import Terminal, short_path
-from mutator.cli.merge_report_clean import print_outcome_counts
-from mutator.cli.options import (
+from mutator.cli import shell_completion
+from mutator.cli.merge_report_clean_commands import print_outcome_counts
+from mutator.cli.shared_options import (
     AcceptVersions,
     Cluster,
     Engine,
@@ -33,6 +32,7 @@ from mutator.cli.options import (
     WorkspaceOptions,
     with_workspace_options,
 )
+from mutator.cli.terminal_output import Terminal, short_path
 from mutator.errors import MutatorError
 from mutator.execution.progress_text import describe_duration
 
@@ -48,7 +48,7 @@ CampaignName = Annotated[
     typer.Argument(
         metavar="CAMPAIGN",
         help="Name of a campaign in the library, or a campaign file.",
-        autocompletion=completion.campaigns,
+        autocompletion=shell_completion.campaigns,
     ),
 ]
 

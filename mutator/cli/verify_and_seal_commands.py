@@ -7,10 +7,10 @@ from typing import Annotated
 import typer
 
 import mutator
-from mutator.cli import completion
-from mutator.cli.console import Terminal, error_text, short_path
-from mutator.cli.merge_report_clean import workspace_if_any
-from mutator.cli.options import Json, WorkspaceOptions, with_workspace_options
+from mutator.cli import shell_completion
+from mutator.cli.merge_report_clean_commands import workspace_if_any
+from mutator.cli.shared_options import Json, WorkspaceOptions, with_workspace_options
+from mutator.cli.terminal_output import Terminal, error_text, short_path
 from mutator.errors import EXIT_CHECK_FAILED
 
 
@@ -35,7 +35,9 @@ Examples:
 
 @with_workspace_options
 def verify(
-    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=completion.runs)],
+    run: Annotated[
+        Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=shell_completion.runs)
+    ],
     rerun: Annotated[int, typer.Option(metavar="N", min=0, help="Rerun N randomly drawn experiments.")] = 0,
     expect: Annotated[
         str | None, typer.Option(metavar="DIGEST", help="The expected seal or results digest, 64 hex digits.")
@@ -94,7 +96,9 @@ def verify(
 
 
 def seal(
-    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=completion.runs)],
+    run: Annotated[
+        Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=shell_completion.runs)
+    ],
     sign: Annotated[
         Path | None, typer.Option(metavar="KEY", help="The file of the SSH key to sign with.")
     ] = None,

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from mutator._common.message_text import counted
-from mutator.cli import review_view
-from mutator.cli.console import Terminal, short_path
+from mutator.cli import review_group_printing
+from mutator.cli.terminal_output import Terminal, short_path
 
 if TYPE_CHECKING:
     import mutator
@@ -18,7 +18,7 @@ def print_status(terminal: Terminal, reviewed: "mutator.ReviewedGroups", campaig
     if terminal.as_json:
         terminal.print_json(_status_as_json(reviewed))
         return
-    counts = review_view.describe_counts(review, reviewed.groups)
+    counts = review_group_printing.describe_counts(review, reviewed.groups)
     terminal.print_text(f"{short_path(review.path)}: {counted(len(reviewed.groups), 'group')}: {counts}")
     if review.four_eyes:
         terminal.print_text("four eyes: nobody can approve what they changed last")
@@ -48,9 +48,9 @@ def _status_as_json(reviewed: "mutator.ReviewedGroups") -> dict[str, Any]:
         "target": review.target,
         "four_eyes": review.four_eyes,
         "groups": len(groups),
-        "states": {name: states[name] for name in review_view.STYLE_BY_STATE},
+        "states": {name: states[name] for name in review_group_printing.STYLE_BY_STATE},
         **{
-            name: [review_view.group_as_json(review, group) for group in listed]
+            name: [review_group_printing.group_as_json(review, group) for group in listed]
             for name, listed in groups_by_list.items()
         },
     }

@@ -8,10 +8,10 @@ import typer
 
 import mutator
 from mutator._common.message_text import counted
-from mutator.cli import review_view
-from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, WorkspaceOptions, with_workspace_options
+from mutator.cli import review_group_printing
 from mutator.cli.review_options import By, Groups, MutantOptions, OnlyGroups, reviewer_or_git_user
+from mutator.cli.shared_options import Json, WorkspaceOptions, with_workspace_options
+from mutator.cli.terminal_output import Terminal, short_path
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -145,9 +145,7 @@ def _choose_groups(
         raise MutatorError(
             f"no group matches {only}", argument="only", remedy="list the groups: `mutator review`"
         )
-    count_text = (
-        f"{counted(len(selected), 'group')} ({review_view.describe_counts(reviewed.review, selected)})"
-    )
+    count_text = f"{counted(len(selected), 'group')} ({review_group_printing.describe_counts(reviewed.review, selected)})"
     if not is_confirmed:
         if not sys.stdin.isatty():
             raise MutatorError(
@@ -163,10 +161,12 @@ def _choose_groups(
 def _print_decided(terminal: Terminal, reviewed: "mutator.ReviewedGroups", groups: "Sequence[Group]") -> None:
     review = reviewed.review
     if terminal.as_json:
-        terminal.print_json([review_view.group_as_json(review, group) for group in groups])
+        terminal.print_json([review_group_printing.group_as_json(review, group) for group in groups])
     for group in groups:
         state = review.state(group).value
         description = review.describe_decision(group) or state
         description += ", flagged" * (review.flag(group.id) is not None)
-        terminal.print_text(f"{group.id} {description}", style=review_view.STYLE_BY_STATE[state])
-    terminal.print_text(f"{short_path(review.path)}: {review_view.describe_counts(review, reviewed.groups)}")
+        terminal.print_text(f"{group.id} {description}", style=review_group_printing.STYLE_BY_STATE[state])
+    terminal.print_text(
+        f"{short_path(review.path)}: {review_group_printing.describe_counts(review, reviewed.groups)}"
+    )

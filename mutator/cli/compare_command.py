@@ -7,9 +7,9 @@ import typer
 
 import mutator
 from mutator._common.message_text import counted, spelling_suggestion
-from mutator.cli import completion
-from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, Only, Wide
+from mutator.cli import shell_completion
+from mutator.cli.shared_options import Json, Only, Wide
+from mutator.cli.terminal_output import Terminal, short_path
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def compare(
         typer.Argument(
             metavar="RUN_A",
             help="The first run folder, e.g. before a change.",
-            autocompletion=completion.runs,
+            autocompletion=shell_completion.runs,
         ),
     ],
     run_b: Annotated[
@@ -54,7 +54,7 @@ def compare(
         typer.Argument(
             metavar="RUN_B",
             help="The second run folder, e.g. after the change.",
-            autocompletion=completion.runs,
+            autocompletion=shell_completion.runs,
         ),
     ],
     out: Annotated[
@@ -68,7 +68,7 @@ def compare(
             "--fail-on",
             metavar="KIND,...",
             help=f"Fail on these changes: {GATES_HELP}.",
-            autocompletion=completion.gates,
+            autocompletion=shell_completion.gates,
         ),
     ] = None,
     wide: Wide = False,

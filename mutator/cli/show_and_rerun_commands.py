@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import mutator
-from mutator.cli import completion
-from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import (
+from mutator.cli import shell_completion
+from mutator.cli.shared_options import (
     ExperimentId,
     Json,
     RunFolderOption,
@@ -19,6 +18,7 @@ from mutator.cli.options import (
     WorkspaceOptions,
     with_workspace_options,
 )
+from mutator.cli.terminal_output import Terminal, short_path
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def show(
             metavar="EXPERIMENT",
             help="An experiment's id, or the start of the id. Default: list the worst.",
             show_default=False,
-            autocompletion=completion.experiments,
+            autocompletion=shell_completion.experiments,
         ),
     ] = None,
     run: RunFolderOption = None,
@@ -81,7 +81,7 @@ def show(
         typer.Option(
             metavar="EXPR",
             help="List only experiments whose results match, e.g. 'delta_v > 5'.",
-            autocompletion=completion.result_columns,
+            autocompletion=shell_completion.result_columns,
         ),
     ] = None,
     limit: Annotated[int, typer.Option(min=1, help="List at most this many experiments.")] = 10,
@@ -101,21 +101,21 @@ def show(
     hazard): by severity class, silent hazards first, then by margin and time. With --only, lists each
     experiment.
     """
-    from mutator.cli import experiment_view
+    from mutator.cli import experiment_printing
 
     terminal = Terminal(as_json, wide)
     if experiment is None:
-        experiment_view.print_worst_experiments(terminal, workspace_options.workspace(), run, only, limit)
+        experiment_printing.print_worst_experiments(terminal, workspace_options.workspace(), run, only, limit)
         return
     workspace = workspace_options.workspace()
-    stored = experiment_view.find_stored_experiment(workspace, run, experiment)
+    stored = experiment_printing.find_stored_experiment(workspace, run, experiment)
     patch = stored.patch
     if patch_alone:
         terminal.print_diff(patch)
         return
     plot_path, film_paths = stored.plot_file if stored.is_drawn else None, list[Path]()
     if drive or plot or video or still:  # only this loads an engine
-        run_experiment = experiment_view.find_run_experiment(workspace, run, experiment)
+        run_experiment = experiment_printing.find_run_experiment(workspace, run, experiment)
         if (drive or plot) and stored.record:
             plot_path = _rerun_and_plot(terminal, run_experiment, anew=drive)
         film_paths = _rerun_and_film(terminal, run_experiment, video, still or [])
@@ -147,15 +147,15 @@ def _experiment_facts(
 
 
 def _print_stored(terminal: Terminal, experiment: "StoredExperiment", patch: str) -> None:
-    from mutator.cli import experiment_view
+    from mutator.cli import experiment_printing
 
-    experiment_view.print_answer(terminal, experiment)
-    experiment_view.print_experiment(terminal, experiment.experiment, patch)
+    experiment_printing.print_answer(terminal, experiment)
+    experiment_printing.print_experiment(terminal, experiment.experiment, patch)
     if experiment.record is None:
         terminal.print_text(str(experiment.not_run_error()))
     else:
-        experiment_view.print_verdict(terminal, experiment)
-        experiment_view.print_fault_path(terminal, experiment)
+        experiment_printing.print_verdict(terminal, experiment)
+        experiment_printing.print_fault_path(terminal, experiment)
     if experiment.stretch:
         terminal.print_text(f"recorded on: {experiment.stretch}")
 
@@ -221,10 +221,10 @@ def rerun(
     The exit code is 1 if the new record differs from the campaign's record.
     """
     from mutator.api.experiment_results import experiment_facts
-    from mutator.cli import experiment_view
+    from mutator.cli import experiment_printing
 
     terminal = Terminal(as_json, wide)
-    run_experiment = experiment_view.find_run_experiment(workspace_options.workspace(), run, experiment)
+    run_experiment = experiment_printing.find_run_experiment(workspace_options.workspace(), run, experiment)
     with terminal.show_spinner(f"rerunning {run_experiment.experiment.scenario}"):
         trial = run_experiment.rerun(keep=trace)
     is_same, traces = trial.same_as_record, trial.single.faulty
@@ -234,7 +234,7 @@ def rerun(
         terminal.print_json(
             facts | {"traces": str(traces) if trace else None, "plot": str(plot) if plot else None}
         )
-    experiment_view.print_verdict(terminal, trial)
+    experiment_printing.print_verdict(terminal, trial)
     terminal.print_result(_describe_comparison(is_same), style="bold red" if is_same is False else None)
     if trace:
         terminal.print_text(f"trace: {short_path(traces)}")

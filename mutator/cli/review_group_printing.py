@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from mutator._common.message_text import counted
-from mutator.cli.console import Terminal
+from mutator.cli.terminal_output import Terminal
 
 if TYPE_CHECKING:
     from mutator.review.mutant_groups import Group
