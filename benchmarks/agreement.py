@@ -7,8 +7,8 @@ correlation with its 95 % interval from a bootstrap over fault types.
 import argparse
 from pathlib import Path
 
+from mutator.paper.fault_type_rank_agreement import GUIDED, measure_agreement
 from mutator.paper.published_numbers import load_published_numbers
-from mutator.paper.rank_agreement import GUIDED, measure_agreement
 from mutator.statistics.results_frame import load_usable_results
 from mutator.statistics.tallies import Tally, tally_by_fault_type
 

@@ -8,7 +8,7 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.message_text import counted
 from mutator.config.yaml_files import MOST_YAML_BYTES
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note
-from mutator.paper import observation_judging, observations_by_seed, observations_page
+from mutator.paper import observation_judging, observations_by_seed, observations_markdown_and_table
 from mutator.paper.observation_judging import ClaimVerdict
 from mutator.paper.published_numbers import has_published_numbers, load_published_numbers
 from mutator.report.panel import Panel, rendered
@@ -87,14 +87,14 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
     )
     seeds_table = observations_by_seed.verdicts_by_seed_table(judged, by_seed) if by_seed else None
     sheets = [
-        observations_page.observations_sheet(judged),
+        observations_markdown_and_table.observations_sheet(judged),
         *([observations_by_seed.observations_by_seed_sheet(by_seed)] if by_seed else ()),
     ]
-    text = observations_page.render_observations_markdown(judged, ends_by_scenario, coverage)
+    text = observations_markdown_and_table.render_observations_markdown(judged, ends_by_scenario, coverage)
     parts = [
         "## The paper's observations",
         coverage,
-        observations_page.verdicts_markdown(judged),
+        observations_markdown_and_table.verdicts_markdown(judged),
         *(
             ("### Seed by seed", observations_by_seed.SEEDS_NOTE, seeds_table.as_markdown())
             if seeds_table
@@ -107,9 +107,9 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
         coverage=coverage,
         observations=sorted(judged, key=lambda observation: observation.verdict is ClaimVerdict.UNDECIDED),
         undecided=ClaimVerdict.UNDECIDED.value,
-        table=observations_page.claims_table,
-        session=observations_page.session_setup_code(ends_by_scenario),
-        rules=observations_page.rules_text(),
+        table=observations_markdown_and_table.claims_table,
+        session=observations_markdown_and_table.session_setup_code(ends_by_scenario),
+        rules=observations_markdown_and_table.rules_text(),
         of_seeds=seeds_table,
         about_seeds=observations_by_seed.SEEDS_NOTE,
     )

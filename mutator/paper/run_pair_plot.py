@@ -15,7 +15,7 @@ from mutator.figures.golden_and_faulty_plot import (
     EventMark,
     infinities_as_gaps,
 )
-from mutator.paper.unsafe_actions import ActionFigure, RunPair, StepFlags
+from mutator.paper.unsafe_action_detection import ActionFigure, RunPair, StepFlags
 from mutator.targets.manifest import TargetManifest
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """The study that the entry point in `mutator.studies` provides."""
 
 from mutator.figures.drawings import Drawing
-from mutator.paper.example_figures import build_example_drawings
+from mutator.paper.example_experiment_figures import build_example_drawings
 from mutator.paper.observations_panel import build_observations_panel
 from mutator.paper.published_numbers import has_published_numbers, load_published_numbers
 from mutator.paper.published_numbers_check import check_published_numbers

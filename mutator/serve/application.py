@@ -14,17 +14,17 @@ from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Re
 from starlette.routing import Route
 
 from mutator.errors import MutatorError, NotServed
-from mutator.serve.home_and_error_pages import form_choices, home_page
+from mutator.serve.home_live_trial_and_error_pages import form_choices, home_page
+from mutator.serve.http_responses import media_type_of, on_error
+from mutator.serve.job_queue import ServeJobs
 from mutator.serve.job_requests import JobCommand, RequestChecker
-from mutator.serve.jobs import ServeJobs
 from mutator.serve.json_api import JobApi, ReviewApi, selected_groups
+from mutator.serve.live_and_trial_pages import WatchPages
 from mutator.serve.page_tokens import HOME_PAGE, PageTokens, review_page_name
-from mutator.serve.report_pages import RunPages
-from mutator.serve.responses import media_type_of, on_error
+from mutator.serve.report_and_comparison_pages import RunPages
 from mutator.serve.run_states import has_report
 from mutator.serve.served_reviews import ServedReviews
 from mutator.serve.served_runs import REPORT_PAGE, ServedRuns, live_address, report_address, summarize_run
-from mutator.serve.watch_pages import WatchPages
 from mutator.web import asset_names, asset_text
 from mutator.workspace import Workspace
 

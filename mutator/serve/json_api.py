@@ -6,10 +6,10 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from mutator.errors import GroupsChanged, JobAlreadyEnded, MutatorError
+from mutator.serve.http_responses import error_facts
+from mutator.serve.job_queue import ServeJobs
 from mutator.serve.job_requests import JobCommand, RequestChecker
-from mutator.serve.jobs import ServeJobs
 from mutator.serve.page_tokens import HOME_PAGE, TOKEN_HEADER, PageTokens, review_page_name
-from mutator.serve.responses import error_facts
 from mutator.serve.served_reviews import GroupSelection, SentDecisions, ServedReviews
 from mutator.serve.served_runs import ServedRuns
 

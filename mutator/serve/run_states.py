@@ -8,7 +8,7 @@ from pathlib import Path
 from mutator._common.folder_locks import is_owner_alive
 from mutator.model import Status
 from mutator.results.table_reader import Results
-from mutator.serve.responses import without_absolute_folders
+from mutator.serve.http_responses import without_absolute_folders
 from mutator.store.line_tail import LineTail
 from mutator.store.records import RECORDS_FOLDER, parse_ending
 from mutator.store.run_folder import RunFolder

@@ -9,7 +9,7 @@ import uvicorn
 from mutator.errors import MutatorError
 from mutator.serve.application import ServedSite, build_application
 from mutator.serve.connection_limits import LimitedConnection
-from mutator.serve.security import HOST, GuardedApplication
+from mutator.serve.request_security import HOST, GuardedApplication
 
 _BACKLOG = 64  # connections to accept at once
 

@@ -170,7 +170,7 @@ Serve = Callable[..., AbstractContextManager[str]]
 def serve() -> Serve:
     pytest.importorskip("uvicorn", reason="extra `serve` is not installed")
     from mutator.serve.application import ServedSite
-    from mutator.serve.security import HOST
+    from mutator.serve.request_security import HOST
     from mutator.serve.served_runs import ServedRuns
     from mutator.serve.server import build_server, open_listener
 

@@ -14,7 +14,7 @@ from mutator.report.report_digests import inputs_digest
 from mutator.review.mutant_groups import groups_of_library
 from mutator.review.review_page import review_page_html
 from mutator.review.review_state_and_actions import load_review
-from mutator.serve.jobs import ServeJobs
+from mutator.serve.job_queue import ServeJobs
 from mutator.store import file_digests
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

@@ -31,8 +31,8 @@ EXCEPTIONS: dict[str, str] = {
     ),
     **dict.fromkeys(
         (
-            "mutator/serve/job_events.py::PhaseEvent.done",
-            "mutator/serve/jobs.py::JobState.DONE",
+            "mutator/serve/job_event_reading.py::PhaseEvent.done",
+            "mutator/serve/job_queue.py::JobState.DONE",
             "mutator/serve/served_reviews.py::SentDecisions.seen",
         ),
         "a key or a value that pages and server send each other",

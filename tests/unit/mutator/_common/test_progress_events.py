@@ -9,7 +9,7 @@ import pytest
 
 from mutator._common import progress_events
 from mutator.errors import MutatorError
-from mutator.serve.job_events import EventReader, FileEvent, MessageEvent, PhaseEvent
+from mutator.serve.job_event_reading import EventReader, FileEvent, MessageEvent, PhaseEvent
 
 
 @pytest.fixture

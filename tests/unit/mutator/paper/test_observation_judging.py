@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.paper import observation_judging, observations_page
+from mutator.paper import observation_judging, observations_markdown_and_table
 from mutator.paper.measures import Estimate, estimate_of_difference, estimate_of_share, median_time
 from mutator.paper.observation_judging import (
     ClaimRule,
@@ -222,4 +222,6 @@ def test_the_query_in_the_report_gives_the_reported_numbers() -> None:
     answers = [answer for one in told for claim in one.claims for answer in claim.answers]
     assert len(answers) > 30
     assert [eval(answer.query, names).text for answer in answers] == [a.result.text for a in answers]
-    assert all(a.query in observations_page.render_observations_markdown(told, (), "") for a in answers)
+    assert all(
+        a.query in observations_markdown_and_table.render_observations_markdown(told, (), "") for a in answers
+    )

@@ -16,7 +16,7 @@ import pytest
 from mutator.report.panels import figures_panel
 from mutator.serve.application import ServedSite
 from mutator.serve.page_tokens import HOME_PAGE, TOKEN_HEADER, review_page_name
-from mutator.serve.security import HOST
+from mutator.serve.request_security import HOST
 from mutator.serve.served_runs import ServedRuns
 from mutator.serve.server import build_server, open_listener
 from mutator.workspace import Workspace

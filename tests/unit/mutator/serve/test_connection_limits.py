@@ -12,7 +12,7 @@ from contextlib import suppress
 import pytest
 
 from mutator.serve import connection_limits
-from mutator.serve.security import HOST
+from mutator.serve.request_security import HOST
 
 from .conftest import TOKEN, Client
 

@@ -13,10 +13,10 @@ from mutator.errors import MutatorError
 from mutator.report import report_builder
 from mutator.report.report_digests import inputs_digest, write_report_files
 from mutator.results import table_building
+from mutator.serve.http_responses import without_absolute_folders
 from mutator.serve.page_tokens import PageTokens
+from mutator.serve.report_and_comparison_pages import RunPages
 from mutator.serve.report_cache import ReportCache
-from mutator.serve.report_pages import RunPages
-from mutator.serve.responses import without_absolute_folders
 from mutator.serve.served_runs import ServedRuns
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import script_bytes

@@ -9,11 +9,11 @@ import pytest
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
+from mutator.serve.job_queue import ServeJobs
 from mutator.serve.job_requests import JobCommand, RequestChecker
-from mutator.serve.jobs import ServeJobs
+from mutator.serve.live_and_trial_pages import WatchPages
 from mutator.serve.page_tokens import PageTokens
 from mutator.serve.served_runs import ServedRuns
-from mutator.serve.watch_pages import WatchPages
 from mutator.store import plan_file
 from mutator.workspace import Workspace
 

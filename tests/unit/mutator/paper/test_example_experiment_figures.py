@@ -11,8 +11,8 @@ import pytest
 
 from mutator.execution.campaign_running import run_campaign
 from mutator.figures.drawings import Drawing, drawing_files
-from mutator.paper.example_figures import build_example_drawings, candidate_rows
-from mutator.paper.unsafe_actions import ACTION_FIGURES, ActionFigure, RunPair
+from mutator.paper.example_experiment_figures import build_example_drawings, candidate_rows
+from mutator.paper.unsafe_action_detection import ACTION_FIGURES, ActionFigure, RunPair
 from mutator.report import report_builder
 from mutator.statistics.results_frame import load_usable_results
 from mutator.store.plan_choices import Choices

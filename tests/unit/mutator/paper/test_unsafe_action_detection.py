@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mutator.model import Record
-from mutator.paper.unsafe_actions import (
+from mutator.paper.unsafe_action_detection import (
     RunPair,
     StepFinder,
     build_wrong_time_finder,

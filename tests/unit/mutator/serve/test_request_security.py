@@ -18,7 +18,7 @@ from mutator.serve.page_tokens import (
     review_page_name,
     run_page_name,
 )
-from mutator.serve.security import MOST_BODY_BYTES
+from mutator.serve.request_security import MOST_BODY_BYTES
 from mutator.serve.served_trials import TRIALS_FOLDER
 
 from .conftest import TOKEN, Answer, Client

@@ -10,8 +10,8 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.report.panels import figures_panel
+from mutator.serve.job_queue import JobState, ServeJob, ServeJobs
 from mutator.serve.job_requests import JobCommand, RerunRequest
-from mutator.serve.jobs import JobState, ServeJob, ServeJobs
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

@@ -13,7 +13,7 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from mutator.errors import MutatorError, NotServed, RequestFromWrongPage
-from mutator.serve.home_and_error_pages import error_page
+from mutator.serve.home_live_trial_and_error_pages import error_page
 
 _MEDIA_TYPES = {
     ".css": "text/css; charset=utf-8",

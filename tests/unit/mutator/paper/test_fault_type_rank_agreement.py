@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
+from mutator.paper.fault_type_rank_agreement import GUIDED, measure_agreement, rank_correlation
 from mutator.paper.published_numbers import load_published_numbers
-from mutator.paper.rank_agreement import GUIDED, measure_agreement, rank_correlation
 from mutator.statistics.tallies import Tally
 
 REFERENCES = Path(__file__).parents[4] / "fault_library/references"
@@ -26,7 +26,7 @@ def test_the_publication_agrees_with_itself_and_ties_are_counted(monkeypatch: py
     """Four of 17 fault types have no guided hazard there; one that is not activated is left out."""
     published = load_published_numbers(REFERENCES)
     ours = dict(published.tally_by_fault_type)
-    monkeypatch.setattr("mutator.paper.rank_agreement.tally_by_fault_type", lambda frame: ours)
+    monkeypatch.setattr("mutator.paper.fault_type_rank_agreement.tally_by_fault_type", lambda frame: ours)
     found = measure_agreement(None, published)  # type: ignore[arg-type]
     assert found.correlation == pytest.approx(1.0)
     assert (found.fault_types, found.tied_here, found.tied_there) == (17, 4, 4)

@@ -18,9 +18,9 @@ from typing import IO, Any
 from mutator._common.progress_events import EVENTS_FD_VARIABLE
 from mutator.errors import JobAlreadyEnded, MutatorError, NotServed
 from mutator.execution.progress_text import describe_outcomes
-from mutator.serve.job_events import EventReader, FileEvent, JobEvent, PhaseEvent
+from mutator.serve.http_responses import without_absolute_folders
+from mutator.serve.job_event_reading import EventReader, FileEvent, JobEvent, PhaseEvent
 from mutator.serve.job_requests import JobCommand
-from mutator.serve.responses import without_absolute_folders
 from mutator.serve.served_trials import trial_address
 
 _GUARD_MODULE = "mutator.serve.job_guard"

@@ -12,13 +12,13 @@ from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Re
 from mutator.errors import MutatorError, NotServed
 from mutator.report.lone_experiment_data import ViewedTarget, experiment_view_data
 from mutator.results.finished_experiments_and_columns import FinishedExperiment
-from mutator.serve.home_and_error_pages import live_page, trial_page
-from mutator.serve.jobs import ServeJob, ServeJobs
-from mutator.serve.live_runs import WatchedRuns, state_as_json
+from mutator.serve.home_live_trial_and_error_pages import live_page, trial_page
+from mutator.serve.job_queue import ServeJob, ServeJobs
 from mutator.serve.page_tokens import TRIAL_PAGE, PageTokens, live_page_name
 from mutator.serve.run_states import FAILED, FINISHED, RUNNING, state_of_run
 from mutator.serve.served_runs import ServedRuns, live_address, report_address
 from mutator.serve.served_trials import TRIALS_FOLDER, ServedTrials
+from mutator.serve.watched_runs import WatchedRuns, state_as_json
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import unpacked_series
 from mutator.workspace import Workspace

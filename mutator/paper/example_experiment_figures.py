@@ -12,7 +12,7 @@ from mutator.figures.drawings import Drawing
 from mutator.figures.golden_and_faulty_plot import event_marks
 from mutator.outcomes.series_sampling import MOST_SAMPLES_PER_S
 from mutator.paper.run_pair_plot import plot_run_pair
-from mutator.paper.unsafe_actions import ACTION_FIGURES, ActionFigure, RunPair
+from mutator.paper.unsafe_action_detection import ACTION_FIGURES, ActionFigure, RunPair
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

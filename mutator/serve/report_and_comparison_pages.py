@@ -21,9 +21,9 @@ from mutator.report.change_since_run_before import ChangeSinceRunBefore, find_ch
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.report_digests import inputs_digest
 from mutator.results.table_reader import Results
+from mutator.serve.http_responses import UNTRUSTED_FILE_HEADERS, OpenFileResponse, media_type_of
 from mutator.serve.page_tokens import PageTokens, run_page_name
 from mutator.serve.report_cache import ReportCache
-from mutator.serve.responses import UNTRUSTED_FILE_HEADERS, OpenFileResponse, media_type_of
 from mutator.serve.served_runs import ServedRuns, open_served_file, report_address
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import read_script, script_bytes

@@ -13,9 +13,9 @@ from mutator.model import Outcome, Status
 from mutator.results import table_building
 from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_ranks
-from mutator.serve import live_runs
-from mutator.serve.live_runs import WatchedRun, WatchedRuns
+from mutator.serve import watched_runs
 from mutator.serve.run_states import count_records, state_of_run
+from mutator.serve.watched_runs import WatchedRun, WatchedRuns
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import RECORDS_SCHEMA
@@ -87,7 +87,7 @@ def test_the_list_is_ranked_as_the_table_whatever_the_order_of_arrival(
     planned: RunFolder, append: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Only some rows are in memory, however long the run is."""
-    monkeypatch.setattr(live_runs, "MOST_ROWS", 4)
+    monkeypatch.setattr(watched_runs, "MOST_ROWS", 4)
     watched = WatchedRun(planned)
     for number in range(12):
         fields = HAZARD | {"hazards": (("H3", 9.0 - number % 7),)} if number % 3 else {}
