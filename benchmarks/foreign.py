@@ -19,7 +19,7 @@ from pathlib import Path
 from statistics import median
 from time import process_time
 
-from mutator._common.doors import OPERATORS
+from mutator._common.extension_doors import OPERATORS
 from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels

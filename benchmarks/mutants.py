@@ -17,7 +17,7 @@ from pathlib import Path
 from statistics import median
 from time import process_time
 
-from mutator._common.doors import OPERATORS
+from mutator._common.extension_doors import OPERATORS
 from mutator.campaigns.plan import build_plan
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment

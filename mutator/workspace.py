@@ -11,7 +11,7 @@ from mutator._common.argument_checks import check_whole_number
 from mutator._common.bounded_reading import MOST_FILE_BYTES, check_file_size, open_regular
 from mutator._common.confined_files import checked_path_inside, files_inside
 from mutator._common.files import check_path_encodable
-from mutator._common.folder_search import (
+from mutator._common.library_and_run_folder_search import (
     environment_path,
     library_folder,
     library_yaml_files,

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from mutator._common.folder_search import RUNS_FOLDER
+from mutator._common.library_and_run_folder_search import RUNS_FOLDER
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
 from mutator.serve.application import ServedSite

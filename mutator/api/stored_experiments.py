@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mutator._common.argument_checks import check_type
 from mutator._common.confined_files import path_below
-from mutator._common.folder_search import run_folders
+from mutator._common.library_and_run_folder_search import run_folders
 from mutator.api.experiment_results import ExperimentResult
 from mutator.api.mutants import build_selected
 from mutator.api.target_and_fault_selection import SelectedTarget

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 from pydantic_core import PydanticKnownError
 
-from mutator._common.doors import OPERATORS
+from mutator._common.extension_doors import OPERATORS
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,

@@ -7,7 +7,7 @@ A package registers its study as an entry point of the group `mutator.studies`; 
 from collections.abc import Iterable
 from typing import Protocol, cast
 
-from mutator._common.doors import STUDIES
+from mutator._common.extension_doors import STUDIES
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from packaging.utils import canonicalize_name
 
-from mutator._common.doors import IMPORTERS
+from mutator._common.extension_doors import IMPORTERS
 from mutator._common.version import VERSION
 from mutator.campaigns import run_environment
 from mutator.campaigns.git_clone import find_clone_state

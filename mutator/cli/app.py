@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
-from mutator._common import progress_events
+from mutator._common import command_progress_events
 from mutator._common.files import disk_full_error, is_disk_full_error
 from mutator._common.interrupts import raising_keyboard_interrupts
 from mutator._common.message_text import spelling_suggestion
@@ -201,7 +201,7 @@ def _click_command() -> Any:
 
 def _run_command_line(argv: Sequence[str]) -> int:
     try:
-        progress_events.open_events_pipe()
+        command_progress_events.open_events_pipe()
         # Not `app()`, which has its own handling of errors, interrupts and closed pipes.
         command = _click_command()
         if "_MUTATOR_COMPLETE" in os.environ:  # a shell asks for completions
@@ -267,7 +267,7 @@ def _warnings_in_one_line() -> Iterator[None]:
                 if str(message) in shown_texts:
                     return
                 shown_texts.add(str(message))
-                progress_events.report_warning(str(message))
+                command_progress_events.report_warning(str(message))
                 Terminal().print_note(f"warning: {message}")
             else:
                 show_other_warning(message, category, *place, **more)
@@ -298,7 +298,7 @@ def _report_defect() -> int:
 
 
 def _print_error(text: str) -> None:
-    progress_events.report_error(text)
+    command_progress_events.report_error(text)
     with ignoring_stderr_errors():
         print(text, file=sys.stderr)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import mutator
-from mutator._common import progress_events
+from mutator._common import command_progress_events
 from mutator._common.message_text import NO_BREAK_SPACE, counted
 from mutator._common.phrase_texts import measured_number
 from mutator.api.experiment_results import experiment_facts
@@ -268,7 +268,7 @@ def _list_events(record: "Record", manifest: "TargetManifest | None") -> list[tu
 def print_trial(terminal: Terminal, trial: "Trial", *, with_plot: bool) -> None:
     """Print an experiment that `try` has just run. `with_plot`: write a plot next to its traces."""
     plot_path = _replace_plot(terminal, trial, with_plot=with_plot)
-    progress_events.report_written_file("trial", trial.folder)
+    command_progress_events.report_written_file("trial", trial.folder)
     if terminal.as_json:
         facts = {**experiment_facts(trial.experiment), **trial.verdict, "patch": trial.patch}
         facts |= {"sentence": trial.sentence}

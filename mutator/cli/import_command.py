@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 import mutator
-from mutator._common.doors import LIBRARY_IMPORTERS
+from mutator._common.extension_doors import LIBRARY_IMPORTERS
 from mutator._common.message_text import counted
 from mutator.cli.shared_options import Json
 from mutator.cli.terminal_output import Terminal, short_path, with_option_names

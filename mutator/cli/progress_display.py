@@ -5,7 +5,7 @@ from contextlib import contextmanager, nullcontext
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from mutator._common import progress_events
+from mutator._common import command_progress_events
 from mutator.cli.terminal_output import Terminal
 from mutator.execution.progress_text import (
     ProgressLines,
@@ -31,7 +31,7 @@ def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], Non
     with _live_progress_bar(terminal) if terminal.err.is_terminal else nullcontext(lines) as show:
 
         def notify(progress: "Progress") -> None:
-            progress_events.report_phase(
+            command_progress_events.report_phase(
                 stage_title(progress), progress.done, progress.total, progress.outcomes
             )
             show(progress)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 import mutator
-from mutator._common.garbage_collection import without_garbage_collection
+from mutator._common.garbage_collection_pause import without_garbage_collection
 from mutator.cli import shell_completion
 from mutator.cli.shared_options import Manifest, Reading, Seed, WorkspaceOptions
 from mutator.cli.terminal_output import Terminal

@@ -10,8 +10,8 @@ from typing import Any
 
 import typer
 
-from mutator._common.doors import EXPORTS
-from mutator._common.folder_search import library_folder, library_yaml_files, run_folders
+from mutator._common.extension_doors import EXPORTS
+from mutator._common.library_and_run_folder_search import library_folder, library_yaml_files, run_folders
 from mutator.engines.engine_kinds import OFFERED_ENGINES
 from mutator.errors import MutatorError
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TextIO
 
-from mutator._common import progress_events
+from mutator._common import command_progress_events
 from mutator._common.hashing import as_json_types
 from mutator._common.message_text import NO_BREAK_SPACE, bind_units, short_id_length, wrap_text
 from mutator._common.table_rendering import TextTable
@@ -77,12 +77,12 @@ class Terminal:
 
     def print_result(self, text: str, style: str | None = None) -> None:
         """Print the sentence that says what came out of the command."""
-        progress_events.report_result(text)
+        command_progress_events.report_result(text)
         self.print_text(text, style)
 
     def print_link(self, kind: str, path: Path, text: str | None = None) -> None:
         """Print where a file was written: `kind: path`, or `text`."""
-        progress_events.report_written_file(kind, path)
+        command_progress_events.report_written_file(kind, path)
         self.print_text(text or f"{kind}: {short_path(path)}")
 
     def print_note(self, text: str, *, without_folding: bool = False) -> None:
@@ -92,7 +92,7 @@ class Terminal:
 
     def print_error(self, text: str) -> None:
         """Print an error to standard error."""
-        progress_events.report_error(text)
+        command_progress_events.report_error(text)
         with ignoring_stderr_errors():
             _print_text(self.err, f"error: {text}", "bold red")
 
@@ -199,7 +199,7 @@ class Terminal:
 
     @contextmanager
     def show_spinner(self, text: str) -> Iterator[None]:
-        progress_events.report_phase(text)
+        command_progress_events.report_phase(text)
         if self.as_json or not self.err.is_terminal:
             yield
             return

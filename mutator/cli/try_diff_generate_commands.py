@@ -8,7 +8,7 @@ import typer
 
 import mutator
 from mutator._common.confined_files import is_inside
-from mutator._common.doors import OPERATORS
+from mutator._common.extension_doors import OPERATORS
 from mutator._common.message_text import counted
 from mutator.cli import shell_completion
 from mutator.cli.shared_options import (

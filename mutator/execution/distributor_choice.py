@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from mutator._common.doors import DISTRIBUTORS
+from mutator._common.extension_doors import DISTRIBUTORS
 from mutator.errors import MutatorError
 from mutator.execution.local_distributor import LocalDistributor
 from mutator.execution.session import Session

@@ -11,7 +11,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.doors import EXPORTS
+from mutator._common.extension_doors import EXPORTS
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:

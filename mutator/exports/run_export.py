@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mutator._common.confined_files import path_below
-from mutator._common.doors import EXPORTS
+from mutator._common.extension_doors import EXPORTS
 from mutator._common.files import make_folder, write_atomic
 from mutator.exports import ExportRequest, ExportSelection, check_options, find_export
 from mutator.store.run_folder import RunFolder

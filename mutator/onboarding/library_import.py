@@ -11,7 +11,7 @@ from textwrap import indent
 import yaml
 
 from mutator._common.confined_files import write_below
-from mutator._common.doors import LIBRARY_IMPORTERS
+from mutator._common.extension_doors import LIBRARY_IMPORTERS
 from mutator._common.shipped_files import write_new_library
 from mutator.errors import MutatorError
 from mutator.stpa.hazard_analysis_checks import injection_places

@@ -11,7 +11,7 @@ import numpy as np
 
 from mutator._common.bounded_reading import MOST_JSON_BYTES, read_bounded
 from mutator._common.confined_files import path_below
-from mutator._common.doors import IMPORTERS
+from mutator._common.extension_doors import IMPORTERS
 from mutator._common.hashing import digest
 from mutator._common.resource_shortages import find_shortage
 from mutator.errors import BadOutput, BadTrace, MutatorError

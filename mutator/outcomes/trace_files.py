@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mutator._common.bounded_reading import MOST_FILE_BYTES
-from mutator._common.doors import IMPORTERS
+from mutator._common.extension_doors import IMPORTERS
 from mutator.errors import BadTrace
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest

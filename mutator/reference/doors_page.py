@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pkgutil import resolve_name
 
-from mutator._common.doors import (
+from mutator._common.extension_doors import (
     DISTRIBUTORS,
     DOORS,
     EXPORTS,

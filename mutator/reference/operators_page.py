@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from mutator._common.doors import OPERATORS
+from mutator._common.extension_doors import OPERATORS
 from mutator._common.table_rendering import TextTable
 from mutator.operators.operator_lookup import find_operator
 from mutator.reference.yaml_key_tables import generated_page_head

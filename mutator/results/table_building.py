@@ -8,7 +8,7 @@ from typing import Any
 
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json, write_json, writing_temporary_path
-from mutator._common.garbage_collection import without_garbage_collection
+from mutator._common.garbage_collection_pause import without_garbage_collection
 from mutator._common.hashing import digest
 from mutator._common.helper_processes import computing_in_background, map_in_processes, process_count_for
 from mutator._common.version import VERSION

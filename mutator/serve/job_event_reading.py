@@ -1,4 +1,4 @@
-"""Reads the events of a job's command (`mutator._common.progress_events`)."""
+"""Reads the events of a job's command (`mutator._common.command_progress_events`)."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal

@@ -15,7 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import IO, Any
 
-from mutator._common.progress_events import EVENTS_FD_VARIABLE
+from mutator._common.command_progress_events import EVENTS_FD_VARIABLE
 from mutator.errors import JobAlreadyEnded, MutatorError, NotServed
 from mutator.execution.progress_text import describe_outcomes
 from mutator.serve.http_responses import without_absolute_folders

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from mutator._common.confined_files import open_below, path_below
 from mutator._common.folder_locks import is_owner_alive
-from mutator._common.folder_search import RUN_HEAD_FILE
+from mutator._common.library_and_run_folder_search import RUN_HEAD_FILE
 from mutator.errors import MutatorError, NotServed, UnsafePath
 from mutator.execution.progress_text import stage_title
 from mutator.results.outcome_counting import count_by_outcome_or_status

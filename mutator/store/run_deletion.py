@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from mutator._common.confined_files import unlink_below
-from mutator._common.doors import EXPORTS
+from mutator._common.extension_doors import EXPORTS
 from mutator._common.files import final_name_of_half_written, is_half_written, read_json, remove_folder
 from mutator._common.folder_locks import lock_run_folder
 from mutator.errors import MutatorError

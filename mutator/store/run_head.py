@@ -7,8 +7,8 @@ from typing import Any
 
 from mutator._common.confined_files import checked_name_not_path, checked_relative_path
 from mutator._common.files import json_bytes, read_json
-from mutator._common.folder_search import RUN_HEAD_FILE
 from mutator._common.hashing import added_field, as_json_types
+from mutator._common.library_and_run_folder_search import RUN_HEAD_FILE
 from mutator._common.typed_json import from_json_types
 from mutator.errors import MutatorError, TypeMisfit
 from mutator.model import Limits

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator._common.doors import IMPORTERS
+from mutator._common.extension_doors import IMPORTERS
 from mutator.config.phrases_yaml import ChangePhraseModel, build_phrase
 from mutator.config.unit_symbol_field import UnitSymbol
 from mutator.config.yaml_files import StrictModel

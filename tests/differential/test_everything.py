@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
-from mutator._common.doors import OPERATORS
+from mutator._common.extension_doors import OPERATORS
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import AnchorKind
 from mutator.workspace import Workspace

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.doors import OPERATORS
+from mutator._common.extension_doors import OPERATORS
 from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FaultModels

@@ -5,7 +5,7 @@ the pages beside the report. The function returns None if there is nothing to sh
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from mutator._common.doors import STUDIES
+from mutator._common.extension_doors import STUDIES
 from mutator.report.panel import Panel, ReportPage
 from mutator.report.panels import (
     failed_runs_panel,

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import mutator
-from mutator._common.doors import DOORS, EXPORTS, OPERATORS, STUDIES
+from mutator._common.extension_doors import DOORS, EXPORTS, OPERATORS, STUDIES
 from mutator.cli.app import main
 from mutator.errors import EXIT_WRONG_INPUT, BadAddition, ResourceShortage
 from mutator.execution.distributor_choice import choose_distributor

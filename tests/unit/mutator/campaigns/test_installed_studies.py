@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common import doors
-from mutator._common.doors import STUDIES
+from mutator._common import extension_doors
+from mutator._common.extension_doors import STUDIES
 from mutator.campaigns.installed_studies import load_installed_study
 from mutator.campaigns.plan import build_plan, load_plan
 from mutator.campaigns.plan_freezing import freeze_plan
@@ -35,7 +35,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         EntryPoint(name, value, STUDIES.group)
         for name, value in ((name, value), ("broken", "crash_tests.study:MISSING"))
     )
-    monkeypatch.setattr(doors, "_entry_points", lambda group: points.select(group=group))
+    monkeypatch.setattr(extension_doors, "_entry_points", lambda group: points.select(group=group))
 
 
 def test_the_shipped_study_is_installed() -> None:
@@ -175,7 +175,7 @@ def test_a_run_can_be_opened_without_its_study(
 ) -> None:
     asking(toycar, "crash_tests")
     folder = freeze_plan(build_plan(toycar, "small"), tmp_path / "planned", toycar)
-    monkeypatch.setattr(doors, "_entry_points", lambda group: EntryPoints())
+    monkeypatch.setattr(extension_doors, "_entry_points", lambda group: EntryPoints())
     assert load_plan(folder).campaign.study == "crash_tests"
     with pytest.raises(
         MutatorError, match="no study 'crash_tests'; expected no study, because none is installed"

@@ -172,7 +172,7 @@ def test_a_run_without_usable_outputs_is_a_crash_only_if_its_fault_was_active(
 
 
 IMPORTER = """\
-from mutator._common.doors import IMPORTERS
+from mutator._common.extension_doors import IMPORTERS
 from mutator.errors import BadTrace
 from mutator.outcomes.trace_files import Importer
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.doors import LIBRARY_IMPORTERS
+from mutator._common.extension_doors import LIBRARY_IMPORTERS
 from mutator.errors import BadAddition, MutatorError
 from mutator.onboarding.library_import import (
     EntryOutcome,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.doors import OPERATORS
+from mutator._common.extension_doors import OPERATORS
 from mutator.engines.code_swap_planning import behaviour_key
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.doors import OPERATORS
+from mutator._common.extension_doors import OPERATORS
 from mutator.errors import MutatorError
 from mutator.mutants.mutant_building import build, build_without_reusing_changed_files
 from mutator.mutants.parsed_files_and_anchors import parsed_file

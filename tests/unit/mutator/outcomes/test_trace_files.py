@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from mutator._common.doors import IMPORTERS
+from mutator._common.extension_doors import IMPORTERS
 from mutator.errors import BadOutput
 from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.targets.channels import Channel

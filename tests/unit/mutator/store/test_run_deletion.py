@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.doors import EXPORTS
+from mutator._common.extension_doors import EXPORTS
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError

@@ -4,7 +4,7 @@ import gc
 
 import pytest
 
-from mutator._common.garbage_collection import without_garbage_collection
+from mutator._common.garbage_collection_pause import without_garbage_collection
 
 
 def test_collection_is_as_before_after_the_block() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common import progress_events
+from mutator._common import command_progress_events
 from mutator.errors import MutatorError
 from mutator.serve.job_event_reading import EventReader, FileEvent, MessageEvent, PhaseEvent
 
@@ -16,60 +16,60 @@ from mutator.serve.job_event_reading import EventReader, FileEvent, MessageEvent
 def pipe(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     reading, writing = os.pipe()
     os.set_inheritable(writing, True)
-    monkeypatch.setenv(progress_events.EVENTS_FD_VARIABLE, str(writing))
-    monkeypatch.setattr(progress_events, "_events_pipe", None)
+    monkeypatch.setenv(command_progress_events.EVENTS_FD_VARIABLE, str(writing))
+    monkeypatch.setattr(command_progress_events, "_events_pipe", None)
     yield reading
     os.close(writing)
     os.close(reading)
 
 
 def test_the_reader_understands_every_event(pipe: int) -> None:
-    progress_events.open_events_pipe()
-    progress_events.report_phase("golden runs", 1, 4, {"sdc": 2})
-    progress_events.report_warning("old")
-    progress_events.report_written_file("plot", Path("plots/a.svg"))
-    progress_events.report_result("verdict: sdc \udcff")
-    progress_events.report_error("x" * 9_999)
+    command_progress_events.open_events_pipe()
+    command_progress_events.report_phase("golden runs", 1, 4, {"sdc": 2})
+    command_progress_events.report_warning("old")
+    command_progress_events.report_written_file("plot", Path("plots/a.svg"))
+    command_progress_events.report_result("verdict: sdc \udcff")
+    command_progress_events.report_error("x" * 9_999)
     data = os.read(pipe, 65_536)
     assert [*EventReader().read(data)] == [
         PhaseEvent(event="phase", phase="golden runs", done=1, total=4, outcomes={"sdc": 2}),
         MessageEvent(event="warning", text="old"),
         FileEvent(event="link", kind="plot", path=str(Path.cwd() / "plots/a.svg")),
         MessageEvent(event="result", text="verdict: sdc ?"),
-        MessageEvent(event="error", text="x" * progress_events.MOST_EVENT_TEXT_LENGTH),
+        MessageEvent(event="error", text="x" * command_progress_events.MOST_EVENT_TEXT_LENGTH),
     ]
     assert all(len(line) < 4_096 and json.loads(line)["event"] for line in data.splitlines())
 
 
 def test_child_processes_do_not_get_the_pipe(pipe: int) -> None:
     """A mutant could otherwise send events."""
-    fd = int(os.environ[progress_events.EVENTS_FD_VARIABLE])
+    fd = int(os.environ[command_progress_events.EVENTS_FD_VARIABLE])
     assert os.get_inheritable(fd)
-    progress_events.open_events_pipe()
-    assert progress_events.EVENTS_FD_VARIABLE not in os.environ
+    command_progress_events.open_events_pipe()
+    assert command_progress_events.EVENTS_FD_VARIABLE not in os.environ
     assert not os.get_inheritable(fd)
 
 
 @pytest.mark.parametrize("text", ["", "x", "-1", "99999", "9" * 99])
 def test_anything_but_an_open_pipe_is_refused(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
-    monkeypatch.setenv(progress_events.EVENTS_FD_VARIABLE, text)
+    monkeypatch.setenv(command_progress_events.EVENTS_FD_VARIABLE, text)
     with pytest.raises(MutatorError, match=f"'{text}'"):
-        progress_events.open_events_pipe()
+        command_progress_events.open_events_pipe()
 
 
 def test_a_file_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Others could write to it."""
     with (tmp_path / "events").open("w") as file:
-        monkeypatch.setenv(progress_events.EVENTS_FD_VARIABLE, str(file.fileno()))
+        monkeypatch.setenv(command_progress_events.EVENTS_FD_VARIABLE, str(file.fileno()))
         with pytest.raises(MutatorError, match="open pipe"):
-            progress_events.open_events_pipe()
+            command_progress_events.open_events_pipe()
 
 
 def test_a_command_goes_on_when_nobody_reads_its_events(monkeypatch: pytest.MonkeyPatch) -> None:
     reading, writing = os.pipe()
     os.close(reading)
-    monkeypatch.setattr(progress_events, "_events_pipe", writing)
-    progress_events.report_result("done")
-    progress_events.report_result("again")
-    assert progress_events._events_pipe is None
+    monkeypatch.setattr(command_progress_events, "_events_pipe", writing)
+    command_progress_events.report_result("done")
+    command_progress_events.report_result("again")
+    assert command_progress_events._events_pipe is None
     os.close(writing)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common import doors
-from mutator._common.doors import DOORS, EXPORTS, Door
+from mutator._common import extension_doors
+from mutator._common.extension_doors import DOORS, EXPORTS, Door
 from mutator.errors import MutatorError
 
 CLONE = Path(__file__).parents[4]
@@ -51,7 +51,7 @@ def test_an_unknown_name_lists_those_that_exist(door_examples: Path) -> None:
 
 
 def test_the_page_lists_every_door() -> None:
-    assert {door for door in vars(doors).values() if isinstance(door, Door)} == set(DOORS)
+    assert {door for door in vars(extension_doors).values() if isinstance(door, Door)} == set(DOORS)
     page = (CLONE / "docs" / "reference" / "doors.md").read_text()
     for door in DOORS:
         assert f'[project.entry-points."{door.group}"]' in page
@@ -63,7 +63,7 @@ def test_no_other_module_looks_for_entry_points() -> None:
     looking = [path for path in folder.rglob("*.py") if "entry_points(" in path.read_text()]
     # pytest loads the plugin; `local` asks only whether it will
     assert {str(path.relative_to(folder)) for path in looking} == {
-        "_common/doors.py",
+        "_common/extension_doors.py",
         "execution/local_distributor.py",
     }
 
