@@ -145,7 +145,8 @@ def _choose_groups(
         raise MutatorError(
             f"no group matches {only}", argument="only", remedy="list the groups: `mutator review`"
         )
-    count_text = f"{counted(len(selected), 'group')} ({review_group_printing.describe_counts(reviewed.review, selected)})"
+    counts = review_group_printing.describe_counts(reviewed.review, selected)
+    count_text = f"{counted(len(selected), 'group')} ({counts})"
     if not is_confirmed:
         if not sys.stdin.isatty():
             raise MutatorError(

@@ -18,7 +18,7 @@ from mutator.workspace import Workspace
 
 from .conftest import Client
 from .test_files import HOSTILE
-from .test_security import check_policy
+from .test_request_security import check_policy
 
 
 @pytest.fixture(scope="module")

@@ -117,4 +117,6 @@ def test_a_common_prefix_is_written_once() -> None:
 @pytest.mark.parametrize("mark", ["<marker", '" L".join', "arrow.label.anchor"])
 def test_one_module_draws_the_arrows_of_all_drawings(mark: str) -> None:
     sources = Path(mutator.__file__).parent
-    assert [path.name for path in sources.rglob("*.py") if mark in path.read_text()] == ["svg_shapes.py"]
+    assert [path.name for path in sources.rglob("*.py") if mark in path.read_text()] == [
+        "arrow_and_box_svg.py"
+    ]

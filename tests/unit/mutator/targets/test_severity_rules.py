@@ -10,7 +10,7 @@ from mutator.targets.hazard_severity import ClassifiedHazard
 from mutator.targets.severity_yaml import load_severity_scale
 from mutator.workspace import Workspace
 
-from .test_contact_severity import SCALE
+from .test_hazard_severity import SCALE
 
 RULE = """\
 rules:
