@@ -36,9 +36,9 @@ from mutator.api.target_places import find_place_notes as find_place_notes
 from mutator.api.target_places import find_places as find_places
 from mutator.api.trials import Trial as Trial
 from mutator.api.trials import try_fault as try_fault
-from mutator.audit.seal import Seals as Seals
+from mutator.audit.run_digests_and_seal import Seals as Seals
 from mutator.campaigns.plan import Plan as Plan
-from mutator.comparison.run_comparison import Gate as Gate
+from mutator.comparison.run_comparison_and_gates import Gate as Gate
 from mutator.errors import CheckFailed as CheckFailed
 from mutator.errors import IncompleteRun as IncompleteRun
 from mutator.errors import MutatorError as MutatorError
@@ -54,7 +54,7 @@ from mutator.model import Trigger as Trigger
 from mutator.onboarding.library_import import EntryOutcome as EntryOutcome
 from mutator.onboarding.library_import import ImportedEntry as ImportedEntry
 from mutator.onboarding.library_import import ImportedLibrary as ImportedLibrary
-from mutator.report.film import Shot as Shot
+from mutator.report.experiment_filming import Shot as Shot
 from mutator.report.run_history import History as History
 from mutator.store.plan_choices import Choices as Choices
 from mutator.store.run_progress import Progress as Progress
