@@ -19,7 +19,7 @@ from mutator.report.answer_parts import (
     filtered_list_fragment,
 )
 from mutator.report.fault_path_page_data import RunFaultPaths, link_name
-from mutator.report.most_dangerous_answer import NO_CLASS_VALUE, SEVERITY_COLUMN
+from mutator.report.most_dangerous_experiments_answer import NO_CLASS_VALUE, SEVERITY_COLUMN
 
 MOST_FAULT_TYPES = 5  # maximum number of fault types listed
 

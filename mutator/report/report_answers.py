@@ -26,7 +26,7 @@ from mutator.report.answer_parts import (
 )
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN
 from mutator.report.fix_first_answers import fix_first_answer
-from mutator.report.most_dangerous_answer import most_dangerous_answer, worst_hazard_ids
+from mutator.report.most_dangerous_experiments_answer import most_dangerous_answer, worst_hazard_ids
 from mutator.report.reported_run import ReportedRun
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.result_rows import ResultRow, rows_of

@@ -20,7 +20,7 @@ from mutator.report.answer_parts import (
 )
 from mutator.report.fault_path_page_data import RunFaultPaths
 from mutator.report.fix_first_answers import fix_first_answer
-from mutator.report.most_dangerous_answer import most_dangerous_answer
+from mutator.report.most_dangerous_experiments_answer import most_dangerous_answer
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.report_answers import build_answers
 from mutator.report.reported_run import ReportedRun
