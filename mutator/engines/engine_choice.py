@@ -10,16 +10,14 @@ from mutator.engines.engine_kinds import ENGINES, FORK, OFFERED_ENGINES, REFEREN
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
-MIN_EXPERIMENTS_TO_FORK = 40  # with fewer experiments, the equivalence check would rerun most of them
 
-
-def choose_engine(engine: str | None, manifest: TargetManifest, experiment_count: int) -> str:
-    """Return the name of the requested engine, or of the fastest that pays off for this many experiments.
+def choose_engine(engine: str | None, manifest: TargetManifest) -> str:
+    """Return the name of the requested engine, or of the fastest that can run this target.
 
     Raises MutatorError if the requested engine is unknown or cannot run this target here.
     """
     if engine is None:
-        return REFERENCE if reason_not_to_fork(manifest, experiment_count) else FORK
+        return REFERENCE if reason_not_forkable(manifest) else FORK
     why = reason_not_forkable(manifest)
     if engine not in ENGINES:
         check_engine_is_offered(engine)
@@ -44,17 +42,8 @@ def make_engine(name: str, arguments: EngineArguments) -> Engine:
     return engine
 
 
-def reason_not_to_fork(manifest: TargetManifest, experiment_count: int) -> str:
-    """Return why this many experiments are not forked unless requested; empty if they are."""
-    few = (
-        f"forking pays off only with {MIN_EXPERIMENTS_TO_FORK} or more experiments"
-        if experiment_count < MIN_EXPERIMENTS_TO_FORK
-        else ""
-    )
-    return reason_not_forkable(manifest) or few
-
-
 def reason_not_forkable(manifest: TargetManifest) -> str:
+    """Return why runs of this target are not forked unless requested; empty if they are."""
     if manifest.stepwise_function is None:
         return f"{manifest.path.name} names no `entry.stepwise`"
     if sys.platform != "linux":

@@ -23,8 +23,8 @@ from mutator.campaigns.plan_growth import APPENDED_FILES, GrowingPlan
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import accepted_version_differences, check_sources, check_version
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
-from mutator.engines.engine_choice import choose_engine, reason_not_forkable
-from mutator.engines.engine_kinds import FORK, REFERENCE
+from mutator.engines.engine_choice import choose_engine
+from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import ensure_work_folder
 from mutator.errors import MutatorError
 from mutator.execution.batch_check import BatchCheck
@@ -90,8 +90,7 @@ class Bench:
         self.caller_lock = threading.Lock()
         self._workspace, self._manifest = workspace, manifest
         check_requirements(manifest)
-        self._not_forked = reason_not_forkable(manifest)
-        self._engine = choose_engine(engine or (REFERENCE if self._not_forked else FORK), manifest, 0)
+        self._requested_engine, self._engine = engine, choose_engine(engine, manifest)
         self._batch_check = BatchCheck(workspace, manifest, campaign)
         self._plan = GrowingPlan(workspace, manifest, campaign, canary, self.path)
         self._checks = BenchChecks(workspace, manifest, campaign, canary, self.path / "work", workers=workers)
@@ -171,7 +170,7 @@ class Bench:
         self._read_records()
 
     def _open_session(self, folder: RunFolder) -> Session:
-        session = Session(self._workspace, folder, workers=self._crew.size, engine=self._engine)
+        session = Session(self._workspace, folder, workers=self._crew.size, engine=self._requested_engine)
         self._worker_prefix = session.new_worker_name("")
         return session
 

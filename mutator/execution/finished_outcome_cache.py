@@ -21,7 +21,8 @@ class FinishedRunOutcome:
 def remember_finished_run(folder: RunFolder, outcome: FinishedRunOutcome) -> None:
     if key := integrity.verified_cache_key(folder.path):
         proof = outcome.proof and {
-            name: getattr(outcome.proof, name) for name in ("sampled", "same", "chosen", "same_chosen")
+            name: getattr(outcome.proof, name)
+            for name in ("sampled", "same", "chosen", "same_chosen", "note")
         }
         outcome_as_json = {"outcomes": dict(outcome.outcomes), "proof": proof, "seals": asdict(outcome.seals)}
         verified_runs_cache.remember_facts(key, ended=outcome_as_json)

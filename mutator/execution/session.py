@@ -30,7 +30,7 @@ from mutator.campaigns.run_provenance import (
     append_worker_machine,
     begin_session_environment,
 )
-from mutator.engines.engine_choice import choose_engine, reason_not_to_fork
+from mutator.engines.engine_choice import choose_engine, reason_not_forkable
 from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import ensure_work_folder
 from mutator.errors import (
@@ -94,10 +94,8 @@ class Session:
         self.pending: tuple[PendingChunk, ...] = ()
         self.proof: tuple[equivalence_check.SampledExperiment, ...] = ()
         self.manifest = workspace.manifest(folder.head.target)
-        # count the whole plan, so that all shards and an unsharded run agree on whether a proof is needed
-        experiments = folder.head.experiments
-        self.engine = choose_engine(engine, self.manifest, experiments)
-        self._not_forked = "" if engine else reason_not_to_fork(self.manifest, experiments)
+        self.engine = choose_engine(engine, self.manifest)
+        self._not_forked = "" if engine else reason_not_forkable(self.manifest)
         self.problem = ""
         self.interrupted = False
         self.secret = token_bytes(_SECRET_BYTES)

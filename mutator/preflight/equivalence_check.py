@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
+from math import comb
 from pathlib import Path
 
 from mutator._common.files import raising_disk_full, remove_folder
@@ -24,6 +25,9 @@ from mutator.store.records import PROOF_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
 
 _MIN_SAMPLE = 20  # finds an engine that changes one record in seven with a chance of 95%
+SMALL_PLAN_SIZE = 40  # with fewer experiments, 20 would be most of them
+_MIN_SMALL_SAMPLE, _EXPERIMENTS_PER_SAMPLED_IN_SMALL_PLAN = 3, 10
+_CONFIDENCE = 0.95  # with which a sample finds what its note says
 _PROOF_ERROR_PREFIX = "in the proof: "
 _EXPERIMENTS_PER_SAMPLED_EXPERIMENT = 100  # one experiment in this many
 # Of a bench, which can end after few experiments: a tenth of the first ones.
@@ -49,12 +53,18 @@ class EquivalenceResult:
     errors: tuple[tuple[str, str], ...] = ()
     chosen: int = 0  # experiments of a bench that were chosen, not drawn: no part of a share
     same_chosen: int = 0
+    note: str = ""  # of a small sample: what it can exclude, and what it does not cover
 
     @property
     def is_complete(self) -> bool:
         return self.same == self.sampled and self.same_chosen == self.chosen
 
     def __str__(self) -> str:
+        return "; ".join(filter(None, (self.without_note, self.note if self.is_complete else "")))
+
+    @property
+    def without_note(self) -> str:
+        """The state of the check, without what a small sample can exclude."""
         if not self.chosen:
             return self._describe_sample()
         chosen = f"{self.same_chosen} of {self.chosen} chosen for their fault type or scenario"
@@ -86,7 +96,13 @@ def mark_check_as_needed(run: Path) -> None:
 
 
 def choose_sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ...]:
-    """Choose one experiment in a hundred, at least 20, with every fault type and every scenario."""
+    """Choose one experiment in a hundred, at least 20, with every fault type and every scenario.
+
+    Of fewer than 40 experiments, choose one in ten, at least three: 20 would be most of them.
+    """
+    if len(experiments) < SMALL_PLAN_SIZE:
+        count = max(_MIN_SMALL_SAMPLE, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_IN_SMALL_PLAN))
+        return draw_balanced(experiments, count, seed)
     count = max(_MIN_SAMPLE, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_EXPERIMENT))
     chosen = list(draw_balanced(experiments, count, seed))
     covered = {mark for experiment in chosen for mark in _traits_to_cover(experiment)}
@@ -141,8 +157,8 @@ def _cached_bench_sample(run: Path, plan: str) -> BenchSample:
 
 @lru_cache(maxsize=4)  # a session asks several times
 def _cached_sample_ids(run: Path, plan: str, seed_count: int) -> tuple[str, ...]:
-    if seed_count == 1:
-        head = RunFolder.open_unverified(run).head
+    head = RunFolder.open_unverified(run).head
+    if seed_count == 1 or head.experiments < SMALL_PLAN_SIZE:
         return tuple(e.id for e in choose_sample(plan_file.load_experiments(run), head.seed))
     ids: list[str] = []
     for seed, group in groupby(plan_file.iterate_experiments(run), key=lambda experiment: experiment.seed):
@@ -233,17 +249,50 @@ def compare_sample(folder: RunFolder, records: Mapping[str, Record]) -> Equivale
                 remedy="do not trust this run: rerun it with --engine reference, and report the problem",
             )
         same_ids.add(name)
-    sampled, chosen = len(sample_ids_in_folder(folder)), frozenset[str]()
+    sample_ids, chosen = set(sample_ids_in_folder(folder)), frozenset[str]()
+    same_ids &= sample_ids
     if folder.is_bench:
         chosen = _cached_bench_sample(folder.path, folder.head.plan).chosen
     same_chosen = len(chosen & same_ids)
     return EquivalenceResult(
-        sampled=sampled - len(chosen),
+        sampled=len(sample_ids) - len(chosen),
         same=len(same_ids) - same_chosen,
         errors=tuple(sorted(errors)),
         chosen=len(chosen),
         same_chosen=same_chosen,
+        note=_note_on_small_sample(folder),
     )
+
+
+def _note_on_small_sample(folder: RunFolder) -> str:
+    """Say what the sample of a small campaign can exclude, and which fault types are not in it."""
+    if folder.is_bench or folder.head.experiments >= SMALL_PLAN_SIZE:
+        return ""
+    experiments = plan_file.load_experiments(folder.path)
+    sampled_ids = _sample_ids_of_plan(folder)
+    if len(sampled_ids) == len(experiments):
+        return ""
+    covered = {_fault_type_of(experiment) for experiment in experiments if experiment.id in sampled_ids}
+    uncovered = sorted({_fault_type_of(experiment) for experiment in experiments} - covered)
+    share = _share_found(len(experiments), len(sampled_ids))
+    exclusion = (
+        f"an engine that changes {share:.0%} of the records or more would have been noticed with a chance of "
+        f"{_CONFIDENCE:.0%}"
+    )
+    return f"{exclusion}; no sample of {', '.join(uncovered)}" if uncovered else exclusion
+
+
+def _share_found(count: int, sample_size: int) -> float:
+    """Return the smallest share of changed records that a sample drawn from `count` records would find."""
+    for changed in range(1, count + 1):
+        missed = comb(count - changed, sample_size) / comb(count, sample_size)
+        if 1.0 - missed >= _CONFIDENCE:
+            return changed / count
+    return 1.0
+
+
+def _fault_type_of(experiment: Experiment) -> str:
+    return f"{experiment.fault.module}/{experiment.fault.fault_type}"
 
 
 def describe_difference(record: Record, reference_record: Record) -> str:

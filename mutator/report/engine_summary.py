@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mutator._common.table_rendering import TextTable
-from mutator.engines.engine_choice import MIN_EXPERIMENTS_TO_FORK
 from mutator.engines.engine_jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.model import Record
@@ -76,11 +75,11 @@ def _describe_equivalence(folder: RunFolder, records: Mapping[str, Record]) -> t
         return text, f"FAILED: {err.got}", True
     if check is None:
         text = "All experiments ran on the reference engine, so no equivalence check is needed."
-        if folder.head.experiments < MIN_EXPERIMENTS_TO_FORK:
-            text += f" Forking pays off only with {MIN_EXPERIMENTS_TO_FORK} or more experiments."
         return text, "none needed", False
     same = f"{check.same} of {check.sampled} same"
     if not check.is_complete:
         judged = f"{check.same} of {check.sampled} judged, none differs"
         return f"The equivalence check is not finished: {check}.", f"not finished: {judged}", False
-    return f"Equivalence check: of a sample rerun from the start, {check}, byte for byte.", same, False
+    note = f" {check.note[:1].upper()}{check.note[1:]}." if check.note else ""
+    text = f"Equivalence check: of a sample rerun from the start, {check.without_note}, byte for byte.{note}"
+    return text, same, False

@@ -1,8 +1,11 @@
 """`run --shard` and `merge` on the command line."""
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+from mutator.audit.seal import Seals
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
@@ -17,7 +20,7 @@ def test_a_shard_is_run_and_merged(cli: Cli, root: Path) -> None:
     assert cli("run", "small", "--out", "rest", "-n", "0", "--shard", "2/2", "--limit", 4).code == 0
     merged = cli("merge", "part", "rest", "--out", "whole", "--json")
     assert merged.code == 0, merged.err
-    digests = {name: merged.json[name] for name in ("seal", "results_digest", "review_digest")}
+    digests = {name: merged.json[name] for name in dataclasses.asdict(Seals())}
     assert merged.json == {"run": "whole", "shards": 2, "experiments": 4, **digests}
     assert [len(digests[name]) for name in ("seal", "results_digest")] == [64, 64]
     again = cli("merge", "part", "rest", "--out", "whole")

@@ -12,11 +12,9 @@ import pytest
 from mutator.audit.run_digests_and_seal import seals_of
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.engines import engine_choice
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution import shard_merging
 from mutator.execution.campaign_running import run_campaign
-from mutator.execution.session import Session
 from mutator.execution.shard_merging import merge_shards
 from mutator.results import table_building
 from mutator.store import recorded_approvals
@@ -92,15 +90,6 @@ def test_merged_shards_have_the_seal_of_the_single_run(runs: Runs, tmp_path: Pat
     merge_shards([runs["2/2"], runs["1/2"]], tmp_path / "out")
     seals = [seals_of(RunFolder.open(path)).seal for path in (runs["whole"], tmp_path / "out", runs["1/2"])]
     assert seals[0] is not None and seals[0] == seals[1] != seals[2]
-
-
-def test_the_whole_plan_decides_the_engine_of_a_shard(
-    runs: Runs, toy: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(
-        engine_choice, "MIN_EXPERIMENTS_TO_FORK", RunFolder.open(runs["whole"]).planned_experiment_count
-    )
-    assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
 
 def test_an_approval_is_merged_if_every_shard_has_it(copies: Runs, tmp_path: Path) -> None:
@@ -204,6 +193,7 @@ def test_a_shard_with_a_failed_equivalence_check_is_refused(
     copies: Runs, tmp_path: Path, broken: str, reseal: Reseal
 ) -> None:
     for path in (copies["1/2"], copies["2/2"]):
+        shutil.rmtree(path / "proof")
         shutil.copytree(path / "records", path / "proof")
         reseal(path)
     path = next((copies[broken] / "proof").iterdir())

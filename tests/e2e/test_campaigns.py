@@ -90,8 +90,9 @@ def test_bad_endings_are_not_harness_errors(toy: Workspace, tmp_path: Path) -> N
 def test_a_run_leaves_its_results_and_no_scratch_files(finished_once: Finished) -> None:
     out, summary, told = finished_once.run, finished_once.summary, finished_once.told
     assert finished_once.after == finished_once.before
-    assert {stage.stage for stage in told} == {"plan", "checks", "golden", "experiments", "tables"}
-    assert told[-2].done == 12
+    assert {stage.stage for stage in told} == {"plan", "checks", "golden", "experiments", "proof", "tables"}
+    assert [stage.done for stage in told if stage.stage == "experiments"][-1] == 12
+    assert told[-2].done == told[-2].total == 3
     assert {p.name for p in out.iterdir()} == {
         "run.json",
         "campaign.yaml",
@@ -101,6 +102,7 @@ def test_a_run_leaves_its_results_and_no_scratch_files(finished_once: Finished) 
         "digests.json",
         "golden",
         "patches",
+        "proof",
         "records",
         "series",
         "timings",
@@ -194,12 +196,12 @@ def test_experiments_with_harness_errors_are_rerun(
 
     monkeypatch.setattr(ReferenceEngine, "execute", flaky)
     out = tmp_path / "run"
-    summary = run_campaign(toy, "small", out)
+    summary = run_campaign(toy, "small", out, engine="reference")
     assert (summary.exit_code, summary.done, summary.ran) == (3, 10, 10)
     assert dict(summary.harness_errors).keys() == set(hit)
     assert summary.outcomes["harness_error"] == 2
     assert sum(row["status"] == "harness_error" and row["outcome"] == "" for row in rows_of(out)) == 2
-    again = run_campaign(toy, "small", out)
+    again = run_campaign(toy, "small", out, engine="reference")
     assert (again.exit_code, again.done, again.ran) == (0, 12, 2)
     assert run_campaign(toy, "small", out).ran == 0
 

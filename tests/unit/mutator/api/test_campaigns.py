@@ -32,7 +32,9 @@ def test_a_campaign_can_be_run_resumed_and_compared(toycar: Workspace, tmp_path:
     first = mutator.run("small", tmp_path / "a", choices=TWO, workspace=toycar, progress=seen.append)
     assert first.summary is not None
     assert (first.summary.ran, first.summary.done, len(first.results)) == (2, 2, 2)
-    assert {"plan", "checks", "golden", "experiments", "tables"} == {progress.stage for progress in seen}
+    assert {"plan", "checks", "golden", "experiments", "proof", "tables"} == {
+        progress.stage for progress in seen
+    }
     again = mutator.run("small", tmp_path / "a", workspace=toycar.library.parent)
     assert again.summary is not None
     assert (again.summary.ran, again.summary.done) == (0, 2)

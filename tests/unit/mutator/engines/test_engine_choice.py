@@ -5,7 +5,7 @@ from pkgutil import resolve_name
 import pytest
 
 from mutator.engines.engine_choice import check_engine_is_offered, choose_engine
-from mutator.engines.engine_kinds import ENGINES, FORK, REFERENCE
+from mutator.engines.engine_kinds import ENGINES, FORK
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
@@ -18,10 +18,9 @@ def test_each_listed_engine_has_a_description_and_a_factory() -> None:
 
 def test_the_default_engine_depends_on_the_size_of_the_campaign(toycar: Workspace) -> None:
     manifest = toycar.manifest("toycar")
-    assert choose_engine(None, manifest, 3) == REFERENCE
-    assert choose_engine(None, manifest, 1000) == FORK
+    assert choose_engine(None, manifest) == FORK
     with pytest.raises(MutatorError, match="no engine 'quick'; expected one of reference, fork"):
-        choose_engine("quick", manifest, 3)
+        choose_engine("quick", manifest)
 
 
 @pytest.mark.parametrize("name", ["warm", "quick", ""])

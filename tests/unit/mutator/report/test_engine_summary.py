@@ -10,6 +10,7 @@ import pytest
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Experiment, Outcome, Record, Status
+from mutator.preflight import equivalence_check
 from mutator.report import engine_summary, report_builder, report_digests
 from mutator.report.experiment_facts import timings_frame
 from mutator.results.table_building import build_tables
@@ -44,8 +45,8 @@ Finish = Callable[..., Path]
 
 @pytest.fixture
 def finish(toycar: Workspace, tmp_path: Path) -> Finish:
-    """Create a finished run of four experiments. The first `proven` records, after `change`, are also in the
-    proof. With None, there is no proof."""
+    """Create a finished run of four experiments, three of which are the sample. The first `proven` records of
+    the sample, after `change`, are in the proof. With None, there is no proof."""
 
     def made(
         proven: int | None,
@@ -58,7 +59,9 @@ def finish(toycar: Workspace, tmp_path: Path) -> Finish:
         records = [record(experiment) for experiment in plan.experiments]
         write_records(run / "records/0001-main.jsonl", records)
         if proven is not None:
-            write_records(run / "proof/0001-main.jsonl", [change(r) for r in records[:proven]])
+            sample = equivalence_check.sample_ids_in_folder(RunFolder.open_unverified(run))
+            sampled = [change(r) for r in records if r.experiment_id in sample]
+            write_records(run / "proof/0001-main.jsonl", sampled[:proven])
         pairs = zip(records, ways, strict=False)
         lines = [timing(r.experiment_id) | {"engine": engine, "why": why} for r, (engine, why) in pairs]
         write(run / "timings/0001-main.jsonl", TIMINGS_SCHEMA, lines)
@@ -89,7 +92,7 @@ def summary(run: Path) -> engine_summary.EngineSummary | None:
 
 
 def test_each_way_of_running_is_counted_with_its_reasons(finish: Finish) -> None:
-    told = summary(finish(4))
+    told = summary(finish(3))
     assert told is not None
     ways = dict(told.table.rows)
     assert list(ways.values()) == ["1"] * 4
@@ -108,13 +111,17 @@ def test_less_frequent_reasons_share_a_line(finish: Finish) -> None:
 
 
 def test_the_newest_timing_of_an_experiment_is_used(finish: Finish) -> None:
-    run = finish(4)
+    run = finish(3)
     again = timing(record_ids(run)[0]) | {"engine": "reference", "why": "it leaves threads behind"}
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, [again])
     told = summary(run)
     assert told is not None
     assert sum(int(count) for _, count in told.table.rows) == 4
     assert not any("fork of the golden run" in way for way, _ in told.table.rows)
+
+
+def sampled_ids(run: Path) -> list[str]:
+    return equivalence_check.sample_ids_in_folder(RunFolder.open_unverified(run))
 
 
 def record_ids(run: Path) -> list[str]:
@@ -124,16 +131,21 @@ def record_ids(run: Path) -> list[str]:
 @pytest.mark.parametrize(
     ("proven", "said", "state"),
     [
-        (4, "4 of 4 experiments came out the same on the reference engine, byte for byte.", "4 of 4 same"),
         (
             3,
-            "3 of 4 experiments came out the same on the reference engine; the others could not be judged: "
+            "3 of 3 experiments came out the same on the reference engine, byte for byte. An engine that "
+            "changes 50% of the records or more would have been noticed with a chance of 95%.",
+            "3 of 3 same",
+        ),
+        (
+            2,
+            "2 of 3 experiments came out the same on the reference engine; the others could not be judged: "
             "they have no result yet.",
-            "not finished: 3 of 4 judged, none differs",
+            "not finished: 2 of 3 judged, none differs",
         ),
         (
             None,
-            "no equivalence check is needed. Forking pays off only with 40 or more experiments.",
+            "no equivalence check is needed.",
             "none needed",
         ),
     ],
@@ -149,24 +161,15 @@ def test_complete_partial_and_missing_proofs_are_distinguished(
     assert not told.has_failed_equivalence
 
 
-def test_a_large_campaign_without_forks_has_no_note_on_its_size(
-    finish: Finish, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(engine_summary, "MIN_EXPERIMENTS_TO_FORK", 4)
-    told = summary(finish(None))
-    assert told is not None
-    assert told.equivalence_text.endswith("so no equivalence check is needed.")
-
-
 def test_a_failed_proof_is_reported_first(finish: Finish) -> None:
-    run = finish(4, change=lambda r: replace(r, trace_digest="0" * 64))
+    run = finish(3, change=lambda r: replace(r, trace_digest="0" * 64))
     build_tables(run)
     written = report_builder.write_report(run, None)
     texts = [path.read_text() for path in (written.markdown, written.page)]
     assert all(text.index("The equivalence check failed") < text.index("Planned: ") for text in texts)
     origin = written.page.with_name("origin.html").read_text()
     for text in (texts[0], origin):
-        assert f"FAILED: experiment {record_ids(run)[0]} differs on the reference engine" in text
+        assert f"FAILED: experiment {sampled_ids(run)[0]} differs on the reference engine" in text
         assert "How the experiments were run" in text
     assert "its golden run has &lt;two&gt; threads" in origin
 
@@ -184,7 +187,7 @@ def test_a_changed_trace_digest_makes_a_report_out_of_date(
     finish: Finish, reseal: Callable[[Path], None]
 ) -> None:
     """The results do not contain the digests of traces."""
-    run = finish(4)
+    run = finish(3)
     build_tables(run)
     results, before = (
         (run / "results.csv").read_bytes(),
@@ -199,7 +202,7 @@ def test_a_changed_trace_digest_makes_a_report_out_of_date(
 
 
 def test_a_failed_proof_is_reported_without_timings(finish: Finish) -> None:
-    told = summary(finish(4, lambda r: replace(r, tree="x"), ways=()))
+    told = summary(finish(3, lambda r: replace(r, tree="x"), ways=()))
     assert told is not None
     assert told.has_failed_equivalence
 

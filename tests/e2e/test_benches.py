@@ -1,0 +1,64 @@
+"""A bench that is killed again and again gives the same seal as one that is left alone."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import mutator
+from mutator.store.records import load_records
+from mutator.workspace import Workspace
+
+_KILLS = 8
+_ASK = """
+import sys
+import mutator
+
+library, out, workers, size = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
+workspace = mutator.Workspace.find(root=library)
+with mutator.open_bench(workspace, out, campaign="small", workers=workers) as bench:
+    asked = [
+        bench.build_experiment("sensor/distance/longer", scenario, start, value=value, hold_s=hold)
+        for scenario in "AB"
+        for start in (1.0, "near")
+        for value in (5, 12.5, 40)
+        for hold in (None, 0.5)
+    ]
+    for begin in range(0, len(asked), size):
+        bench.run(asked[begin : begin + size], f"from {begin}")
+"""
+
+
+def ask(workspace: Workspace, out: Path, workers: int, size: int) -> subprocess.Popen[bytes]:
+    words = [str(workspace.library.parent), str(out), str(workers), str(size)]
+    return subprocess.Popen([sys.executable, "-c", _ASK, *words], start_new_session=True)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("kept_checks")
+@pytest.mark.parametrize(("workers", "size"), [(1, 2), (2, 5)])
+def test_kills_inside_and_between_batches_change_nothing(
+    toycar: Workspace, tmp_path: Path, workers: int, size: int
+) -> None:
+    """Killed at random moments, resumed, in batches: the records, the seal and the digest of the plan of one
+    batch that was left alone; and no experiment has a second record.
+    """
+    alone = ask(toycar, tmp_path / "alone", 1, 100)
+    assert alone.wait(600) == 0
+    out, rng = tmp_path / "killed", random.Random(size)
+    for _ in range(_KILLS):
+        process = ask(toycar, out, workers, size)
+        try:
+            assert process.wait(rng.uniform(1.0, 4.0)) == 0
+        except subprocess.TimeoutExpired:
+            os.kill(process.pid, signal.SIGKILL)
+            process.wait()
+    assert ask(toycar, out, workers, size).wait(600) == 0
+    first, second = (mutator.load_run(tmp_path / name, workspace=toycar) for name in ("alone", "killed"))
+    assert second.seal == first.seal is not None
+    assert dict(load_records(out)) == dict(load_records(tmp_path / "alone"))
+    assert second.verify().differences == ()
