@@ -19,7 +19,7 @@ from pathlib import Path
 from statistics import median
 from time import process_time
 
-from mutator._common.extension_doors import OPERATORS
+from mutator._common.extension_doors import OPERATOR_DOOR
 from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
@@ -108,7 +108,7 @@ def check_mutant(file: ParsedFile, models: FaultModels, injection: Injection) ->
         return f"does not compile: {error}"
     if unsplice(mutant) != file.data:
         return "does not un-splice"
-    if ast.dump(InactiveCode().visit(tree)) != ast.dump(file.tree):
+    if ast.dump(InactiveCode().visit(tree)) != ast.dump(file.syntax_tree):
         return "its inactive code differs"
     return None
 
@@ -118,7 +118,7 @@ def try_file(path: Path, models: FaultModels, figures: Figures) -> None:
     tree = read_tree(path.parent, [path.name])
     file, facts = parsed_file(tree, path.name), statement_facts_of(tree, path.name)
     parsed = process_time()
-    operators = OPERATORS.shipped_names()
+    operators = OPERATOR_DOOR.shipped_names()
     functions = file.functions_by_name
     listed = [one for name in functions for one in mutations_of(file, facts, name, models, operators)]
     mutations = [*drop_equal_code(file, listed).mutations]

@@ -17,7 +17,7 @@ from pathlib import Path
 from statistics import median
 from time import process_time
 
-from mutator._common.extension_doors import OPERATORS
+from mutator._common.extension_doors import OPERATOR_DOOR
 from mutator.campaigns.plan import build_plan
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment
@@ -44,7 +44,7 @@ def operators(manifest: TargetManifest, models: FaultModels, count: int) -> tupl
     """Return how many mutants of operators are found and how many are built per second of CPU."""
     select_mutations(manifest, models, ["return"], PLACES)  # parses the files, as every campaign must
     start = process_time()
-    found = select_mutations(manifest, models, OPERATORS.names(), PLACES)
+    found = select_mutations(manifest, models, OPERATOR_DOOR.names(), PLACES)
     took = process_time() - start
     faults = [mutation.to_fault("as_described") for mutation in sample_mutations(found, count, 1)]
     trigger = always_trigger()

@@ -8,7 +8,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
-from mutator._common.hashing import added_field, added_values, as_json_types, content_id
+from mutator._common.hashing import added_field, as_json_types, content_id, non_default_added_fields
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 
 Value = int | float | str | bool | None
@@ -214,7 +214,7 @@ class Experiment:
         # the fault's id, not its content: a plan then hashes each fault once instead of once per run
         trigger = self.trigger_as_json
         parts = (self.scenario, self.scenario_digest, self.method, trigger, self.seed, self.setting)
-        later = added_values(self)
+        later = non_default_added_fields(self)
         return content_id([self.fault.id, *parts, *([later] if later else [])])
 
     @cached_property

@@ -12,9 +12,9 @@ from mutator._common.bounded_reading import MOST_FILE_BYTES, check_file_size, op
 from mutator._common.confined_files import checked_path_inside, files_inside
 from mutator._common.files import check_path_encodable
 from mutator._common.library_and_run_folder_search import (
-    environment_path,
     library_folder,
     library_yaml_files,
+    path_from_environment,
     templates_folder,
 )
 from mutator._common.message_text import counted, describe_choices, spelling_suggestion
@@ -96,7 +96,7 @@ class Workspace:
         if sandbox:
             # late: what only reads loads nothing of the engines
             import_module(_SANDBOX_MODULE).check_sandbox_available()
-        target_root = Path(target) if target else environment_path("MUTATOR_TARGET")
+        target_root = Path(target) if target else path_from_environment("MUTATOR_TARGET")
         if target_root and not target_root.is_dir():
             raise MutatorError(
                 f"no folder {target_root}",

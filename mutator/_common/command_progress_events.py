@@ -14,7 +14,7 @@ from mutator.errors import MutatorError
 
 EVENTS_FD_VARIABLE = "MUTATOR_EVENTS_FD"
 MOST_EVENT_TEXT_LENGTH = 500  # characters; so that a line is written in one piece (PIPE_BUF)
-_events_pipe: int | None = None
+_events_pipe_descriptor: int | None = None
 
 
 def open_events_pipe() -> None:
@@ -22,7 +22,7 @@ def open_events_pipe() -> None:
 
     MutatorError if the variable does not name an open pipe.
     """
-    global _events_pipe
+    global _events_pipe_descriptor
     text = os.environ.pop(EVENTS_FD_VARIABLE, None)
     if text is None:
         return
@@ -35,7 +35,7 @@ def open_events_pipe() -> None:
         raise MutatorError(
             f"'{text}'", where=EVENTS_FD_VARIABLE, expected="the number of an open pipe", remedy="unset it"
         ) from None
-    _events_pipe = fd
+    _events_pipe_descriptor = fd
 
 
 def report_phase(
@@ -70,11 +70,11 @@ def report_error(text: str) -> None:
 
 
 def _send_event(event: str, **facts: object) -> None:
-    global _events_pipe
-    if _events_pipe is None:
+    global _events_pipe_descriptor
+    if _events_pipe_descriptor is None:
         return
     line = json.dumps({"event": event, **facts}, ensure_ascii=False) + "\n"
     try:
-        os.write(_events_pipe, line.encode("utf-8", "replace"))
+        os.write(_events_pipe_descriptor, line.encode("utf-8", "replace"))
     except OSError:  # nobody reads any more
-        _events_pipe = None
+        _events_pipe_descriptor = None

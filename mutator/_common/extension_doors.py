@@ -31,7 +31,7 @@ _HARNESS_FOLDER = Path(__file__).parent.parent  # the harness
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Door:
     """One kind of addition. `addition` is its name, `type_path` the type of every object (`module:class`),
-    and `group` the group of entry points.
+    and `entry_point_group` the group of entry points.
 
     The modules of the package `shipped_package` hold the shipped ones, each as an attribute named like
     `addition`, in capitals and with `_` for a space. A module's name is the name of the object, with `_` for
@@ -39,11 +39,11 @@ class Door:
     """
 
     addition: str
-    group: str
+    entry_point_group: str
     type_path: str
     shipped_package: str | None = None
     api_argument: str | None = None  # the API's argument that names one; None if only files do
-    first_sorted_names: tuple[str, ...] = ()  # these come before all others, in this order
+    names_sorted_first: tuple[str, ...] = ()  # these come before all others, in this order
 
     @property
     def attribute_in_module(self) -> str:
@@ -60,15 +60,15 @@ class Door:
 
     def installed_names(self) -> tuple[str, ...]:
         """Return the names that other packages add."""
-        return tuple(sorted({point.name for point in _entry_points(self.group)}))
+        return tuple(sorted({point.name for point in _entry_points(self.entry_point_group)}))
 
     def names(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys((*self.shipped_names(), *self.installed_names())))
 
     def sort_key(self, name: str) -> tuple[int, str]:
         """Return a key that sorts names."""
-        return self.first_sorted_names.index(name) if name in self.first_sorted_names else len(
-            self.first_sorted_names
+        return self.names_sorted_first.index(name) if name in self.names_sorted_first else len(
+            self.names_sorted_first
         ), name
 
     def has_name(self, name: str) -> bool:
@@ -80,7 +80,7 @@ class Door:
         MutatorError for an unknown name, a name that two packages use, an entry point that cannot be loaded,
         or an object of another kind.
         """
-        points = list(_entry_points(self.group).select(name=name))
+        points = list(_entry_points(self.entry_point_group).select(name=name))
         is_shipped = name in self.shipped_names()
         if len(points) + is_shipped > 1:
             owners = ["mutator"] * is_shipped + [_package_and_version(point) for point in points]
@@ -140,7 +140,7 @@ class Door:
         packages = [_package_and_version(point) for point in self._entry_points_of_others(name)]
         if not packages:
             return None
-        where, line = next(_foreign_lines(err), (None, None))
+        where, line = next(_lines_outside_harness(err), (None, None))
         return BadAddition(
             f"{self.addition} '{name}' of package {packages[0]} fails: {type(err).__name__}: {err}",
             where=where,
@@ -149,7 +149,7 @@ class Door:
         )
 
     def _entry_points_of_others(self, name: str) -> "list[EntryPoint]":
-        points = _entry_points(self.group).select(name=name)
+        points = _entry_points(self.entry_point_group).select(name=name)
         return [point for point in points if not (point.dist and point.dist.name == DISTRIBUTION)]
 
     def _name_error(self, name: str, got: str, remedy: str) -> MutatorError:
@@ -176,7 +176,7 @@ def _entry_points(group: str) -> "EntryPoints":
     return entry_points(group=group)
 
 
-def _foreign_lines(err: Exception) -> Iterator[tuple[str, int]]:
+def _lines_outside_harness(err: Exception) -> Iterator[tuple[str, int]]:
     """Yield the files and lines of an exception that are not the harness's, from the outermost call."""
     for frame, line in walk_tb(err.__traceback__):
         file = frame.f_code.co_filename
@@ -188,44 +188,53 @@ def _package_and_version(point: "EntryPoint") -> str:
     return f"{point.dist.name} {point.dist.version}" if point.dist else "unknown"
 
 
-EXPORTS = Door(
+EXPORT_DOOR = Door(
     addition="export",
-    group="mutator.exports",
+    entry_point_group="mutator.exports",
     type_path="mutator.exports:Export",
     shipped_package="mutator.exports.formats",
     api_argument="format",
 )
-IMPORTERS = Door(
+TRACE_IMPORTER_DOOR = Door(
     addition="importer",
-    group="mutator.importers",
+    entry_point_group="mutator.importers",
     type_path="mutator.outcomes.trace_files:Importer",
     shipped_package="mutator.outcomes.importers",
     api_argument="trace",
 )
-LIBRARY_IMPORTERS = Door(
+LIBRARY_IMPORTER_DOOR = Door(
     addition="library importer",
-    group="mutator.library_importers",
+    entry_point_group="mutator.library_importers",
     type_path="mutator.onboarding.library_import:LibraryImporter",
     shipped_package="mutator.paper.importers",
     api_argument="format",
 )
-DISTRIBUTORS = Door(
+DISTRIBUTOR_DOOR = Door(
     addition="distributor",
-    group="mutator.distributors",
+    entry_point_group="mutator.distributors",
     type_path="mutator.execution.distributor_choice:DistributorKind",
     shipped_package="mutator.execution.distributors",
     api_argument="cluster",
 )
-OPERATORS = Door(
+OPERATOR_DOOR = Door(
     addition="operator",
-    group="mutator.operators",
+    entry_point_group="mutator.operators",
     type_path="mutator.operators:Operator",
     shipped_package="mutator.operators.shipped",
     api_argument="operators",
     # if two make the same change, it belongs to the first, so another order changes samples
-    first_sorted_names=("arithmetic", "comparison", "constant", "branch", "omission", "return", "argument"),
+    names_sorted_first=("arithmetic", "comparison", "constant", "branch", "omission", "return", "argument"),
 )
-STUDIES = Door(
-    addition="study", group="mutator.studies", type_path="mutator.report.reported_run:PublishedWork"
+STUDY_DOOR = Door(
+    addition="study",
+    entry_point_group="mutator.studies",
+    type_path="mutator.report.reported_run:PublishedWork",
 )
-DOORS = (EXPORTS, IMPORTERS, LIBRARY_IMPORTERS, DISTRIBUTORS, OPERATORS, STUDIES)
+ALL_DOORS = (
+    EXPORT_DOOR,
+    TRACE_IMPORTER_DOOR,
+    LIBRARY_IMPORTER_DOOR,
+    DISTRIBUTOR_DOOR,
+    OPERATOR_DOOR,
+    STUDY_DOOR,
+)

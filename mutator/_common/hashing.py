@@ -29,7 +29,7 @@ def is_added_field(field: "dataclasses.Field[Any]") -> bool:
     return _ADDED_KEY in field.metadata
 
 
-def added_values(record: Any) -> dict[str, Any]:
+def non_default_added_fields(record: Any) -> dict[str, Any]:
     """Return the `added` fields of a dataclass instance that differ from the defaults, as JSON types."""
     _, later = _first_and_added_fields(type(record))  # type: ignore[arg-type]  # classes are hashable
     if not later:
@@ -64,7 +64,7 @@ def as_json_types(value: Any) -> Any:
         for name in _first_and_added_fields(type(value))[0]:
             field_value = getattr(value, name)
             values[name] = field_value if type(field_value) in _SCALAR_TYPES else as_json_types(field_value)
-        return values | added_values(value)
+        return values | non_default_added_fields(value)
     if isinstance(value, dict):
         return {str(k): as_json_types(v) for k, v in value.items()}
     if isinstance(value, list | tuple):

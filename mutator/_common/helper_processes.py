@@ -18,15 +18,17 @@ _MIN_EXPERIMENTS_TO_SHARE = (
     20_000  # the smallest number of experiments for which a second process is worth starting
 )
 
-T = TypeVar("T")
-R = TypeVar("R")
+ItemT = TypeVar("ItemT")
+ResultT = TypeVar("ResultT")
 
 
 def process_count_for(experiment_count: int) -> int:
     return min(_MOST_PROCESSES, usable_cores()) if experiment_count >= _MIN_EXPERIMENTS_TO_SHARE else 1
 
 
-def map_in_processes(compute: Callable[[T], R], items: Sequence[T], process_count: int) -> Iterator[R]:
+def map_in_processes(
+    compute: Callable[[ItemT], ResultT], items: Sequence[ItemT], process_count: int
+) -> Iterator[ResultT]:
     """Yield `compute(item)` for each item, in order, computed by `process_count` processes (with fewer than
     two: by this process).
 
@@ -42,7 +44,9 @@ def map_in_processes(compute: Callable[[T], R], items: Sequence[T], process_coun
 
 
 @contextmanager
-def computing_in_background(compute: Callable[[], R], process_count: int) -> Iterator[Callable[[], R]]:
+def computing_in_background(
+    compute: Callable[[], ResultT], process_count: int
+) -> Iterator[Callable[[], ResultT]]:
     """Run `compute` in another process during the block. Yield a function that waits for its result.
 
     The function raises what `compute` raised. With fewer than two processes, `compute` itself is yielded.
@@ -56,7 +60,7 @@ def computing_in_background(compute: Callable[[], R], process_count: int) -> Ite
 
 @contextmanager
 def _started_workers(
-    compute: Callable[[T], R], items: Sequence[T], process_count: int
+    compute: Callable[[ItemT], ResultT], items: Sequence[ItemT], process_count: int
 ) -> Iterator[list[Connection]]:
     """Start worker processes, which end with the block, and yield the connections to their results."""
     context = get_context("fork")  # items and `compute` are inherited, and need not be pickled
@@ -83,8 +87,8 @@ def _started_workers(
 
 
 def _send_results(
-    compute: Callable[[T], Any],
-    items: Sequence[T],
+    compute: Callable[[ItemT], Any],
+    items: Sequence[ItemT],
     pipes: Sequence[tuple[Connection, Connection]],
     worker_number: int,
 ) -> None:

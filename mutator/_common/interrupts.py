@@ -12,7 +12,7 @@ class _InterruptState:
     is_pending: bool = False  # an interruption arrived in such a block
 
 
-_state = _InterruptState()
+_interrupt_state = _InterruptState()
 
 
 @contextmanager
@@ -23,8 +23,8 @@ def raising_keyboard_interrupts() -> Iterator[None]:
     """
 
     def interrupt(number: int, frame: object) -> None:
-        if _state.delay_depth:
-            _state.is_pending = True
+        if _interrupt_state.delay_depth:
+            _interrupt_state.is_pending = True
         else:
             raise KeyboardInterrupt
 
@@ -49,11 +49,11 @@ def delaying_interrupts() -> Iterator[None]:
 
     Native code that calls Python, such as a parser, would replace KeyboardInterrupt with another exception.
     """
-    _state.delay_depth += 1
+    _interrupt_state.delay_depth += 1
     try:
         yield
     finally:
-        _state.delay_depth -= 1
-        if _state.is_pending and not _state.delay_depth:
-            _state.is_pending = False
+        _interrupt_state.delay_depth -= 1
+        if _interrupt_state.is_pending and not _interrupt_state.delay_depth:
+            _interrupt_state.is_pending = False
             raise KeyboardInterrupt

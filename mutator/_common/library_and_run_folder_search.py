@@ -31,7 +31,7 @@ def templates_folder(root: _PathArgument = None, templates: _PathArgument = None
     )
 
 
-def environment_path(variable: str) -> Path | None:
+def path_from_environment(variable: str) -> Path | None:
     value = os.environ.get(variable)
     return Path(value) if value else None
 
@@ -46,7 +46,7 @@ def library_yaml_files(library: Path, folder: str) -> dict[str, Path]:
     return dict(sorted(files.items()))
 
 
-def run_folders(root: Path) -> list[Path]:
+def run_folders_newest_first(root: Path) -> list[Path]:
     """Return the run folders in runs/ of the current folder and of `root`, the most recently used first."""
     bases = {base.resolve() for base in (RUNS_FOLDER, root / RUNS_FOLDER)}
     heads = [head for base in bases for head in base.glob(f"*/{RUN_HEAD_FILE}")]
@@ -57,8 +57,8 @@ def run_folders(root: Path) -> list[Path]:
 def _configured_folder(folder: _PathArgument, root: _PathArgument, name: str, variable: str) -> Path | None:
     if folder or root:
         return Path(folder) if folder else Path(root or "") / name
-    base = environment_path("MUTATOR_ROOT")
-    return environment_path(variable) or (base / name if base else None)
+    base = path_from_environment("MUTATOR_ROOT")
+    return path_from_environment(variable) or (base / name if base else None)
 
 
 def _nearest_folder_with(*folders: str) -> Path | None:

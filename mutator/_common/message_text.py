@@ -51,46 +51,50 @@ def spelling_suggestion(word: str, choices: list[str]) -> str:
     return f"; did you mean '{close[0]}'?" if close else ""
 
 
-_PYTHON_OPERATORS = {"&&": "and", "||": "or", "!": "not", "=": "=="}
+_PYTHON_OPERATOR_BY_FOREIGN_OPERATOR = {"&&": "and", "||": "or", "!": "not", "=": "=="}
 _FOREIGN_OPERATOR_PATTERN = re.compile(r"&&|\|\||!(?!=)|(?<![<>=!])=(?!=)")
-_QUOTED_PATTERN = re.compile(r"\"[^\"]*\"|'[^']*'")
+_QUOTED_TEXT_PATTERN = re.compile(r"\"[^\"]*\"|'[^']*'")
 
 
-def operator_hint(text: str) -> str:
+def python_operator_hint(text: str) -> str:
     """Return which Python operators to write for those of other languages, such as `&&`; '' without any."""
-    operators = dict.fromkeys(_FOREIGN_OPERATOR_PATTERN.findall(_QUOTED_PATTERN.sub("", text)))
-    return ", ".join(f"write '{_PYTHON_OPERATORS[operator]}' for '{operator}'" for operator in operators)
+    operators = dict.fromkeys(_FOREIGN_OPERATOR_PATTERN.findall(_QUOTED_TEXT_PATTERN.sub("", text)))
+    return ", ".join(
+        f"write '{_PYTHON_OPERATOR_BY_FOREIGN_OPERATOR[operator]}' for '{operator}'" for operator in operators
+    )
 
 
 NO_BREAK_SPACE = "\u00a0"  # in a terminal, printed as a space at which text is not folded
-_UNIT_PATTERN = re.compile(r"(?<=\d) (?!(?:and|in|of|or|to) )(?=[A-Za-z%°][\w/^²]{0,4}(?![\w/]))")
+_SPACE_BEFORE_UNIT_PATTERN = re.compile(
+    r"(?<=\d) (?!(?:and|in|of|or|to) )(?=[A-Za-z%°][\w/^²]{0,4}(?![\w/]))"
+)
 
-_COMPARISON_PATTERN = re.compile(r" ([<>]=?|[=!]=) ")  # `hwt <= 2.0`
+_SPACED_COMPARISON_PATTERN = re.compile(r" ([<>]=?|[=!]=) ")  # `hwt <= 2.0`
 
 
-def bind_numbers(text: str) -> str:
+def with_unbreakable_numbers(text: str) -> str:
     """Return the text with spaces that no line may be folded at between a number and a short word, which can
     be its unit. For texts of pages: what users copy into files or a shell keeps its spaces.
     """
-    return _UNIT_PATTERN.sub(NO_BREAK_SPACE, text)
+    return _SPACE_BEFORE_UNIT_PATTERN.sub(NO_BREAK_SPACE, text)
 
 
-def bind_units(text: str) -> str:
+def with_unbreakable_units(text: str) -> str:
     """Return the text with spaces that no line may be folded at: between a number and a short word, which can
     be its unit, around the sign of a comparison, and in commands in backticks.
     """
-    text = bind_numbers(text)
-    text = _COMPARISON_PATTERN.sub(NO_BREAK_SPACE + r"\1" + NO_BREAK_SPACE, text)
-    return _COMMAND_PATTERN.sub(lambda command: command[0].replace(" ", NO_BREAK_SPACE), text)
+    text = with_unbreakable_numbers(text)
+    text = _SPACED_COMPARISON_PATTERN.sub(NO_BREAK_SPACE + r"\1" + NO_BREAK_SPACE, text)
+    return _COMMAND_IN_BACKTICKS_PATTERN.sub(lambda command: command[0].replace(" ", NO_BREAK_SPACE), text)
 
 
 def unbreakable_parts(text: str) -> list[str]:
     """Return the parts of a text between which a line can be folded."""
-    return re.split(r"[ \n]", bind_units(text))
+    return re.split(r"[ \n]", with_unbreakable_units(text))
 
 
 _NAME_BEFORE_VALUE_PATTERN = re.compile(r"[^\s:]+(?: [^\s:]+)*  +")  # `name   ` before a value
-_COMMAND_PATTERN = re.compile(r"`[^`]*`")
+_COMMAND_IN_BACKTICKS_PATTERN = re.compile(r"`[^`]*`")
 _DIGEST_LINE_PATTERN = re.compile(r"[\w .-]{1,40}:? +[0-9a-f]{64}")  # `seal: 3f9a...`, to copy
 _UNBREAKABLE_SPACE = "\0"  # no message contains it, and textwrap does not break lines there
 
@@ -111,7 +115,9 @@ def _wrap_line(line: str, width: int) -> str:
     start = _NAME_BEFORE_VALUE_PATTERN.match(line)
     # values far to the right would leave too little room for their lines
     indent = len(start[0]) if start and len(start[0]) <= width // 2 else _indentation(line) + 2
-    unbroken = _COMMAND_PATTERN.sub(lambda command: command[0].replace(" ", _UNBREAKABLE_SPACE), line)
+    unbroken = _COMMAND_IN_BACKTICKS_PATTERN.sub(
+        lambda command: command[0].replace(" ", _UNBREAKABLE_SPACE), line
+    )
     if indent + max(map(len, unbroken.split(" "))) > width:  # e.g. a digest in a narrow terminal
         indent = _indentation(line) + 2
     lines = textwrap.wrap(

@@ -8,7 +8,7 @@ VALUE_HOLE, ABSOLUTE_PREFIX = "value", "abs_"
 CHANGED_HOLE, FUNCTION_HOLE, FILE_HOLE = "changed", "function", "file"  # in phrases of fault models
 
 _HOLE_PATTERN = re.compile(r"\{([^{}]*)\}")
-_WHOLE_FROM = 100.0  # from here on, converted numbers have no decimals
+_LEAST_SHOWN_AS_WHOLE_NUMBER = 100.0  # from here on, converted numbers have no decimals
 _LEAST_WITH_HUNDREDTHS = 0.1
 _ROUNDING = 1e-9  # numbers below this are 0
 _LARGEST_EXACT = 1e15
@@ -30,7 +30,7 @@ def fill_phrase(texts: Sequence[str], values: Mapping[str, str]) -> str:
     return ""
 
 
-def measured_number(number: float, unit: str = "") -> str:
+def measured_number_text(number: float, unit: str = "") -> str:
     """Return a measured number as sentences, lists and tables all show it: `24.60 m/s`; one below 0.1 with
     two digits.
     """
@@ -39,10 +39,10 @@ def measured_number(number: float, unit: str = "") -> str:
     return with_unit(text, unit)
 
 
-def converted_number(number: float, unit: str = "") -> str:
+def converted_number_text(number: float, unit: str = "") -> str:
     """Return a number in another unit than the plan's, as one says it: `124 m`, `24.6 kph`, `0.46 m`."""
     size = abs(number)
-    if size >= _WHOLE_FROM:
+    if size >= _LEAST_SHOWN_AS_WHOLE_NUMBER:
         text = f"{number:.0f}"
     elif size >= 1.0:
         text = f"{number:.1f}".removesuffix(".0")
@@ -51,12 +51,12 @@ def converted_number(number: float, unit: str = "") -> str:
     return with_unit(text, unit)
 
 
-def measured_time(seconds: float) -> str:
+def measured_time_text(seconds: float) -> str:
     """Return a time in a drive as tables show it: `24.60 s`; a shorter one than 0.1 s with two digits."""
-    return measured_number(seconds, "s")
+    return measured_number_text(seconds, "s")
 
 
-def planned_number(number: float, unit: str = "") -> str:
+def planned_number_text(number: float, unit: str = "") -> str:
     """Return a number of the plan with all its digits: `50 mph`."""
     text = str(int(number)) if float(number).is_integer() and abs(number) < _LARGEST_EXACT else repr(number)
     return with_unit(text, unit)

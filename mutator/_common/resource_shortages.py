@@ -5,7 +5,7 @@ import os
 
 from mutator.errors import ResourceShortage
 
-_OPEN_FILES_ERRNOS = (errno.EMFILE, errno.ENFILE)
+_TOO_MANY_OPEN_FILES_ERRNOS = (errno.EMFILE, errno.ENFILE)
 _NO_THREAD_MESSAGE = "can't start new thread"  # Python's RuntimeError has no number
 # of an ImportError, when there is too little memory to load a library; it has no number either
 _NO_MEMORY_TO_LOAD_MESSAGES = ("failed to map segment", "cannot allocate memory")
@@ -25,7 +25,7 @@ def find_shortage(err: BaseException | None) -> ResourceShortage | None:
                 expected="more memory, or a higher limit (`ulimit -v`)",
                 remedy=f"end other programs, raise the limit, or use fewer workers; then {_RUN_AGAIN_REMEDY}",
             )
-        if number in _OPEN_FILES_ERRNOS or (
+        if number in _TOO_MANY_OPEN_FILES_ERRNOS or (
             isinstance(err, ImportError) and os.strerror(errno.EMFILE) in str(err)
         ):
             return ResourceShortage(

@@ -14,7 +14,7 @@ from zipfile import ZipFile
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 
-ARCHIVE_PATH = Path(__file__).with_name("shipped.zip")  # created by setup.py; not in a clone
+SHIPPED_ARCHIVE_PATH = Path(__file__).with_name("shipped.zip")  # created by setup.py; not in a clone
 CLONE_FOLDER = Path(__file__).resolve().parents[2]
 SHIPPED_TARGET_ROOT = "shipped:target"  # value of `root` in a manifest
 _LIBRARY_README_PATH = Path(__file__).with_name("new_library.md")
@@ -29,15 +29,15 @@ def shipped_folder() -> Path:
     be unpacked.
     """
     return (
-        _checked_unpacked_folder(ARCHIVE_PATH, _unpacked_archives_folder())
-        if ARCHIVE_PATH.exists()
+        _checked_unpacked_folder(SHIPPED_ARCHIVE_PATH, _unpacked_archives_folder())
+        if SHIPPED_ARCHIVE_PATH.exists()
         else CLONE_FOLDER
     )
 
 
 def check_not_shipped(path: Path) -> None:
     """Raise MutatorError if `path`, which is about to be written, is in the unpacked archive."""
-    if ARCHIVE_PATH.exists() and path.absolute().is_relative_to(_unpacked_archives_folder()):
+    if SHIPPED_ARCHIVE_PATH.exists() and path.absolute().is_relative_to(_unpacked_archives_folder()):
         raise MutatorError(
             "part of the library that ships with mutator, which must not change",
             where=path,

@@ -43,7 +43,7 @@ class TextTable:
         """Return the table in Markdown; with `escape=False`, the cells are already Markdown."""
 
         def line(cells: Sequence[str]) -> str:
-            texts = [markdown_line(c).replace("|", "\\|") for c in cells] if escape else cells
+            texts = [escaped_markdown_line(c).replace("|", "\\|") for c in cells] if escape else cells
             return f"| {' | '.join(texts)} |"
 
         rule = f"|{'---|' * len(self.heads)}"
@@ -88,7 +88,7 @@ class TextTable:
         return Markup("<thead><tr>{}</tr></thead>\n").format(Markup("").join(heads))
 
 
-def markdown_line(text: str) -> str:
+def escaped_markdown_line(text: str) -> str:
     """Convert text to one line of Markdown that shows every character, even in `<class 'float'>` and
     `__init__`.
     """

@@ -17,7 +17,7 @@ from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hin
 from mutator._common.hashing import is_added_field
 from mutator.errors import MutatorError, TypeMisfit
 
-_T = TypeVar("_T")
+_ValueT = TypeVar("_ValueT")
 _Reader = Callable[[Any], Any]
 _TYPE_DESCRIPTIONS = {
     str: "text",
@@ -30,12 +30,12 @@ _SURROGATE_PATTERN = re.compile("[\ud800-\udfff]")
 _MOST_VALUE_LENGTH = 60  # of a value in a message, in characters
 
 
-def from_json_types(kind: type[_T], data: object) -> _T:
+def typed_value_from_json(kind: type[_ValueT], data: object) -> _ValueT:
     """Read a value of this type. Misfit for a value of another type, or a missing or unknown key.
 
     Only keys of `added` fields can be missing.
     """
-    return cast(_T, _reader_of(cast(Any, kind))(data))
+    return cast(_ValueT, _reader_of(cast(Any, kind))(data))
 
 
 @cache

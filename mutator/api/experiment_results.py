@@ -135,7 +135,7 @@ class ExperimentResult(ABC):
         worst = classified_hazard_of(self.record, self.scale) if self.record else None
         if not self.record or not self.scale or not worst:
             return ""
-        return self.scale.describe_basis(worst.hazard, dict(self.record.metrics))
+        return self.scale.describe_values_behind_class(worst.hazard, dict(self.record.metrics))
 
     @property
     def sentence(self) -> str:

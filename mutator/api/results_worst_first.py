@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mutator.campaigns.row_filters import matching_items
-from mutator.results.experiment_sentence import ExperimentSentences, Row
+from mutator.results.experiment_sentence import ExperimentSentences, ResultCells
 from mutator.results.result_rows import ResultRow, cells_by_row, rows_of
 from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_ranks, worst_of_each_cause
@@ -35,7 +35,7 @@ def worst_results(
     return worst, len(row_indices)
 
 
-def _filter_row(numbered_row: tuple[int, Row]) -> Row:
+def _filter_row(numbered_row: tuple[int, ResultCells]) -> ResultCells:
     """Return the row as filters know it: with None for an empty cell, which is a text."""
     _, row = numbered_row
     return {name: None if cell == "" else cell for name, cell in row.items()}

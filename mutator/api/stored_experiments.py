@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mutator._common.argument_checks import check_type
 from mutator._common.confined_files import path_below
-from mutator._common.library_and_run_folder_search import run_folders
+from mutator._common.library_and_run_folder_search import run_folders_newest_first
 from mutator.api.experiment_results import ExperimentResult
 from mutator.api.mutants import build_selected
 from mutator.api.target_and_fault_selection import SelectedTarget
@@ -31,7 +31,7 @@ from mutator.workspace import Workspace
 
 
 def find_newest_run(root: Path) -> Path:
-    folders = run_folders(root)
+    folders = run_folders_newest_first(root)
     if not folders:
         raise MutatorError(
             "no run folder in runs/",

@@ -51,7 +51,7 @@ def repair_run(folder: RunFolder, workspace: Workspace | None = None) -> list[st
     with lock_run_folder(folder.path, patience_s=0.0), raising_disk_full(folder.path):
         renewed = list(_renew_damaged_ledger(folder))
         ledger = file_digests.settled_ledger(folder.path)
-        lost_patches = _lost_patches(folder)
+        lost_patches = _experiments_with_lost_patch(folder)
         changes = [*_file_changes(folder, ledger), *_segment_changes(folder, ledger, lost_patches)]
         for name, *_ in changes:
             _set_aside(folder.path, name)
@@ -111,7 +111,7 @@ def _file_changes(folder: RunFolder, ledger: DigestLedger) -> Iterator[_FileChan
             yield name, None, f"{name} set aside: the finished run had no such file"
 
 
-def _lost_patches(folder: RunFolder) -> list[str]:
+def _experiments_with_lost_patch(folder: RunFolder) -> list[str]:
     """Planned experiments whose stored patch does not match their record."""
     lost, planned = [], folder.planned_positions()
     for stored in load_stored_records(folder, "records"):

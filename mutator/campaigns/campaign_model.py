@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 from pydantic_core import PydanticKnownError
 
-from mutator._common.extension_doors import OPERATORS
+from mutator._common.extension_doors import OPERATOR_DOOR
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
@@ -20,8 +20,8 @@ from mutator.model import AfterHazard, Limits, Method
 
 
 def _validated_operator(name: str) -> str:
-    if not OPERATORS.has_name(name):
-        *others, last = map(repr, OPERATORS.names())
+    if not OPERATOR_DOOR.has_name(name):
+        *others, last = map(repr, OPERATOR_DOOR.names())
         raise PydanticKnownError("enum", {"expected": f"{', '.join(others)} or {last}"})
     return name
 
@@ -29,7 +29,7 @@ def _validated_operator(name: str) -> str:
 _OperatorName = Annotated[
     str,
     AfterValidator(_validated_operator),
-    WithJsonSchema({"anyOf": [{"enum": OPERATORS.shipped_names()}, {"type": "string"}]}),
+    WithJsonSchema({"anyOf": [{"enum": OPERATOR_DOOR.shipped_names()}, {"type": "string"}]}),
 ]
 
 

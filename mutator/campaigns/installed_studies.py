@@ -7,7 +7,7 @@ A package registers its study as an entry point of the group `mutator.studies`; 
 from collections.abc import Iterable
 from typing import Protocol, cast
 
-from mutator._common.extension_doors import STUDIES
+from mutator._common.extension_doors import STUDY_DOOR
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
@@ -22,7 +22,7 @@ class CheckableStudy(Protocol):
 
 def load_installed_study(name: str) -> CheckableStudy:
     """Load the study of that name; MutatorError if it is not installed, cannot be loaded or is no study."""
-    return cast(CheckableStudy, STUDIES.load(name))
+    return cast(CheckableStudy, STUDY_DOOR.load(name))
 
 
 def study_problems(name: str, study: CheckableStudy, workspace: Workspace) -> list[MutatorError]:

@@ -10,7 +10,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, Limits
 from mutator.operators.executed_lines_and_types import (
-    ExecutedLines,
+    ExecutedLinesByFile,
     GoldenRunInputs,
     measure_executed_lines,
     measure_variable_types,
@@ -83,7 +83,7 @@ class OperatorFaultFinder:
         self,
         selection: OperatorSelection,
         golden_runs: Sequence[GoldenRunInputs],
-        executed: Sequence[ExecutedLines],
+        executed: Sequence[ExecutedLinesByFile],
     ) -> SelectedMutations:
         types = None
         if any_needs_types(selection.operators):

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import TypeVar
 
-from mutator._common.message_text import operator_hint, spelling_suggestion
+from mutator._common.message_text import python_operator_hint, spelling_suggestion
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.results.renamed_columns import RENAMED_COLUMNS
 
@@ -102,7 +102,7 @@ def compile_filter(text: str, columns: Collection[str]) -> RowPredicate:
         return _FilterCompiler(text, columns).node_predicate(tree.body)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as err:
         got = f"not an expression ({getattr(err, 'msg', err)})"
-        raise _filter_error(text, got, _ALLOWED_SYNTAX, operator_hint(text)) from None
+        raise _filter_error(text, got, _ALLOWED_SYNTAX, python_operator_hint(text)) from None
 
 
 def _filter_error(text: str, got: str, expected: str, remedy: str = "") -> MutatorError:

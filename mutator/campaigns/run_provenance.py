@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from packaging.utils import canonicalize_name
 
-from mutator._common.extension_doors import IMPORTERS
+from mutator._common.extension_doors import TRACE_IMPORTER_DOOR
 from mutator._common.version import VERSION
 from mutator.campaigns import run_environment
 from mutator.campaigns.git_clone import find_clone_state
@@ -107,7 +107,7 @@ def begin_session_environment(
     manifest = workspace.manifest(folder.head.target)
     folder_by_name = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
     folder_by_name |= {"overlay": manifest.overlay} if manifest.overlay else {}
-    importer = IMPORTERS.other_package_of(Path(manifest.trace_file).suffix.removeprefix("."))
+    importer = TRACE_IMPORTER_DOOR.other_package_of(Path(manifest.trace_file).suffix.removeprefix("."))
     used = (
         *(requirement.name for requirement in manifest.requires),
         *packages,

@@ -48,7 +48,7 @@ from mutator.workspace import Workspace
 
 _OTHER_HASH_SEED = 4242  # any but 0, the seed of ordinary runs
 _MOST_REPEATED_RUN_S = 5.0  # of CPU; slower golden runs are not repeated for the fast engines
-_MOST_PLACES = 20  # places listed in a finding
+_MOST_LISTED_PLACES = 20  # places listed in a finding
 
 
 def findings_from_running(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
@@ -207,7 +207,7 @@ class _RunningCheck:
         self, name: str, golden: _GoldenRuns, *, depends_on_hash_seed: bool
     ) -> Finding:
         where = describe_first_difference(self.manifest, golden.first.out, golden.again.out)
-        places, remedy = nondeterminism_suspects.likely_causes(
+        places, remedy = nondeterminism_suspects.likely_places_and_remedies(
             self.manifest, self._notes_with_target_lines(golden), depends_on_hash_seed=depends_on_hash_seed
         )
         which = ", but only if their hash seeds differ" if depends_on_hash_seed else ""
@@ -249,7 +249,7 @@ class _RunningCheck:
                 name="clocks",
                 level=CheckState.OK,
                 found=message,
-                places=tuple(dict.fromkeys(places))[:_MOST_PLACES],
+                places=tuple(dict.fromkeys(places))[:_MOST_LISTED_PLACES],
             )
         ]
 

@@ -172,7 +172,7 @@ def _describe_target_place(error: MutatorError, manifest: TargetManifest) -> str
     """Return the place of an error in the target, with the file named as in specs: ` (pkg/sonar.py:28)`."""
     if not error.where:
         return ""
-    path = manifest.tree.relative_name(error.where)
+    path = manifest.tree.path_as_in_specs(error.where)
     return f" ({path})" if error.line is None else f" ({path}:{error.line})"
 
 

@@ -9,7 +9,7 @@ from mutator.engines.in_target.nondeterminism_watch import CLOCK, DRAW, HASH, PR
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches_any_glob
 
-_MOST_PLACES = 5  # the first causes hide the later ones, so a long list helps nobody
+_MOST_LISTED_PLACES = 5  # the first causes hide the later ones, so a long list helps nobody
 _REMEDY_BY_KIND = {
     CLOCK: "count time in steps: `step * dt`",
     DRAW: "draw from `numpy.random.default_rng(seed)` with the run's seed",
@@ -23,7 +23,7 @@ _UNKNOWN_CAUSE_REMEDY = (
 )
 
 
-def likely_causes(
+def likely_places_and_remedies(
     manifest: TargetManifest, watch_report: Mapping[str, Any], *, depends_on_hash_seed: bool
 ) -> tuple[list[FindingPlace], str]:
     """Return the most suspicious lines, likeliest first, and the remedies.
@@ -38,9 +38,9 @@ def likely_causes(
     by_hashes = [*((HASH, place_of_note(note)) for note in hashes), *ordered]
     by_others = [(note["kind"], place_of_note(note)) for note in others]
     suspects = by_hashes if depends_on_hash_seed else (by_others or by_hashes)
-    remedies = dict.fromkeys(_REMEDY_BY_KIND[kind] for kind, _ in suspects[:_MOST_PLACES])
+    remedies = dict.fromkeys(_REMEDY_BY_KIND[kind] for kind, _ in suspects[:_MOST_LISTED_PLACES])
     unknown = _REMEDY_BY_KIND[HASH] if depends_on_hash_seed else _UNKNOWN_CAUSE_REMEDY
-    return [place for _, place in suspects[:_MOST_PLACES]], "; ".join(remedies) or unknown
+    return [place for _, place in suspects[:_MOST_LISTED_PLACES]], "; ".join(remedies) or unknown
 
 
 def set_order_places(manifest: TargetManifest) -> list[FindingPlace]:

@@ -24,7 +24,7 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 
-_MOST_PLACES = 20  # places listed in a finding
+_MOST_LISTED_PLACES = 20  # places listed in a finding
 _UNREACHED_REMEDY = (
     "faults there are never active: anchor them elsewhere, or add a scenario that reaches these statements"
 )
@@ -140,7 +140,7 @@ class ReachTracker:
                 remedy="faults there are never active: anchor where the result arrives in the run",
                 places=tuple(
                     replace(s.place, what=f"{s.place.what}: {place.text}")
-                    for s, place in places[:_MOST_PLACES]
+                    for s, place in places[:_MOST_LISTED_PLACES]
                 ),
             )
 
@@ -156,7 +156,7 @@ class ReachTracker:
             message = f"{whole}, {'which is' if count == 1 else 'which are all'} reached" if count else "none"
             return Finding(name=name, level=CheckState.OK, found=message)
         message = f"{len(unreached)} of {whole} never reached in {', '.join(self._scenarios_run)}"
-        places = tuple(unreached[:_MOST_PLACES])
+        places = tuple(unreached[:_MOST_LISTED_PLACES])
         return Finding(name=name, level=CheckState.WARN, found=message, remedy=remedy, places=places)
 
 

@@ -46,7 +46,7 @@ def compare(
         typer.Argument(
             metavar="RUN_A",
             help="The first run folder, e.g. before a change.",
-            autocompletion=shell_completion.runs,
+            autocompletion=shell_completion.complete_runs,
         ),
     ],
     run_b: Annotated[
@@ -54,7 +54,7 @@ def compare(
         typer.Argument(
             metavar="RUN_B",
             help="The second run folder, e.g. after the change.",
-            autocompletion=shell_completion.runs,
+            autocompletion=shell_completion.complete_runs,
         ),
     ],
     out: Annotated[
@@ -68,7 +68,7 @@ def compare(
             "--fail-on",
             metavar="KIND,...",
             help=f"Fail on these changes: {GATES_HELP}.",
-            autocompletion=shell_completion.gates,
+            autocompletion=shell_completion.complete_gates,
         ),
     ] = None,
     wide: Wide = False,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import mutator
 from mutator._common import command_progress_events
 from mutator._common.message_text import NO_BREAK_SPACE, counted
-from mutator._common.phrase_texts import measured_number
+from mutator._common.phrase_texts import measured_number_text
 from mutator.api.experiment_results import experiment_facts
 from mutator.api.results_worst_first import worst_causes, worst_results
 from mutator.api.stored_experiments import StoredExperiment, find_newest_run, open_stored_run
@@ -54,10 +54,10 @@ def print_worst_experiments(
     length = terminal.id_length(stored_run.folder.experiment_ids())
     if only is None:
         causes, count = worst_causes(stored_run.path, limit)
-        rows = [_row_facts(row, length) | {"more": more} for row, more in causes]
+        rows = [_cells_by_head(row, length) | {"more": more} for row, more in causes]
     else:
         worst_rows, count = worst_results(stored_run.path, only, limit)
-        rows = [_row_facts(row, length) for row in worst_rows]
+        rows = [_cells_by_head(row, length) for row in worst_rows]
     if terminal.as_json:
         terminal.print_json({"run": str(folder), "count": count, "worst": rows})
         return
@@ -92,14 +92,14 @@ def without_unused_columns(rows: list[dict[str, object]]) -> list[dict[str, obje
     return [{head: cell for head, cell in row.items() if head not in unused} for row in rows]
 
 
-def _row_facts(row: "ResultRow", id_length: int | None) -> dict[str, object]:
+def _cells_by_head(row: "ResultRow", id_length: int | None) -> dict[str, object]:
     return {
         "experiment": row.experiment_id[:id_length],
         "ending": row.ending,
         "severity": row.severity,
-        "delta-v [m/s]": _as_shown(row.delta_v if row.severity else None),
+        "delta-v [m/s]": _rounded_as_in_sentences(row.delta_v if row.severity else None),
         "hazards": ", ".join(name for name, _ in row.hazards),
-        "margin": _as_shown(row.margin),
+        "margin": _rounded_as_in_sentences(row.margin),
         "first alert": row.alerts[0] if row.alerts else "",
         "fault": row.fault,
         "drive": f"{row.scenario}, {row.trigger}",
@@ -107,9 +107,9 @@ def _row_facts(row: "ResultRow", id_length: int | None) -> dict[str, object]:
     }
 
 
-def _as_shown(number: float | None) -> float | None:
+def _rounded_as_in_sentences(number: float | None) -> float | None:
     """Return a measured number with the digits that it has in sentences."""
-    return None if number is None else float(measured_number(number))
+    return None if number is None else float(measured_number_text(number))
 
 
 def print_experiment(
@@ -128,7 +128,7 @@ def print_experiment(
     terminal.print_text()
 
 
-def print_answer(terminal: Terminal, result: "ExperimentResult") -> None:
+def print_ending_in_words(terminal: Terminal, result: "ExperimentResult") -> None:
     """Print what came out, in words and in short: the ending, the first hazard, and whether an alert preceded
     it.
     """

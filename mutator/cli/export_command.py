@@ -31,14 +31,15 @@ Examples:
 @with_workspace_options
 def export(
     run: Annotated[
-        Path, typer.Argument(metavar="RUN", help="A run folder.", autocompletion=shell_completion.runs)
+        Path,
+        typer.Argument(metavar="RUN", help="A run folder.", autocompletion=shell_completion.complete_runs),
     ],
     format: Annotated[
         str,
         typer.Option(
             metavar=f"[{'|'.join(Format)}]",
             help="What to write. Other packages can add formats.",
-            autocompletion=shell_completion.formats,
+            autocompletion=shell_completion.complete_formats,
         ),
     ],
     out: Annotated[
@@ -60,7 +61,7 @@ def export(
         typer.Option(
             metavar="EXPR",
             help="MCAP: only experiments whose result columns match, e.g. 'outcome == \"hazard\"'.",
-            autocompletion=shell_completion.result_columns,
+            autocompletion=shell_completion.complete_result_columns,
         ),
     ] = None,
     table: Annotated[ExportTable, typer.Option(help="CSV and Parquet: which table.")] = ExportTable.RESULTS,

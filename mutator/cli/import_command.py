@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 import mutator
-from mutator._common.extension_doors import LIBRARY_IMPORTERS
+from mutator._common.extension_doors import LIBRARY_IMPORTER_DOOR
 from mutator._common.message_text import counted
 from mutator.cli.shared_options import Json
 from mutator.cli.terminal_output import Terminal, short_path, with_option_names
@@ -30,7 +30,7 @@ def import_faults(
         str,
         typer.Argument(
             metavar="FORMAT",
-            help=f"{', '.join(LIBRARY_IMPORTERS.shipped_names())}, or one that another package adds.",
+            help=f"{', '.join(LIBRARY_IMPORTER_DOOR.shipped_names())}, or one that another package adds.",
         ),
     ],
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="The folder with the files.")],

@@ -151,7 +151,7 @@ Examples:
   mutator check --drive --scenario S1       only the golden run of this scenario
   mutator --target ~/openpilot check        the same library against another source tree
 """
-STYLE_BY_LEVEL = {"ok": "green", "warning": "yellow", "failed": "red"}
+STYLE_BY_CHECK_STATE = {"ok": "green", "warning": "yellow", "failed": "red"}
 
 
 @with_workspace_options
@@ -167,7 +167,7 @@ def check(
         list[str] | None,
         typer.Option(
             help="With --drive: only this scenario; repeatable. Default: the scenarios of the campaigns.",
-            autocompletion=shell_completion.scenarios,
+            autocompletion=shell_completion.complete_scenarios,
         ),
     ] = None,
     as_json: Json = False,
@@ -215,7 +215,7 @@ def check(
 
 
 def _print_finding(terminal: Terminal, finding: "Finding") -> None:
-    terminal.print_text(f"{finding.name}: {finding.found}", style=STYLE_BY_LEVEL[finding.level])
+    terminal.print_text(f"{finding.name}: {finding.found}", style=STYLE_BY_CHECK_STATE[finding.level])
     for finding_place in finding.places:
         file = (
             short_path(Path(finding_place.file))

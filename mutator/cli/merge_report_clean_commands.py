@@ -69,7 +69,7 @@ def merge(
     shards: Annotated[
         list[Path],
         typer.Argument(
-            metavar="DIR", help="The run folder of each shard.", autocompletion=shell_completion.runs
+            metavar="DIR", help="The run folder of each shard.", autocompletion=shell_completion.complete_runs
         ),
     ],
     out: OutRunFolder,
@@ -109,7 +109,9 @@ def report(
     run: Annotated[
         Path,
         typer.Argument(
-            metavar="DIR", help="A run folder, or a folder of runs.", autocompletion=shell_completion.runs
+            metavar="DIR",
+            help="A run folder, or a folder of runs.",
+            autocompletion=shell_completion.complete_runs,
         ),
     ],
     wide: Wide = False,
@@ -193,7 +195,8 @@ Examples:
 
 def clean(
     runs: Annotated[
-        list[Path], typer.Argument(metavar="DIR", help="Run folders.", autocompletion=shell_completion.runs)
+        list[Path],
+        typer.Argument(metavar="DIR", help="Run folders.", autocompletion=shell_completion.complete_runs),
     ],
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Delete without asking.")] = False,
 ) -> None:

@@ -48,7 +48,7 @@ CampaignName = Annotated[
     typer.Argument(
         metavar="CAMPAIGN",
         help="Name of a campaign in the library, or a campaign file.",
-        autocompletion=shell_completion.campaigns,
+        autocompletion=shell_completion.complete_campaigns,
     ),
 ]
 

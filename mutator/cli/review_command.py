@@ -99,7 +99,7 @@ def list_groups(
     """List groups, new and changed ones first (the default)."""
     terminal = Terminal(as_json, wide)
     reviewed = mutant_options.load(terminal, workspace_options).matching(only, exclude)
-    review_group_printing.print_list(terminal, reviewed.review, reviewed.groups)
+    review_group_printing.print_group_list(terminal, reviewed.review, reviewed.groups)
 
 
 @with_workspace_options
@@ -123,9 +123,11 @@ def show(
     reviewed = mutant_options.load(terminal, workspace_options)
     selected = reviewed.find(groups)
     for group in () if as_json else selected:
-        (review_group_printing.print_changes if changes else review_group_printing.print_group)(
-            terminal, reviewed.review, group
-        )
+        (
+            review_group_printing.print_changes_since_decision
+            if changes
+            else review_group_printing.print_group
+        )(terminal, reviewed.review, group)
     pictures_by_group: dict[str, dict[str, str]] = {}
     if pictures:
         pictures_by_group = _write_pictures(
@@ -193,7 +195,7 @@ def walk(
     workspace_options: WorkspaceOptions,
 ) -> None:
     """Show new and changed groups one by one, and ask for a decision on each."""
-    from mutator.cli.review_walk import walk_through
+    from mutator.cli.review_walk import review_one_by_one
 
     terminal = Terminal()
 
@@ -201,7 +203,7 @@ def walk(
         reviewed = mutant_options.load(terminal, workspace_options)
         return reviewed.matching(only, exclude)
 
-    walk_through(terminal, load_groups, lambda: reviewer_or_git_user(workspace_options, by))
+    review_one_by_one(terminal, load_groups, lambda: reviewer_or_git_user(workspace_options, by))
 
 
 @with_workspace_options

@@ -29,7 +29,7 @@ def group_as_json(review: "Review", group: "Group", *, with_diff_and_values: boo
         "what": group.label,
         "injections": group.injection_labels,
         "about": title_lines(group),
-        "words": group.fault_words,
+        "words": group.fault_descriptions,
     }
     facts |= {"at": decision.at if decision else None, "changed": review.stale_parts(group)}
     facts |= {"remarks": [asdict(remark) for remark in review.remarks(group.id)]}
@@ -58,7 +58,7 @@ def describe_counts(review: "Review", groups: Sequence["Group"]) -> str:
     )
 
 
-def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) -> None:
+def print_group_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) -> None:
     if terminal.as_json:
         terminal.print_json([group_as_json(review, group) for group in groups])
         return
@@ -102,7 +102,7 @@ def _describe_trigger(group: "Group") -> str:
     return f"{group.trigger_kinds}, {group.hold_kinds}" if group.trigger_kinds else "always"
 
 
-def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
+def _print_group_head(terminal: Terminal, review: "Review", group: "Group") -> None:
     from mutator.review.group_display_texts import title_lines
 
     state, flag = review.state(group).value, review.flag(group.id)
@@ -117,8 +117,8 @@ def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
         terminal.print_text(f"{remark.by}{f' on {remark.at[:10]}' if remark.at else ''}: {remark.text}")
 
 
-def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
-    _print_head(terminal, review, group)
+def print_changes_since_decision(terminal: Terminal, review: "Review", group: "Group") -> None:
+    _print_group_head(terminal, review, group)
     terminal.print_text(f"  {group.label}", style="bold")
     terminal.print_text()
     if changes := review.diff_since_decision(group):
@@ -139,12 +139,12 @@ def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
         trigger_condition_lines,
     )
 
-    _print_head(terminal, review, group)
+    _print_group_head(terminal, review, group)
     for injection in group.injection_labels:
         terminal.print_text(f"  {injection}", style="bold")
-    for words in group.fault_words[:MOST_WORDS]:
+    for words in group.fault_descriptions[:MOST_WORDS]:
         terminal.print_text(f"  {words}")
-    if (more_words := len(group.fault_words) - MOST_WORDS) > 0:
+    if (more_words := len(group.fault_descriptions) - MOST_WORDS) > 0:
         terminal.print_text(f"  and {more_words} more")
     runs = "" if group.experiment_count is None else f", {counted(group.experiment_count, 'experiment')}"
     if group.value_ranges:

@@ -27,7 +27,7 @@ OnlyGroups = Annotated[
         "--only",
         metavar="EXPR",
         help=f"Only groups that match. Columns: {', '.join(GROUP_FILTER_COLUMNS)}.",
-        autocompletion=shell_completion.group_columns,
+        autocompletion=shell_completion.complete_group_columns,
     ),
 ]
 ExcludeGroups = Annotated[
@@ -36,7 +36,7 @@ ExcludeGroups = Annotated[
         "--exclude",
         metavar="EXPR",
         help="Leave out groups that match.",
-        autocompletion=shell_completion.group_columns,
+        autocompletion=shell_completion.complete_group_columns,
     ),
 ]
 Groups = Annotated[

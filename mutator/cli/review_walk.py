@@ -13,10 +13,10 @@ from mutator.errors import MutatorError
 if TYPE_CHECKING:
     import mutator
 
-WORD_BY_KEY = {"a": "approve", "r": "reject", "s": "skip", "q": "quit"}
+ACTION_BY_KEY = {"a": "approve", "r": "reject", "s": "skip", "q": "quit"}
 
 
-def walk_through(
+def review_one_by_one(
     terminal: Terminal, load_groups: Callable[[], "mutator.ReviewedGroups"], name_reviewer: Callable[[], str]
 ) -> None:
     """Show each new or changed group, ask for a decision, and save it at once. Ask again if somebody else has
@@ -61,12 +61,12 @@ def walk_through(
 
 
 def _ask_for_key(terminal: Terminal, position: str) -> str:
-    choices = "  ".join(f"[{key}] {word}" for key, word in WORD_BY_KEY.items())
+    choices = "  ".join(f"[{key}] {word}" for key, word in ACTION_BY_KEY.items())
     while True:
         terminal.print_text(f"{position}:  {choices}", style="bold")
         try:
             key = typer.getchar().lower()
         except EOFError:  # Ctrl-D
             return "q"
-        if key in WORD_BY_KEY:
+        if key in ACTION_BY_KEY:
             return key

@@ -35,7 +35,7 @@ def serve(
         typer.Argument(
             metavar="RUNS",
             help="Run folders, or folders of run folders. Default: runs/.",
-            autocompletion=shell_completion.runs,
+            autocompletion=shell_completion.complete_runs,
         ),
     ] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="The port; 0: any free port.")] = 0,

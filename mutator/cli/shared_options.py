@@ -27,7 +27,7 @@ Manifest = Annotated[
     str | None,
     typer.Option(
         help="Name or file of the target's manifest. Default: the library's only manifest.",
-        autocompletion=shell_completion.targets,
+        autocompletion=shell_completion.complete_targets,
     ),
 ]
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed for drawn values and times.")]
@@ -45,7 +45,7 @@ RunFolderOption = Annotated[
         "--run",
         metavar="DIR",
         help="The run folder. Default: the newest in runs/.",
-        autocompletion=shell_completion.runs,
+        autocompletion=shell_completion.complete_runs,
     ),
 ]
 ExperimentId = Annotated[
@@ -53,7 +53,7 @@ ExperimentId = Annotated[
     typer.Argument(
         metavar="EXPERIMENT",
         help="An experiment's id, or the start of the id.",
-        autocompletion=shell_completion.experiments,
+        autocompletion=shell_completion.complete_experiments,
     ),
 ]
 Only = Annotated[
@@ -61,13 +61,15 @@ Only = Annotated[
     typer.Option(
         metavar="EXPR",
         help="Only experiments that match, e.g. 'value > 100'.",
-        autocompletion=shell_completion.plan_columns,
+        autocompletion=shell_completion.complete_plan_columns,
     ),
 ]
 Exclude = Annotated[
     str | None,
     typer.Option(
-        metavar="EXPR", help="Leave out experiments that match.", autocompletion=shell_completion.plan_columns
+        metavar="EXPR",
+        help="Leave out experiments that match.",
+        autocompletion=shell_completion.complete_plan_columns,
     ),
 ]
 Limit = Annotated[
@@ -97,7 +99,7 @@ Engine = Annotated[
         metavar="NAME",
         help="; ".join(f"{kind.name}: {kind.about}" for kind in map(ENGINES.__getitem__, OFFERED_ENGINES))
         + f". All give the same results. Default: {FORK}, where possible and worthwhile.",
-        autocompletion=shell_completion.engines,
+        autocompletion=shell_completion.complete_engines,
     ),
 ]
 AcceptVersions = Annotated[

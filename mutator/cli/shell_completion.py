@@ -10,8 +10,12 @@ from typing import Any
 
 import typer
 
-from mutator._common.extension_doors import EXPORTS
-from mutator._common.library_and_run_folder_search import library_folder, library_yaml_files, run_folders
+from mutator._common.extension_doors import EXPORT_DOOR
+from mutator._common.library_and_run_folder_search import (
+    library_folder,
+    library_yaml_files,
+    run_folders_newest_first,
+)
 from mutator.engines.engine_kinds import OFFERED_ENGINES
 from mutator.errors import MutatorError
 
@@ -31,12 +35,12 @@ def build_completer(folder: str) -> Completer:
     return complete
 
 
-campaigns = build_completer("campaigns")
-scenarios = build_completer("scenarios")
-specs = build_completer("faults")
+complete_campaigns = build_completer("campaigns")
+complete_scenarios = build_completer("scenarios")
+complete_specs = build_completer("faults")
 
 
-def targets(ctx: typer.Context, incomplete: str) -> list[str]:
+def complete_targets(ctx: typer.Context, incomplete: str) -> list[str]:
     """Complete the names in the manifests."""
     from mutator.targets.manifests_by_name import manifest_path_by_name
 
@@ -47,19 +51,21 @@ def targets(ctx: typer.Context, incomplete: str) -> list[str]:
     return _names_starting(names, incomplete)
 
 
-def runs(ctx: typer.Context, incomplete: str) -> list[str]:
-    return _names_starting(map(_relative_to_here, run_folders(_library_folder(ctx).parent)), incomplete)
+def complete_runs(ctx: typer.Context, incomplete: str) -> list[str]:
+    return _names_starting(
+        map(_relative_to_here, run_folders_newest_first(_library_folder(ctx).parent)), incomplete
+    )
 
 
-def formats(ctx: typer.Context, incomplete: str) -> list[str]:
-    return _names_starting(EXPORTS.names(), incomplete)
+def complete_formats(ctx: typer.Context, incomplete: str) -> list[str]:
+    return _names_starting(EXPORT_DOOR.names(), incomplete)
 
 
-def engines(ctx: typer.Context, incomplete: str) -> list[str]:
+def complete_engines(ctx: typer.Context, incomplete: str) -> list[str]:
     return _names_starting(OFFERED_ENGINES, incomplete)
 
 
-def triggers(ctx: typer.Context, incomplete: str) -> list[str]:
+def complete_triggers(ctx: typer.Context, incomplete: str) -> list[str]:
     """Complete the names of contexts. Times and conditions are the user's."""
     from mutator.config.yaml_files import load_yaml
 
@@ -74,7 +80,7 @@ def triggers(ctx: typer.Context, incomplete: str) -> list[str]:
     return _names_starting(names, incomplete)
 
 
-def gates(ctx: typer.Context, incomplete: str) -> list[str]:
+def complete_gates(ctx: typer.Context, incomplete: str) -> list[str]:
     """Complete the last kind of a list with commas."""
     import mutator  # which loads its parts only as they are used
 
@@ -82,13 +88,13 @@ def gates(ctx: typer.Context, incomplete: str) -> list[str]:
     return [before + comma + name for name in _names_starting((gate.value for gate in mutator.Gate), last)]
 
 
-def plan_columns(ctx: typer.Context, incomplete: str) -> list[str]:
+def complete_plan_columns(ctx: typer.Context, incomplete: str) -> list[str]:
     from mutator.results.plan_columns import PLAN_COLUMN_NAMES
 
     return _expressions_with_column(PLAN_COLUMN_NAMES, incomplete)
 
 
-def result_columns(ctx: typer.Context, incomplete: str) -> list[str]:
+def complete_result_columns(ctx: typer.Context, incomplete: str) -> list[str]:
     """Complete a column of the results of the named run, or of the newest one."""
     return [
         text
@@ -97,21 +103,21 @@ def result_columns(ctx: typer.Context, incomplete: str) -> list[str]:
     ]
 
 
-def group_columns(ctx: typer.Context, incomplete: str) -> list[str]:
+def complete_group_columns(ctx: typer.Context, incomplete: str) -> list[str]:
     from mutator.review.group_filter_columns import GROUP_FILTER_COLUMNS
 
     return _expressions_with_column(GROUP_FILTER_COLUMNS, incomplete)
 
 
-def experiments(ctx: typer.Context, incomplete: str) -> list[str]:
+def complete_experiments(ctx: typer.Context, incomplete: str) -> list[str]:
     """Complete the experiment ids of the named run, or of the newest one."""
     return [
         name for folder in _run_folders(ctx) for name in _names_starting(_experiment_ids(folder), incomplete)
     ]
 
 
-def specs_and_experiments(ctx: typer.Context, incomplete: str) -> list[str]:
-    return specs(ctx, incomplete) + experiments(ctx, incomplete)
+def complete_specs_and_experiments(ctx: typer.Context, incomplete: str) -> list[str]:
+    return complete_specs(ctx, incomplete) + complete_experiments(ctx, incomplete)
 
 
 def _library_folder(ctx: typer.Context) -> Path:
@@ -140,7 +146,7 @@ def _experiment_ids(run: Path) -> list[str]:
 def _run_folders(ctx: typer.Context) -> list[Path]:
     """Return the named run folder, or the newest one, if there is any."""
     run = ctx.params.get("run")
-    return [Path(run)] if run else list(run_folders(_library_folder(ctx).parent)[:1])
+    return [Path(run)] if run else list(run_folders_newest_first(_library_folder(ctx).parent)[:1])
 
 
 def _heads_of(table: Path) -> list[str]:

@@ -55,7 +55,7 @@ def show(
             metavar="EXPERIMENT",
             help="An experiment's id, or the start of the id. Default: list the worst.",
             show_default=False,
-            autocompletion=shell_completion.experiments,
+            autocompletion=shell_completion.complete_experiments,
         ),
     ] = None,
     run: RunFolderOption = None,
@@ -81,7 +81,7 @@ def show(
         typer.Option(
             metavar="EXPR",
             help="List only experiments whose results match, e.g. 'delta_v > 5'.",
-            autocompletion=shell_completion.result_columns,
+            autocompletion=shell_completion.complete_result_columns,
         ),
     ] = None,
     limit: Annotated[int, typer.Option(min=1, help="List at most this many experiments.")] = 10,
@@ -149,7 +149,7 @@ def _experiment_facts(
 def _print_stored(terminal: Terminal, experiment: "StoredExperiment", patch: str) -> None:
     from mutator.cli import experiment_printing
 
-    experiment_printing.print_answer(terminal, experiment)
+    experiment_printing.print_ending_in_words(terminal, experiment)
     experiment_printing.print_experiment(terminal, experiment.experiment, patch)
     if experiment.record is None:
         terminal.print_text(str(experiment.not_run_error()))

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from mutator._common import command_progress_events
 from mutator._common.hashing import as_json_types
-from mutator._common.message_text import NO_BREAK_SPACE, bind_units, short_id_length, wrap_text
+from mutator._common.message_text import NO_BREAK_SPACE, short_id_length, with_unbreakable_units, wrap_text
 from mutator._common.table_rendering import TextTable
 from mutator.cli.terminal_table_layout import TerminalTable
 from mutator.errors import MutatorError
@@ -325,7 +325,7 @@ def _build_console(*, stderr: bool) -> "Console":
 def _print_text(console: "Console", text: str, style: str | None, *, without_folding: bool = False) -> None:
     text = _escape_controls(text)
     if not without_folding:
-        text = wrap_text(bind_units(text), _line_width(console))
+        text = wrap_text(with_unbreakable_units(text), _line_width(console))
     # Rich must not fold again
     console.print(
         text.replace(NO_BREAK_SPACE, " "), style=style, markup=False, highlight=False, soft_wrap=True

@@ -8,11 +8,11 @@ import textwrap
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
-from mutator._common.message_text import NO_BREAK_SPACE, bind_units, unbreakable_parts
+from mutator._common.message_text import NO_BREAK_SPACE, unbreakable_parts, with_unbreakable_units
 
 GAP = "  "
 INDENT = "  "  # of an entry's second line
-TWO_LINES_BELOW = 100  # columns of a terminal
+TWO_LINES_BELOW_WIDTH = 100  # columns of a terminal
 LEAST_TEXT_WIDTH = 28  # a longer text is not folded into a narrower column
 
 StyledLine = list[tuple[str, str]]  # pairs of text and style
@@ -54,7 +54,7 @@ class TerminalTable:
         widths = list(map(_column_widths, zip(self.heads, *self.rows, strict=True)))
         if self.last_is_whole:
             head = len(self.heads[-1])
-            widths[-1] = _Widths(natural=widths[-1].natural, with_folded_head=head, least=head)
+            widths[-1] = _ColumnWidths(natural=widths[-1].natural, with_folded_head=head, least=head)
         return _LayoutSearch(widths, self._by_importance()).search(width)
 
     def _by_importance(self) -> list[int]:
@@ -66,21 +66,23 @@ class TerminalTable:
         """Return the lines to print: heads, a rule, and the rows; `rule` is a character."""
         width = max(_line_width(columns) + len(INDENT) * (i > 0) for i, columns in enumerate(layout.lines))
         rule_line: StyledLine = [(rule * width, "")]
-        lines = [*self._entry(self.heads, layout, ["bold"] * len(self.heads)), rule_line]
+        lines = [*self._entry_lines(self.heads, layout, ["bold"] * len(self.heads)), rule_line]
         for number, row in enumerate(self.rows, start=1):
             is_total = self.last_is_total and number == len(self.rows)
             if is_total and number > 1:
                 lines.append(rule_line)
-            lines += self._entry(
+            lines += self._entry_lines(
                 row, layout, [style_by_cell.get(cell, "bold" if is_total else "") for cell in row]
             )
         return lines
 
-    def _entry(self, cells: Sequence[str], layout: TableLayout, styles: Sequence[str]) -> list[StyledLine]:
+    def _entry_lines(
+        self, cells: Sequence[str], layout: TableLayout, styles: Sequence[str]
+    ) -> list[StyledLine]:
         lines: list[StyledLine] = []
         for i, columns in enumerate(layout.lines):
             folded = [self._fold(cells[column.index], column) for column in columns]
-            for parts in zip(*_filled(folded), strict=True):
+            for parts in zip(*_padded_to_equal_length(folded), strict=True):
                 line: StyledLine = [(INDENT, "")] if i else []
                 for column, text in zip(columns, parts, strict=True):
                     padded = text.rjust if column.index in self.right_aligned else text.ljust
@@ -95,7 +97,7 @@ class TerminalTable:
 
 
 @dataclass(frozen=True, slots=True)
-class _Widths:
+class _ColumnWidths:
     """The widths of a column: without folding, with only its head folded, and with everything folded."""
 
     natural: int
@@ -103,12 +105,12 @@ class _Widths:
     least: int
 
 
-def _column_widths(column: Sequence[str]) -> _Widths:
+def _column_widths(column: Sequence[str]) -> _ColumnWidths:
     """Return the widths of a head with its cells."""
-    head, *cells = map(bind_units, column)
+    head, *cells = map(with_unbreakable_units, column)
     of_cells = max((len(line) for cell in cells for line in cell.split("\n")), default=0)
     longest = max(len(part) for cell in column for part in unbreakable_parts(cell))
-    return _Widths(
+    return _ColumnWidths(
         natural=max(len(head), of_cells),
         with_folded_head=max(longest, of_cells),
         least=max(longest, min(of_cells, LEAST_TEXT_WIDTH)),
@@ -118,7 +120,7 @@ def _column_widths(column: Sequence[str]) -> _Widths:
 class _LayoutSearch:
     """Search the layout that shows the most of columns with these widths."""
 
-    def __init__(self, widths: Sequence[_Widths], by_importance: Sequence[int]) -> None:
+    def __init__(self, widths: Sequence[_ColumnWidths], by_importance: Sequence[int]) -> None:
         self._widths, self._by_importance = widths, by_importance
 
     def search(self, width: int | None) -> TableLayout:
@@ -127,7 +129,7 @@ class _LayoutSearch:
             return TableLayout((self._unfolded(indices),))
         if columns := self._fit(indices, width):
             return TableLayout((columns,))
-        if width < TWO_LINES_BELOW:
+        if width < TWO_LINES_BELOW_WIDTH:
             return self._two_lines(indices, width)
         columns, dropped = self._fit_most(indices, width)
         return TableLayout((columns,), dropped)
@@ -163,7 +165,7 @@ class _LayoutSearch:
         if spare < 0:
             return ()
         missing_widths = [column.natural - size for column, size in zip(columns, least, strict=True)]
-        more = _share_out(spare, missing_widths)
+        more = _share_out_width(spare, missing_widths)
         return tuple(
             PlacedColumn(i, size + extra) for i, size, extra in zip(indices, least, more, strict=True)
         )
@@ -172,7 +174,7 @@ class _LayoutSearch:
         return tuple(PlacedColumn(index, self._widths[index].natural) for index in indices)
 
 
-def _share_out(spare: int, missing_widths: Sequence[int]) -> list[int]:
+def _share_out_width(spare: int, missing_widths: Sequence[int]) -> list[int]:
     """Share what is spare out among columns that want so much more; those that want little get all of it."""
     shares = [0] * len(missing_widths)
     waiting = len(missing_widths)
@@ -190,13 +192,13 @@ def _line_width(columns: Sequence[PlacedColumn]) -> int:
 def _fold(cell: str, width: int) -> list[str]:
     lines = [
         line
-        for text in bind_units(cell).split("\n")
+        for text in with_unbreakable_units(cell).split("\n")
         for line in textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False) or [""]
     ]
     return [line.replace(NO_BREAK_SPACE, " ") for line in lines]
 
 
-def _filled(columns: list[list[str]]) -> list[list[str]]:
+def _padded_to_equal_length(columns: list[list[str]]) -> list[list[str]]:
     """Return columns of equally many lines."""
     height = max(map(len, columns))
     return [lines + [""] * (height - len(lines)) for lines in columns]

@@ -8,7 +8,7 @@ import typer
 
 import mutator
 from mutator._common.confined_files import is_inside
-from mutator._common.extension_doors import OPERATORS
+from mutator._common.extension_doors import OPERATOR_DOOR
 from mutator._common.message_text import counted
 from mutator.cli import shell_completion
 from mutator.cli.shared_options import (
@@ -35,7 +35,7 @@ SpecName = Annotated[
     typer.Argument(
         metavar="SPEC",
         help="Name of a spec in the library, or a spec file.",
-        autocompletion=shell_completion.specs,
+        autocompletion=shell_completion.complete_specs,
     ),
 ]
 TriggerText = Annotated[
@@ -44,7 +44,7 @@ TriggerText = Annotated[
         "--trigger",
         metavar="WHEN",
         help="A context (C1), a time in s (10), `always`, or a condition on observed values.",
-        autocompletion=shell_completion.triggers,
+        autocompletion=shell_completion.complete_triggers,
     ),
 ]
 
@@ -72,7 +72,7 @@ def try_spec(
             "--scenario",
             "-s",
             help="Name or file of a driving scenario.",
-            autocompletion=shell_completion.scenarios,
+            autocompletion=shell_completion.complete_scenarios,
         ),
     ],
     trigger: TriggerText = "always",
@@ -149,7 +149,7 @@ def diff(
         typer.Argument(
             metavar="SPEC|EXPERIMENT",
             help="A spec, a spec file, or an experiment's id.",
-            autocompletion=shell_completion.specs_and_experiments,
+            autocompletion=shell_completion.complete_specs_and_experiments,
         ),
     ],
     trigger: TriggerText = "always",
@@ -207,7 +207,7 @@ def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole
             terminal.print_note(note)
 
 
-OPERATOR_NAMES = ", ".join(OPERATORS.shipped_names())
+OPERATOR_NAMES = ", ".join(OPERATOR_DOOR.shipped_names())
 
 GENERATE_EXAMPLES = """\b
 Examples:
@@ -226,7 +226,7 @@ def generate(
         typer.Argument(
             metavar="SPEC",
             help="Specs, globs of specs, or spec files.",
-            autocompletion=shell_completion.specs,
+            autocompletion=shell_completion.complete_specs,
         ),
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="A new or empty folder.")] = ...,  # type: ignore[assignment]
@@ -240,7 +240,7 @@ def generate(
             "--trigger",
             metavar="WHEN",
             help="As for `try`; repeatable. Default: every context.",
-            autocompletion=shell_completion.triggers,
+            autocompletion=shell_completion.complete_triggers,
         ),
     ] = None,
     operators: Annotated[
@@ -265,7 +265,7 @@ def generate(
             "--scenario",
             "-s",
             help="With --operators: only lines that this scenario's golden run executes.",
-            autocompletion=shell_completion.scenarios,
+            autocompletion=shell_completion.complete_scenarios,
         ),
     ] = None,
     all_lines: Annotated[

@@ -36,7 +36,8 @@ Examples:
 @with_workspace_options
 def verify(
     run: Annotated[
-        Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=shell_completion.runs)
+        Path,
+        typer.Argument(metavar="DIR", help="A run folder.", autocompletion=shell_completion.complete_runs),
     ],
     rerun: Annotated[int, typer.Option(metavar="N", min=0, help="Rerun N randomly drawn experiments.")] = 0,
     expect: Annotated[
@@ -97,7 +98,8 @@ def verify(
 
 def seal(
     run: Annotated[
-        Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=shell_completion.runs)
+        Path,
+        typer.Argument(metavar="DIR", help="A run folder.", autocompletion=shell_completion.complete_runs),
     ],
     sign: Annotated[
         Path | None, typer.Option(metavar="KEY", help="The file of the SSH key to sign with.")

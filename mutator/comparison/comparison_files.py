@@ -9,8 +9,8 @@ from pathlib import Path
 
 from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
-from mutator._common.message_text import bind_numbers, counted
-from mutator._common.table_rendering import TextTable, markdown_line
+from mutator._common.message_text import counted, with_unbreakable_numbers
+from mutator._common.table_rendering import TextTable, escaped_markdown_line
 from mutator.comparison.comparison_replays import ReportAddresses, addresses_from, replay_elements
 from mutator.comparison.experiment_matching import ExperimentPair, ResultChangeKind, time_to_hazard
 from mutator.comparison.input_differences_and_remarks import InputFact
@@ -24,8 +24,8 @@ MOST_LISTED_EXPERIMENTS = (
     50  # number of experiments that the Markdown lists for each change; the page and the CSV list all
 )
 MOST_SHOWN_ROWS = 500  # table rows that the page shows at once; browsers need seconds to lay out thousands
-_WORSE_CHANGES = frozenset(gate.value for gate in Gate)
-_BETTER_CHANGES = frozenset(
+_WORSE_CHANGE_NAMES = frozenset(gate.value for gate in Gate)
+_BETTER_CHANGE_NAMES = frozenset(
     kind.value
     for kind in (
         ResultChangeKind.HAZARD_GONE,
@@ -134,8 +134,8 @@ def render_markdown(comparison: Comparison) -> str:
 
 def _pair_list(pairs: tuple[ExperimentPair, ...]) -> str:
     lines = [
-        f"- {p.b.label}: {markdown_line(describe_ending_change(p))} (`{p.a.id}`, `{p.b.id}`)"
-        + (f" {markdown_line(p.row_b.sentence)}" if p.row_b.sentence else "")
+        f"- {p.b.label}: {escaped_markdown_line(describe_ending_change(p))} (`{p.a.id}`, `{p.b.id}`)"
+        + (f" {escaped_markdown_line(p.row_b.sentence)}" if p.row_b.sentence else "")
         for p in pairs[:MOST_LISTED_EXPERIMENTS]
     ]
     more = len(pairs) - MOST_LISTED_EXPERIMENTS
@@ -156,13 +156,15 @@ def _unmatched_reasons_table(comparison: Comparison) -> TextTable:
     return TextTable(heads=("why", "experiments"), rows=rows, right_aligned=(1,))
 
 
-def verdict(comparison: Comparison) -> tuple[str, str]:
+def verdict_word_and_sentence(comparison: Comparison) -> tuple[str, str]:
     """Return a word for the change from the first run to the second (worse, better, otherwise, same), and a
     sentence with the numbers of experiments. An experiment that is worse in any respect is not better.
     """
     all_kinds = [{kind.value for kind in pair.change_kinds} for pair in comparison.changed_pairs]
-    worse = sum(bool(kinds & _WORSE_CHANGES) for kinds in all_kinds)
-    better = sum(bool(kinds & _BETTER_CHANGES) and not kinds & _WORSE_CHANGES for kinds in all_kinds)
+    worse = sum(bool(kinds & _WORSE_CHANGE_NAMES) for kinds in all_kinds)
+    better = sum(
+        bool(kinds & _BETTER_CHANGE_NAMES) and not kinds & _WORSE_CHANGE_NAMES for kinds in all_kinds
+    )
     otherwise = len(all_kinds) - worse - better
     experiments = counted(len(comparison.pairs), "experiment")
     if not all_kinds:
@@ -179,11 +181,13 @@ def render_html_page(comparison: Comparison, addresses: ReportAddresses) -> str:
     from markupsafe import Markup
 
     # numbers are bound to their units in text, not in HTML
-    environment = html_environment(lambda value: bind_numbers(value) if type(value) is str else value)
+    environment = html_environment(
+        lambda value: with_unbreakable_numbers(value) if type(value) is str else value
+    )
     counts = Counter(change for pair in comparison.pairs for change in pair.change_kinds)
     return environment.from_string(asset_text("comparison/comparison.html")).render(
         c=comparison,
-        verdict=verdict(comparison),
+        verdict=verdict_word_and_sentence(comparison),
         summary=summary_text(comparison),
         differing=_facts_table(comparison, [fact for fact in comparison.facts if fact.is_different]),
         origin=_facts_table(comparison, [f for f in comparison.facts if not f.name.startswith("package ")]),
@@ -192,13 +196,13 @@ def render_html_page(comparison: Comparison, addresses: ReportAddresses) -> str:
         reasons=_unmatched_reasons_table(comparison),
         changed=_changed_table(comparison, addresses),
         limit=MOST_SHOWN_ROWS,
-        styles=[Markup(text) for text in page_styles()],
+        styles=[Markup(text) for text in page_style_sheets()],
         data=[Markup(element) for element in replay_elements(comparison, addresses)],
         scripts=[Markup(asset_text(name)) for name in load_order("comparison", ".js")],
     )
 
 
-def page_styles() -> tuple[str, ...]:
+def page_style_sheets() -> tuple[str, ...]:
     """Return the style sheets of the page."""
     return tuple(
         asset_text(name).replace("LIMIT", str(MOST_SHOWN_ROWS + 1))
@@ -222,7 +226,7 @@ def _changed_row(pair: ExperimentPair, comparison: Comparison, addresses: Report
     button = Markup('<button type="button" class="open" data-a="{}" data-b="{}">{}</button>').format
     return (
         button(pair.a.id, pair.b.id, pair.b.label),
-        Markup("").join(badge(" bad" if change in _WORSE_CHANGES else "", change) for change in changes),
+        Markup("").join(badge(" bad" if change in _WORSE_CHANGE_NAMES else "", change) for change in changes),
         *map(_ending_html, sides),
         *map(_hazard_time_text, sides),
         Markup("<br>").join(
@@ -254,7 +258,7 @@ def _ending_html(row: ResultRow) -> str:
     if row.detail:
         details.append(row.detail)
     ending = Markup('<span class="ending {0}">{0}</span> {1}').format(row.ending, ", ".join(details))
-    sentence = Markup('<p class="sentence">{}</p>').format(bind_numbers(row.sentence))
+    sentence = Markup('<p class="sentence">{}</p>').format(with_unbreakable_numbers(row.sentence))
     return ending + sentence if row.sentence else ending
 
 

@@ -13,7 +13,7 @@ from mutator.comparison.paired_rate_and_time_sheets import (
     total_and_type_sheets,
 )
 from mutator.statistics.bootstrap_median_intervals import median_difference
-from mutator.statistics.metric_and_severity_tables import describe_classes
+from mutator.statistics.metric_and_severity_tables import describe_severity_classes
 from mutator.statistics.paired_statistics import wilcoxon_p
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
 from mutator.targets.hazard_severity import SEVERITY_CLASSES, SeverityScale
@@ -77,7 +77,7 @@ def severity_cross_table(
         name="severity",
         title="Severity",
         note=f"Rows: severity class in {names.a}. Columns: severity class in {names.b}."
-        + describe_classes(scale, classes),
+        + describe_severity_classes(scale, classes),
         heads=(f"{names.a} / {names.b}", *(name or NO_CLASS for name in classes)),
         lines=tuple(
             (severity_class or NO_CLASS, *(counts[severity_class, other] for other in classes))

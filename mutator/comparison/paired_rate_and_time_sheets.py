@@ -11,8 +11,8 @@ from mutator.comparison.experiment_matching import ExperimentPair, ResultChangeK
 from mutator.model import Outcome, Status
 from mutator.results.result_rows import ResultRow
 from mutator.statistics.guided_against_random import holm_adjusted
-from mutator.statistics.paired_statistics import mcnemar, paired_times, rate_difference
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.paired_statistics import mcnemar_test, paired_times, rate_difference
+from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
 
 TIME_COLUMN_BY_EVENT = {
@@ -93,11 +93,14 @@ def rates_sheets(frame: pd.DataFrame, names: RunDisplayNames) -> tuple[Sheet, Sh
 
 def _rate_cells(frame: pd.DataFrame, flag: str) -> tuple[SheetCell, ...]:
     first, second = frame[f"{flag}_a"], frame[f"{flag}_b"]
-    m, change = mcnemar(first, second), rate_difference(first, second, frame["fault"])
-    rates = (share(m.both + m.first_only, m.pair_count), share(m.both + m.second_only, m.pair_count))
+    m, change = mcnemar_test(first, second), rate_difference(first, second, frame["fault"])
+    rates = (
+        share_with_interval(m.both + m.first_only, m.pair_count),
+        share_with_interval(m.both + m.second_only, m.pair_count),
+    )
     return (
         *(m.pair_count, *rates, m.first_only, m.second_only),
-        *(change.difference, change.low, change.high, PValue(m.p)),
+        *(change.difference, change.low, change.high, PValue(m.p_value)),
     )
 
 
@@ -138,7 +141,7 @@ def _time_cells(frame: pd.DataFrame, name: str) -> tuple[SheetCell, ...]:
         t.median_difference.difference,
         t.median_difference.low,
         t.median_difference.high,
-        PValue(t.p),
+        PValue(t.p_value),
     )
 
 

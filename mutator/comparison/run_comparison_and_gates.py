@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from mutator._common.phrase_texts import measured_number
+from mutator._common.phrase_texts import measured_number_text
 from mutator.comparison.compared_runs import ComparedRun, load_compared_run
 from mutator.comparison.experiment_matching import (
     ExperimentMatching,
@@ -40,7 +40,7 @@ from mutator.model import Experiment
 from mutator.results.result_rows import ResultRow
 from mutator.statistics.statistics_sheet import Sheet
 
-Scenes = tuple[dict[str, Any] | None, dict[str, Any] | None]
+SceneOfEachRun = tuple[dict[str, Any] | None, dict[str, Any] | None]
 
 
 class Gate(StrEnum):
@@ -91,7 +91,7 @@ class Comparison:
     b: ComparedRun
     matching: ExperimentMatching
     golden_alerts_notes: tuple[str, str] = ("", "")
-    scenes: Scenes = (None, None)
+    scenes: SceneOfEachRun = (None, None)
 
     @cached_property
     def names(self) -> RunDisplayNames:
@@ -183,7 +183,7 @@ def compare_runs(
     run_b: Path,
     only: str | None = None,
     golden_alerts_notes: tuple[str, str] = ("", ""),
-    scenes: Scenes = (None, None),
+    scenes: SceneOfEachRun = (None, None),
 ) -> Comparison:
     """Compare two run folders; `only` filters experiments by plan columns.
 
@@ -193,7 +193,7 @@ def compare_runs(
     # classify both runs by the same scale, or neither, and by metrics that both have
     scale = b.folder.severity_scale if a.folder.severity_scale else None
     if scale:
-        scale = scale.with_rules_over([metric.name for metric in a.folder.head.metrics])
+        scale = scale.with_only_rules_of_metrics([metric.name for metric in a.folder.head.metrics])
     a, b = a.classified_by(scale), b.classified_by(scale)
     matching = match_experiments(a, b)
     if not matching.pairs:
@@ -265,7 +265,7 @@ def _describe_ending(row: ResultRow) -> str:
     if row.severity:
         details.append(row.severity_label)
         if row.delta_v is not None:
-            details[-1] += f", delta-v {measured_number(row.delta_v, 'm/s')}"
+            details[-1] += f", delta-v {measured_number_text(row.delta_v, 'm/s')}"
     if row.alerts:
         is_late = bool(row.hazards) and row.reaction_time is None
         details.append(f"alert {', '.join(row.alerts)}" + (" only after the hazard" if is_late else ""))

@@ -8,9 +8,14 @@ from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 
 # a function has one entry, and an empty name matches any return or condition
-_NAMELESS_KINDS = (AnchorKind.ENTRY, AnchorKind.BEFORE_RETURN, AnchorKind.RETURN_VALUE, AnchorKind.CONDITION)
+_ANCHOR_KINDS_WITHOUT_NAME = (
+    AnchorKind.ENTRY,
+    AnchorKind.BEFORE_RETURN,
+    AnchorKind.RETURN_VALUE,
+    AnchorKind.CONDITION,
+)
 # only these can name items, such as `pose['x']`
-_ASSIGNMENT_KINDS = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
+_ASSIGNMENT_ANCHOR_KINDS = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
 
 class LocationModel(StrictModel, title="A place"):
@@ -75,7 +80,7 @@ class LocationModel(StrictModel, title="A place"):
         "after all other statements.",
     )
 
-    def location(self, source: YamlSource, keys: KeyPath) -> FaultLocation:
+    def build_location(self, source: YamlSource, keys: KeyPath) -> FaultLocation:
         """Return the location; errors point at `keys` in `source`."""
         anchors = [kind for kind in AnchorKind if getattr(self, kind.value) not in (None, False)]
         if len(anchors) != 1:
@@ -87,7 +92,7 @@ class LocationModel(StrictModel, title="A place"):
             )
         kind = anchors[0]
         name = "" if kind is AnchorKind.ENTRY else getattr(self, kind.value)
-        if not (_is_valid_name(kind, name) or (not name and kind in _NAMELESS_KINDS)):
+        if not (_is_valid_anchor_name(kind, name) or (not name and kind in _ANCHOR_KINDS_WITHOUT_NAME)):
             expected = (
                 "an expression as in the source" if kind in VALUE_ANCHORS else "a name as in the source"
             )
@@ -135,9 +140,9 @@ class LocationModel(StrictModel, title="A place"):
         return name
 
 
-def _is_valid_name(kind: AnchorKind, name: str) -> bool:
+def _is_valid_anchor_name(kind: AnchorKind, name: str) -> bool:
     if kind is AnchorKind.DEFAULT and "." in name:
         return False
     if kind in VALUE_ANCHORS:
         return is_expression(name)
-    return is_dotted_name(name) or (kind in _ASSIGNMENT_KINDS and is_assignable(name))
+    return is_dotted_name(name) or (kind in _ASSIGNMENT_ANCHOR_KINDS and is_assignable(name))

@@ -28,11 +28,11 @@ _WRONG_SHAPE_ERRORS = ("list_type", "tuple_type", "dict_type", "model_type", "da
 _UNKNOWN_KEY_ERRORS = ("extra_forbidden", "unexpected_keyword_argument")  # of a model, of a dataclass
 
 
-def explain_error(
+def got_expected_remedy_and_keys(
     problem: ErrorDetails, model: type[BaseModel]
 ) -> tuple[str, str, str, tuple[str | int, ...]]:
     """Return (got, expected, remedy, keys) for one validation error of `model`."""
-    keys, valid_keys = _keys_and_valid_keys(model, tuple(problem["loc"]))
+    keys, valid_keys = _error_keys_and_valid_keys(model, tuple(problem["loc"]))
     key = next((str(k) for k in reversed(keys) if isinstance(k, str)), "")
     kind = problem["type"]
     context = problem.get("ctx", {})
@@ -67,7 +67,7 @@ def choose_error_to_report(errors: Sequence[ErrorDetails]) -> ErrorDetails:
     return min(apt or errors, key=lambda problem: problem["type"] not in _UNKNOWN_KEY_ERRORS)
 
 
-def _keys_and_valid_keys(
+def _error_keys_and_valid_keys(
     model: type[BaseModel], loc: tuple[str | int, ...]
 ) -> tuple[tuple[str | int, ...], list[str]]:
     """Return the path of keys to an error, and the valid keys next to the last one.

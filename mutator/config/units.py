@@ -65,7 +65,7 @@ UNIT_SUFFIXES_TEXT = ", ".join(UNITS)
 _MOST_SUFFIX_PARTS = 1 + max(suffix.count("_") for suffix in UNITS)  # number of parts of the longest suffix
 
 
-def split_unit(key: str) -> tuple[str, Unit | None]:
+def split_key_at_unit(key: str) -> tuple[str, Unit | None]:
     """Split `offset_m` into (`offset`, metre), at the longest suffix. A key without a unit is returned with
     None.
     """

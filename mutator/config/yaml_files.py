@@ -20,8 +20,8 @@ from mutator.config import pydantic_error_messages
 from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.errors import MutatorError
 
-M = TypeVar("M", bound="StrictModel")
-T = TypeVar("T")
+ModelT = TypeVar("ModelT", bound="StrictModel")
+RecordT = TypeVar("RecordT")
 
 MOST_YAML_BYTES = 1_000_000
 MOST_YAML_DEPTH = 40  # nested lists and mappings
@@ -29,7 +29,7 @@ MOST_YAML_VALUES = 100_000  # keys, texts, numbers, lists and mappings
 # YAML ends a line also at these, unlike an editor; line numbers count as the parser does
 _LINE_BREAK_PATTERN = re.compile(r"\r\n|[\r\n\x85\u2028\u2029]")
 _DIRECTIVE_PATTERN = re.compile(r"(?:\A\ufeff?|[\r\n\x85\u2028\u2029])%")
-_SCALAR_PATTERNS = {
+_YAML12_SCALAR_PATTERNS = {
     "bool": ("tTfF", r"true|True|TRUE|false|False|FALSE"),
     "null": ("~nN\0", r"~|null|Null|NULL|"),
     "int": ("-+0123456789", r"[-+]?[0-9]{1,300}"),  # longer integers are floats, infinite if too large
@@ -54,22 +54,22 @@ class _AcceptsMapping:
         return schema
 
 
-YamlRecord = Annotated[T, _AcceptsMapping()]
+YamlRecord = Annotated[RecordT, _AcceptsMapping()]
 """A dataclass in a file model, with fields of `yaml_metadata` and a configuration of
 `pydantic_mapping_config`.
 """
 
 
 # the loader in C is many times as fast, but an installation of PyYAML can lack it
-class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+class _Yaml12Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
     """The safe loader with the scalars of YAML 1.2: `on`, `no` and `1:30` are text."""
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012
 
 
-for _kind, (_first, _pattern) in _SCALAR_PATTERNS.items():
+for _kind, (_first, _pattern) in _YAML12_SCALAR_PATTERNS.items():
     for _character in _first:
-        _Loader.yaml_implicit_resolvers.setdefault("" if _character == "\0" else _character, []).append(
+        _Yaml12Loader.yaml_implicit_resolvers.setdefault("" if _character == "\0" else _character, []).append(
             (f"tag:yaml.org,2002:{_kind}", re.compile(rf"(?:{_pattern})\Z"))
         )
 
@@ -82,7 +82,7 @@ def parse_yaml(text: str, path: Path) -> YamlSource:
     """Parse text as `load_yaml` does; errors name `path`."""
     try:
         _check_syntax(text, path)
-        node = yaml.compose(text, Loader=_Loader)
+        node = yaml.compose(text, Loader=_Yaml12Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         raise MutatorError(
@@ -125,7 +125,7 @@ def _check_syntax(text: str, path: Path) -> None:
             remedy="remove or indent it",
         )
     documents = depth = values = 0
-    for event in yaml.parse(text, Loader=_Loader):
+    for event in yaml.parse(text, Loader=_Yaml12Loader):
         line = event.start_mark.line + 1 if event.start_mark else None
         anchor = getattr(event, "anchor", None)
         tag = getattr(event, "tag", None)
@@ -215,8 +215,8 @@ def _parse_scalar(kind: str, text: str) -> Any:
 
 
 def load_yaml_model(
-    path: Path, model: type[M], schema: str, prepare: Callable[[YamlSource], YamlSource] | None = None
-) -> tuple[M, YamlSource]:
+    path: Path, model: type[ModelT], schema: str, prepare: Callable[[YamlSource], YamlSource] | None = None
+) -> tuple[ModelT, YamlSource]:
     """Parse `path`, check its key `schema: name/version` against `schema`, and validate the rest as `model`.
 
     `prepare` changes the content before it is validated. MutatorError for an invalid file or another schema.
@@ -238,7 +238,7 @@ def load_yaml_model(
         return model.model_validate(body), source
     except ValidationError as error:
         errors = error.errors(include_url=False)
-        got, expected, remedy, keys = pydantic_error_messages.explain_error(
+        got, expected, remedy, keys = pydantic_error_messages.got_expected_remedy_and_keys(
             pydantic_error_messages.choose_error_to_report(errors), model
         )
         if len(errors) > 1:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from mutator._common.extension_doors import DISTRIBUTORS
+from mutator._common.extension_doors import DISTRIBUTOR_DOOR
 from mutator.errors import MutatorError
 from mutator.execution.local_distributor import LocalDistributor
 from mutator.execution.session import Session
@@ -54,19 +54,19 @@ def choose_distributor(cluster: str | None = None, *, insecure: bool = False) ->
             )
         return LocalDistributor()
     name, colon, where = cluster.partition(":")
-    if not (colon and DISTRIBUTORS.has_name(name)):
+    if not (colon and DISTRIBUTOR_DOOR.has_name(name)):
         name, where = _DEFAULT_DISTRIBUTOR, cluster
-    kind = DISTRIBUTORS.load(name)
+    kind = DISTRIBUTOR_DOOR.load(name)
     assert isinstance(kind, DistributorKind)
-    with DISTRIBUTORS.blaming_package(name):
+    with DISTRIBUTOR_DOOR.blaming_package(name):
         opened = kind.open(where, insecure)
-    return opened if name in DISTRIBUTORS.shipped_names() else _ForeignDistributor(name, opened)
+    return opened if name in DISTRIBUTOR_DOOR.shipped_names() else _ForeignDistributor(name, opened)
 
 
 def packages_of_distributor(distributor: Distributor) -> tuple[str, ...]:
     """Return the package that adds a distributor, if the harness does not."""
     name = distributor.name if isinstance(distributor, _ForeignDistributor) else ""
-    return (package,) if (package := DISTRIBUTORS.other_package_of(name)) else ()
+    return (package,) if (package := DISTRIBUTOR_DOOR.other_package_of(name)) else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,5 +75,5 @@ class _ForeignDistributor:
     distributor: Distributor
 
     def run(self, session: Session) -> None:
-        with DISTRIBUTORS.blaming_package(self.name):
+        with DISTRIBUTOR_DOOR.blaming_package(self.name):
             self.distributor.run(session)

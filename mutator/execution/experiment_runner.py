@@ -21,8 +21,8 @@ from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe_contract import activation_of
 from mutator.outcomes import golden_trace_comparison, trace_and_record_loading
 from mutator.outcomes.actuator_change_and_speeds import (
-    change_share,
     first_actuator_change,
+    share_in_direction,
     speeds_after_activation,
 )
 from mutator.outcomes.channel_departures import departures_from_golden
@@ -204,7 +204,7 @@ class ExperimentRunner:
 
     def _finish_without_run(self, experiment: Experiment, err: MutatorError) -> RecordedExperiment:
         status = Status.INVALID_MUTANT if isinstance(err, InvalidMutant) else Status.HARNESS_ERROR
-        place = f"{self.manifest.tree.relative_name(err.where)}: " if err.where else ""
+        place = f"{self.manifest.tree.path_as_in_specs(err.where)}: " if err.where else ""
         return RecordedExperiment(
             experiment=experiment,
             record=_record_of_mutant_without_outcome(experiment, status, place + err.got, None),
@@ -326,7 +326,7 @@ class ExperimentRunner:
             metrics=judged.metrics,
             left=departures_from_golden(reference, faulty, self.manifest.channels, time, judged.t_end),
             first_change=change,
-            first_change_share=change_share(reference, faulty, time, change, end),
+            first_change_share=share_in_direction(reference, faulty, time, change, end),
             speeds=speeds_after_activation(self.manifest, reference, faulty, activation, end),
         )
 

@@ -11,7 +11,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.extension_doors import EXPORTS
+from mutator._common.extension_doors import EXPORT_DOOR
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class Format(StrEnum, metaclass=_FormatMembers):
     """The formats that a run can be written in. Other packages can add more, which have names only."""
 
     _ignore_ = "name"
-    for name in EXPORTS.shipped_names():
+    for name in EXPORT_DOOR.shipped_names():
         vars()[name.replace("-", "_").upper()] = name
 
     @property
@@ -88,9 +88,9 @@ class Export:
 
 def find_export(name: str) -> Export:
     """Return the format of that name; MutatorError if there is none, or if its package is broken."""
-    export = EXPORTS.load(name)
+    export = EXPORT_DOOR.load(name)
     assert isinstance(export, Export)
-    if name not in EXPORTS.shipped_names() and not fnmatchcase(export.file, f"{name}.?*"):
+    if name not in EXPORT_DOOR.shipped_names() and not fnmatchcase(export.file, f"{name}.?*"):
         raise MutatorError(  # `mutator clean` knows an export by this name
             f"export '{name}' writes the file '{export.file}'",
             expected=f"the name '{name}' with a suffix",

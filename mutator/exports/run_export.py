@@ -3,14 +3,14 @@
 from pathlib import Path
 
 from mutator._common.confined_files import path_below
-from mutator._common.extension_doors import EXPORTS
+from mutator._common.extension_doors import EXPORT_DOOR
 from mutator._common.files import make_folder, write_atomic
 from mutator.exports import ExportRequest, ExportSelection, check_options, find_export
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 EXPORTS_FOLDER = "exports"
-WHOLE_RUN = ExportSelection()
+WHOLE_RUN_SELECTION = ExportSelection()
 
 
 def export(
@@ -19,7 +19,7 @@ def export(
     out: Path | None = None,
     *,
     workspace: Workspace | None = None,
-    selection: ExportSelection = WHOLE_RUN,
+    selection: ExportSelection = WHOLE_RUN_SELECTION,
 ) -> Path:
     """Write the run folder `run` as `format` to `out` (default: RUN/exports/); return the file or folder.
 
@@ -29,7 +29,7 @@ def export(
     chosen_format = find_export(format)
     folder = RunFolder.open(run)
     check_options(format, chosen_format, selection)
-    with EXPORTS.blaming_package(format):
+    with EXPORT_DOOR.blaming_package(format):
         name = chosen_format.file.format(table=selection.table.value)
         path = out or path_below(folder.path / EXPORTS_FOLDER, name)
         content = chosen_format.write(

@@ -146,7 +146,7 @@ def _check_paired(draws: tuple[DrawSpec, ...], source: YamlSource, keys: KeyPath
 
 
 def _build_draw(default_key: str, key: str, model: DrawModel, source: YamlSource, keys: KeyPath) -> DrawSpec:
-    name, unit = units.split_unit(key)
+    name, unit = units.split_key_at_unit(key)
     check_name(name, source, (*keys, key))
     ways = {"integers": model.integers_from, "reals": model.reals_from, "list": model.values}
     kinds = [kind for kind, way in ways.items() if way is not None]

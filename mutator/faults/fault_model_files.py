@@ -180,7 +180,7 @@ def _load_model(path: Path) -> FaultModel:
 
 def _build_param(name: str, param: UnnamedParamSchema, source: YamlSource) -> ParamSchema:
     keys = ("params", name)
-    if not name.isidentifier() or units.split_unit(name)[1]:
+    if not name.isidentifier() or units.split_key_at_unit(name)[1]:
         raise source.error(keys, f"parameter '{name}'", expected="an identifier without a unit suffix")
     if name in _TEMPLATE_VARIABLES:
         raise source.error(

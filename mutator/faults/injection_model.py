@@ -81,7 +81,7 @@ class InjectionModel(StrictModel, title="An injection"):
             )
         params = []
         for key, value in self.params.items():
-            name, unit = units.split_unit(key)
+            name, unit = units.split_key_at_unit(key)
             param_keys = (*keys, "params", key)
             suffix = unit.suffix if unit else None
             params.append(
@@ -98,7 +98,7 @@ class InjectionModel(StrictModel, title="An injection"):
                 "neither `at` nor `message`" if self.at is None else "both `at` and `message`",
                 expected="one of them: a place in the source, or a message",
             )
-        location = self.at.location(source, (*keys, "at")) if self.at else None
+        location = self.at.build_location(source, (*keys, "at")) if self.at else None
         self._check_instance_keys(location.anchor.kind if location else None, source, keys)
         return InjectionSpec(
             location=location,

@@ -54,5 +54,5 @@ def _draw_propagation_times(frame: pd.DataFrame) -> Drawing:
         title="Propagation times by scenario",
         note="Times between two events, in runs with both (number above). Alert to hazard: "
         "only if the alert came first. Runs that ended before the second event are not shown.",
-        figure=propagation_time_figure.draw(frame),
+        figure=propagation_time_figure.draw_times_by_scenario(frame),
     )

@@ -13,20 +13,33 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MARKERS = ("o", "s", "^", "D", "v", "P", "p")  # their number shares no factor with that of the colours
-_COLOURS = ("#0072b2", "#c04f00", "#007a5a", "#a8326f", "#8a5a00", "#5b4bb5")
+_SCENARIO_MARKERS = (
+    "o",
+    "s",
+    "^",
+    "D",
+    "v",
+    "P",
+    "p",
+)  # their number shares no factor with that of the colours
+_SCENARIO_COLOURS = ("#0072b2", "#c04f00", "#007a5a", "#a8326f", "#8a5a00", "#5b4bb5")
 _LIMIT_COLOUR = "#b00020"
-Limits = Sequence[tuple[float, str]]
+LabelledLimits = Sequence[tuple[float, str]]
 
 
 @figure_style.shipped_style()
-def draw_values(points: pd.DataFrame, *, title: str, x_label: str, y_label: str, limits: Limits) -> "Figure":
+def draw_values(
+    points: pd.DataFrame, *, title: str, x_label: str, y_label: str, limits: LabelledLimits
+) -> "Figure":
     """Draw a mark for each row of `points`: `value` and `y`, with `scenario` as colour and shape, filled if
     `is_hazard`. Each of the `limits` is a height and its words.
     """
     figure, [axis] = figure_style.blank_figure(4.5, 1, 1)
     for number, (scenario, group) in enumerate(points.groupby("scenario", sort=True, observed=True)):
-        colour, marker = _COLOURS[number % len(_COLOURS)], _MARKERS[number % len(_MARKERS)]
+        colour, marker = (
+            _SCENARIO_COLOURS[number % len(_SCENARIO_COLOURS)],
+            _SCENARIO_MARKERS[number % len(_SCENARIO_MARKERS)],
+        )
         for is_hazard, part in group.groupby("is_hazard"):
             axis.plot(
                 part["value"],
@@ -49,7 +62,7 @@ def draw_values(points: pd.DataFrame, *, title: str, x_label: str, y_label: str,
             color=_LIMIT_COLOUR,
             fontsize=figure_style.SMALL_TEXT_POINTS,
         )
-    _finish(figure, axis, title, x_label, y_label)
+    _finish_axis(figure, axis, title, x_label, y_label)
     return figure
 
 
@@ -61,7 +74,7 @@ def draw_times_to_hazard(frame: pd.DataFrame, fault: pd.DataFrame | None, reacti
     figure, [axis] = figure_style.blank_figure(4.0, 1, 1)
     parts = [("all faults", frame, "#5c6672", 2.5)]
     if fault is not None:
-        parts.append(("this fault", fault, _COLOURS[1], 1.6))
+        parts.append(("this fault", fault, _SCENARIO_COLOURS[1], 1.6))
     latest = max(reaction_time_s, frame["time_to_hazard"].max(skipna=True) if len(frame) else 0.0, 0.1)
     for name, part, colour, width in parts:
         times = np.sort(part["time_to_hazard"].dropna().to_numpy())
@@ -78,13 +91,13 @@ def draw_times_to_hazard(frame: pd.DataFrame, fault: pd.DataFrame | None, reacti
     axis.axvline(reaction_time_s, color=figure_style.INK_COLOUR, linestyle="--", linewidth=1.2)
     axis.set_ylim(0, 104)
     axis.set_xlim(0, 1.05 * latest)
-    _finish(
+    _finish_axis(
         figure, axis, "How soon hazards come", "time from activation to hazard [s]", "share of hazards [%]"
     )
     return figure
 
 
-def _finish(figure: "Figure", axis: "Axes", title: str, x_label: str, y_label: str) -> None:
+def _finish_axis(figure: "Figure", axis: "Axes", title: str, x_label: str, y_label: str) -> None:
     axis.set_title(title, fontsize=figure_style.TEXT_POINTS, loc="left")
     axis.set_xlabel(x_label, fontsize=figure_style.TEXT_POINTS)
     axis.set_ylabel(y_label, fontsize=figure_style.TEXT_POINTS)

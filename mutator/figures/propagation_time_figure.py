@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @figure_style.shipped_style()
-def draw(frame: pd.DataFrame) -> "Figure":
+def draw_times_by_scenario(frame: pd.DataFrame) -> "Figure":
     methods, scenarios = sorted(frame["method"].unique()), sorted(frame["scenario"].unique())
     spreads = {
         (m, s): propagation_spreads_by_step(group) for (m, s), group in frame.groupby(["method", "scenario"])
@@ -48,7 +48,7 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 def _draw_method(axis: "Axes", spreads: Sequence[tuple[float, TimeSpread]], method: str) -> None:
     colour, marker = figure_style.colour_and_marker(method)
-    with_runs = [(x, spread) for x, spread in spreads if spread.n]
+    with_runs = [(x, spread) for x, spread in spreads if spread.time_count]
     xs = [x for x, _ in with_runs]
     lower = [s.lower_quartile for _, s in with_runs]
     upper = [s.upper_quartile for _, s in with_runs]
@@ -70,7 +70,7 @@ def _draw_method(axis: "Axes", spreads: Sequence[tuple[float, TimeSpread]], meth
     )
     for x, s in with_runs:
         axis.annotate(
-            str(s.n),
+            str(s.time_count),
             (x, max(s.upper_quartile, s.mean)),
             xytext=(0, 4),
             textcoords="offset points",

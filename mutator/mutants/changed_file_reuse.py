@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 
 from mutator.mutants.injected_line_syntax import tag_of
-from mutator.mutants.normalized_source import compiles, normalize_numbers_and_ids
+from mutator.mutants.normalized_source import normalize_numbers_and_ids, normalized_source_compiles
 from mutator.mutants.parsed_files_and_anchors import ParsedFile
 from mutator.mutants.splicing import LineEdit, sort_edits
 from mutator.targets.source_tree import SourceTree
@@ -84,7 +84,7 @@ def compiles_for_every_mutant(file: ParsedFile, change: ReusableChangedFile, key
     """
     texts = (text.rstrip("\r\n") for *_, text in key)  # the file's last line can lack a line end
     lines = "\n".join(texts).encode(file.encoding).splitlines()
-    return compiles(change.with_inserted_lines(lines).data)
+    return normalized_source_compiles(change.with_inserted_lines(lines).data)
 
 
 def _split_at_tagged_lines(data: bytes, sign: bytes) -> list[bytes]:

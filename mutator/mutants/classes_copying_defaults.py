@@ -15,7 +15,7 @@ from mutator.mutants.modules_importing_constants import module_name
 from mutator.targets.source_tree import SourceTree
 
 # bases whose classes copy defaults, or read them in a way of their own; by package
-_BASES_BY_PACKAGE: Mapping[str, frozenset[str]] = {
+_COPYING_BASES_BY_PACKAGE: Mapping[str, frozenset[str]] = {
     "pydantic": frozenset({"BaseModel", "RootModel", "BaseSettings", "GenericModel"}),
     "pydantic_settings": frozenset({"BaseSettings"}),
     "sqlmodel": frozenset({"SQLModel"}),
@@ -32,8 +32,8 @@ _BASES_BY_PACKAGE: Mapping[str, frozenset[str]] = {
     "typing_extensions": frozenset({"NamedTuple", "TypedDict"}),
 }
 _CLASS_VARIABLE_PATTERN = re.compile(r"\bClassVar\b")
-_METACLASSES = frozenset({"enum.EnumMeta", "enum.EnumType"})
-_DECORATORS = frozenset({"pydantic.dataclasses.dataclass"})
+_COPYING_METACLASSES = frozenset({"enum.EnumMeta", "enum.EnumType"})
+_COPYING_DECORATORS = frozenset({"pydantic.dataclasses.dataclass"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,40 +46,40 @@ class _ClassBases:
     class_variables: frozenset[str]  # annotated as `ClassVar`: no fields
 
 
-def copying_ancestor(tree: SourceTree, path: str, name: str, field: str) -> str | None:
+def reason_field_is_copied(tree: SourceTree, path: str, name: str, field: str) -> str | None:
     """Return why a class's field cannot be set, such as `its class derives from BaseModel of pydantic`.
 
     The class is found by its qualified name. Bases are followed through the files of the target. A `ClassVar`
     is no field: the class keeps it as it is.
     """
-    facts = tree.derive_once(path, _classes_of).get(name)
+    facts = tree.derive_once(path, _class_bases_in_file).get(name)
     if facts is None or field in facts.class_variables:
         return None
-    return _copying_ancestor(tree, path, name, frozenset())
+    return _reason_field_is_copied(tree, path, name, frozenset())
 
 
-def _copying_ancestor(
+def _reason_field_is_copied(
     tree: SourceTree, path: str, name: str, visited: frozenset[tuple[str, str]]
 ) -> str | None:
-    classes = tree.derive_once(path, _classes_of)
+    classes = tree.derive_once(path, _class_bases_in_file)
     if name not in classes or (path, name) in visited:
         return None
     facts = classes[name]
-    if match := next((d for d in facts.decorators if d in _DECORATORS), None):
+    if match := next((d for d in facts.decorators if d in _COPYING_DECORATORS), None):
         return f"its class is decorated with {match}, which keeps its own copy of each default"
-    if match := next((m for m in facts.metaclasses if m in _METACLASSES), None):
+    if match := next((m for m in facts.metaclasses if m in _COPYING_METACLASSES), None):
         return f"its class has the metaclass {match}, which does not allow a new value"
     for base in facts.bases:
         package, _, last = base.rpartition(".")
-        if last in _BASES_BY_PACKAGE.get(package.partition(".")[0], ()):
+        if last in _COPYING_BASES_BY_PACKAGE.get(package.partition(".")[0], ()):
             return f"its class derives from {last} of {package}, which does not allow a new value"
-        for base_path, base_name in _definitions(tree, path, classes, base):
-            if reason := _copying_ancestor(tree, base_path, base_name, visited | {(path, name)}):
+        for base_path, base_name in _classes_of_base(tree, path, classes, base):
+            if reason := _reason_field_is_copied(tree, base_path, base_name, visited | {(path, name)}):
                 return reason
     return None
 
 
-def _definitions(
+def _classes_of_base(
     tree: SourceTree, path: str, classes: Mapping[str, _ClassBases], base: str
 ) -> Iterator[tuple[str, str]]:
     """Yield path and name of the classes that a base can be."""
@@ -95,12 +95,12 @@ def _definitions(
         )
 
 
-def _classes_of(path: str, data: bytes, root: Path) -> Mapping[str, _ClassBases]:
+def _class_bases_in_file(path: str, data: bytes, root: Path) -> Mapping[str, _ClassBases]:
     try:
         module = ast.parse(data)
     except (SyntaxError, ValueError, RecursionError):
         return {}
-    return dict(_classes_in_body(module.body, "", ImportedNames(module, path, _BASES_BY_PACKAGE)))
+    return dict(_classes_in_body(module.body, "", ImportedNames(module, path, _COPYING_BASES_BY_PACKAGE)))
 
 
 def _classes_in_body(

@@ -44,7 +44,7 @@ def _functions_and_rest_compile(file: ParsedFile, edits: Iterable[LineEdit]) -> 
 
 def _compiles_outside_functions(file: ParsedFile, outside: tuple[LineEdit, ...]) -> bool:
     """Return whether the file compiles with `outside`, and `outside` has at most the probe's import."""
-    if len(outside) > 1 or any(edit.line_index != file.import_line for edit in outside):
+    if len(outside) > 1 or any(edit.line_index != file.import_insertion_line_index for edit in outside):
         return False
     if outside not in file.verified_edits:
         try:

@@ -18,7 +18,7 @@ from mutator.mutants.positions_of_both_parsers import (
     statement_position,
 )
 
-_VERBS = ("assign", "call", "return")
+_ANCHOR_VERBS = ("assign", "call", "return")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +75,7 @@ class Function:
         """The statements by verb ("assign", "call" or "return") and name, in source order."""
         statements: dict[tuple[str, str], list[Statement]] = defaultdict(list)
         for statement in self.statements:
-            for verb in _VERBS:
+            for verb in _ANCHOR_VERBS:
                 for name in dict.fromkeys(statement.names_for(verb)):
                     statements[verb, name].append(statement)
         return statements

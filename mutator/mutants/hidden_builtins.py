@@ -21,7 +21,7 @@ _TEMPLATE_TAG_PATTERN = re.compile(r"\{\{.*?\}\}|\{%.*?%\}|\{#.*?#\}", re.DOTALL
 _WORD_PATTERN = re.compile(r"\w+")
 _CALL_PATTERN = re.compile(r"(?<![\w.])(\w+)\(")
 _BUILTIN_FUNCTIONS = frozenset(name for name in dir(builtins) if callable(getattr(builtins, name)))
-_CALLED_FOR_NUMBERS = frozenset({"float"})  # infinity and NaN as values of parameters
+_BUILTINS_CALLED_FOR_NUMBERS = frozenset({"float"})  # infinity and NaN as values of parameters
 
 
 def check_calls_builtins(file: ParsedFile, line: int, model: FaultModel, code: str) -> None:
@@ -48,7 +48,7 @@ def _called_by_templates(*templates: str) -> frozenset[str]:
     """Return the built-in functions that a model's templates can call."""
     texts = [_TEMPLATE_TAG_PATTERN.sub(" ", template) for template in templates]
     words = {word for text in texts for word in _WORD_PATTERN.findall(text)}
-    return _BUILTIN_FUNCTIONS & (words | _CALLED_FOR_NUMBERS)
+    return _BUILTIN_FUNCTIONS & (words | _BUILTINS_CALLED_FOR_NUMBERS)
 
 
 def _called_names(code: str) -> frozenset[str]:
@@ -83,10 +83,10 @@ class HiddenBuiltins:
 
     def __init__(self, file: ParsedFile) -> None:
         self._file = file
-        everywhere = {*names_of_module(file.data), *_names_bound_in(file.tree)}
+        everywhere = {*names_of_module(file.data), *_names_bound_in(file.syntax_tree)}
         self._bound_somewhere = everywhere & _BUILTIN_FUNCTIONS
 
-    def are_called(self, names: frozenset[str], line: int) -> bool:
+    def hides_any_at(self, names: frozenset[str], line: int) -> bool:
         """Whether one of `names`, in injected code at a line (from 0), would not be the built-in function."""
         names &= self._bound_somewhere
         return bool(names) and not names.isdisjoint(_names_bound_around(self._file, line))
@@ -95,13 +95,13 @@ class HiddenBuiltins:
 def _names_bound_around(file: ParsedFile, line: int) -> Iterator[str]:
     """Yield the names that the module and the functions around a line bind."""
     yield from names_of_module(file.data)
-    for node in ast.walk(file.tree):
+    for node in ast.walk(file.syntax_tree):
         match node:
-            case ast.FunctionDef() | ast.AsyncFunctionDef() if _has_line(node, line + 1):
+            case ast.FunctionDef() | ast.AsyncFunctionDef() if _spans_line(node, line + 1):
                 yield from (name for part in (node.args, *node.body) for name in _names_bound_in(part))
 
 
-def _has_line(node: ast.stmt, line: int) -> bool:
+def _spans_line(node: ast.stmt, line: int) -> bool:
     return node.lineno <= line <= (node.end_lineno or 0)
 
 

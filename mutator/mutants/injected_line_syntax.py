@@ -214,7 +214,7 @@ def probe_import_line(package: str | None) -> str:
     )
 
 
-def observe_call(expressions: Sequence[tuple[str, str]]) -> str:
+def observation_call_source(expressions: Sequence[tuple[str, str]]) -> str:
     return f"{PROBE_MODULE_NAME}.observe({', '.join(f'{name}={text}' for name, text in expressions)})"
 
 

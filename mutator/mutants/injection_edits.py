@@ -34,7 +34,7 @@ from mutator.mutants.splicing import (
     insertion_edit,
     mutated_bytes,
 )
-from mutator.mutants.statement_template_texts import one_line_texts
+from mutator.mutants.statement_template_texts import anchor_and_one_line_texts
 from mutator.mutants.template_rendering import render_changed_value, render_snippet
 from mutator.targets.allowed_locations import check_location_allowed
 from mutator.targets.manifest import TargetManifest
@@ -93,7 +93,7 @@ def injection_edit(
     if model.needs is TemplateNeed.CALL:
         raise _model_misfit_error(file, model, anchor.first_line)
     if model.needs is not None:
-        anchor, texts = one_line_texts(file, anchor, model.needs)
+        anchor, texts = anchor_and_one_line_texts(file, anchor, model.needs)
     _check_instance_condition(file, anchor.names_used_in_function, anchor.first_line, injection)
     code = _snippet_limited_to_instances(
         render_snippet(model, dict(injection.params), tag, texts), injection, tag, model

@@ -29,16 +29,20 @@ SWITCH_BY_COMPILER: Mapping[str, tuple[str, str] | None] = {
     "cython.compile": None,
 }
 # calls that run a function once, with symbols instead of numbers, to build a graph
-_TRACERS = frozenset({"casadi.Function", "jax.make_jaxpr", "torch.export.export", "torch.fx.symbolic_trace"})
+_TRACING_CALLS = frozenset(
+    {"casadi.Function", "jax.make_jaxpr", "torch.export.export", "torch.fx.symbolic_trace"}
+)
 COMPILER_PACKAGES = tuple(sorted({name.partition(".")[0].encode() for name in SWITCH_BY_COMPILER}))
-_PACKAGES = tuple(sorted({*COMPILER_PACKAGES, *(name.partition(".")[0].encode() for name in _TRACERS)}))
-_PACKAGE_NAMES = frozenset(package.decode() for package in _PACKAGES)
+_SEARCHED_PACKAGES = tuple(
+    sorted({*COMPILER_PACKAGES, *(name.partition(".")[0].encode() for name in _TRACING_CALLS)})
+)
+_PACKAGE_NAMES = frozenset(package.decode() for package in _SEARCHED_PACKAGES)
 # names of the parameter by which the compilers take a function
-_FUNCTION_PARAMETERS = frozenset(
+_PARAMETERS_TAKING_FUNCTION = frozenset(
     {"fun", "func", "function", "py_func", "signature_or_function", "model", "obj"}
 )
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
-_STATEMENT_PARTS = (ast.stmt, ast.excepthandler, ast.match_case)
+_STATEMENT_NODE_TYPES = (ast.stmt, ast.excepthandler, ast.match_case)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,18 +54,20 @@ class CompiledCode:
     compiler_by_callee: Mapping[str, str]  # functions that this file calls only in compiled functions
     compiler_by_foreign_function: Mapping[str, str]  # functions of other modules, by dotted name
     compiler_by_foreign_callee: Mapping[str, str]  # the same that this file calls only in compiled functions
-    frozen_constants: Mapping[str, str]  # constants that only compiled functions read, with the compiler
-    constants_of_callees: Mapping[str, str]  # the same if callees count as compiled
+    compiler_by_frozen_constant: Mapping[
+        str, str
+    ]  # constants that only compiled functions read, with the compiler
+    compiler_by_constant_of_callees: Mapping[str, str]  # the same if callees count as compiled
 
 
-_NOTHING = CompiledCode(
+_NO_COMPILED_CODE = CompiledCode(
     compiler_by_function={},
     tracer_by_function={},
     compiler_by_callee={},
     compiler_by_foreign_function={},
     compiler_by_foreign_callee={},
-    frozen_constants={},
-    constants_of_callees={},
+    compiler_by_frozen_constant={},
+    compiler_by_constant_of_callees={},
 )
 
 
@@ -80,12 +86,12 @@ def _import_pattern(packages: tuple[bytes, ...]) -> re.Pattern[bytes]:
 
 
 def find_compiled_code(path: str, data: bytes, root: Path) -> CompiledCode:
-    if not can_import(data, _PACKAGES):
-        return _NOTHING
+    if not can_import(data, _SEARCHED_PACKAGES):
+        return _NO_COMPILED_CODE
     try:
         module = ast.parse(data)
     except (SyntaxError, ValueError, RecursionError):
-        return _NOTHING
+        return _NO_COMPILED_CODE
     return _CompilerSearch(module, path).result()
 
 
@@ -115,8 +121,8 @@ class _CompilerSearch:
                 for node, compiler in compiled.items()
                 if isinstance(node, ast.expr) and (dotted := self._imports.dotted(node)) not in names_outside
             },
-            frozen_constants=self._frozen_constants({}),
-            constants_of_callees=self._frozen_constants(callees),
+            compiler_by_frozen_constant=self._frozen_constants({}),
+            compiler_by_constant_of_callees=self._frozen_constants(callees),
         )
 
     def _callees(self) -> dict[str, str]:
@@ -151,11 +157,11 @@ class _CompilerSearch:
 
     def _frozen_constants(self, callees: Mapping[str, str]) -> dict[str, str]:
         compiled, outside = self._split_nodes(callees)
-        variables_outside = {node.id for node in outside if _is_read(node)}
+        variables_outside = {node.id for node in outside if _is_variable_read(node)}
         return {
             node.id: compiler
             for node, compiler in compiled.items()
-            if _is_read(node) and node.id not in variables_outside
+            if _is_variable_read(node) and node.id not in variables_outside
         }
 
     def _compiler(self, node: ast.expr) -> str | None:
@@ -172,7 +178,7 @@ class _CompilerSearch:
                 if inner_compiler and isinstance(statement, _Function):
                     self._compilers.setdefault(inner_prefix[:-1], inner_compiler)
             for node in ast.iter_child_nodes(statement):
-                if not isinstance(node, _STATEMENT_PARTS):
+                if not isinstance(node, _STATEMENT_NODE_TYPES):
                     self._visit_calls(node, prefix)
             for block in blocks_of(statement):
                 self._visit_body(block, inner_prefix, inner_compiler)
@@ -186,14 +192,16 @@ class _CompilerSearch:
                         self._lambdas.append((argument, compiler))
                     if dotted := self._imports.dotted(argument):
                         self._foreign[dotted] = compiler
-            elif (tracer := self._imports.dotted(call.func)) in _TRACERS:
+            elif (tracer := self._imports.dotted(call.func)) in _TRACING_CALLS:
                 for node in (n for argument in (*call.args, *call.keywords) for n in ast.walk(argument)):
                     traced = node.func if isinstance(node, ast.Call) else node
                     self._note_function(traced, prefix, tracer, self._tracers)
 
     def _functions_given_to(self, call: ast.Call) -> Iterator[ast.expr]:
         """Yield what a compiler is given: `law`, also by keyword or inside another call (`vmap(law)`)."""
-        by_keyword = [keyword.value for keyword in call.keywords if keyword.arg in _FUNCTION_PARAMETERS]
+        by_keyword = [
+            keyword.value for keyword in call.keywords if keyword.arg in _PARAMETERS_TAKING_FUNCTION
+        ]
         for argument in call.args[:1] or by_keyword:
             yield argument
             if isinstance(argument, ast.Call) and self._imports.dotted(argument.func):
@@ -228,9 +236,9 @@ def _collect_functions(body: Sequence[ast.stmt], prefix: str, functions: dict[st
 
 def _names_read_in(nodes: Collection[ast.AST]) -> set[str]:
     """Return the names of variables that are read, and of attributes."""
-    variables = {node.id for node in nodes if _is_read(node)}
+    variables = {node.id for node in nodes if _is_variable_read(node)}
     return variables | {node.attr for node in nodes if isinstance(node, ast.Attribute)}
 
 
-def _is_read(node: ast.AST) -> TypeGuard[ast.Name]:
+def _is_variable_read(node: ast.AST) -> TypeGuard[ast.Name]:
     return isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)

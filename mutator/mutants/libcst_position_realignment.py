@@ -15,7 +15,7 @@ _LINE_END_PATTERN = re.compile(r"\r\n|\r|\n")
 _CHARACTERS_LIBCST_LOSES = frozenset(" \t\f\r\n\\")
 
 
-class _Text:
+class _TextWithoutLayout:
     def __init__(self, text: str) -> None:
         self.text = text
         self.line_starts = [0, *(match.end() for match in _LINE_END_PATTERN.finditer(text))]
@@ -40,7 +40,7 @@ def align_positions(positions: RangeByNode, written: str, original: str) -> Rang
 
     `written` is the text that LibCST writes.
     """
-    new, old = _Text(written), _Text(original)
+    new, old = _TextWithoutLayout(written), _TextWithoutLayout(original)
     if new.text_without_layout != old.text_without_layout:
         return None
     offsets = [*old.kept_offsets, len(original)]

@@ -20,9 +20,9 @@ from mutator.mutants.changed_file_reuse import (
     reuse_key,
 )
 from mutator.mutants.compile_check_by_function import certainly_compiles_for_key
-from mutator.mutants.injected_line_syntax import OBSERVATION_TAG, observe_call
+from mutator.mutants.injected_line_syntax import OBSERVATION_TAG, observation_call_source
 from mutator.mutants.injection_edits import InjectionEdit, edits_of
-from mutator.mutants.normalized_source import compiles, normalize_numbers_and_ids
+from mutator.mutants.normalized_source import normalize_numbers_and_ids, normalized_source_compiles
 from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.mutants.patch_rendering import render_changed_file, render_new_file
 from mutator.mutants.probe_contract import ProbeSource, build_probe_settings, probe_path, render_probe
@@ -68,7 +68,7 @@ def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, tr
     `fault.hold` overrides `trigger.hold`. MutatorError with candidates if an anchor is missing or ambiguous,
     InvalidMutant if the result does not compile.
     """
-    return _build_with(manifest, models, fault, trigger, _ReusingSplicer(manifest.tree))
+    return _build_with_splicer(manifest, models, fault, trigger, _ReusingSplicer(manifest.tree))
 
 
 def build_without_reusing_changed_files(
@@ -78,10 +78,10 @@ def build_without_reusing_changed_files(
 
     `build` must return the same bytes.
     """
-    return _build_with(manifest, models, fault, trigger, _Splicer())
+    return _build_with_splicer(manifest, models, fault, trigger, _Splicer())
 
 
-def _build_with(
+def _build_with_splicer(
     manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger, splicer: "_Splicer"
 ) -> Mutant:
     injections = fault.injections if fault else ()
@@ -107,7 +107,7 @@ def _build_with(
         id=mutant_id,
         files=dict(sorted(files.items())),
         patch="".join(text for _, text in sorted(patches.items())),
-        tree_digest=manifest.tree.digest_with(files),
+        tree_digest=manifest.tree.digest_with_changes(files),
         probe_source=probe,
         injection_ids=ids,
         ids_before_anchor=_ids_before_anchor(injection_edits),
@@ -140,7 +140,9 @@ def _observation_edit(manifest: TargetManifest) -> LineEdit:
     observation = manifest.observation
     file = parsed_file(manifest.tree, observation.location.path)
     anchor = file.resolve_statement(observation.location)
-    return insertion_edit(file, anchor, [observe_call(observation.name_expression_pairs)], OBSERVATION_TAG)
+    return insertion_edit(
+        file, anchor, [observation_call_source(observation.name_expression_pairs)], OBSERVATION_TAG
+    )
 
 
 def _build_probe(
@@ -215,7 +217,7 @@ class _ReusingSplicer(_Splicer):
         self._tree = tree
 
     def check_probe_compiles(self, text: str, ids: Sequence[str], where: Path) -> None:
-        if not compiles(normalize_numbers_and_ids(text, ids).encode()):
+        if not normalized_source_compiles(normalize_numbers_and_ids(text, ids).encode()):
             super().check_probe_compiles(text, ids, where)
 
     def splice_and_compile(

@@ -32,7 +32,7 @@ def _zero_like(number: re.Match[str]) -> str:
 
 
 @lru_cache(maxsize=256)
-def compiles(text: bytes) -> bool:
+def normalized_source_compiles(text: bytes) -> bool:
     """Return whether normalized source, and so every source that normalizes to it, compiles."""
     try:
         compile(text, "<normalized>", "exec", dont_inherit=True)

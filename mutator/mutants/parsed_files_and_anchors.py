@@ -46,8 +46,10 @@ class ResolvedAnchor:
     first_line: int
     end_line: int
     inserts_after: bool
-    is_alone: bool
-    indentable_count: int  # lines that a guard can indent: all, or only the first if a string spans lines
+    is_alone_on_line: bool
+    indentable_line_count: (
+        int  # lines that a guard can indent: all, or only the first if a string spans lines
+    )
     indent: bytes
     names_used_in_function: frozenset[str]  # used in the function
 
@@ -61,14 +63,14 @@ class ParsedFile:
     encoding: str
     newline: bytes
     indent_unit: bytes
-    import_line: int  # the import of the probe is inserted before this line
+    import_insertion_line_index: int  # the import of the probe is inserted before this line
     functions_by_name: Mapping[str, tuple[Function, ...]]
     ast_positions: frozenset[NodePosition]  # according to `ast`
     expressions_by_function: Mapping[str, tuple[Expression, ...]]  # by function
     constants_and_defaults: tuple[ConstantOrDefault, ...]
     outermost_function_lines: tuple[range, ...]  # the lines of each outermost function
     full_path: Path
-    tree: ast.Module = field(repr=False, compare=False)
+    syntax_tree: ast.Module = field(repr=False, compare=False)
     verified_edits: set[Hashable] = field(
         default_factory=set, repr=False, compare=False
     )  # edits that passed checks
@@ -144,14 +146,14 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
             newline=module.default_newline.encode(),
             # a form feed would begin the line anew
             indent_unit=module.default_indent.rpartition("\f")[2].encode() or b"    ",
-            import_line=import_insertion_line(module, positions, logical_lines),
+            import_insertion_line_index=import_insertion_line(module, positions, logical_lines),
             functions_by_name=collect_functions(module, positions, used_names_by_function(data)),
             expressions_by_function=list_expressions(data, tree, module, positions),
             constants_and_defaults=list_constants_and_defaults(data, tree, logical_lines),
             outermost_function_lines=tuple(list_outermost_function_lines(tree)),
             ast_positions=ast_node_positions(tree),
             full_path=where,
-            tree=tree,
+            syntax_tree=tree,
         )
 
 
@@ -189,8 +191,8 @@ def _resolve_statement(file: ParsedFile, location: FaultLocation) -> ResolvedAnc
         first_line=first,
         end_line=statement.end_line,
         inserts_after=location.anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL),
-        is_alone=statement.is_alone,
-        indentable_count=1 if statement.has_multiline_string else statement.end_line - first,
+        is_alone_on_line=statement.is_alone,
+        indentable_line_count=1 if statement.has_multiline_string else statement.end_line - first,
         indent=_indentation_at(file, first),
         names_used_in_function=function.used_names,
     )
@@ -203,8 +205,8 @@ def _resolve_block_start(file: ParsedFile, first_line: int, names: frozenset[str
         first_line=first_line,
         end_line=first_line,
         inserts_after=True,
-        is_alone=True,
-        indentable_count=0,
+        is_alone_on_line=True,
+        indentable_line_count=0,
         indent=indent,
         names_used_in_function=names,
     )
@@ -261,8 +263,8 @@ def _resolve_function_entry(
         first_line=index,
         end_line=index,
         inserts_after=index != model_line,
-        is_alone=True,
-        indentable_count=0,
+        is_alone_on_line=True,
+        indentable_line_count=0,
         indent=_indentation_at(file, model_line),
         names_used_in_function=function.used_names,
     )

@@ -17,7 +17,7 @@ from mutator.mutants.parsed_files_and_anchors import (
     functions_named,
     normalized_function_name,
 )
-from mutator.mutants.statement_template_texts import one_line_texts
+from mutator.mutants.statement_template_texts import anchor_and_one_line_texts
 
 _OPERATOR_MODEL_PREFIX = "operator_"  # models of mutation operators, which find their own places
 # nothing after a `return` runs, so it has no anchor behind it
@@ -117,12 +117,12 @@ class _PlaceLister:
         if model.kind is SnippetKind.VALUE and model.expression_parts:
             return False
         if model.kind is SnippetKind.GUARD and (
-            anchor.first_line == anchor.end_line or not anchor.is_alone or anchor.inserts_after
+            anchor.first_line == anchor.end_line or not anchor.is_alone_on_line or anchor.inserts_after
         ):
             return False
         if model.needs is not None:
             try:
-                one_line_texts(self.file, anchor, model.needs)
+                anchor_and_one_line_texts(self.file, anchor, model.needs)
             except MutatorError:
                 return False
         return True
@@ -156,7 +156,7 @@ class _PlaceLister:
 
     def meets_hidden_builtin(self, template: str, line: int) -> bool:
         """Whether the template calls a built-in function that the file hides at a line (from 0)."""
-        return self.hidden_builtins.are_called(builtins_always_called(template), line)
+        return self.hidden_builtins.hides_any_at(builtins_always_called(template), line)
 
     def location_at(self, function: str, anchor: Anchor) -> FaultLocation:
         return FaultLocation(path=self.file.path, function=function, anchor=anchor)

@@ -9,12 +9,12 @@ from importlib.machinery import EXTENSION_SUFFIXES
 
 from mutator.errors import MutatorError
 from mutator.model import AnchorKind, FaultLocation
-from mutator.mutants.classes_copying_defaults import copying_ancestor
+from mutator.mutants.classes_copying_defaults import reason_field_is_copied
 from mutator.mutants.jit_compiled_code_in_tree import (
-    compiler_of_constant,
-    compiler_of_function,
-    switch_of_compiler,
-    tracer_of_function,
+    environment_switch_of_compiler,
+    jit_compiler_freezing_constant,
+    jit_compiler_of_function,
+    tracing_call_of_function,
 )
 from mutator.mutants.parsed_files_and_anchors import ParsedFile, normalized_function_name, parsed_file
 from mutator.mutants.possible_places import ListedPlace
@@ -36,8 +36,8 @@ def check_place_can_be_hit(manifest: TargetManifest, location: FaultLocation) ->
     if reason is None:
         return
     file = parsed_file(manifest.tree, location.path)
-    compiler = _compiler(manifest, location)
-    switch = switch_of_compiler(compiler) if compiler else ""
+    compiler = _jit_compiler_at(manifest, location)
+    switch = environment_switch_of_compiler(compiler) if compiler else ""
     turning_off = f", or add `{switch}` to `env` of {manifest.path.name}" if switch else ""
     raise MutatorError(
         f"no fault can act here: {reason}",
@@ -54,16 +54,16 @@ def refusal_reason(manifest: TargetManifest, location: FaultLocation) -> str | N
         return refusal_reason_of_function(manifest, location.path, location.function)
     if reason := _refusal_reason_of_file(manifest, location.path):
         return reason
-    if compiler := _compiler(manifest, location):
+    if compiler := _jit_compiler_at(manifest, location):
         return f"only functions compiled by {compiler} read it, and they keep its first value"
     owner, _, field = location.anchor.name.rpartition(".")
-    return copying_ancestor(manifest.tree, location.path, owner, field) if owner else None
+    return reason_field_is_copied(manifest.tree, location.path, owner, field) if owner else None
 
 
 def refusal_reason_of_function(manifest: TargetManifest, path: str, function: str) -> str | None:
     """Return why Python never runs a function from this file as it stands; None if it can."""
     name = normalized_function_name(function)
-    compiler = compiler_of_function(manifest.tree, path, name, manifest.env)
+    compiler = jit_compiler_of_function(manifest.tree, path, name, manifest.env)
     return _refusal_reason_of_file(manifest, path) or (
         f"{function} is compiled by {compiler}" if compiler else None
     )
@@ -86,7 +86,7 @@ def split_by_refusal(
         reason = reasons[key]
         if reason is None:
             usable.append(place)
-            tracer = None if is_constant else tracer_of_function(manifest.tree, location.path, name)
+            tracer = None if is_constant else tracing_call_of_function(manifest.tree, location.path, name)
             graph = f"{tracer} runs it once, to build a graph; a fault acts only if it runs again"
             reason = graph if tracer else None
         if reason is not None:
@@ -99,11 +99,13 @@ def split_by_refusal(
     return usable, sorted([*notes.values(), *unsettable], key=lambda note: note.line)
 
 
-def _compiler(manifest: TargetManifest, location: FaultLocation) -> str | None:
+def _jit_compiler_at(manifest: TargetManifest, location: FaultLocation) -> str | None:
     if location.anchor.kind is AnchorKind.CONSTANT:
-        return compiler_of_constant(manifest.tree, location.path, location.anchor.name, manifest.env)
+        return jit_compiler_freezing_constant(
+            manifest.tree, location.path, location.anchor.name, manifest.env
+        )
     function = normalized_function_name(location.function)
-    return compiler_of_function(manifest.tree, location.path, function, manifest.env)
+    return jit_compiler_of_function(manifest.tree, location.path, function, manifest.env)
 
 
 def _refusal_reason_of_file(manifest: TargetManifest, path: str) -> str | None:

@@ -92,12 +92,12 @@ _TURN_COUNTER, _READ_COUNTER = "turns", "read"  # filters that count; no templat
 class WorkCountingContext(_Context):
     """The names of one rendering, and how much work it has done."""
 
-    work = 0
+    work_steps = 0
 
     def add_work(self, work: int) -> None:
         """Count work; SecurityError if it is too much."""
-        self.work += work
-        if self.work > MOST_WORK_STEPS:
+        self.work_steps += work
+        if self.work_steps > MOST_WORK_STEPS:
             raise SecurityError(f"it does more than {MOST_WORK_STEPS} steps of work")
 
 

@@ -86,7 +86,7 @@ def insertion_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str]
 
 def guard_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], tag: str) -> LineEdit:
     """Return the edit that wraps the statement at `anchor` in `code`, whose last line opens a block."""
-    if anchor.first_line == anchor.end_line or not anchor.is_alone or anchor.inserts_after:
+    if anchor.first_line == anchor.end_line or not anchor.is_alone_on_line or anchor.inserts_after:
         raise MutatorError(
             "a guard needs a statement that is alone on its lines",
             where=file.full_path,
@@ -94,12 +94,12 @@ def guard_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], ta
             expected="an anchor `before_call`, `before_assign` or `before_return`",
             remedy="anchor at the statement to omit",
         )
-    lines = _tagged_lines(file, anchor, code, tag, anchor.indentable_count)
+    lines = _tagged_lines(file, anchor, code, tag, anchor.indentable_line_count)
     return LineEdit(
         line_index=anchor.first_line,
         rank=EditRank.GUARD,
         lines=lines,
-        indented_line_count=anchor.indentable_count,
+        indented_line_count=anchor.indentable_line_count,
         indent_unit=_indent_unit_of(file, anchor.indent),
     )
 
@@ -168,7 +168,9 @@ def _line_replacement_edit(
 
 def probe_import_edit(file: ParsedFile, package: str | None) -> LineEdit:
     line = probe_import_line(package).encode(file.encoding)
-    return LineEdit(line_index=file.import_line, rank=EditRank.BEFORE, lines=(line + file.newline,))
+    return LineEdit(
+        line_index=file.import_insertion_line_index, rank=EditRank.BEFORE, lines=(line + file.newline,)
+    )
 
 
 def _indent_unit_of(file: ParsedFile, indent: bytes) -> bytes:

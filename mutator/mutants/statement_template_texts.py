@@ -20,7 +20,7 @@ _BLOCK_ENDING_STATEMENTS = ast.Return | ast.Raise | ast.Break | ast.Continue
 _BLOCK_FIELDS = ("body", "orelse", "finalbody")
 
 
-def one_line_texts(
+def anchor_and_one_line_texts(
     file: ParsedFile, anchor: ResolvedAnchor, needs: TemplateNeed
 ) -> tuple[ResolvedAnchor, dict[str, str]]:
     """Return the anchor, and the text of each statement on one line, by its name in templates.
@@ -29,7 +29,7 @@ def one_line_texts(
     or if its lines cannot be moved.
     """
     anchored, following = _small_statements_by_line(file.data).get(anchor.first_line, (None, None))
-    if anchored is None or anchor.first_line == anchor.end_line or not anchor.is_alone:
+    if anchored is None or anchor.first_line == anchor.end_line or not anchor.is_alone_on_line:
         raise _unfit_error(file, anchor, "the anchor is not at a statement that is alone on its lines")
     if isinstance(anchored, _BLOCK_ENDING_STATEMENTS):
         raise _unfit_error(file, anchor, f"`{ast.unparse(anchored)}` ends its block")
@@ -48,9 +48,11 @@ def _extend_to_next_statement(
     file: ParsedFile, anchor: ResolvedAnchor, following: ast.stmt
 ) -> ResolvedAnchor:
     last = following.end_lineno or 0
-    if anchor.indentable_count != anchor.end_line - anchor.first_line or _has_multiline_string(following):
+    if anchor.indentable_line_count != anchor.end_line - anchor.first_line or _has_multiline_string(
+        following
+    ):
         raise _unfit_error(file, anchor, "a string spans several lines, so its statement cannot be indented")
-    return replace(anchor, end_line=last, indentable_count=last - anchor.first_line)
+    return replace(anchor, end_line=last, indentable_line_count=last - anchor.first_line)
 
 
 def _has_multiline_string(statement: ast.stmt) -> bool:

@@ -95,7 +95,7 @@ def join_literals(items: Sequence[object], between: str = "") -> str:
     return between.join(map(python_literal, items))
 
 
-_ENVIRONMENT = TemplateEnvironment(
+_TEMPLATE_ENVIRONMENT = TemplateEnvironment(
     functions={"refuse": refuse_params},
     filters={
         "signed": signed_term,
@@ -229,7 +229,7 @@ def _checked_param(param: ParamSchema, params: Mapping[str, Value]) -> Value:
 def render_template(template: str, names: Mapping[str, object], where: Path, first_line: int = 1) -> str:
     """Render a template, or its part from `first_line` on; MutatorError with the line, if known."""
     try:
-        return _ENVIRONMENT.compiled_template(template).render(names)
+        return _TEMPLATE_ENVIRONMENT.compiled_template(template).render(names)
     except TemplateSyntaxError as error:
         raise _template_error(str(error.message), where, error.lineno, first_line) from None
     except TemplateError as error:
@@ -248,7 +248,7 @@ def _template_error(problem: str, where: Path, line: int | None, first_line: int
         where=where,
         line=line + first_line - 1 if line else None,
         expected="names of the model's parameters, `fi`, a loop over a list, a condition, arithmetic, or one "
-        f"of the filters {', '.join(sorted(_ENVIRONMENT.filter_names))}",
+        f"of the filters {', '.join(sorted(_TEMPLATE_ENVIRONMENT.filter_names))}",
         remedy="correct the template, or let the code that it writes do the work",
     )
 

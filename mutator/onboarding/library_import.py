@@ -11,7 +11,7 @@ from textwrap import indent
 import yaml
 
 from mutator._common.confined_files import write_below
-from mutator._common.extension_doors import LIBRARY_IMPORTERS
+from mutator._common.extension_doors import LIBRARY_IMPORTER_DOOR
 from mutator._common.shipped_files import write_new_library
 from mutator.errors import MutatorError
 from mutator.stpa.hazard_analysis_checks import injection_places
@@ -79,8 +79,8 @@ def import_into_new_library(format_name: str, source: Path, folder: Path) -> Imp
     MutatorError for an unknown format, for files that are not in it, if nothing can be imported, and for a
     folder that is not empty.
     """
-    importer = LIBRARY_IMPORTERS.load(format_name)
-    with LIBRARY_IMPORTERS.blaming_package(format_name):
+    importer = LIBRARY_IMPORTER_DOOR.load(format_name)
+    with LIBRARY_IMPORTER_DOOR.blaming_package(format_name):
         imported: ImportedLibrary = importer.read(source)
     _check_not_empty(imported, source)
     write_new_library(folder)

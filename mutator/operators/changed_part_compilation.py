@@ -30,7 +30,7 @@ _Position = tuple[int, int]  # line from 1, column in bytes
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
+class _StepToChild:
     """The way from a node to a child: the node's field, and the index in it if the field is a list."""
 
     node: ast.AST
@@ -57,12 +57,13 @@ class ChangeablePart:
     """The smallest part of a function whose code a mutation changes: a statement, or an element in it.
 
     `steps` go from the statement to the changed expression, through the elements of long nodes at
-    `long_steps`. Mutations of different parts give equal code only if they give the original's.
+    `step_indices_into_long_nodes`. Mutations of different parts give equal code only if they give the
+    original's.
     """
 
     statement: ast.stmt
-    steps: tuple[_Step, ...] = ()
-    long_steps: tuple[int, ...] = ()
+    steps: tuple[_StepToChild, ...] = ()
+    step_indices_into_long_nodes: tuple[int, ...] = ()
 
     @property
     def is_in_condition(self) -> bool:
@@ -71,13 +72,13 @@ class ChangeablePart:
     def statement_with(self, child: ast.AST) -> ast.stmt:
         """Return the statement with `child` at the end of the steps, without what has its own code."""
         for i, step in reversed([*enumerate(self.steps)]):
-            child = _with_child(step, child, alone=i in self.long_steps)
+            child = _with_child(step, child, alone=i in self.step_indices_into_long_nodes)
         assert isinstance(child, ast.stmt)
         return _head_of(child)
 
     @property
     def key(self) -> Hashable:
-        elements = (self.steps[i] for i in self.long_steps)
+        elements = (self.steps[i] for i in self.step_indices_into_long_nodes)
         return id(self.statement), *((id(step.node), step.field, step.index) for step in elements)
 
 
@@ -85,12 +86,12 @@ class ChangeableParts:
     """The code of the statements of a file, as they are and with mutations."""
 
     def __init__(self, file: ParsedFile) -> None:
-        self._step_to_child: dict[int, _Step] = {}  # by the child's id, as the other two
+        self._step_to_child: dict[int, _StepToChild] = {}  # by the child's id, as the other two
         self._simple_statement_by_line: dict[int, ast.stmt] = {}
         self._statements_in_async_functions: set[int] = set()
         self._nonlocal_names: set[str] = set()
-        self._note_nodes(file.tree)
-        code = compile(file.tree, "<file>", "exec", dont_inherit=True)
+        self._note_nodes(file.syntax_tree)
+        code = compile(file.syntax_tree, "<file>", "exec", dont_inherit=True)
         self._instruction_starts = sorted(set(_instruction_starts(code)))
 
     def _note_nodes(self, tree: ast.Module) -> None:
@@ -114,7 +115,7 @@ class ChangeableParts:
         target = mutation.mutated_part
         if not isinstance(target, Expression):
             return ChangeablePart(self._simple_statement_by_line[target.first_line + 1])
-        steps: list[_Step] = []
+        steps: list[_StepToChild] = []
         node: ast.AST = target.node
         while not isinstance(node, ast.stmt):
             steps.append(self._step_to_child[id(node)])
@@ -174,21 +175,23 @@ class ChangeableParts:
         return not self._nonlocal_names.isdisjoint(names)
 
 
-def _steps_from(node: ast.AST) -> Iterator[_Step]:
+def _steps_from(node: ast.AST) -> Iterator[_StepToChild]:
     for field, value in ast.iter_fields(node):
         if isinstance(value, list):
-            yield from (_Step(node, field, i) for i, child in enumerate(value) if isinstance(child, ast.AST))
+            yield from (
+                _StepToChild(node, field, i) for i, child in enumerate(value) if isinstance(child, ast.AST)
+            )
         elif isinstance(value, ast.AST):
-            yield _Step(node, field, None)
+            yield _StepToChild(node, field, None)
 
 
-def _elements_count(steps: list[_Step]) -> bool:
+def _elements_count(steps: list[_StepToChild]) -> bool:
     """Return whether each element of the last step's node counts by itself."""
     inner = next((i for i in reversed(range(len(steps))) if not isinstance(steps[i].node, ast.Tuple)), -1)
     return inner == len(steps) - 1 or isinstance(steps[inner].node, _PARENTS_THAT_KEEP_TUPLES)
 
 
-def _with_child(step: _Step, child: ast.AST, *, alone: bool) -> ast.AST:
+def _with_child(step: _StepToChild, child: ast.AST, *, alone: bool) -> ast.AST:
     """Return a copy of the step's node with another child; `alone`: without its other elements."""
     node = copy(step.node)
     if step.index is None:

@@ -57,7 +57,7 @@ class _ComparedCode:
 
 def _compared_codes(file: ParsedFile, mutations: Sequence[Mutation]) -> list[_ComparedCode]:
     """Return what to compare for each mutation: the code of a part of its function, if that is enough."""
-    parts, functions = ChangeableParts(file), _Functions(file)
+    parts, functions = ChangeableParts(file), _WholeFunctionCode(file)
     numbers_by_part: dict[Hashable, list[int]] = defaultdict(list)
     changed_parts = [parts.part_of(mutation) for mutation in mutations]
     for number, part in enumerate(changed_parts):
@@ -74,7 +74,7 @@ def _compared_codes(file: ParsedFile, mutations: Sequence[Mutation]) -> list[_Co
     return [result[number] for number in range(len(mutations))]
 
 
-class _Functions:
+class _WholeFunctionCode:
     """The code of whole functions."""
 
     def __init__(self, file: ParsedFile) -> None:

@@ -25,8 +25,8 @@ from mutator.targets.manifest import TargetManifest
 
 # part of each entry's key: a new schema ignores the old entries instead of misreading them
 _LINES_SCHEMA, _TYPES_SCHEMA = "lines/1", "types/1"
-ExecutedLines = dict[str, frozenset[int]]  # lines (from 1) by file
-TypesByFile = Mapping[str, Mapping[int, TypesByName]]  # types of variables by file and line (from 1)
+ExecutedLinesByFile = dict[str, frozenset[int]]  # lines (from 1) by file
+TypesByFileAndLine = Mapping[str, Mapping[int, TypesByName]]  # types of variables by file and line (from 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,21 +40,21 @@ class GoldenRunInputs:
 
 def measure_executed_lines(
     manifest: TargetManifest, golden_runs: Sequence[GoldenRunInputs], limits: Limits
-) -> list[ExecutedLines]:
+) -> list[ExecutedLinesByFile]:
     """Return the lines that each golden run executes, measured unless cached. MutatorError if a run fails."""
-    measured = _measure(manifest, golden_runs, limits, _LINES_SCHEMA)
+    measured = _reports_of_golden_runs(manifest, golden_runs, limits, _LINES_SCHEMA)
     return [{file: frozenset(lines) for file, lines in run.items()} for run in measured]
 
 
 def measure_variable_types(
     manifest: TargetManifest, golden_runs: Sequence[GoldenRunInputs], limits: Limits
-) -> TypesByFile:
+) -> TypesByFileAndLine:
     """Return the types of variables in golden runs, measured unless cached. MutatorError if a run fails.
 
     A variable counts on a line if it is bound in each run that executes the line; its types are those of all.
     """
     types_by_file: dict[str, dict[int, dict[str, str]]] = {}
-    for run in _measure(manifest, golden_runs, limits, _TYPES_SCHEMA):
+    for run in _reports_of_golden_runs(manifest, golden_runs, limits, _TYPES_SCHEMA):
         for file, types_by_line in run.items():
             merged = types_by_file.setdefault(file, {})
             for line, types in types_by_line.items():
@@ -64,7 +64,7 @@ def measure_variable_types(
     return types_by_file
 
 
-def _measure(
+def _reports_of_golden_runs(
     manifest: TargetManifest, golden_runs: Sequence[GoldenRunInputs], limits: Limits, schema: str
 ) -> list[dict[str, Any]]:
     """Return what each golden run reports, by file."""
@@ -75,12 +75,14 @@ def _measure(
             engine = ReferenceEngine(manifest, scratch / "work", limits)
             for i, golden_run in enumerate(golden_runs):
                 if reports[i] is None:
-                    reports[i] = _run_and_note(engine, golden_run, scratch / "work" / f"lines-{i}", schema)
+                    reports[i] = _run_and_read_report(
+                        engine, golden_run, scratch / "work" / f"lines-{i}", schema
+                    )
                     _save_cached(_cache_key(manifest, golden_run, schema), reports[i] or {})
     return [report or {} for report in reports]
 
 
-def _run_and_note(
+def _run_and_read_report(
     engine: ReferenceEngine, golden_run: GoldenRunInputs, folder: Path, schema: str
 ) -> dict[str, Any]:
     job = Job(

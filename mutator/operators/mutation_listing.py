@@ -4,7 +4,7 @@ import ast
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 
-from mutator._common.extension_doors import OPERATORS
+from mutator._common.extension_doors import OPERATOR_DOOR
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Anchor, AnchorKind, FaultLocation
@@ -31,7 +31,7 @@ def mutations_of(
     mutations = list(_expression_mutations(file, facts, function, models, operator_by_name))
     if any(operator.omits for operator in operator_by_name.values()):
         mutations += _omission_mutations(file, facts, function, operator_by_name)
-    return sorted(mutations, key=lambda mutation: (mutation.line, OPERATORS.sort_key(mutation.operator)))
+    return sorted(mutations, key=lambda mutation: (mutation.line, OPERATOR_DOOR.sort_key(mutation.operator)))
 
 
 def _expression_mutations(
@@ -81,7 +81,7 @@ def _rules_for(
 ) -> Iterator[tuple[str, MutationRule]]:
     for name, operator in operators.items():
         if operator.rules:
-            with OPERATORS.blaming_package(name):
+            with OPERATOR_DOOR.blaming_package(name):
                 for rule in operator.rules(expression, facts):
                     if not isinstance(rule, MutationRule):
                         raise TypeError(f"{rule!r} is no MutationRule")
@@ -136,7 +136,7 @@ def _omission_mutations(
 
 
 def _operator_omits(name: str, operator: Operator, statement: Statement, facts: StatementFacts) -> bool:
-    with OPERATORS.blaming_package(name):
+    with OPERATOR_DOOR.blaming_package(name):
         return bool(operator.omits and operator.omits(statement, facts))
 
 

@@ -12,7 +12,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.mutants.refused_places import refusal_reason_of_function
 from mutator.operators.equal_code_filter import drop_equal_code
-from mutator.operators.executed_lines_and_types import TypesByFile
+from mutator.operators.executed_lines_and_types import TypesByFileAndLine
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutations import Mutation
 from mutator.operators.statement_facts import statement_facts_of
@@ -69,7 +69,7 @@ def select_mutations(
     operators: Collection[str],
     places: Sequence[str],
     executed: LinesByFile | None = None,
-    types: TypesByFile | None = None,
+    types: TypesByFileAndLine | None = None,
 ) -> SelectedMutations:
     """Return the operators' mutations at these places, sorted by file and line.
 
@@ -100,7 +100,7 @@ def _select_in_file(
     path: str,
     functions: Collection[str],
     executed: LinesByFile | None,
-    types: TypesByFile | None,
+    types: TypesByFileAndLine | None,
 ) -> SelectedMutations:
     file, facts = parsed_file(manifest.tree, path), statement_facts_of(manifest.tree, path)
     if types is not None:

@@ -19,14 +19,14 @@ OPERATOR_MODELS = (
 @cache
 def find_operator(name: str) -> Operator:
     """Return the operator of that name; MutatorError if there is none, or if its package is broken."""
-    operator = extension_doors.OPERATORS.load(name)
+    operator = extension_doors.OPERATOR_DOOR.load(name)
     assert isinstance(operator, Operator)
     return operator
 
 
 def names_in_all() -> tuple[str, ...]:
     """Return the operators that `all` stands for."""
-    return tuple(name for name in extension_doors.OPERATORS.names() if find_operator(name).is_in_all)
+    return tuple(name for name in extension_doors.OPERATOR_DOOR.names() if find_operator(name).is_in_all)
 
 
 def any_needs_types(names: Iterable[str]) -> bool:
@@ -49,6 +49,6 @@ def unique_operator_names(names: Iterable[str]) -> tuple[str, ...]:
     for name in unique_names:
         find_operator(name)
     if not unique_names:
-        expected = ", ".join(extension_doors.OPERATORS.names())
+        expected = ", ".join(extension_doors.OPERATOR_DOOR.names())
         raise MutatorError("no operator", argument="operators", expected=f"one or more of {expected}")
     return unique_names

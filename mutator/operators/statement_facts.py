@@ -33,7 +33,7 @@ class StatementFacts:
       setter share a name
     * `statement_lines`: the lines of each statement without those of nested statements
     * `function_names`: the local names of each function
-    * `reported_name_extents`: the extents of names in arguments of loggers and `print`, which control nothing
+    * `logged_name_extents`: the extents of names in arguments of loggers and `print`, which control nothing
     * `types_by_line`: the types of variables in golden runs, by the line that then begins; None without runs
     """
 
@@ -42,7 +42,7 @@ class StatementFacts:
     first_binding_line_by_name: dict[tuple[int, str], int] = field(default_factory=dict)
     statement_lines: list[range] = field(default_factory=list)
     function_names: tuple[FunctionNames, ...] = ()
-    reported_name_extents: frozenset[NodeExtent] = frozenset()
+    logged_name_extents: frozenset[NodeExtent] = frozenset()
     types_by_line: Mapping[int, TypesByName] | None = None
 
     def types_at(self, line: int) -> TypesByName | None:
@@ -71,15 +71,15 @@ def statement_facts_of(tree: SourceTree, path: str) -> StatementFacts:
 
 def _collect_facts(path: str, data: bytes, root: Path) -> StatementFacts:
     module = ast.parse(data)
-    reported = (name for node in ast.walk(module) for name in _reported_names(node))
+    reported = (name for node in ast.walk(module) for name in _names_in_log_calls(node))
     facts = StatementFacts(
-        function_names=names_of_functions(module), reported_name_extents=frozenset(map(extent_of, reported))
+        function_names=names_of_functions(module), logged_name_extents=frozenset(map(extent_of, reported))
     )
     _collect_block(module.body, None, facts)
     return facts
 
 
-def _reported_names(node: ast.AST) -> Iterator[ast.Name]:
+def _names_in_log_calls(node: ast.AST) -> Iterator[ast.Name]:
     """Yield the names in the arguments of a call such as `self.logger.info(...)`, `print(...)`."""
     match node:
         case ast.Call(func=ast.Name(id="print")):

@@ -13,7 +13,7 @@ from mutator.outcomes.golden_trace_comparison import (
     signed_differences,
     values_at_common_time,
 )
-from mutator.outcomes.hazard_and_metric_judgement import formula_variables
+from mutator.outcomes.hazard_and_metric_judgement import formula_values_by_name
 from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
@@ -46,12 +46,12 @@ def first_actuator_change(
     for channel in channels:
         if channel_deviation(golden, faulty, channel, time_channel).t_first == t_manifest:
             values = values_at_common_time(golden, faulty, channel, time_channel, t_manifest)
-            if values and (change := _change(*values)):
+            if values and (change := _direction_of_change(*values)):
                 return channel.name, change
     return None
 
 
-def _change(golden: float, faulty: float) -> str | None:
+def _direction_of_change(golden: float, faulty: float) -> str | None:
     if math.isnan(faulty):
         return None if math.isnan(golden) else NO_NUMBER
     if faulty == golden or math.isnan(golden):
@@ -59,7 +59,7 @@ def _change(golden: float, faulty: float) -> str | None:
     return HIGHER if faulty > golden else LOWER
 
 
-def change_share(
+def share_in_direction(
     golden: Trace, faulty: Trace, time_channel: str, change: tuple[str, str] | None, end: float | None
 ) -> float | None:
     """Return which share, from 0 to 1, of a channel's deviation from golden has the direction of `change`: of
@@ -107,7 +107,7 @@ def speeds_after_activation(
 
 
 def _speeds_between(manifest: TargetManifest, trace: Trace, first: float, last: float) -> np.ndarray:
-    values = formula_variables(manifest, trace)
+    values = formula_values_by_name(manifest, trace)
     speeds = trace_formulas.formula_at_each_step(manifest.speed, values)
     between = (values[TIME] >= first) & (values[TIME] <= last)
     return np.asarray(speeds[between & np.isfinite(speeds)])

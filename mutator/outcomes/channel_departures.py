@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mutator.outcomes.golden_trace_comparison import channel_deviation, end_of_shorter
+from mutator.outcomes.golden_trace_comparison import channel_deviation, first_time_only_in_longer
 from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.targets.channels import Channel
 
@@ -22,7 +22,7 @@ def departures_from_golden(
     golden at its end at the latest. The largest deviation is taken over the time that both runs cover.
     """
     end = np.inf if t_end is None else t_end + _TIME_SLACK_S
-    shorter_end = end_of_shorter(golden[time_channel], faulty[time_channel])
+    shorter_end = first_time_only_in_longer(golden[time_channel], faulty[time_channel])
     departed = []
     for channel in channels:
         if channel.name in golden and channel.name in faulty:

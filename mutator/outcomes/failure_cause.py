@@ -14,7 +14,7 @@ from mutator.model import RunError, Status
 from mutator.mutants.injected_line_syntax import Tag, changed_value_positions, place_in_target, tag_of
 from mutator.mutants.probe_contract import is_probe_path
 
-_Position = tuple[str, int, int]  # file, line, column
+_CodePosition = tuple[str, int, int]  # file, line, column
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,14 +34,14 @@ class _ChangedFiles:
         self._ids_before_anchor = ids_before_anchor
         self._lines = {path: data.splitlines() for path, data in files.items()}
 
-    def tag_at(self, position: _Position) -> Tag | None:
+    def tag_at(self, position: _CodePosition) -> Tag | None:
         file, line = self._lines.get(position[0], ()), position[1]
         return tag_of(file[line - 1]) if 0 < line <= len(file) else None
 
-    def place_in_target(self, position: _Position) -> str:
+    def place_in_target(self, position: _CodePosition) -> str:
         return place_in_target(*position[:2], self._files, self._ids_before_anchor)
 
-    def injection_ids_at(self, position: _Position, tag: Tag, in_probe: bool) -> Sequence[str]:
+    def injection_ids_at(self, position: _CodePosition, tag: Tag, in_probe: bool) -> Sequence[str]:
         """Return the ids of the injections whose code is at this position. There can be none, because a
         changed line also has unchanged parts.
         """

@@ -17,9 +17,9 @@ from mutator.model import Experiment, Fault, Outcome, Record
 from mutator.outcomes.channel_departures import Departure
 from mutator.outcomes.fault_routes_to_process import (
     PossibleRoute,
-    chain_route,
     distances_from,
-    structure_route,
+    route_by_channel_roles,
+    route_through_structure,
     studied_links,
 )
 from mutator.store.run_folder import RunFolder
@@ -245,8 +245,10 @@ class FaultPathFinder:
             state_by_component=states,
             inferred_ranks={name: int(place) for name, place in late.items() if place is not None},
             links=links,
-            reached=min(reversed(changed), key=route.steps_to_process.__getitem__, default=""),
-            stopped_at=_holding_components(route, states, arrived) if masked else (),
+            reached=min(
+                reversed(changed), key=route.distance_to_process_by_component.__getitem__, default=""
+            ),
+            stopped_at=_stopping_components(route, states, arrived) if masked else (),
             link_to_first_actuator=min(through, key=lambda c: ranks.get(c.tip, inf), default=None),
         )
 
@@ -305,8 +307,10 @@ class FaultPathFinder:
 
     def _route_of(self, injected: frozenset[str]) -> PossibleRoute:
         if self.structure is None:
-            return chain_route(self._role_by_component, self.process_components)
-        return structure_route(self.structure.components, self._links, self.process_components, injected)
+            return route_by_channel_roles(self._role_by_component, self.process_components)
+        return route_through_structure(
+            self.structure.components, self._links, self.process_components, injected
+        )
 
     def _earliest_feedback_rank(self, names: Collection[str], ranks: Mapping[str, float]) -> float:
         """Return the rank of the earliest time of feedback through one of these components, or infinity.
@@ -352,7 +356,7 @@ def _link_state(
     return LinkState.THROUGH if states[tip] in _STATES_REACHED_BY_FAULT else LinkState.STOPPED
 
 
-def _holding_components(
+def _stopping_components(
     route: PossibleRoute, states: Mapping[str, ComponentState], arrived: Collection[str]
 ) -> tuple[str, ...]:
     """Return the components that held a fault: those fed by a component that the fault reached or, if there

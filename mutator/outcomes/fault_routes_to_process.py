@@ -19,13 +19,13 @@ class PossibleRoute:
     feeders_off_route: Mapping[
         str, frozenset[str]
     ]  # by component: the components not on the route that lead to it
-    steps_to_process: Mapping[str, int]  # by component: number of links to the process
+    distance_to_process_by_component: Mapping[str, int]  # by component: number of links to the process
 
     def feeders_on_route(self, component: str) -> set[str]:
         return {tail for tail, tip in self.links.values() if tip == component}
 
 
-def chain_route(roles: Mapping[str, str], processes: frozenset[str]) -> PossibleRoute:
+def route_by_channel_roles(roles: Mapping[str, str], processes: frozenset[str]) -> PossibleRoute:
     """Return the chain of components, ordered by their channels' roles. The place of injection is unknown."""
     order = [role.value for role in (Role.INTERNAL, Role.ACTUATOR, Role.TRUTH)]
     chain = sorted(roles, key=lambda name: order.index(roles[name]))
@@ -37,11 +37,11 @@ def chain_route(roles: Mapping[str, str], processes: frozenset[str]) -> Possible
         entry_components=frozenset(chain[:1]),
         is_injection_place_known=False,
         feeders_off_route=dict.fromkeys(chain[:1], processes),
-        steps_to_process={name: len(chain) - place for place, name in enumerate(chain)},
+        distance_to_process_by_component={name: len(chain) - place for place, name in enumerate(chain)},
     )
 
 
-def structure_route(
+def route_through_structure(
     components: Collection[str],
     links: Mapping[str, tuple[str, str]],
     processes: frozenset[str],
@@ -62,7 +62,7 @@ def structure_route(
         entry_components=injected,
         is_injection_place_known=True,
         feeders_off_route=off_route,
-        steps_to_process={name: steps.get(name, len(on_route)) for name in on_route},
+        distance_to_process_by_component={name: steps.get(name, len(on_route)) for name in on_route},
     )
 
 

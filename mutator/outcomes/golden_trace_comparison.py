@@ -29,7 +29,7 @@ def compare_traces(
     different time onward. `t_end` is the end of the drive if that is before the end of the run.
     """
     end = np.inf if t_end is None else t_end + _TIME_SLACK_S
-    first = end_of_shorter(golden[time_channel], faulty[time_channel])
+    first = first_time_only_in_longer(golden[time_channel], faulty[time_channel])
     max_dev: list[tuple[str, float]] = []
     dev: list[tuple[str, float]] = []
     for channel in channels:
@@ -98,10 +98,10 @@ def _first_unequal_time(golden: np.ndarray, faulty: np.ndarray) -> float:
     unlike = np.flatnonzero(golden[:rows] != faulty[:rows])
     if unlike.size:
         return float(min(golden[unlike[0]], faulty[unlike[0]]))
-    return end_of_shorter(golden, faulty)
+    return first_time_only_in_longer(golden, faulty)
 
 
-def end_of_shorter(golden: np.ndarray, faulty: np.ndarray) -> float:
+def first_time_only_in_longer(golden: np.ndarray, faulty: np.ndarray) -> float:
     """Return the first time that only the longer run has, or infinity if both have equal length."""
     rows = min(len(golden), len(faulty))
     longer = max(golden, faulty, key=len)

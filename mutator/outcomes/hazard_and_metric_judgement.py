@@ -65,13 +65,13 @@ def judge_run(
     """Judge a run. Its trace and that of its golden run must have the channels that the manifest needs for
     judging. Without a golden run (this is one), metrics that use it have no value.
     """
-    values = formula_variables(manifest, trace)
+    values = formula_values_by_name(manifest, trace)
     if golden is not None and any(metric.uses_golden for metric in manifest.metrics):
-        values = {**values, **_golden_values(formula_variables(manifest, golden), values[TIME])}
+        values = {**values, **_golden_values(formula_values_by_name(manifest, golden), values[TIME])}
     hazards, metrics = [], []
     ends: dict[str, float] = {}
     for hazard in manifest.hazard_rules:
-        robustness = _robustness(hazard, values, manifest) if hazard.required_stl else None
+        robustness = _stl_robustness(hazard, values, manifest) if hazard.required_stl else None
         first = _first_hazard_time(hazard, values, robustness, record)
         if first is not None:
             hazards.append((hazard.name, first))
@@ -106,7 +106,7 @@ def judge_run(
     )
 
 
-def formula_variables(manifest: TargetManifest, trace: Trace) -> ValuesByName:
+def formula_values_by_name(manifest: TargetManifest, trace: Trace) -> ValuesByName:
     """Return the variables of the manifest's formulas, with a number for each step.
 
     A channel with its own times keeps its newest value. Before its first value it is NaN.
@@ -129,7 +129,7 @@ def _golden_values(golden: ValuesByName, steps: np.ndarray) -> ValuesByName:
     }
 
 
-def _robustness(hazard: Hazard, values: ValuesByName, manifest: TargetManifest) -> np.ndarray:
+def _stl_robustness(hazard: Hazard, values: ValuesByName, manifest: TargetManifest) -> np.ndarray:
     try:
         return temporal_logic.robustness_at_each_step(hazard.required_stl, values, manifest.step_s)
     except MutatorError as error:
@@ -147,10 +147,10 @@ def _first_hazard_time(
         if robustness is not None
         else trace_formulas.condition_at_each_step(hazard.when, values)
     )
-    return _first_true_time(_has_lasted(holds, values[TIME], hazard.for_s), values[TIME])
+    return _first_true_time(_lasted_mask(holds, values[TIME], hazard.for_s), values[TIME])
 
 
-def _has_lasted(holds: np.ndarray, time: np.ndarray, for_s: float) -> np.ndarray:
+def _lasted_mask(holds: np.ndarray, time: np.ndarray, for_s: float) -> np.ndarray:
     if not for_s:
         return holds
     begins = holds & ~np.concatenate(([False], holds[:-1]))

@@ -63,14 +63,14 @@ class _ReachReport:
     """The report of the watching process. Damaged parts count as empty, as a target can write it, too."""
 
     def __init__(self, report: Mapping[str, Any]) -> None:
-        self.counts_before: Mapping[str, int] = _typed(report.get("before"), dict)
-        self.children: Sequence[str] = _typed(report.get("children"), list)
-        self.starts: Sequence[tuple[str, int, int]] = _typed(report.get("starts"), list)
-        self.loaded: Sequence[str] = _typed(report.get("loaded"), list)
-        self.replacements: Mapping[str, str] = _typed(report.get("replaced"), dict)
+        self.counts_before: Mapping[str, int] = _value_of_type_or_empty(report.get("before"), dict)
+        self.children: Sequence[str] = _value_of_type_or_empty(report.get("children"), list)
+        self.starts: Sequence[tuple[str, int, int]] = _value_of_type_or_empty(report.get("starts"), list)
+        self.loaded: Sequence[str] = _value_of_type_or_empty(report.get("loaded"), list)
+        self.replacements: Mapping[str, str] = _value_of_type_or_empty(report.get("replaced"), dict)
 
 
-def _typed(value: object, kind: type) -> Any:
+def _value_of_type_or_empty(value: object, kind: type) -> Any:
     return value if isinstance(value, kind) else kind()
 
 

@@ -46,17 +46,17 @@ def find_lost_value(
         values = values_on_steps(faulty, name, steps).astype(float)
         golden_values = values_on_steps(golden, name, golden_steps).astype(float)
         reference = newest_values(golden_steps, golden_values, steps)
-        is_nan = np.isnan(values) & ~np.isnan(reference) & ~_may_be_nan(golden_values, values)
+        is_nan = np.isnan(values) & ~np.isnan(reference) & ~_nan_allowed_mask(golden_values, values)
         is_unexpected = np.isinf(values) & ~np.isin(values, golden_values)
         lost_now = is_nan | is_unexpected & np.isfinite(reference)
-        at = np.flatnonzero(lost_now & _in_drive(steps, t_end))
+        at = np.flatnonzero(lost_now & _steps_in_drive(steps, t_end))
         if at.size:
             instead = "NaN" if np.isnan(values[at[0]]) else "infinite"
             lost.append(LostValue(name=name, instead=instead, time_s=float(steps[at[0]])))
     return min(lost, key=lambda value: value.time_s, default=None)
 
 
-def _may_be_nan(golden_values: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _nan_allowed_mask(golden_values: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return the steps in which NaN can mean that there is nothing to observe, such as no vehicle ahead."""
     is_absent = np.isnan(golden_values)
     if np.any(is_absent[1:] & ~is_absent[:-1]):
@@ -71,7 +71,7 @@ def find_value_lost_for_good(manifest: TargetManifest, trace: Trace, t_end: floa
     A value can be NaN for some time, or never a number, if there is nothing to observe.
     """
     steps = np.asarray(trace[manifest.time_channel], float)
-    driven = _in_drive(steps, t_end)
+    driven = _steps_in_drive(steps, t_end)
     lost: list[LostValue] = []
     for name in _recorded_names(manifest, trace):
         is_number = ~np.isnan(values_on_steps(trace, name, steps).astype(float)[driven])
@@ -88,5 +88,5 @@ def _recorded_names(manifest: TargetManifest, *traces: Trace) -> Iterator[str]:
             yield value.name
 
 
-def _in_drive(steps: np.ndarray, t_end: float | None) -> np.ndarray:
+def _steps_in_drive(steps: np.ndarray, t_end: float | None) -> np.ndarray:
     return steps <= (np.inf if t_end is None else t_end + _TIME_SLACK_S)

@@ -22,7 +22,7 @@ from mutator.targets.manifest import TargetManifest
 
 MOST_SAMPLES_PER_S = 20.0  # maximum number of samples per second
 # a channel keeps every n-th sample
-_SAMPLE_EVERY_BY_ROLE = {Role.ACTUATOR: 1, Role.TRUTH: 1, Role.INTERNAL: 2}
+_SAMPLE_EVERY_NTH_BY_ROLE = {Role.ACTUATOR: 1, Role.TRUTH: 1, Role.INTERNAL: 2}
 _HALF_OF_LAST_BIT = np.uint32(8)  # half of the lowest bit that is kept
 _TIME_SLACK_S = 1e-9  # s; times are sums of steps
 
@@ -36,8 +36,8 @@ class SeriesSampler:
         ]
         self._clock = manifest.time_channel
         self._time = np.asarray(golden[self._clock], dtype=float)
-        self._values = self._values_on(golden, self._time)
-        self._sample_every = [_SAMPLE_EVERY_BY_ROLE[channel.role] for channel in self._channels]
+        self._values = self._values_at_steps(golden, self._time)
+        self._sample_every = [_SAMPLE_EVERY_NTH_BY_ROLE[channel.role] for channel in self._channels]
         self._sample_steps = _thinned_steps(self._time)
         self.golden = Series(
             t=self._time[self._sample_steps],
@@ -117,16 +117,16 @@ class SeriesSampler:
             return (
                 time,
                 _padded_with_nan(self._values, len(time)),
-                _padded_with_nan(self._values_on(faulty, faulty_time), len(time)),
+                _padded_with_nan(self._values_at_steps(faulty, faulty_time), len(time)),
             )
         time = np.union1d(faulty_time, self._time)
         return (
             time,
             self._newest_values(self._values, self._time, time),
-            self._newest_values(self._values_on(faulty, faulty_time), faulty_time, time),
+            self._newest_values(self._values_at_steps(faulty, faulty_time), faulty_time, time),
         )
 
-    def _values_on(self, trace: Trace, time: np.ndarray) -> np.ndarray:
+    def _values_at_steps(self, trace: Trace, time: np.ndarray) -> np.ndarray:
         """Return an array with a row for each channel and a column for each step. Missing channels: NaN."""
         rows = np.full((len(self._channels), len(time)), np.nan)
         for row, channel in zip(rows, self._channels, strict=True):

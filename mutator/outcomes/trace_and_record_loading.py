@@ -11,7 +11,7 @@ import numpy as np
 
 from mutator._common.bounded_reading import MOST_JSON_BYTES, read_bounded
 from mutator._common.confined_files import path_below
-from mutator._common.extension_doors import IMPORTERS
+from mutator._common.extension_doors import TRACE_IMPORTER_DOOR
 from mutator._common.hashing import digest
 from mutator._common.resource_shortages import find_shortage
 from mutator.errors import BadOutput, BadTrace, MutatorError
@@ -71,7 +71,7 @@ def _check_importer_works(err: Exception, manifest: TargetManifest, path: Path) 
     if (
         path.is_file()
         and not is_missing_channel
-        and (failure := IMPORTERS.other_package_error(path.suffix.removeprefix("."), err))
+        and (failure := TRACE_IMPORTER_DOOR.other_package_error(path.suffix.removeprefix("."), err))
     ):
         raise failure from err
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mutator._common.bounded_reading import MOST_FILE_BYTES
-from mutator._common.extension_doors import IMPORTERS
+from mutator._common.extension_doors import TRACE_IMPORTER_DOOR
 from mutator.errors import BadTrace
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
@@ -53,8 +53,8 @@ class Importer:
     """A reader of traces; its name is the suffix.
 
     `read` returns an array for each channel and for the step times, by manifest name; a channel that lacks
-    values at some steps also has its times, named by `own_times`. BadTrace for an invalid file, KeyError for
-    a missing channel. After any other exception, the experiment is a harness error, because nobody knows
+    values at some steps also has its times, named by `own_times`. BadTrace for an invalid file, KeyError
+    for a missing channel. After any other exception, the experiment is a harness error, because nobody knows
     whether the run or the importer failed. A file can claim any size, so check before you unpack it.
     """
 
@@ -64,7 +64,7 @@ class Importer:
 
 @cache
 def _importer_for(name: str) -> Importer:
-    importer = IMPORTERS.load(name)
+    importer = TRACE_IMPORTER_DOOR.load(name)
     assert isinstance(importer, Importer)
     return importer
 

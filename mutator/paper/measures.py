@@ -18,8 +18,8 @@ import pandas as pd
 
 from mutator._common.message_text import counted
 from mutator.statistics import event_time_statistics, guided_against_random
-from mutator.statistics.shares_with_intervals import CONFIDENCE, Share
-from mutator.statistics.shares_with_intervals import share as wilson
+from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL, Share
+from mutator.statistics.shares_with_intervals import share_with_interval as wilson
 from mutator.statistics.tallies import tally_by_fault_type
 
 __all__ = [
@@ -127,7 +127,9 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
     low = high = estimate = math.nan
     if discordant:
         estimate = matched.first_only / discordant
-        low, high = map(float, proportion_confint(matched.first_only, discordant, 1 - CONFIDENCE, "beta"))
+        low, high = map(
+            float, proportion_confint(matched.first_only, discordant, 1 - CONFIDENCE_LEVEL, "beta")
+        )
     return Estimate(
         value=estimate,
         low=low,
@@ -135,7 +137,7 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
         n=discordant,
         count_with_property=matched.first_only,
         text=f"{counted(matched.pair_count, 'pair')}; hazard only in the guided run: {matched.first_only}, "
-        f"only in the random run: {matched.second_only} (McNemar p {matched.p:.2g})",
+        f"only in the random run: {matched.second_only} (McNemar p {matched.p_value:.2g})",
     )
 
 
@@ -149,7 +151,7 @@ def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
         return Estimate(
             value=math.nan, low=math.nan, high=math.nan, n=len(times_s), text=f"- (N {len(times_s)})"
         )
-    interval = ttest_1samp(times_s, 0.0).confidence_interval(CONFIDENCE)
+    interval = ttest_1samp(times_s, 0.0).confidence_interval(CONFIDENCE_LEVEL)
     return _time_estimate(float(times_s.mean()), float(interval.low), float(interval.high), len(times_s))
 
 
@@ -199,7 +201,7 @@ def estimate_of_difference(first: Share, second: Share) -> Estimate:
             second.of,
             method="newcomb",
             compare="diff",
-            alpha=1 - CONFIDENCE,
+            alpha=1 - CONFIDENCE_LEVEL,
         )
     difference = first.rate - second.rate
     text = _describe_difference(difference, low, high, first, second)

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_source_lines import YamlSource
 from mutator.paper.measures import MEASURES, Estimate, estimate_of_difference, estimate_of_share
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.shares_with_intervals import share_with_interval
 
 FILE_NAME = "paper_observations.yaml"
 SCHEMA = "paper_observations/1"
@@ -129,7 +129,7 @@ class Claim(StrictModel):
 
     def published_estimate(self) -> Estimate | None:
         """Return the paper's counts as an estimate."""
-        shares = [share(count, of) for count, of in self.paper]
+        shares = [share_with_interval(count, of) for count, of in self.paper]
         if len(shares) == 2:
             return estimate_of_difference(*shares)
         return estimate_of_share(shares[0]) if shares else None
@@ -155,7 +155,7 @@ class ClaimAnswer:
 
     group: str
     query: str
-    result: Estimate
+    estimate: Estimate
     verdict: ClaimVerdict
 
 
@@ -282,4 +282,4 @@ def _answer_claim(
             expected=f"arguments that {measure_name} accepts, with names of columns of the results",
             remedy="see mutator/paper/measures.py",
         ) from err
-    return ClaimAnswer(group=group, query=query, result=estimate, verdict=rule.verdict_on(estimate))
+    return ClaimAnswer(group=group, query=query, estimate=estimate, verdict=rule.verdict_on(estimate))

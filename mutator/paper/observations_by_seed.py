@@ -10,7 +10,7 @@ from mutator.paper.observation_judging import ClaimVerdict, JudgedObservation, j
 from mutator.statistics.seed_spread_tables import seeds_of
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 
-JudgedBySeed = Mapping[str, Sequence[JudgedObservation]]
+JudgedObservationsBySeed = Mapping[str, Sequence[JudgedObservation]]
 
 SEEDS_NOTE = (
     "Each seed repeats the whole campaign with different draws. The observations are judged on the runs of "
@@ -21,7 +21,7 @@ SEEDS_NOTE = (
 
 def judge_by_seed(
     path: Path, runs: pd.DataFrame, mixture_gaps_of: Callable[[pd.DataFrame], Sequence[str]]
-) -> JudgedBySeed:
+) -> JudgedObservationsBySeed:
     """Judge the observations on the runs of each seed separately. Empty if there is only one seed.
 
     `mixture_gaps_of` returns how a seed's runs differ from the paper's mixture of faults.
@@ -36,7 +36,9 @@ def judge_by_seed(
     }
 
 
-def verdicts_by_seed_table(judged: Sequence[JudgedObservation], by_seed: JudgedBySeed) -> TextTable:
+def verdicts_by_seed_table(
+    judged: Sequence[JudgedObservation], by_seed: JudgedObservationsBySeed
+) -> TextTable:
     heads = ("observation", "", "all seeds together", *(verdict.value for verdict in ClaimVerdict), "seeds")
     rows = [
         (
@@ -52,12 +54,12 @@ def verdicts_by_seed_table(judged: Sequence[JudgedObservation], by_seed: JudgedB
     return TextTable(heads=heads, rows=rows, right_aligned=range(3, len(heads)))
 
 
-def _seeds_with_verdict(number: int, verdict: ClaimVerdict, by_seed: JudgedBySeed) -> list[str]:
+def _seeds_with_verdict(number: int, verdict: ClaimVerdict, by_seed: JudgedObservationsBySeed) -> list[str]:
     # numbers begin at 1
     return [seed for seed, judged in by_seed.items() if judged[number - 1].verdict is verdict]
 
 
-def observations_by_seed_sheet(by_seed: JudgedBySeed) -> Sheet:
+def observations_by_seed_sheet(by_seed: JudgedObservationsBySeed) -> Sheet:
     return Sheet(
         name="observations_by_seed",
         title="The paper's observations by seed",
@@ -70,7 +72,7 @@ def observations_by_seed_sheet(by_seed: JudgedBySeed) -> Sheet:
     )
 
 
-def _sheet_rows(by_seed: JudgedBySeed) -> Iterator[tuple[SheetCell, ...]]:
+def _sheet_rows(by_seed: JudgedObservationsBySeed) -> Iterator[tuple[SheetCell, ...]]:
     for seed, judged in by_seed.items():
         for observation in judged:
             for claim in observation.claims:
@@ -83,5 +85,10 @@ def _sheet_rows(by_seed: JudgedBySeed) -> Iterator[tuple[SheetCell, ...]]:
                         claim.claim.claim_text,
                         answer.group,
                     )
-                    numbers = (answer.result.n, answer.result.value, answer.result.low, answer.result.high)
+                    numbers = (
+                        answer.estimate.n,
+                        answer.estimate.value,
+                        answer.estimate.low,
+                        answer.estimate.high,
+                    )
                     yield (*head, *numbers, answer.verdict.value)

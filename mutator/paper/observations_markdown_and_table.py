@@ -38,13 +38,13 @@ def claims_table(observation: JudgedObservation) -> TextTable:
             str(claim.verdict_on_paper or "-"),
         ]
         if len(claim.answers) == 1:
-            first_row += [claim.answers[0].result.text, rule, _describe_verdict(claim)]
+            first_row += [claim.answers[0].estimate.text, rule, _describe_verdict(claim)]
         else:
             first_row += ["" if claim.answers else "-", rule, _describe_verdict(claim)]
         rows.append(first_row)
         if len(claim.answers) > 1:
             rows += [
-                ["", answer.group, "", "", answer.result.text, "", answer.verdict.value]
+                ["", answer.group, "", "", answer.estimate.text, "", answer.verdict.value]
                 for answer in claim.answers
             ]
     return TextTable(heads=CLAIM_HEADS, rows=rows)
@@ -125,7 +125,12 @@ def _sheet_rows(observations: Sequence[JudgedObservation]) -> Iterator[tuple[She
             if not claim.answers:
                 yield (*head, "", paper, by_rule, *[None] * 4, rule, "", claim.verdict.value, "")
             for answer in claim.answers:
-                numbers = (answer.result.n, answer.result.value, answer.result.low, answer.result.high)
+                numbers = (
+                    answer.estimate.n,
+                    answer.estimate.value,
+                    answer.estimate.low,
+                    answer.estimate.high,
+                )
                 verdict = (answer.verdict.value, claim.verdict.value, answer.query)
                 yield (*head, answer.group, paper, by_rule, *numbers, rule, *verdict)
 

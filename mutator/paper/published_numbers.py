@@ -10,7 +10,7 @@ from mutator.config.yaml_source_lines import YamlSource
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.tallies import Tally
 
-FILE_NAMES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
+PUBLISHED_FILE_NAMES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,9 +83,13 @@ class _TimesFile(StrictModel):
 
 def load_published_numbers(references: Path) -> PublishedNumbers:
     """Load the numbers cited in a folder. MutatorError with file and line if counts are impossible."""
-    summary, summary_source = load_yaml_model(references / FILE_NAMES[0], _SummaryFile, "paper_summary/1")
-    coverage, coverage_source = load_yaml_model(references / FILE_NAMES[1], _CoverageFile, "paper_coverage/1")
-    times, _ = load_yaml_model(references / FILE_NAMES[2], _TimesFile, "paper_times/1")
+    summary, summary_source = load_yaml_model(
+        references / PUBLISHED_FILE_NAMES[0], _SummaryFile, "paper_summary/1"
+    )
+    coverage, coverage_source = load_yaml_model(
+        references / PUBLISHED_FILE_NAMES[1], _CoverageFile, "paper_coverage/1"
+    )
+    times, _ = load_yaml_model(references / PUBLISHED_FILE_NAMES[2], _TimesFile, "paper_times/1")
     tally_by_scenario = {}
     for i, row in enumerate(summary.rows):
         tally = Tally(**row.model_dump(exclude={"method", "scenario"}))
@@ -111,7 +115,7 @@ def load_published_numbers(references: Path) -> PublishedNumbers:
 
 
 def has_published_numbers(references: Path) -> bool:
-    return all((references / name).is_file() for name in FILE_NAMES)
+    return all((references / name).is_file() for name in PUBLISHED_FILE_NAMES)
 
 
 def _check_tally(tally: Tally, source: YamlSource, row_index: int) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from mutator.config.yaml_files import load_yaml
 from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
-from mutator.paper.published_numbers import FILE_NAMES, PublishedNumbers, load_published_numbers
+from mutator.paper.published_numbers import PUBLISHED_FILE_NAMES, PublishedNumbers, load_published_numbers
 from mutator.statistics.tallies import Tally, sum_tallies
 from mutator.workspace import Workspace
 
@@ -24,11 +24,11 @@ def check_published_numbers(workspace: Workspace) -> Iterator[MutatorError]:
     methods, scenarios and fault types, and sums over scenarios that differ from those over fault types.
     """
     references = workspace.references
-    if missing := [name for name in FILE_NAMES if not (references / name).is_file()]:
+    if missing := [name for name in PUBLISHED_FILE_NAMES if not (references / name).is_file()]:
         yield MutatorError(
             f"the published numbers are not in this library: no {', '.join(missing)}",
             where=references,
-            expected=f"{', '.join(FILE_NAMES[:-1])} and {FILE_NAMES[-1]}",
+            expected=f"{', '.join(PUBLISHED_FILE_NAMES[:-1])} and {PUBLISHED_FILE_NAMES[-1]}",
             remedy="copy them from the shipped library, or remove `study:` from the campaigns",
         )
         return
@@ -37,7 +37,7 @@ def check_published_numbers(workspace: Workspace) -> Iterator[MutatorError]:
     except MutatorError as error:
         yield error
         return
-    summary, coverage = (load_yaml(references / name) for name in FILE_NAMES[:2])
+    summary, coverage = (load_yaml(references / name) for name in PUBLISHED_FILE_NAMES[:2])
     faults_folder = workspace.library / "faults"
     fault_types = {
         path.relative_to(faults_folder).with_suffix("").as_posix() for path in workspace.spec_files()

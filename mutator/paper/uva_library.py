@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from mutator._common.shipped_files import shipped_folder
-from mutator.config.units import split_unit
+from mutator.config.units import split_key_at_unit
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
 from mutator.onboarding.library_import import EntryOutcome, ImportedEntry, ImportedLibrary
@@ -219,7 +219,7 @@ class _LibraryBuilder:
 
 
 def _value_text(place: HookPlace, values: Sequence[float | int]) -> str:
-    units = [split_unit(key)[1] for key in place.draws]
+    units = [split_key_at_unit(key)[1] for key in place.draws]
     unit = f" {units[0].symbol}" if units and units[0] else ""
     return ", ".join(f"{value:.12g}" for value in values) + unit
 

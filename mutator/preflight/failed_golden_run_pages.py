@@ -57,7 +57,7 @@ def write_golden_run_pages(folder: RunFolder, workspace: Workspace) -> list[Path
             continue
         page = path_below(folder.path / REPORT_FOLDER, f"golden-{golden_run.key}.html")
         make_folder(page.parent)
-        text = _page_text(golden_run.key, detail, _drive_as_json(golden_run.key, manifest, trace, judged))
+        text = _page_html(golden_run.key, detail, _drive_as_json(golden_run.key, manifest, trace, judged))
         write_atomic(page, text.encode())
         pages.append(page)
     return pages
@@ -100,7 +100,7 @@ def _json_numbers(values: Iterable[float]) -> list[float | str | None]:
     ]
 
 
-def _page_text(name: str, detail: str, drive: dict[str, Any]) -> str:
+def _page_html(name: str, detail: str, drive: dict[str, Any]) -> str:
     style = "".join(map(asset_text, load_order("golden", ".css")))
     script = "".join(map(asset_text, load_order("golden", ".js")))
     title = f"Golden run {escape(name)}"

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pkgutil import resolve_name
 
 from mutator._common.extension_doors import (
-    DISTRIBUTORS,
-    DOORS,
-    EXPORTS,
-    IMPORTERS,
-    LIBRARY_IMPORTERS,
-    OPERATORS,
-    STUDIES,
+    ALL_DOORS,
+    DISTRIBUTOR_DOOR,
+    EXPORT_DOOR,
+    LIBRARY_IMPORTER_DOOR,
+    OPERATOR_DOOR,
+    STUDY_DOOR,
+    TRACE_IMPORTER_DOOR,
     Door,
 )
 from mutator._common.table_rendering import TextTable
@@ -36,28 +36,28 @@ Once a package is uninstalled, the files that its exports wrote in run folders a
 The package in `tests/fixtures/doors/` has an example of each but the study.
 """
 _EXAMPLE_BY_DOOR = {
-    EXPORTS.addition: ("a format of `mutator export`", "counts", "door_examples.counts:EXPORT"),
-    IMPORTERS.addition: (
+    EXPORT_DOOR.addition: ("a format of `mutator export`", "counts", "door_examples.counts:EXPORT"),
+    TRACE_IMPORTER_DOOR.addition: (
         "a format of traces; its name is the suffix",
         "jsonl",
         "door_examples.jsonl:IMPORTER",
     ),
-    LIBRARY_IMPORTERS.addition: (
+    LIBRARY_IMPORTER_DOOR.addition: (
         "a format of `mutator import` ([import faults](../how-to/import-faults.md))",
         "drives",
         "door_examples.drives:IMPORTER",
     ),
-    DISTRIBUTORS.addition: (
+    DISTRIBUTOR_DOOR.addition: (
         "a way to run experiments elsewhere, chosen by `--cluster NAME:WHERE`",
         "here",
         "door_examples.here:DISTRIBUTOR",
     ),
-    OPERATORS.addition: (
+    OPERATOR_DOOR.addition: (
         "mutants without a spec ([mutation operators](operators.md))",
         "zero",
         "door_examples.zero:OPERATOR",
     ),
-    STUDIES.addition: (
+    STUDY_DOOR.addition: (
         "published results with which runs are compared ([add a study](../how-to/add-a-study.md))",
         "crash_tests",
         "crash_tests.study:STUDY",
@@ -128,7 +128,7 @@ def render_doors_page(workspace: Workspace) -> str:
     rows = [(f"**{p.name}**", p.purpose, p.protocol, p.how_to_register, p.example) for p in _INTERNAL_DOORS]
     inside = TextTable(heads=heads, rows=rows).as_markdown(escape=False)
     parts = [generated_page_head("Doors"), _INTRO, "## Entry points of other packages\n", _ENTRY_POINTS_NOTE]
-    for door in DOORS:
+    for door in ALL_DOORS:
         parts += _door_section(door)
     return "\n".join([*parts, "## Data and tables\n", inside]).rstrip() + "\n"
 
@@ -143,7 +143,8 @@ def _door_section(door: Door) -> Iterator[str]:
         attribute = door.attribute_in_module
         yield f"Inside the project, it is the attribute `{attribute}` of a module in `{folder}/`."
     yield f"\n{inspect.cleandoc(kind.__doc__)}\n"
-    yield f'```toml\n[project.entry-points."{door.group}"]\n{example_name} = "{example_value}"\n```\n'
+    yield f'```toml\n[project.entry-points."{door.entry_point_group}"]'
+    yield f'{example_name} = "{example_value}"\n```\n'
     yield from _mapping_tables(door)
     shipped_rows = [(f"`{name}`", door.load(name).about) for name in door.shipped_names()]
     if shipped_rows:
@@ -154,7 +155,7 @@ def _door_section(door: Door) -> Iterator[str]:
 
 def _mapping_tables(door: Door) -> Iterator[str]:
     """Yield what each shipped importer of libraries makes of the entries of its files."""
-    for name in door.shipped_names() if door is LIBRARY_IMPORTERS else ():
+    for name in door.shipped_names() if door is LIBRARY_IMPORTER_DOOR else ():
         heads = (f"entry of `{name}`", "what it becomes", "what differs, or why it is refused")
         rows = door.load(name).mapping
         yield TextTable(heads=heads, rows=rows).as_markdown(escape=False) + "\n"

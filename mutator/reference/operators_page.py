@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from mutator._common.extension_doors import OPERATORS
+from mutator._common.extension_doors import OPERATOR_DOOR
 from mutator._common.table_rendering import TextTable
 from mutator.operators.operator_lookup import find_operator
 from mutator.reference.yaml_key_tables import generated_page_head
@@ -62,7 +62,7 @@ def render_operators_page(workspace: Workspace) -> str:
 
 
 def _replacement_rows() -> Iterator[tuple[str, str, str]]:
-    for name in OPERATORS.shipped_names():
+    for name in OPERATOR_DOOR.shipped_names():
         heads = [f"`{name}`"]
         for where, replacement in find_operator(name).replacements:
             yield heads.pop() if heads else "", where, replacement

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 from mutator._common.confined_files import read_below
 from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.hashing import as_json_types
-from mutator._common.typed_json import from_json_types
+from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError, TypeMisfit
 from mutator.model import Outcome
 from mutator.report.panel import REPORT_FOLDER
-from mutator.report.run_history import last_ending, run_folders, target_commit_of
+from mutator.report.run_history import end_of_last_experiment, run_folders, target_commit_of
 from mutator.results.outcome_counting import outcome_or_status_of_rows
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
@@ -48,16 +48,19 @@ class ChangeSinceRunBefore:
 
 def find_change(folder: RunFolder, results: "DataFrame") -> ChangeSinceRunBefore | None:
     """Compare a run with the run before; None without one that can be read."""
-    ended = last_ending(folder)
+    ended = end_of_last_experiment(folder)
     before = _find_run_before(folder, ended) if ended else None
     if before is None:
         return None
     earlier, date = before
     try:
-        endings = {"before": _endings(Results(earlier.path).frame()), "after": _endings(results)}
+        endings = {
+            "before": _ending_by_experiment(Results(earlier.path).frame()),
+            "after": _ending_by_experiment(results),
+        }
     except MutatorError:  # it has no results yet
         return None
-    return _change(earlier, date, endings)
+    return _change_between(earlier, date, endings)
 
 
 def _find_run_before(folder: RunFolder, ended: datetime) -> tuple[RunFolder, datetime] | None:
@@ -68,7 +71,7 @@ def _find_run_before(folder: RunFolder, ended: datetime) -> tuple[RunFolder, dat
         with suppress(MutatorError, LookupError, TypeError, ValueError):  # the other run is damaged
             other = RunFolder.open_unverified(path)
             is_alike = (other.head.campaign, other.head.plan) == (folder.head.campaign, folder.head.plan)
-            if is_alike and (date := last_ending(other)) and date < ended:
+            if is_alike and (date := end_of_last_experiment(other)) and date < ended:
                 candidates.append((date, path.name, other))
     if not candidates:
         return None
@@ -76,11 +79,13 @@ def _find_run_before(folder: RunFolder, ended: datetime) -> tuple[RunFolder, dat
     return other, date
 
 
-def _endings(results: "DataFrame") -> "Series[str]":
+def _ending_by_experiment(results: "DataFrame") -> "Series[str]":
     return outcome_or_status_of_rows(results).set_axis(results["experiment_id"])
 
 
-def _change(earlier: RunFolder, date: datetime, endings: Mapping[str, "Series[str]"]) -> ChangeSinceRunBefore:
+def _change_between(
+    earlier: RunFolder, date: datetime, endings: Mapping[str, "Series[str]"]
+) -> ChangeSinceRunBefore:
     import pandas as pd
 
     pairs = pd.concat(endings, axis=1, join="inner").sort_index()
@@ -102,6 +107,6 @@ def stored_change(folder: RunFolder) -> ChangeSinceRunBefore | None:
     try:
         data = read_below(folder.path, f"{REPORT_FOLDER}/{RUN_BEFORE_FILE}")
         stored = parse_json_object(data, path, RUN_BEFORE_SCHEMA)
-        return from_json_types(ChangeSinceRunBefore, {k: v for k, v in stored.items() if k != "schema"})
+        return typed_value_from_json(ChangeSinceRunBefore, {k: v for k, v in stored.items() if k != "schema"})
     except (OSError, MutatorError, TypeMisfit):
         return None

@@ -16,7 +16,9 @@ from mutator.store.run_folder import RunFolder
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-MOST_REASONS = 20  # maximum number of listed reasons for using the reference engine, most frequent first
+MOST_LISTED_REASONS = (
+    20  # maximum number of listed reasons for using the reference engine, most frequent first
+)
 _MODE_DESCRIPTIONS = {
     RunMode.FORK: "a fork of the golden run, just before the fault is first active",
     RunMode.GOLDEN_REUSED: "no run: the trigger never holds, so the golden run's result is used",
@@ -61,9 +63,9 @@ def _table_rows(counts_by_mode: Counter[tuple[str | None, str]]) -> Iterator[lis
         if count := reasons.pop("", 0):
             yield [description, str(count)]
         by_count = sorted(reasons.items(), key=lambda item: (-item[1], item[0]))
-        for why, count in by_count[:MOST_REASONS]:
+        for why, count in by_count[:MOST_LISTED_REASONS]:
             yield [f"{description}, because the run cannot be forked: {why}", str(count)]
-        if rest := sum(count for _, count in by_count[MOST_REASONS:]):
+        if rest := sum(count for _, count in by_count[MOST_LISTED_REASONS:]):
             yield [f"{description}, for other reasons (see timings/)", str(rest)]
 
 

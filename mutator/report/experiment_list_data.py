@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from mutator.workspace import Workspace
 
 TABLE_SCHEMA = "report-table/1"
-LIST_ORDER = ["module", "fault_type", "scenario", "method", "trigger", "experiment_id"]
+LIST_SORT_COLUMNS = ["module", "fault_type", "scenario", "method", "trigger", "experiment_id"]
 DETAILS_SCHEMA = "report-details/1"
 _ALERT_COLUMNS = ("alerts", "t_alert", "reaction_time")  # columns that need a target with alerts
 MOST_EMBEDDED_STILL_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
@@ -148,7 +148,7 @@ def _listed_results(run: ReportedRun) -> "DataFrame":
         RANK_COLUMN: run.experiment_facts.worst_first_ranks[is_listed],
         UNTIMED_PATH_COLUMN: run.experiment_facts.untimed_path_indices[is_listed],
     }
-    return run.results[is_listed].assign(**extra_columns).sort_values(LIST_ORDER)
+    return run.results[is_listed].assign(**extra_columns).sort_values(LIST_SORT_COLUMNS)
 
 
 def _list_table_data(run: ReportedRun, listed: "DataFrame") -> dict[str, Any]:

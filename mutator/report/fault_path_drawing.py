@@ -8,9 +8,9 @@ from typing import Any
 from urllib.parse import quote
 
 from mutator.report.fault_path_page_data import PathCounts, link_name
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.stpa import arrow_and_box_svg
-from mutator.stpa.arrow_and_box_svg import path_data
+from mutator.stpa.arrow_and_box_svg import svg_path_data
 from mutator.stpa.control_structure_layout import ComponentBox, LinkArrow, lay_out_structure
 from mutator.stpa.hazard_analysis_yaml import ControlStructureModel, LinkModel
 
@@ -53,12 +53,12 @@ def draw_path_counts(structure: ControlStructureModel, counts: PathCounts, links
     ]
     for name, link in structure.links.items():
         if name not in links:
-            lines += _idle_link_svg(layout.arrows[name], link)
+            lines += _idle_link_svg(layout.arrow_by_link[name], link)
     for name, link in structure.links.items():
         if name in links:
-            lines += _link_svg(name, layout.arrows[name], link, counts)
+            lines += _link_svg(name, layout.arrow_by_link[name], link, counts)
     for name, component in plain.items():
-        lines += _box_svg(name, layout.boxes[name], component.label, component.about, counts)
+        lines += _box_svg(name, layout.box_by_component[name], component.label, component.about, counts)
     return "\n".join((*lines, "</svg>"))
 
 
@@ -69,9 +69,12 @@ def counts_for_drawing(
     return {
         "active": counts.active_fault_count,
         "links": {
-            name: _link_look(counts.passed_by_link[name], counts.reached_by_link[name]) for name in links
+            name: _link_kind_width_count_and_interval(
+                counts.passed_by_link[name], counts.reached_by_link[name]
+            )
+            for name in links
         },
-        "components": {name: _box_look(name, counts) for name in structure.components},
+        "components": {name: _box_classes_and_count_lines(name, counts) for name in structure.components},
     }
 
 
@@ -82,31 +85,34 @@ def describe_passed_share(passed: int, reached: int) -> str:
 
 def describe_interval(passed: int, reached: int) -> str:
     """Return the 95 % interval of the share; '' if no fault reached the link."""
-    result = share(passed, reached)
+    result = share_with_interval(passed, reached)
     return f"95 % interval {100 * result.low:.0f} to {100 * result.high:.0f} %" if reached else ""
 
 
 def _is_short(arrow: LinkArrow) -> bool:
     """Whether the boxes are side by side, so that the count needs two lines."""
-    return arrow.points[0][1] == arrow.points[-1][1]
+    return arrow.corners[0][1] == arrow.corners[-1][1]
 
 
 def _idle_link_svg(arrow: LinkArrow, link: LinkModel) -> Iterator[str]:
     yield (
-        f'<g class="idle"><path d="{path_data(arrow.points)}" stroke-dasharray="3 4" '
+        f'<g class="idle"><path d="{svg_path_data(arrow.corners)}" stroke-dasharray="3 4" '
         f'marker-end="url(#path-tip-quiet)"/>{arrow_and_box_svg.label_line(arrow, escape(link.label))}</g>'
     )
 
 
 def _link_svg(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
-    kind, width, count, interval = _link_look(counts.passed_by_link[name], counts.reached_by_link[name])
+    kind, width, count, interval = _link_kind_width_count_and_interval(
+        counts.passed_by_link[name], counts.reached_by_link[name]
+    )
     short = _is_short(arrow)
     first, _, last = count.partition(", ") if short else (count, "", "")
     yield (
         f'<a class="link is-{kind}" data-link="{escape(name)}"{" data-short" if short else ""} '
         f'href="#through={quote(link_name(link.from_, link.to))}">'
         f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}\n{interval}</title>"
-        f'<path class="hit" d="{path_data(arrow.points)}"/><path class="line" d="{path_data(arrow.points)}" '
+        f'<path class="hit" d="{svg_path_data(arrow.corners)}"/>'
+        f'<path class="line" d="{svg_path_data(arrow.corners)}" '
         f'style="stroke-width: {width}" marker-end="url(#path-tip-{kind})"/>'
         f"{arrow_and_box_svg.label_line(arrow, escape(link.label))}"
         f"{arrow_and_box_svg.label_line(arrow, first, 1, 'count')}"
@@ -114,7 +120,7 @@ def _link_svg(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) 
     )
 
 
-def _link_look(passed: int, reached: int) -> tuple[str, str, str, str]:
+def _link_kind_width_count_and_interval(passed: int, reached: int) -> tuple[str, str, str, str]:
     """Return a link's kind, the width of its line, its count, and the interval of its share."""
     kind = "through" if passed else "stopped" if reached else "quiet"
     width = _THINNEST_LINE_PX + (_WIDEST_LINE_PX - _THINNEST_LINE_PX) * (passed / reached if reached else 0.0)
@@ -122,7 +128,7 @@ def _link_look(passed: int, reached: int) -> tuple[str, str, str, str]:
     return kind, f"{width:.1f}px", count, interval
 
 
-def _box_look(name: str, counts: PathCounts) -> tuple[str, str, str]:
+def _box_classes_and_count_lines(name: str, counts: PathCounts) -> tuple[str, str, str]:
     """Return a box's classes, and its two lines of counts. Where no fault was injected or stopped, the first
     line says how many came there.
     """
@@ -138,7 +144,7 @@ def _box_look(name: str, counts: PathCounts) -> tuple[str, str, str]:
 
 
 def _box_svg(name: str, box: ComponentBox, label: str, about: str, counts: PathCounts) -> Iterator[str]:
-    classes, first, last = _box_look(name, counts)
+    classes, first, last = _box_classes_and_count_lines(name, counts)
     middle, top = box.x + box.width / 2, box.y + box.height / 2
     yield (
         f'<a class="{classes}" data-component="{escape(name)}" href="#stopped_at={quote(name)}">'

@@ -17,11 +17,11 @@ from mutator.report.reported_run import ReportedRun
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.statistics.bootstrap_median_intervals import median_interval
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
 
-MOST_CHANGES = 3  # maximum number of new hazards, and of those gone, that are listed
+MOST_LISTED_CHANGES = 3  # maximum number of new hazards, and of those gone, that are listed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +85,7 @@ def _share_number(
     filters: Mapping[str, tuple[str, ...] | list[str]],
     query: str = "",
 ) -> KeyNumber:
-    result = share(len(part), len(whole))
+    result = share_with_interval(len(part), len(whole))
     meaning = f"of the {plural_noun} {verb}"
     if not result.of:
         return KeyNumber(value="-", meaning=meaning, evidence=f"there were no {plural_noun}", fragment="")
@@ -169,7 +169,10 @@ def describe_change(run: ReportedRun) -> DescribedChange | None:
     commit = "" if change.target_commit == "-" else f", target {change.target_commit}"
     text += f", of {change.shared_count:,} experiments that are also in {change.name} "
     text += f"({change.date} UTC{commit})."
-    listed = {"new": change.new_hazard_ids[:MOST_CHANGES], "gone": change.former_hazard_ids[:MOST_CHANGES]}
+    listed = {
+        "new": change.new_hazard_ids[:MOST_LISTED_CHANGES],
+        "gone": change.former_hazard_ids[:MOST_LISTED_CHANGES],
+    }
     results = run.results[run.results["experiment_id"].isin([*listed["new"], *listed["gone"]])]
     rows = rows_of(results, run.faults, ExperimentSentences.of_run(run.folder.head))
     rows_by_id = {row.experiment_id: row for row in rows}

@@ -10,7 +10,7 @@ import pandas as pd
 
 from mutator.report.reported_run import ReportedRun
 from mutator.statistics.results_frame import hazard_names
-from mutator.statistics.shares_with_intervals import CONFIDENCE
+from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL
 from mutator.targets.hazard_severity import SEVERITY_CLASSES
 
 HeatMapCells = list[list[Any]]  # by row; each cell has a count or value, and its base (the number of runs)
@@ -106,7 +106,7 @@ def _median_bounds(sorted_values: np.ndarray) -> list[float | None]:
     """
     from scipy.stats import binom  # type: ignore[import-untyped]
 
-    rank = int(binom.ppf((1 - CONFIDENCE) / 2, sorted_values.size, 0.5)) if sorted_values.size else 0
+    rank = int(binom.ppf((1 - CONFIDENCE_LEVEL) / 2, sorted_values.size, 0.5)) if sorted_values.size else 0
     return [_rounded(sorted_values[rank - 1]), _rounded(sorted_values[-rank])] if rank else []
 
 

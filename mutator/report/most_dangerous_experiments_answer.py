@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from mutator._common.phrase_texts import measured_number
+from mutator._common.phrase_texts import measured_number_text
 from mutator.report.answer_parts import (
     AnswerCell,
     AnswerTable,
@@ -171,6 +171,6 @@ def _describe_danger(row: Mapping[Any, Any], contact_column: str, units: Mapping
     """
     if contact_column and row[contact_column] and not isnan(row[contact_column]):
         words = "delta-v" if contact_column == "delta_v" else "contact at"
-        return f"{words} {measured_number(row[contact_column], units.get(contact_column, ''))}"
+        return f"{words} {measured_number_text(row[contact_column], units.get(contact_column, ''))}"
     margins = [(margin, units[f"{MARGIN_PREFIX}{name.lower()}"]) for name, margin in row["margins"]]
-    return f"margin {measured_number(*min(margins))}" if margins else "-"
+    return f"margin {measured_number_text(*min(margins))}" if margins else "-"

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.message_text import bind_numbers
+from mutator._common.message_text import with_unbreakable_numbers
 from mutator._common.table_rendering import TextTable
 from mutator.web.html_templates import html_environment
 
@@ -46,7 +46,9 @@ def rendered(template: str, **values: Any) -> "Markup":
     from markupsafe import Markup
 
     # numbers are bound to their units in text, not in HTML
-    environment = html_environment(lambda value: bind_numbers(value) if type(value) is str else value)
+    environment = html_environment(
+        lambda value: with_unbreakable_numbers(value) if type(value) is str else value
+    )
     environment.filters["marked"] = render_note
     return Markup(environment.from_string(template).render(**values))
 

@@ -18,7 +18,7 @@ from mutator.report.panel import REPORT_FOLDER, ReportPage
 from mutator.report.panels import build_pages, build_panels, build_study_page
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.panels.first_screen_panel import build_first_screen_panel
-from mutator.report.report_digests import inputs_digest, is_current, write_report_files
+from mutator.report.report_digests import inputs_digest, is_report_current, write_report_files
 from mutator.report.report_glossary import glossary_of
 from mutator.report.report_markdown_and_html import (
     ReportContent,
@@ -65,7 +65,7 @@ class BuiltReport:
 
 def ensure_report(run: Path, workspace: Workspace | None) -> WrittenReport:
     """Write the report of a run folder unless it is up to date."""
-    if not is_current(run, inputs_digest(RunFolder.open(run), workspace)):
+    if not is_report_current(run, inputs_digest(RunFolder.open(run), workspace)):
         return write_report(run, workspace)
     return _written_report(run, Results(run).row_count())
 

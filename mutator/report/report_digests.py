@@ -67,7 +67,7 @@ def inputs_digest(folder: RunFolder, workspace: Workspace | None) -> str:
     )
 
 
-def is_current(run: Path, inputs: str) -> bool:
+def is_report_current(run: Path, inputs: str) -> bool:
     """Whether the report of a run was made from these inputs and has not changed since."""
     stamp = _read_stamp(run)
     if stamp.get("made_from") != inputs or not stamp["files"]:

@@ -89,7 +89,7 @@ def write_history(folder: Path) -> History:
             expected="a run folder, or a folder of run folders",
             remedy="check the path",
         )
-    runs.sort(key=_order)
+    runs.sort(key=_sort_key_by_date)
     text, page = (folder / name for name in HISTORY_FILES)
     write_atomic(text, _history_markdown(runs, omission_reasons).encode())
     write_atomic(page, _history_html(folder, runs, omission_reasons).encode())
@@ -102,7 +102,7 @@ def _past_run(path: Path) -> PastRun:
     cpu_s = sum(float(line["cpu_s"]) for line in folder.timings().values())
     return PastRun(
         folder=folder,
-        date=last_ending(folder),
+        date=end_of_last_experiment(folder),
         target_commit=target_commit_of(folder),
         rows_by_id=rows,
         cpu_s=cpu_s,
@@ -116,13 +116,13 @@ def target_commit_of(folder: RunFolder) -> str:
     return f"{state.commit[:8]}{' with changes' if state.changed else ''}" if state else "-"
 
 
-def last_ending(folder: RunFolder) -> datetime | None:
+def end_of_last_experiment(folder: RunFolder) -> datetime | None:
     """Return when the last experiment of a run ended; None if the run has no times."""
     endings = filter(None, map(ending_of, folder.timings().values()))
     return max(endings, default=None)
 
 
-def _order(run: PastRun) -> tuple[datetime, str]:
+def _sort_key_by_date(run: PastRun) -> tuple[datetime, str]:
     return run.date or datetime.min.replace(tzinfo=UTC), run.name
 
 
@@ -133,7 +133,7 @@ def _group_by_plan(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
         runs_by_plan.setdefault(f"{run.folder.head.campaign}, plan {run.folder.head.plan[:8]}", []).append(
             run
         )
-    return dict(sorted(runs_by_plan.items(), key=lambda item: _order(item[1][-1]), reverse=True))
+    return dict(sorted(runs_by_plan.items(), key=lambda item: _sort_key_by_date(item[1][-1]), reverse=True))
 
 
 def _table_cells(run: PastRun) -> list[str]:

@@ -28,7 +28,7 @@ ENDINGS_WORST_FIRST = (
     Outcome.MASKED.value,
     Outcome.NOT_ACTIVATED.value,
 )
-LASTING_VALUES = (PERMANENT, TRANSIENT)
+PERMANENCE_VALUES = (PERMANENT, TRANSIENT)
 _CONTEXT_LINES = 2  # lines shown before and after a marked line outside functions
 _MOST_GAP_LINES = 3  # smaller gaps are shown: the note on what is left out takes a line, too
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
 
-_MOST_GROUP_ROWS = 1 << 20  # maximum number of rows in a row group (pyarrow's default)
-_MOST_GROUP_CELLS = 1 << 23  # maximum number of cells in a row group, because a whole group is in memory
+_MOST_ROW_GROUP_ROWS = 1 << 20  # maximum number of rows in a row group (pyarrow's default)
+_MOST_ROW_GROUP_CELLS = 1 << 23  # maximum number of cells in a row group, because a whole group is in memory
 
 ColumnType = Literal["text", "flag", "count", "number"]
 ARROW_TYPE_BY_COLUMN_TYPE = {"text": "string", "flag": "int8", "count": "int64", "number": "double"}
@@ -79,7 +79,7 @@ class ParquetTableWriter:
         self._pa = pa
         self._schema = parquet_schema(columns)
         self._writer = parquet.ParquetWriter(path, self._schema, compression="zstd")
-        self._rows_per_group = min(_MOST_GROUP_ROWS, _MOST_GROUP_CELLS // len(columns))
+        self._rows_per_group = min(_MOST_ROW_GROUP_ROWS, _MOST_ROW_GROUP_CELLS // len(columns))
         self._pending_batches: list[Any] = []
         self._pending_rows = 0  # number of rows not yet written
         self._is_empty = True

@@ -6,12 +6,12 @@ from mutator._common.phrase_texts import (
     FILE_HOLE,
     FUNCTION_HOLE,
     VALUE_HOLE,
-    converted_number,
+    converted_number_text,
     fill_phrase,
     holes_of,
-    planned_number,
+    planned_number_text,
 )
-from mutator.config.units import split_unit
+from mutator.config.units import split_key_at_unit
 from mutator.model import Fault, Injection, Value
 from mutator.targets.stored_phrases import NEGATIVE, POSITIVE, PhraseByCase, Phrases
 
@@ -35,12 +35,12 @@ def _spec_clause(fault: Fault, phrase: PhraseByCase) -> str:
 
 def _parameter_texts(fault: Fault, hole: str) -> dict[str, str]:
     """Return the texts of a parameter that a hole names with its unit: `by_kph`."""
-    name, unit = split_unit(hole)
+    name, unit = split_key_at_unit(hole)
     for injection in fault.injections:
         params = dict(injection.params)
         for key, symbol in ((hole, ""), (name, unit.symbol if unit else "")):
             if isinstance(number := params.get(key), int | float):
-                text, absolute = (converted_number(value, symbol) for value in (number, abs(number)))
+                text, absolute = (converted_number_text(value, symbol) for value in (number, abs(number)))
                 return _number_texts(hole, text, absolute)
     return {}
 
@@ -69,7 +69,7 @@ def _injection_texts(injection: Injection) -> dict[str, str]:
 def _value_texts(name: str, value: Value, unit: str) -> dict[str, str]:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return {} if value is None else {name: str(value)}
-    return _number_texts(name, planned_number(value, unit), planned_number(abs(value), unit))
+    return _number_texts(name, planned_number_text(value, unit), planned_number_text(abs(value), unit))
 
 
 def _number_texts(name: str, text: str, absolute: str) -> dict[str, str]:

@@ -21,14 +21,14 @@ def numeric_value_of(fault: Fault) -> Value:
     return None if isinstance(fault.value, str) else fault.value
 
 
-def _variant(experiment: Experiment) -> str:
+def _variant_cell(experiment: Experiment) -> str:
     """Return the variant, with the fault's value if that is text."""
     fault = experiment.fault
     variant = fault.spec.split("/", 2)[-1]
     return fault_label(variant, fault.value, fault.unit) if isinstance(fault.value, str) else variant
 
 
-def _hold(experiment: Experiment) -> Hold:
+def _experiment_hold(experiment: Experiment) -> Hold:
     return experiment.fault.hold or experiment.trigger.hold
 
 
@@ -87,7 +87,7 @@ LAST_PLAN_COLUMNS = (
         "text",
         "",
         "the variant of the spec; for a mutation operator, the place and change",
-        _variant,
+        _variant_cell,
     ),
     PlanColumn("aim", "text", "", "the hazard that the fault aims at", lambda e: e.fault.aim),
     PlanColumn("condition", "text", "", "the condition of the trigger", lambda e: e.trigger.condition),
@@ -98,14 +98,14 @@ HOLD_COLUMNS = (  # of results.csv alone
         "text",
         "",
         "how long the fault stays active: `while` the condition holds, `for` a time, or `to_end`",
-        lambda e: _hold(e).value,
+        lambda e: _experiment_hold(e).value,
     ),
     PlanColumn(
         "hold_s",
         "number",
         "s",
         "how long it stays active with the hold `for`",
-        lambda e: e.trigger.hold_s if _hold(e) is Hold.FOR else None,
+        lambda e: e.trigger.hold_s if _experiment_hold(e) is Hold.FOR else None,
     ),
 )
 _ALL_PLAN_COLUMNS = (*FIRST_PLAN_COLUMNS, *LAST_PLAN_COLUMNS)

@@ -20,7 +20,7 @@ from mutator.targets.stored_phrases import (
 )
 
 
-def _speed(name: str, finished: FinishedExperiment) -> float | None:
+def _speed_cell(name: str, finished: FinishedExperiment) -> float | None:
     return dict(finished.record.speeds).get(name)
 
 
@@ -88,7 +88,7 @@ FIRST_CHANGE_COLUMNS = (
     ),
 )
 SPEED_COLUMNS = tuple(
-    ResultColumn(name, "number", "m/s", about, partial(_speed, name))
+    ResultColumn(name, "number", "m/s", about, partial(_speed_cell, name))
     for name, about in (
         (SPEED_AT_ACTIVATION, "the car's speed at the activation"),
         (

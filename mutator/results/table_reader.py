@@ -38,7 +38,7 @@ _CATEGORY_COLUMNS = (
     "variant",
     "aim",
 )
-_ORDERED_VALUES = {"status": [s.value for s in Status], "outcome": [o.value for o in Outcome]}
+_ORDERED_VALUES_BY_COLUMN = {"status": [s.value for s in Status], "outcome": [o.value for o in Outcome]}
 # Cells and bytes of text that a small Parquet file may claim, and how many more for each byte of a large one:
 # equal values are stored once, so that a forged file could claim more than the memory holds.
 MOST_SMALL_FILE_CELLS, MOST_SMALL_FILE_TEXT_BYTES = 10_000_000, 100_000_000
@@ -125,7 +125,7 @@ class Results:
             frame[name] = frame[name].astype("boolean")
         for name in _CATEGORY_COLUMNS:
             frame[name] = frame[name].astype("category")
-        for name, order in _ORDERED_VALUES.items():
+        for name, order in _ORDERED_VALUES_BY_COLUMN.items():
             frame[name] = pd.Categorical(frame[name], categories=order, ordered=True)
         any_hazard = frame[hazards].any(axis=1).astype("boolean")
         frame["hazard"] = any_hazard.mask(frame["status"] != Status.OK.value)
@@ -163,8 +163,8 @@ class Results:
             name = column.name
             if column.type == "flag":
                 allowed: set[object] = {0, 1, None}
-            elif name in _ORDERED_VALUES:
-                allowed = {*_ORDERED_VALUES[name], *([None] if name == "outcome" else [])}
+            elif name in _ORDERED_VALUES_BY_COLUMN:
+                allowed = {*_ORDERED_VALUES_BY_COLUMN[name], *([None] if name == "outcome" else [])}
             else:
                 continue
             cells = {cell for part in table[name].chunks for cell in part.unique().to_pylist()}

@@ -14,7 +14,13 @@ from pathlib import Path, PurePosixPath
 from mutator.config.location_syntax import PROBE_MODULE_NAME
 from mutator.mutants.injected_line_syntax import changed_value_positions, tag_of
 from mutator.review import source_definitions_and_uses
-from mutator.review.source_definitions_and_uses import SUPER, NameUse, SourceImport, SourceModule, uses_in
+from mutator.review.source_definitions_and_uses import (
+    SUPER,
+    NameUse,
+    SourceImport,
+    SourceModule,
+    external_names_used_in,
+)
 from mutator.targets.source_tree import SourceTree
 
 _ClassKey = tuple[str, str]  # its file, its name
@@ -42,7 +48,9 @@ class CalledCode:
         are included whole.
         """
         module = source_definitions_and_uses.parse_module(path, mutated_file, Path())
-        return self._sources_with_callees(path, uses_in(module.tree, selection=_InjectedNodes(mutated_file)))
+        return self._sources_with_callees(
+            path, external_names_used_in(module.tree, selection=_InjectedNodes(mutated_file))
+        )
 
     def called_by_expressions(self, path: str, function: str, texts: Iterable[str]) -> dict[str, str]:
         """Return the code that expressions would call in a function. Invalid expressions are ignored."""
@@ -50,7 +58,7 @@ class CalledCode:
         uses: list[NameUse] = []
         for text in texts:
             with suppress(SyntaxError):
-                uses += source_definitions_and_uses.uses_inside_function(
+                uses += source_definitions_and_uses.external_names_used_inside_function(
                     node, owner, ast.parse(text, mode="eval")
                 )
         return self._sources_with_callees(path, uses)
@@ -72,10 +80,12 @@ class CalledCode:
         """Yield the places that the source of this place calls. A class includes its methods."""
         module = self._module(definition.path)
         for node in module.definitions_of(definition.name) if definition.name else [module.tree]:
-            uses = uses_in(node, definition.name.rpartition(".")[0])
+            uses = external_names_used_in(node, definition.name.rpartition(".")[0])
             is_class = isinstance(node, ast.ClassDef)
             yield from self._definitions_of_uses(
-                definition.path, (use for use in uses if not (is_class and use.owner)), definition.self_class
+                definition.path,
+                (use for use in uses if not (is_class and use.owning_class)),
+                definition.self_class,
             )
             yield from self._named_data_files(definition.path, node)
 
@@ -101,18 +111,18 @@ class CalledCode:
         self, path: str, uses: Iterable[NameUse], self_class: _ClassKey | None = None
     ) -> Iterator[_Definition]:
         for use in uses:
-            if use.words[0] == PROBE_MODULE_NAME:  # the probe has a group of its own
+            if use.name_parts[0] == PROBE_MODULE_NAME:  # the probe has a group of its own
                 continue
             if use.imported:
-                yield from self._definitions_of_import(path, use.imported, use.words[1:], 0)
-            elif use.owner:
-                here, name = (path, use.owner), use.words[1]
-                if use.words[0] == SUPER:
+                yield from self._definitions_of_import(path, use.imported, use.name_parts[1:], 0)
+            elif use.owning_class:
+                here, name = (path, use.owning_class), use.name_parts[1]
+                if use.name_parts[0] == SUPER:
                     yield from self._methods_of_bases(here, name, self_class or here, 0)
                 else:
                     yield from self._methods_of_self(self_class or here, name, self_class or here, 0)
             else:
-                yield from self._definitions_of_name(path, use.words, 0)
+                yield from self._definitions_of_name(path, use.name_parts, 0)
 
     def _definitions_of_name(self, path: str, words: tuple[str, ...], depth: int) -> Iterator[_Definition]:
         module = self._module(path)

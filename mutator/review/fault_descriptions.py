@@ -10,7 +10,7 @@ from mutator.results.fault_phrases import describe_fault
 from mutator.targets.stored_phrases import Phrases
 
 
-def words_of_faults(
+def descriptions_of_faults(
     faults: Collection[Fault], specs: Iterable[FaultSpec], models: FaultModels
 ) -> tuple[str, ...]:
     """Return what each fault does, once: the phrase of its spec or fault model, or its label."""

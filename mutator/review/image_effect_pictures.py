@@ -44,7 +44,7 @@ LEVEL_NAMES = ("least", "middle", "most")  # also in file names, and in addresse
 MOST_DRAWN_VALUES = 9  # maximum number of a group's values to draw; three are shown
 MIN_CORRELATION = 0.5  # minimum correlation of amount and change for ranking severity by amount
 JPEG_QUALITY = 85  # the images of a group then take about 0.15 MB in the cache
-RUN_LIMITS = Limits(cpu_s=60, wall_s=120)  # for a run that never reaches the injected lines
+PICTURE_RUN_LIMITS = Limits(cpu_s=60, wall_s=120)  # for a run that never reaches the injected lines
 _SCHEMA = "pictures/1"  # in the cache's keys, so that files of another format are never read
 _drawing_lock = Lock()  # a page requests all images of a group at once: the first request draws them
 
@@ -204,7 +204,7 @@ def _run_and_cache_pictures(
     pictures_by_group = {}
     with ScratchFolder("mutator-pictures-") as scratch:
         (scratch / "work").mkdir()
-        engine = ReferenceEngine(manifest, scratch / "work", RUN_LIMITS)
+        engine = ReferenceEngine(manifest, scratch / "work", PICTURE_RUN_LIMITS)
         for i, names in enumerate(places.values()):
             groups = [requests[name] for name in names]
             before, *rest = _images_of_run(

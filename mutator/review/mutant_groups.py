@@ -27,7 +27,7 @@ from mutator.operators.statement_facts import statement_facts_of
 from mutator.review import patch_shapes
 from mutator.review.code_called_by_injections import CalledCode
 from mutator.review.decision_basis_texts import BasisTexts, distinct_diffs, fault_hunks, function_sources
-from mutator.review.fault_descriptions import words_of_faults
+from mutator.review.fault_descriptions import descriptions_of_faults
 from mutator.review.parameter_ranges_and_units import find_variant, units_of_parameters, value_ranges_of
 from mutator.review.patch_shapes import PatchShape
 from mutator.review.review_entries import BasisDigests, ValueRanges
@@ -47,7 +47,7 @@ class Group:
     campaign; None if no campaign is given. `trigger_kinds` and `hold_kinds` list the kinds that occur, joined
     by `or`. `value_ranges` has the range of each parameter in the specs, and `unit_by_parameter` its unit in
     the injected code. `about_by_variant` says what each variant of a spec does. `reviewed_text` is the text
-    that a decision is bound to. `source_files` are the specs and templates. `fault_words` say
+    that a decision is bound to. `source_files` are the specs and templates. `fault_descriptions` say
     what each fault does.
     """
 
@@ -69,7 +69,7 @@ class Group:
     about_by_variant: Mapping[str, str] = field(default_factory=dict)
     reviewed_text: str = ""
     source_files: tuple[Path, ...] = ()
-    fault_words: tuple[str, ...] = ()
+    fault_descriptions: tuple[str, ...] = ()
 
     @property
     def diff(self) -> str:
@@ -217,7 +217,7 @@ class _GroupBuilder:
             about_by_variant=self._about_by_variant(faults.values()),
             reviewed_text=render_reviewed_text(material.digests, values, material.sections),
             source_files=self._source_files(faults.values(), models),
-            fault_words=words_of_faults(faults.values(), self.specs.values(), self.models),
+            fault_descriptions=descriptions_of_faults(faults.values(), self.specs.values(), self.models),
         )
 
     def _about_by_variant(self, faults: Iterable[Fault]) -> dict[str, str]:

@@ -56,9 +56,9 @@ class NameUse:
     `owner` is the class.
     """
 
-    words: tuple[str, ...]
+    name_parts: tuple[str, ...]
     imported: SourceImport | None = None
-    owner: str = ""
+    owning_class: str = ""
 
 
 @dataclass(frozen=True)
@@ -107,22 +107,26 @@ def parse_module(path: str, data: bytes, root: Path) -> SourceModule:
         tree = ast.Module(body=[], type_ignores=[])
     defined: dict[str, list[ast.stmt]] = {}
     imports: dict[str, list[SourceImport]] = {}
-    for name, node in _definitions(tree.body, ""):
+    for name, node in _definitions_in(tree.body, ""):
         defined.setdefault(name, []).append(node)
     for name, import_ in _imports(tree.body):
         imports.setdefault(name, []).append(import_)
     return SourceModule(tree=tree, definitions=defined, imports=imports)
 
 
-def uses_in(node: ast.AST, owner: str = "", selection: NodeSelection | None = None) -> Iterator[NameUse]:
+def external_names_used_in(
+    node: ast.AST, owner: str = "", selection: NodeSelection | None = None
+) -> Iterator[NameUse]:
     """Yield the external names used in the selected parts of `node`. `owner` is the class of a method."""
-    yield from _uses(node, _NameScope(owner=owner), selection or _AllNodes())
+    yield from _external_uses(node, _NameScope(owner=owner), selection or _AllNodes())
 
 
-def uses_inside_function(function: ast.stmt | None, owner: str, node: ast.AST) -> Iterator[NameUse]:
+def external_names_used_inside_function(
+    function: ast.stmt | None, owner: str, node: ast.AST
+) -> Iterator[NameUse]:
     """Yield the external names that `node` uses inside a function (a method, if `owner` is a class)."""
     scope = _NameScope(owner=owner)
-    yield from _uses(
+    yield from _external_uses(
         node,
         scope.within_function(function) if isinstance(function, _FUNCTION_NODES) else scope,
         _AllNodes(),
@@ -155,11 +159,11 @@ class _NameScope:
             if name == words[0]:
                 return NameUse(words, imported=import_)
         if words[0] == self.self_name and self.owner:
-            return NameUse(words, owner=self.owner) if len(words) > 1 else None
+            return NameUse(words, owning_class=self.owner) if len(words) > 1 else None
         return None if words[0] in self.local_names else NameUse(words)
 
 
-def _uses(node: ast.AST, scope: _NameScope, selection: NodeSelection) -> Iterator[NameUse]:
+def _external_uses(node: ast.AST, scope: _NameScope, selection: NodeSelection) -> Iterator[NameUse]:
     if isinstance(node, ast.stmt) and not selection.may_contain(_first_line(node), node.end_lineno or 0):
         return
     if isinstance(node, ast.Name | ast.Attribute) and (words := _dotted_name(node)):
@@ -167,9 +171,9 @@ def _uses(node: ast.AST, scope: _NameScope, selection: NodeSelection) -> Iterato
             yield use
         return
     if isinstance(node, ast.Attribute) and _is_super_call(node.value) and scope.owner and node in selection:
-        yield NameUse((SUPER, node.attr), owner=scope.owner)
+        yield NameUse((SUPER, node.attr), owning_class=scope.owner)
     for part, inner in _children_with_scopes(node, scope):
-        yield from _uses(part, inner, selection)
+        yield from _external_uses(part, inner, selection)
 
 
 def _children_with_scopes(node: ast.AST, scope: _NameScope) -> Iterator[tuple[ast.AST, _NameScope]]:
@@ -255,19 +259,19 @@ def _local_names_and_imports(node: _FunctionNode) -> tuple[frozenset[str], list[
     return frozenset(names - not_local - {name for name, _ in imports}), imports
 
 
-def _definitions(body: Sequence[ast.stmt], inside: str) -> Iterator[tuple[str, ast.stmt]]:
+def _definitions_in(body: Sequence[ast.stmt], inside: str) -> Iterator[tuple[str, ast.stmt]]:
     """Name and statement of every definition in a module or class, including those in blocks such as `if`."""
     for node in body:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             yield inside + node.name, node
             if isinstance(node, ast.ClassDef):
-                yield from _definitions(node.body, f"{inside}{node.name}.")
+                yield from _definitions_in(node.body, f"{inside}{node.name}.")
         elif isinstance(node, ast.Assign | ast.AnnAssign | ast.AugAssign):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
             names = (n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name))
             yield from ((inside + name, node) for name in names)
         else:
-            yield from _definitions(_nested_statements(node), inside)
+            yield from _definitions_in(_nested_statements(node), inside)
 
 
 def _imports(body: Sequence[ast.stmt]) -> Iterator[tuple[str, SourceImport]]:

@@ -15,14 +15,14 @@ from starlette.routing import Route
 
 from mutator.errors import MutatorError, NotServed
 from mutator.serve.home_live_trial_and_error_pages import form_choices, home_page
-from mutator.serve.http_responses import media_type_of, on_error
+from mutator.serve.http_responses import error_response, media_type_of
 from mutator.serve.job_queue import ServeJobs
 from mutator.serve.job_requests import JobCommand, RequestChecker
 from mutator.serve.json_api import JobApi, ReviewApi, selected_groups
 from mutator.serve.live_and_trial_pages import WatchPages
 from mutator.serve.page_tokens import HOME_PAGE, PageTokens, review_page_name
 from mutator.serve.report_and_comparison_pages import RunPages
-from mutator.serve.run_states import has_report
+from mutator.serve.run_states import can_make_report
 from mutator.serve.served_reviews import ServedReviews
 from mutator.serve.served_runs import REPORT_PAGE, ServedRuns, live_address, report_address, summarize_run
 from mutator.web import asset_names, asset_text
@@ -70,25 +70,29 @@ def build_application(site: ServedSite) -> Starlette:
     jobs = JobApi(RequestChecker(site.workspace, site.runs), site.jobs, site.tokens)
     routes = [
         *_page_routes(site),
-        Route("/api/library", _in_thread(lambda _: JSONResponse(form_choices(site.workspace)))),
-        Route("/api/runs", _in_thread(lambda _: JSONResponse({"runs": site.summarize_runs()}))),
-        Route("/api/review/{target}", _in_thread(reviews.group_reviews)),
-        Route("/api/review/{target}", _json_post(reviews.decide), methods=["POST"]),
-        Route("/api/review/{target}/{group}/changes", _in_thread(reviews.changes_since_decision)),
-        Route("/api/review/{target}/{group}/pictures", _in_thread(reviews.picture_levels)),
-        Route("/api/review/{target}/{group}/typical", _in_thread(reviews.typical_results)),
-        Route("/review/{target}/{group}/picture/{level}-before.jpg", _in_thread(reviews.picture_before)),
-        Route("/review/{target}/{group}/picture/{level}-after.jpg", _in_thread(reviews.picture_after)),
-        Route("/api/jobs", _in_thread(jobs.list_jobs)),
-        Route("/api/jobs", _json_post(jobs.submit), methods=["POST"]),
-        Route("/api/jobs/{job}/log", _in_thread(jobs.log)),
-        Route("/api/jobs/{job}/cancel", _json_post(jobs.cancel), methods=["POST"]),
+        Route("/api/library", _answered_in_thread(lambda _: JSONResponse(form_choices(site.workspace)))),
+        Route("/api/runs", _answered_in_thread(lambda _: JSONResponse({"runs": site.summarize_runs()}))),
+        Route("/api/review/{target}", _answered_in_thread(reviews.group_reviews)),
+        Route("/api/review/{target}", _json_post_handler(reviews.decide), methods=["POST"]),
+        Route("/api/review/{target}/{group}/changes", _answered_in_thread(reviews.changes_since_decision)),
+        Route("/api/review/{target}/{group}/pictures", _answered_in_thread(reviews.picture_levels)),
+        Route("/api/review/{target}/{group}/typical", _answered_in_thread(reviews.typical_results)),
+        Route(
+            "/review/{target}/{group}/picture/{level}-before.jpg", _answered_in_thread(reviews.picture_before)
+        ),
+        Route(
+            "/review/{target}/{group}/picture/{level}-after.jpg", _answered_in_thread(reviews.picture_after)
+        ),
+        Route("/api/jobs", _answered_in_thread(jobs.list_jobs)),
+        Route("/api/jobs", _json_post_handler(jobs.submit), methods=["POST"]),
+        Route("/api/jobs/{job}/log", _answered_in_thread(jobs.log)),
+        Route("/api/jobs/{job}/cancel", _json_post_handler(jobs.cancel), methods=["POST"]),
     ]
-    errors: dict[Any, Any] = dict.fromkeys((MutatorError, ValidationError, HTTPException), on_error)
+    errors: dict[Any, Any] = dict.fromkeys((MutatorError, ValidationError, HTTPException), error_response)
     return Starlette(routes=routes, exception_handlers=errors, lifespan=lifespan)
 
 
-def _in_thread(answer: Callable[[Request], Response]) -> AsyncHandler:
+def _answered_in_thread(answer: Callable[[Request], Response]) -> AsyncHandler:
     """Compute the response in a thread, so that other requests need not wait."""
 
     async def handler(request: Request) -> Response:
@@ -97,7 +101,7 @@ def _in_thread(answer: Callable[[Request], Response]) -> AsyncHandler:
     return handler
 
 
-def _json_post(answer: Callable[[Request, bytes], Response]) -> AsyncHandler:
+def _json_post_handler(answer: Callable[[Request, bytes], Response]) -> AsyncHandler:
     async def handler(request: Request) -> Response:
         content_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
         if content_type != "application/json":
@@ -118,7 +122,7 @@ def _page_routes(site: ServedSite) -> list[Route]:
 
     def run_file(request: Request) -> Response:
         key, name = request.path_params["run"], request.path_params["path"]
-        if name == REPORT_PAGE and not has_report(site.runs.folder(key)):
+        if name == REPORT_PAGE and not can_make_report(site.runs.folder(key)):
             return RedirectResponse(live_address(key))
         return site.run_pages.run_file(key, name)
 
@@ -136,19 +140,19 @@ def _page_routes(site: ServedSite) -> list[Route]:
         return HTMLResponse(site.reviews.render_html_page(selection, request.url.query, runs, token))
 
     return [
-        Route("/", _in_thread(home)),
-        Route("/assets/{name:path}", _in_thread(_asset_response)),
-        Route("/runs/{run}/", _in_thread(redirect_to_report)),
-        Route("/runs/{run}/{path:path}", _in_thread(run_file)),
-        Route("/compare/{a}/{b}/", _in_thread(comparison_file)),
-        Route("/compare/{a}/{b}/{name}", _in_thread(comparison_file)),
-        Route("/live/{run}", _in_thread(watching.live_html)),
-        Route("/live/{run}/{experiment}", _in_thread(watching.live_experiment_html)),
-        Route("/trial/{trial}", _in_thread(watching.trial_html)),
-        Route("/api/runs/{run}/live", _in_thread(watching.live_data)),
-        Route("/api/runs/{run}/experiments/{experiment}", _in_thread(watching.live_experiment_data)),
-        Route("/api/trials/{trial}", _in_thread(watching.trial_data)),
-        Route("/review/{target}", _in_thread(review_html)),
+        Route("/", _answered_in_thread(home)),
+        Route("/assets/{name:path}", _answered_in_thread(_asset_response)),
+        Route("/runs/{run}/", _answered_in_thread(redirect_to_report)),
+        Route("/runs/{run}/{path:path}", _answered_in_thread(run_file)),
+        Route("/compare/{a}/{b}/", _answered_in_thread(comparison_file)),
+        Route("/compare/{a}/{b}/{name}", _answered_in_thread(comparison_file)),
+        Route("/live/{run}", _answered_in_thread(watching.live_html)),
+        Route("/live/{run}/{experiment}", _answered_in_thread(watching.live_experiment_html)),
+        Route("/trial/{trial}", _answered_in_thread(watching.trial_html)),
+        Route("/api/runs/{run}/live", _answered_in_thread(watching.live_data)),
+        Route("/api/runs/{run}/experiments/{experiment}", _answered_in_thread(watching.live_experiment_data)),
+        Route("/api/trials/{trial}", _answered_in_thread(watching.trial_data)),
+        Route("/review/{target}", _answered_in_thread(review_html)),
     ]
 
 

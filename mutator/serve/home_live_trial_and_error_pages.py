@@ -78,7 +78,7 @@ def form_choices(workspace: Workspace) -> dict[str, Any]:
     }
     try:
         for names, files in (("scenarios", workspace.scenarios), ("campaigns", workspace.campaigns)):
-            choices[names] = [{"name": name, "about": _about_file(path)} for name, path in files.items()]
+            choices[names] = [{"name": name, "about": _title_in_file(path)} for name, path in files.items()]
         readings = workspace.readings()
         choices["readings"] = [
             {"name": name, "about": about}
@@ -106,7 +106,7 @@ def form_choices(workspace: Workspace) -> dict[str, Any]:
     return choices
 
 
-def _about_file(path: Path) -> str:
+def _title_in_file(path: Path) -> str:
     """Return the title of a scenario's or campaign's file; '' if the file has a format of its own."""
     try:
         data = load_yaml(path).data

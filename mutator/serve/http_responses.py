@@ -62,7 +62,7 @@ def without_absolute_folders(text: str) -> str:
     return _FOLDERS_PATTERN.sub("", text)
 
 
-def error_facts(error: MutatorError) -> dict[str, Any]:
+def error_as_json(error: MutatorError) -> dict[str, Any]:
     place = error.where or error.argument
     parts = {"got": error.got, "where": place, "expected": error.expected, "remedy": error.remedy}
     facts: dict[str, Any] = {
@@ -73,7 +73,7 @@ def error_facts(error: MutatorError) -> dict[str, Any]:
     return {"error": facts}
 
 
-def on_error(request: Request, error: Exception) -> Response:
+def error_response(request: Request, error: Exception) -> Response:
     """Return the response to a failed request: JSON for scripts, a page for people."""
     failure = _as_mutator_error(error)
     status = (
@@ -81,7 +81,7 @@ def on_error(request: Request, error: Exception) -> Response:
     )
     if isinstance(error, HTTPException):
         status = error.status_code
-    facts = error_facts(failure)
+    facts = error_as_json(failure)
     if request.url.path.startswith("/api/"):
         return JSONResponse(facts, status)
     return Response(error_page(facts["error"]), status, media_type="text/html")

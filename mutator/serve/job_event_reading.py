@@ -7,7 +7,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from mutator.config.yaml_files import StrictModel
 
-_LONGEST_LINE = 16_384  # bytes; longer ones are dropped
+_MOST_LINE_BYTES = 16_384  # bytes; longer ones are dropped
 Count = Annotated[int, Field(ge=0)]
 
 
@@ -48,8 +48,8 @@ class EventReader:
 
     def read(self, data: bytes) -> Iterator[JobEvent]:
         *lines, self._rest = (self._rest + data).split(b"\n")
-        if len(self._rest) > _LONGEST_LINE:
-            self._rest = self._rest[:_LONGEST_LINE] + b"\0"  # never a valid line
+        if len(self._rest) > _MOST_LINE_BYTES:
+            self._rest = self._rest[:_MOST_LINE_BYTES] + b"\0"  # never a valid line
         for line in lines:
             try:
                 yield _EVENT_ADAPTER.validate_json(line)

@@ -26,7 +26,7 @@ from mutator.serve.served_trials import trial_address
 _GUARD_MODULE = "mutator.serve.job_guard"
 _OUTPUT_COLUMNS = "200"  # line width of a job's output; pages wrap the lines
 _MOST_LOG_BYTES = 100_000  # only the last bytes of a job's output are kept
-_READ_BYTES = 65_536  # what a pipe holds in Linux
+_READ_CHUNK_BYTES = 65_536  # what a pipe holds in Linux
 _MOST_MESSAGE_CHARACTERS = 500
 _MOST_ENDED_JOBS = 200  # ended jobs to keep, the newest
 _MOST_WAITING_JOBS = 50
@@ -54,7 +54,7 @@ class ServeJob:
     result_address: str | None = None
     started: datetime | None = None
     ended: datetime | None = None
-    log: bytearray = field(default_factory=bytearray)
+    output_log: bytearray = field(default_factory=bytearray)
     result_text: str = ""  # what came out of the command, in one sentence
     error_text: str = ""
     path_by_kind: dict[str, str] = field(default_factory=dict)  # kind of file -> path
@@ -78,11 +78,11 @@ class ServeJob:
     @property
     def log_text(self) -> str:
         """The output, without control characters and absolute paths."""
-        return _printable_bytes(self.log)
+        return _printable_bytes(self.output_log)
 
     def add_output(self, data: bytes) -> None:
-        self.log += data
-        del self.log[:-_MOST_LOG_BYTES]
+        self.output_log += data
+        del self.output_log[:-_MOST_LOG_BYTES]
 
     def add_events(self, data: bytes) -> None:
         """Take in what the command sent through the pipe for events."""
@@ -248,7 +248,7 @@ class ServeJobs:
                 pipes.register(pipe, selectors.EVENT_READ, reader)
             while pipes.get_map():
                 for ready, _ in pipes.select():
-                    data = os.read(ready.fd, _READ_BYTES)
+                    data = os.read(ready.fd, _READ_CHUNK_BYTES)
                     if not data:
                         pipes.unregister(ready.fd)
                     with self._lock:

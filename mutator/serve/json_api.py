@@ -6,7 +6,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from mutator.errors import GroupsChanged, JobAlreadyEnded, MutatorError
-from mutator.serve.http_responses import error_facts
+from mutator.serve.http_responses import error_as_json
 from mutator.serve.job_queue import ServeJobs
 from mutator.serve.job_requests import JobCommand, RequestChecker
 from mutator.serve.page_tokens import HOME_PAGE, TOKEN_HEADER, PageTokens, review_page_name
@@ -88,7 +88,7 @@ class JobApi:
         try:
             self._jobs.cancel(job.id)
         except JobAlreadyEnded as err:
-            return JSONResponse(error_facts(err), 409)
+            return JSONResponse(error_as_json(err), 409)
         return JSONResponse({"id": job.id})
 
     def _check_token(self, request: Request, command: JobCommand) -> None:

@@ -23,7 +23,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import unpacked_series
 from mutator.workspace import Workspace
 
-_PLANNING = {"state": RUNNING, "stage": "plan", "rows": [], "version": 0, "planned": 0, "done": 0}
+_STATE_WHILE_PLANNING = {"state": RUNNING, "stage": "plan", "rows": [], "version": 0, "planned": 0, "done": 0}
 
 
 class WatchPages:
@@ -47,7 +47,7 @@ class WatchPages:
         """Send state, counts and, unless the page has seen this version of them, the worst results so far."""
         key, seen_version = (
             request.path_params["run"],
-            _whole_number(request.query_params.get("version", "0")),
+            _parse_whole_number(request.query_params.get("version", "0")),
         )
         job = self._job_of(key)
         facts: dict[str, Any] = {"job": job.as_json() if job else None, "report": None}
@@ -82,7 +82,7 @@ class WatchPages:
 
     def _listed_experiment(self, folder: RunFolder, name: str) -> FinishedExperiment:
         """Return one of the worst experiments of a run so far; NotServed if it is not among them."""
-        finished = self._watched.experiment(folder, name)
+        finished = self._watched.listed_experiment(folder, name)
         if finished is None:
             raise NotServed(
                 f"no experiment '{name}' among the worst so far",
@@ -134,13 +134,13 @@ class WatchPages:
         if job is None:
             if self._runs.unplanned_folder(key) is None:
                 self._runs.folder(key)  # raises NotServed
-            return _PLANNING
+            return _STATE_WHILE_PLANNING
         if job.ended:
-            return _PLANNING | {"state": FAILED, "problem": job.message}
-        return _PLANNING | {"detail": "waits for other jobs" if job.state == "queued" else ""}
+            return _STATE_WHILE_PLANNING | {"state": FAILED, "problem": job.message}
+        return _STATE_WHILE_PLANNING | {"detail": "waits for other jobs" if job.state == "queued" else ""}
 
 
-def _whole_number(text: str) -> int:
+def _parse_whole_number(text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) < 16):
         raise MutatorError(f"version '{text}'", expected="a whole number")
     return int(text)

@@ -50,7 +50,7 @@ class GuardedApplication:
         if response is None and scope["method"] == "POST":
             body = await _read_body(Headers(scope=scope), receive)
             if body is None:
-                response = _refusal("a body of more than 1 MB", 413)
+                response = _refusal_response("a body of more than 1 MB", 413)
             else:
                 receive = _replay_body(body, receive)
         await (response or self._app)(scope, receive, send)
@@ -59,24 +59,24 @@ class GuardedApplication:
         headers, method = Headers(scope=scope), scope["method"]
         origins = headers.getlist("origin")
         if method not in _ALLOWED_METHODS:
-            return _refusal(f"the method is not one of {', '.join(_ALLOWED_METHODS)}", 405)
+            return _refusal_response(f"the method is not one of {', '.join(_ALLOWED_METHODS)}", 405)
         if len(hosts := headers.getlist("host")) != 1 or hosts[0] not in self._hosts:
-            return _refusal("the request names another host")
+            return _refusal_response("the request names another host")
         if len(origins) > 1 or any(origin != f"http://{hosts[0]}" for origin in origins):
-            return _refusal("the request comes from another origin")
+            return _refusal_response("the request comes from another origin")
         if method == "POST" and not origins:
-            return _refusal("the request has no origin")
+            return _refusal_response("the request has no origin")
         if method == "POST" and any(
             headers.get(name, expected[0]) not in expected for name, expected in _SCRIPT_FETCH_VALUES.items()
         ):
-            return _refusal("the request does not come from the script of a page")
+            return _refusal_response("the request does not come from the script of a page")
         destination = headers.get("sec-fetch-dest", "")
         if destination in _FRAME_DESTINATIONS:
-            return _refusal("pages cannot be shown in other pages")
+            return _refusal_response("pages cannot be shown in other pages")
         if destination == "empty" and not scope["path"].startswith("/api/"):
-            return _refusal("scripts cannot read pages, because pages contain tokens")
+            return _refusal_response("scripts cannot read pages, because pages contain tokens")
         if headers.get("sec-fetch-site", "none") not in _SAME_SITE_VALUES:
-            return _refusal("the request comes from another site")
+            return _refusal_response("the request comes from another site")
         return None
 
     def _response_without_cookie(self, scope: Scope) -> Response | None:
@@ -84,13 +84,13 @@ class GuardedApplication:
         query = parse_qs(scope["query_string"].decode("latin-1"), keep_blank_values=True)
         if scope["path"] == "/" and scope["method"] == "GET" and "token" in query:
             if not all(self._is_token(value) for value in query["token"]):
-                return _refusal("wrong token: open the address that the server printed")
+                return _refusal_response("wrong token: open the address that the server printed")
             redirect = RedirectResponse("/", 303)
             redirect.set_cookie(self._cookie, self._token, httponly=True, samesite="strict")
             return redirect
         if any(self._is_token(value) for value in _cookie_values(Headers(scope=scope), self._cookie)):
             return None
-        return _refusal("no token: open the address that the server printed")
+        return _refusal_response("no token: open the address that the server printed")
 
     def _is_token(self, text: str) -> bool:
         return hmac.compare_digest(text.encode(), self._token.encode())
@@ -104,7 +104,7 @@ def _cookie_values(headers: Headers, name: str) -> Iterable[str]:
                 yield value
 
 
-def _refusal(why: str, status: int = 403) -> Response:
+def _refusal_response(why: str, status: int = 403) -> Response:
     return PlainTextResponse(f"refused: {why}\n", status)
 
 
@@ -161,7 +161,7 @@ def content_security_policy() -> str:
     """Return the policy for pages: they can run only code from `mutator.web`, as files or inline by hash."""
     scripts = [csp_hash(f"\n{asset_text(name)}") for name in asset_names(".js")]
     # a page of a comparison changes a style sheet
-    sheets = dict.fromkeys((*map(asset_text, asset_names(".css")), *comparison_files.page_styles()))
+    sheets = dict.fromkeys((*map(asset_text, asset_names(".css")), *comparison_files.page_style_sheets()))
     styles = [csp_hash(f"\n{sheet}") for sheet in sheets]
     return "; ".join(
         (

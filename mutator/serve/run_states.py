@@ -16,7 +16,7 @@ from mutator.store.run_progress import Progress, progress_label
 from mutator.store.session_progress import read_session_progress
 
 FINISHED, RUNNING, FAILED, UNFINISHED = "finished", "running", "failed", "unfinished"
-STAGES = (
+SESSION_STAGES = (
     "plan",
     "checks",
     "golden",
@@ -36,7 +36,10 @@ class RunState:
 
     @property
     def is_past_experiments(self) -> bool:
-        return self.progress is not None and self.progress.stage in STAGES[STAGES.index("experiments") + 1 :]
+        return (
+            self.progress is not None
+            and self.progress.stage in SESSION_STAGES[SESSION_STAGES.index("experiments") + 1 :]
+        )
 
 
 def state_of_run(folder: RunFolder) -> RunState:
@@ -53,7 +56,7 @@ def state_of_run(folder: RunFolder) -> RunState:
     return RunState(state=UNFINISHED)
 
 
-def has_report(run: Path) -> bool:
+def can_make_report(run: Path) -> bool:
     """Whether a report can be made: no command works on the run, and it was not killed before its tables."""
     folder = RunFolder.open_unverified(run)
     state = state_of_run(folder).state

@@ -107,7 +107,7 @@ def live_address(key: str) -> str:
 
 def summarize_run(key: str, path: Path) -> dict[str, Any]:
     facts: dict[str, Any] = {"key": key, "campaign": "", "target": "", "planned": 0, "done": 0}
-    facts |= {"report": report_address(key), "live": live_address(key), "changed": _last_change(path)}
+    facts |= {"report": report_address(key), "live": live_address(key), "changed": _last_work_time_s(path)}
     facts |= {"state": "damaged", "stage": "", "outcomes": {}, "problem": ""}
     try:
         folder = RunFolder.open_unverified(path)
@@ -137,7 +137,7 @@ def _outcomes_so_far(folder: RunFolder, run_state: RunState) -> dict[str, int]:
     return count_records(folder.path)
 
 
-def _last_change(run: Path) -> float:
+def _last_work_time_s(run: Path) -> float:
     """Return when a command last began or ended work on a run, in s since 1970; 0 if unknown."""
     times = []
     for name in (RUN_HEAD_FILE, DIGESTS_FILE):

@@ -62,7 +62,7 @@ class ServedTrials:
             manifest = self._workspace.manifest(trial.target)
             self._check_unchanged(trial, manifest)
             view = self._view(folder, trial, manifest)
-        request = _request_of(trial)
+        request = _request_repeating(trial)
         return view | {"request": request, "range": self._range_of(trial.experiment)}
 
     def _check_unchanged(self, trial: StoredTrial, manifest: TargetManifest) -> None:
@@ -104,7 +104,7 @@ def _encoded_series(folder: Path, trial: StoredTrial, manifest: TargetManifest) 
     return sampler.encoded_golden, encode_series(sampler.faulty_series(faulty, trial.record), sampler.golden)
 
 
-def _request_of(trial: StoredTrial) -> dict[str, Any]:
+def _request_repeating(trial: StoredTrial) -> dict[str, Any]:
     """Return the request for a job that repeats a trial, as `job_requests.TrialRequest` reads it."""
     experiment, fault = trial.experiment, trial.experiment.fault
     spec, _, variant = fault.spec.rpartition("/")

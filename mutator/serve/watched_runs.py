@@ -35,11 +35,11 @@ _MOST_BYTES_AT_ONCE = (
     2_000_000  # of each file of records; about 2,000 records, which take a fifth of a second
 )
 _MOST_WATCHED_RUNS = 4  # each has an index of its plan in memory
-_versions = count(1)
+_version_numbers = count(1)
 
 
 @dataclass(kw_only=True)
-class _Counts:
+class _RunCounts:
     activated: int = 0
     silent: int = 0
     hazards: Counter[str] = field(default_factory=Counter)
@@ -61,12 +61,12 @@ class WatchedRun:
         self._planned = PlannedExperiments(folder.path)
         self._sentences = ExperimentSentences.of_run(folder.head)
         self._columns = result_columns_of(folder.head)
-        self._counts = _Counts(hazards=Counter(dict.fromkeys(folder.head.hazards, 0)))
+        self._counts = _RunCounts(hazards=Counter(dict.fromkeys(folder.head.hazards, 0)))
         self._finished_ids: set[str] = set()
         self._harness_error_ids: set[str] = set()
         self._worst: list[FinishedExperiment] = []
         self._rows: list[ResultRow] = []
-        self._version = next(_versions)
+        self._version = next(_version_numbers)
 
     def poll(self) -> None:
         """Read what workers appended since the last call, or a part of it."""
@@ -82,12 +82,12 @@ class WatchedRun:
                 ValueError,
             ):  # a head, or nothing that a worker wrote
                 continue
-            if self._count(record) and self._can_be_listed(record):
+            if self._count_if_new(record) and self._can_be_listed(record):
                 new_experiments.append(self._finished(experiment, record))
         if new_experiments:
-            self._rank(new_experiments)
+            self._keep_worst(new_experiments)
 
-    def experiment(self, name: str) -> FinishedExperiment | None:
+    def listed_experiment(self, name: str) -> FinishedExperiment | None:
         """Return one of the listed experiments."""
         return next((finished for finished in self._worst if finished.experiment.id == name), None)
 
@@ -101,19 +101,19 @@ class WatchedRun:
             "harness_errors": len(self._harness_error_ids),
             "activated": counts.activated,
             "hazards": [
-                {"name": hazard, "about": self._about(hazard), "count": counts.hazards[hazard]}
+                {"name": hazard, "about": self._hazard_meaning(hazard), "count": counts.hazards[hazard]}
                 for hazard in head.hazards
             ],
             "silent": counts.silent if head.alerts else None,
-            "outcomes": {label: number for label in _label_order() if (number := counts.labels[label])},
+            "outcomes": {label: number for label in _labels_in_order() if (number := counts.labels[label])},
             "behind": self._tail.has_more,
             "rows": None if seen_version == self._version else list(map(self._row_as_json, self._rows)),
         }
 
-    def _about(self, hazard: str) -> str:
+    def _hazard_meaning(self, hazard: str) -> str:
         return next((facts.about for facts in self._folder.head.about_hazards if facts.name == hazard), "")
 
-    def _count(self, record: Record) -> bool:
+    def _count_if_new(self, record: Record) -> bool:
         """Count a record; return whether it is a new result. A harness error is retried."""
         if record.experiment_id in self._finished_ids:
             return False
@@ -134,7 +134,7 @@ class WatchedRun:
     def _finished(self, experiment: Experiment, record: Record) -> FinishedExperiment:
         return FinishedExperiment(experiment, record, self._folder.severity_scale)
 
-    def _rank(self, new_experiments: Iterable[FinishedExperiment]) -> None:
+    def _keep_worst(self, new_experiments: Iterable[FinishedExperiment]) -> None:
         """Keep the worst results. One that falls out cannot come back: later ones only push it down."""
         candidates = [*self._worst, *new_experiments]
         frame = frame_of_finished(self._columns, candidates, self._folder.head.hazards)
@@ -142,7 +142,7 @@ class WatchedRun:
         self._worst = [candidates[row] for row in order]
         faults = {finished.experiment.fault.id: finished.experiment.fault for finished in self._worst}
         self._rows = rows_of(frame.iloc[order], faults, self._sentences)
-        self._version = next(_versions)
+        self._version = next(_version_numbers)
 
     def _row_as_json(self, row: ResultRow) -> dict[str, Any]:
         scale = self._folder.severity_scale
@@ -158,7 +158,7 @@ class WatchedRun:
         }
 
 
-def _label_order() -> list[str]:
+def _labels_in_order() -> list[str]:
     return [*(outcome.value for outcome in Outcome), *(s.value for s in Status if s is not Status.OK)]
 
 
@@ -176,12 +176,12 @@ class WatchedRuns:
             watched.poll()
             return watched.as_json(seen_version)
 
-    def experiment(self, folder: RunFolder, name: str) -> FinishedExperiment | None:
+    def listed_experiment(self, folder: RunFolder, name: str) -> FinishedExperiment | None:
         """Return one of the worst experiments of a run so far; None if it is not among them."""
         with self._lock:
             watched = self._watched(folder)
             watched.poll()
-            return watched.experiment(name)
+            return watched.listed_experiment(name)
 
     def _watched(self, folder: RunFolder) -> WatchedRun:
         # a new run can have the name of a deleted one

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 
 from mutator.statistics.paired_statistics import PairedDifference
-from mutator.statistics.shares_with_intervals import CONFIDENCE
+from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL
 
-RESAMPLES = 999  # fewer than for rates, because each draw of a median goes through all runs
+RESAMPLE_COUNT = 999  # fewer than for rates, because each draw of a median goes through all runs
 _RESAMPLING_SEED = 1  # fixed, so that equal results give equal tables
 _MOST_BATCH_CELLS = 500_000  # maximum number of cells in one batch of draws, to limit memory
 _MIN_BLOCK_SIZE = 256  # minimum number of values in a block
@@ -53,7 +53,7 @@ def _bootstrap_interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[
     for counts in _draw_cluster_counts(len(names), max(codes.size // block + 1, block)):
         medians = [sample.medians(counts) for sample in sorted_samples]
         draws.append(medians[0] - medians[1] if len(medians) > 1 else medians[0])
-    tail = (1 - CONFIDENCE) / 2
+    tail = (1 - CONFIDENCE_LEVEL) / 2
     low, high = np.quantile(np.concatenate(draws), (tail, 1 - tail))
     return float(low), float(high)
 
@@ -71,8 +71,8 @@ def _draw_cluster_counts(cluster_count: int, other_cells_per_draw: int) -> Itera
     """
     rng = np.random.default_rng(_RESAMPLING_SEED)
     batch = max(1, _MOST_BATCH_CELLS // max(cluster_count, other_cells_per_draw))
-    for begin in range(0, RESAMPLES, batch):
-        size = min(batch, RESAMPLES - begin)
+    for begin in range(0, RESAMPLE_COUNT, batch):
+        size = min(batch, RESAMPLE_COUNT - begin)
         yield rng.multinomial(cluster_count, np.full(cluster_count, 1 / cluster_count), size=size)
 
 

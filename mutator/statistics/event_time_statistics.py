@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from mutator.statistics.results_frame import hazard_names
-from mutator.statistics.shares_with_intervals import CONFIDENCE, Share, share
+from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL, Share, share_with_interval
 
 FirstAlertsByHazardRun = Mapping[str, tuple[tuple[str, float], ...]]
 _SHARE_TOLERANCE = (
@@ -27,7 +27,7 @@ _SHARE_TOLERANCE = (
 class TimeSpread:
     """The mean and quartiles of `n` times in s. NaN if there are none."""
 
-    n: int
+    time_count: int
     mean: float
     lower_quartile: float
     median: float
@@ -65,11 +65,15 @@ def spread_of_times(times: pd.Series) -> TimeSpread:
     present = times.dropna()
     if present.empty:
         return TimeSpread(
-            n=0, mean=math.nan, lower_quartile=math.nan, median=math.nan, upper_quartile=math.nan
+            time_count=0, mean=math.nan, lower_quartile=math.nan, median=math.nan, upper_quartile=math.nan
         )
     lower, median, upper = (float(present.quantile(q)) for q in (0.25, 0.5, 0.75))
     return TimeSpread(
-        n=len(present), mean=float(present.mean()), lower_quartile=lower, median=median, upper_quartile=upper
+        time_count=len(present),
+        mean=float(present.mean()),
+        lower_quartile=lower,
+        median=median,
+        upper_quartile=upper,
     )
 
 
@@ -78,7 +82,7 @@ def share_of_hazards_within(frame: pd.DataFrame, time_s: float) -> Share:
     no later than `time_s` after it.
     """
     times = frame["time_to_hazard"].dropna()
-    return share(int((times.round(6) <= time_s).sum()), len(times))
+    return share_with_interval(int((times.round(6) <= time_s).sum()), len(times))
 
 
 def propagation_spreads_by_step(frame: pd.DataFrame) -> dict[str, TimeSpread]:
@@ -117,7 +121,7 @@ def alert_to_hazard_times(
         "hazards_after_alert": events,
         "runs_alerted_too_late": len(alerted) - len(first),
     }
-    late_hazards = share(int((late & first["is_hazard"]).sum()), events)
+    late_hazards = share_with_interval(int((late & first["is_hazard"]).sum()), events)
     if not events:
         nan = math.nan
         no_hazard_share = 1.0 if len(first) else nan
@@ -157,7 +161,7 @@ def _median_time(curve: Any) -> float:
 def _median_time_interval(curve: Any) -> tuple[float, float]:
     """Return the interval of the median time. Infinite or NaN: not reached."""
     with np.errstate(all="ignore"):  # the last point of the curve can be 0, which has no log
-        low, high = curve.quantile_ci(0.5, alpha=1 - CONFIDENCE)
+        low, high = curve.quantile_ci(0.5, alpha=1 - CONFIDENCE_LEVEL)
     # a curve that ends at 0 has no interval there, so the median's interval cannot end there
     is_open = high == curve.surv_times[-1] and curve.surv_prob[-1] < _SHARE_TOLERANCE
     return float(low), math.inf if is_open else float(high)
@@ -183,7 +187,9 @@ def alert_first_share_by_hazard_and_alert(
         warned = sum(bool(names) for names in before)
         if before:
             run_counts = {**dict(sorted(counts.items())), "any": warned, "none": len(before) - warned}
-            shares |= {(hazard, name): share(count, len(before)) for name, count in run_counts.items()}
+            shares |= {
+                (hazard, name): share_with_interval(count, len(before)) for name, count in run_counts.items()
+            }
     return shares
 
 

@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 
 from mutator.statistics.paired_statistics import PairCounts, resampled_interval
-from mutator.statistics.paired_statistics import mcnemar as exact_mcnemar
-from mutator.statistics.shares_with_intervals import CONFIDENCE
+from mutator.statistics.paired_statistics import mcnemar_test as exact_mcnemar
+from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL
 from mutator.statistics.tallies import Tally
 
 RateBase = Literal["activated", "injected"]
@@ -108,7 +108,7 @@ def pool_odds_ratios(parts: Sequence[FaultTypeStratum]) -> PooledOddsRatio:
         )
     table = StratifiedTable([np.array(stratum.contingency_table) for stratum in informative])
     with np.errstate(all="ignore"):  # an odds ratio of 0 or infinity has no finite interval
-        low, high = table.oddsratio_pooled_confint(alpha=1 - CONFIDENCE)
+        low, high = table.oddsratio_pooled_confint(alpha=1 - CONFIDENCE_LEVEL)
         return PooledOddsRatio(
             odds_ratio=float(table.oddsratio_pooled),
             low=float(low),

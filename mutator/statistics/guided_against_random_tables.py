@@ -6,7 +6,7 @@ from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random import RATE_BASES, RateBase
 from mutator.statistics.paired_statistics import PairCounts
 from mutator.statistics.published_counts import THIS_RUN, PublishedCounts, counts_by_source
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
 from mutator.statistics.tallies import tally_by_fault_type
 
@@ -19,8 +19,8 @@ def hazard_odds_sheet(frame: pd.DataFrame, published: PublishedCounts | None) ->
             parts = guided_against_random.strata_with_both_methods(counts, base)
             pooled = guided_against_random.pool_odds_ratios(parts)
             rates = (
-                share(sum(s.guided_hazards for s in parts), sum(s.guided_runs for s in parts)),
-                share(sum(s.random_hazards for s in parts), sum(s.random_runs for s in parts)),
+                share_with_interval(sum(s.guided_hazards for s in parts), sum(s.guided_runs for s in parts)),
+                share_with_interval(sum(s.random_hazards for s in parts), sum(s.random_runs for s in parts)),
             )
             odds = (
                 pooled.stratum_count,
@@ -66,8 +66,8 @@ def hazards_by_fault_type_sheet(frame: pd.DataFrame, published: PublishedCounts 
             for stratum, p, adjusted in zip(
                 parts, p_values, guided_against_random.holm_adjusted(p_values), strict=True
             ):
-                guided = share(stratum.guided_hazards, stratum.guided_runs)
-                random = share(stratum.random_hazards, stratum.random_runs)
+                guided = share_with_interval(stratum.guided_hazards, stratum.guided_runs)
+                random = share_with_interval(stratum.random_hazards, stratum.random_runs)
                 lines.append((base, source, stratum.fault_type, guided, random, PValue(p), PValue(adjusted)))
     return Sheet(
         name="guided_against_random_by_fault_type",
@@ -92,7 +92,7 @@ def matched_pairs_sheet(frame: pd.DataFrame) -> Sheet:
             str(kind): guided_against_random.mcnemar_of_pairs(group)
             for kind, group in selected.groupby("kind")
         }
-        adjusted = guided_against_random.holm_adjusted([matched.p for matched in kinds.values()])
+        adjusted = guided_against_random.holm_adjusted([matched.p_value for matched in kinds.values()])
         lines.append(
             (selection, "total", *_pair_cells(guided_against_random.mcnemar_of_pairs(selected)), None)
         )
@@ -114,4 +114,4 @@ def matched_pairs_sheet(frame: pd.DataFrame) -> Sheet:
 
 def _pair_cells(matched: PairCounts) -> tuple[SheetCell, ...]:
     counts = (matched.pair_count, matched.both, matched.first_only, matched.second_only, matched.neither)
-    return (*counts, PValue(matched.p))
+    return (*counts, PValue(matched.p_value))

@@ -7,7 +7,7 @@ import pandas as pd
 
 from mutator.statistics.bootstrap_median_intervals import median_interval
 from mutator.statistics.results_frame import select_common_columns
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 from mutator.targets.hazard_severity import SEVERITY_CLASSES, SeverityScale
 from mutator.targets.stored_target_facts import MetricFacts
@@ -47,7 +47,7 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[MetricFacts]) -> Sheet:
     )
 
 
-def describe_classes(scale: SeverityScale | None, names: Sequence[str]) -> str:
+def describe_severity_classes(scale: SeverityScale | None, names: Sequence[str]) -> str:
     """Return a sentence with the classes in words, to append to a note; empty without a scale."""
     labels = [scale.labels[name] for name in names if name] if scale else []
     return f" Severity classes: {', '.join(labels)}." if labels else ""
@@ -63,14 +63,14 @@ def severity_by_fault_type_sheet(frame: pd.DataFrame, scale_for_note: SeveritySc
     activated = frame.loc[frame["is_activated"], columns]
     for kind, group in _runs_by_fault_type(activated) if "severity" in frame else ():
         counts = [int((group["severity"] == name).sum()) for name in SEVERITY_CLASSES]
-        shares = [share(count, len(group)) for count in (sum(counts), *counts)]
+        shares = [share_with_interval(count, len(group)) for count in (sum(counts), *counts)]
         lines.append((kind, *shares))
     return Sheet(
         name="severity",
         title="Severity by fault type",
         note="Activated faults with a hazard that has a severity class, in total and by class. 95 % "
         "Wilson intervals; in brackets, the count and the total."
-        + describe_classes(scale_for_note, SEVERITY_CLASSES),
+        + describe_severity_classes(scale_for_note, SEVERITY_CLASSES),
         heads=("fault type", "any class", *SEVERITY_CLASSES),
         lines=tuple(lines),
     )

@@ -15,7 +15,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Status
 from mutator.results.table_columns import alert_names_in
 from mutator.statistics.paired_statistics import resampled_interval
-from mutator.statistics.shares_with_intervals import Share, share
+from mutator.statistics.shares_with_intervals import Share, share_with_interval
 from mutator.statistics.statistics_sheet import Sheet, SheetCell, cell_text
 from mutator.triggers.trigger_kinds import ALWAYS_NAME
 
@@ -23,9 +23,9 @@ AlertsByGoldenRun = Mapping[tuple[str, str], frozenset[str]]  # (scenario, seed 
 
 PERMANENT, TRANSIENT, EITHER = "permanent", "transient", "either"
 ALL_MUTANTS, MUTANTS, DRIVES = "all", "mutants", "drives"
-_EFFECTS = ("actuator changed", "new alert", "hazard", "crash or timeout")
-_ALERT_EFFECT, _ACTIVE_COLUMN = _EFFECTS[1], "active"
-_HEADS = ("of", "counted", "fault", "number", "not activated", *_EFFECTS, "no effect")
+_EFFECT_NAMES = ("actuator changed", "new alert", "hazard", "crash or timeout")
+_ALERT_EFFECT, _ACTIVE_COLUMN = _EFFECT_NAMES[1], "active"
+_COLUMN_HEADS = ("of", "counted", "fault", "number", "not activated", *_EFFECT_NAMES, "no effect")
 _NOTE = (
     "This table shows how operator mutants affect the closed loop. *Permanent* mutants are active in the "
     "whole drive, *transient* ones while their trigger holds. Shares are of *activated* mutants; a mutant "
@@ -56,7 +56,7 @@ def mutant_effect_flags(
         _ACTIVE_COLUMN: mutant_runs["is_activated"] | is_broken,
         **dict(
             zip(
-                _EFFECTS,
+                _EFFECT_NAMES,
                 # `False` stands for new alerts; it is replaced or removed below
                 (mutant_runs["is_manifested"], False, mutant_runs["is_hazard"], is_broken),
                 strict=True,
@@ -121,8 +121,8 @@ def mutation_score_sheet(
         name="mutation_score",
         title="Mutation score",
         note=_NOTE + ("" if golden_alerts is not None else _UNKNOWN_ALERTS_NOTE) + chosen + without,
-        heads=_HEADS,
-        lines=tuple(_lines(drives)),
+        heads=_COLUMN_HEADS,
+        lines=tuple(_sheet_lines(drives)),
     )
 
 
@@ -134,7 +134,9 @@ def totals_table(sheet: Sheet) -> TextTable:
         if name == ALL_MUTANTS
     ]
     return TextTable(
-        heads=("mutation score", *_HEADS[3:]), rows=rows, right_aligned=range(1, len(_HEADS) - 2)
+        heads=("mutation score", *_COLUMN_HEADS[3:]),
+        rows=rows,
+        right_aligned=range(1, len(_COLUMN_HEADS) - 2),
     )
 
 
@@ -144,15 +146,15 @@ def _short_text(cell: SheetCell) -> str:
     return f"{100 * cell.rate:.1f} % ({100 * cell.low:.0f} to {100 * cell.high:.0f})"
 
 
-def _lines(drives: pd.DataFrame) -> Iterator[tuple[SheetCell, ...]]:
+def _sheet_lines(drives: pd.DataFrame) -> Iterator[tuple[SheetCell, ...]]:
     if drives.empty:
         return
     yield from _lines_by_fault_kind(ALL_MUTANTS, drives)
     if drives["fault"].nunique() > 1:
-        yield _line(ALL_MUTANTS, MUTANTS, EITHER, _flags_by_mutant(drives))
+        yield _sheet_line(ALL_MUTANTS, MUTANTS, EITHER, _flags_by_mutant(drives))
     if drives.duplicated(["mutant", "fault"]).any():
         for fault_kind, group in drives.groupby("fault"):
-            yield _line(ALL_MUTANTS, DRIVES, str(fault_kind), group.set_index("mutant"))
+            yield _sheet_line(ALL_MUTANTS, DRIVES, str(fault_kind), group.set_index("mutant"))
     for groups in ("operator", "function"):
         for name, group in drives.groupby(groups):
             yield from _lines_by_fault_kind(str(name), group)
@@ -160,19 +162,19 @@ def _lines(drives: pd.DataFrame) -> Iterator[tuple[SheetCell, ...]]:
 
 def _lines_by_fault_kind(name: str, drives: pd.DataFrame) -> Iterator[tuple[SheetCell, ...]]:
     for fault_kind, group in drives.groupby("fault"):
-        yield _line(name, MUTANTS, str(fault_kind), _flags_by_mutant(group))
+        yield _sheet_line(name, MUTANTS, str(fault_kind), _flags_by_mutant(group))
 
 
 def _flags_by_mutant(drives: pd.DataFrame) -> pd.DataFrame:
-    flags = [name for name in (_ACTIVE_COLUMN, *_EFFECTS) if name in drives]
+    flags = [name for name in (_ACTIVE_COLUMN, *_EFFECT_NAMES) if name in drives]
     return drives.groupby("mutant")[flags].any()
 
 
-def _line(name: str, counted: str, fault_kind: str, flags: pd.DataFrame) -> tuple[SheetCell, ...]:
+def _sheet_line(name: str, counted: str, fault_kind: str, flags: pd.DataFrame) -> tuple[SheetCell, ...]:
     """Return a line of the sheet. `flags` has a row for each counted item and is indexed by mutant."""
     active = flags[flags[_ACTIVE_COLUMN]]
-    effects = [effect for effect in _EFFECTS if effect in active]
-    cells = [_share_of_flag(active[effect]) if effect in active else None for effect in _EFFECTS]
+    effects = [effect for effect in _EFFECT_NAMES if effect in active]
+    cells = [_share_of_flag(active[effect]) if effect in active else None for effect in _EFFECT_NAMES]
     no_effect = int((~active[effects].any(axis=1)).sum())
     return (name, counted, fault_kind, len(flags), len(flags) - len(active), *cells, no_effect)
 
@@ -181,11 +183,11 @@ def _share_of_flag(flag: "pd.Series[bool]") -> Share:
     """Return the share of a flag. If a mutant has several rows, the interval resamples whole mutants."""
     count, total = int(flag.sum()), len(flag)
     if flag.index.is_unique:
-        return share(count, total)
+        return share_with_interval(count, total)
     sums = flag.groupby(level=0).agg(["sum", "count"])
-    low, high = resampled_interval((sums["sum"].to_numpy(), sums["count"].to_numpy()), _rate)
+    low, high = resampled_interval((sums["sum"].to_numpy(), sums["count"].to_numpy()), _rate_of_sums)
     return Share(count=count, of=total, low=low, high=high)
 
 
-def _rate(counts: Any, wholes: Any, axis: int = -1) -> Any:
+def _rate_of_sums(counts: Any, wholes: Any, axis: int = -1) -> Any:
     return np.sum(counts, axis=axis) / np.sum(wholes, axis=axis)

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mutator.statistics.shares_with_intervals import CONFIDENCE
+from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL
 
-RESAMPLES = 9999  # a draw only adds up one number for each cluster
+RESAMPLE_COUNT = 9999  # a draw only adds up one number for each cluster
 _RESAMPLING_SEED = 1  # fixed, so that resampling is deterministic
 _TIME_DECIMALS = 9  # decimals of a time difference; absorbs rounding errors
 
@@ -30,7 +30,7 @@ class PairCounts:
     first_only: int
     second_only: int
     neither: int
-    p: float
+    p_value: float
 
     @property
     def pair_count(self) -> int:
@@ -56,10 +56,10 @@ class PairedTimes:
     first_median: float
     second_median: float
     median_difference: PairedDifference
-    p: float
+    p_value: float
 
 
-def mcnemar(first: pd.Series, second: pd.Series) -> PairCounts:
+def mcnemar_test(first: pd.Series, second: pd.Series) -> PairCounts:
     """Compare two flags of each pair with McNemar's exact test (statsmodels)."""
     from statsmodels.stats.contingency_tables import (  # type: ignore[import-untyped]
         mcnemar as exact_mcnemar,
@@ -73,7 +73,7 @@ def mcnemar(first: pd.Series, second: pd.Series) -> PairCounts:
         first_only=first_only,
         second_only=second_only,
         neither=neither,
-        p=min(1.0, float(test.pvalue)),
+        p_value=min(1.0, float(test.pvalue)),
     )
 
 
@@ -105,9 +105,9 @@ def resampled_interval(clusters: Sequence[np.ndarray], statistic: Callable[..., 
             statistic,
             paired=True,
             vectorized=True,
-            n_resamples=RESAMPLES,
+            n_resamples=RESAMPLE_COUNT,
             batch=500,  # limits memory, which grows with draws times clusters
-            confidence_level=CONFIDENCE,
+            confidence_level=CONFIDENCE_LEVEL,
             method="percentile",
             rng=np.random.default_rng(_RESAMPLING_SEED),
         ).confidence_interval
@@ -134,10 +134,10 @@ def paired_times(first: pd.Series, second: pd.Series) -> PairedTimes:
             first_median=nan,
             second_median=nan,
             median_difference=PairedDifference(difference=nan, low=nan, high=nan),
-            p=nan,
+            p_value=nan,
         )
     change = (after - before).round(_TIME_DECIMALS)
-    interval = quantile_test(change.to_numpy(), p=0.5).confidence_interval(CONFIDENCE)
+    interval = quantile_test(change.to_numpy(), p=0.5).confidence_interval(CONFIDENCE_LEVEL)
     return PairedTimes(
         pair_count=len(change),
         first_median=float(before.median()),
@@ -145,7 +145,7 @@ def paired_times(first: pd.Series, second: pd.Series) -> PairedTimes:
         median_difference=PairedDifference(
             difference=float(change.median()), low=float(interval.low), high=float(interval.high)
         ),
-        p=wilcoxon_p(before, after),
+        p_value=wilcoxon_p(before, after),
     )
 
 

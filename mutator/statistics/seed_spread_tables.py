@@ -12,7 +12,7 @@ import pandas as pd
 
 from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.results_frame import hazard_names
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.statistics.statistics_sheet import PercentRate, Sheet, SheetCell
 
 ALL_FAULTS = "all"  # label of the lines for all faults
@@ -21,7 +21,7 @@ _NOTE = (
     "from 9,999 resamples of whole seeds (none if all seeds agree). Least and largest: the smallest and the "
     "largest share of a seed."
 )
-_HEADS = (
+_COLUMN_HEADS = (
     *("faults", "what", "of", "all seeds", "between seeds, low", "between seeds, high"),
     *("least", "seed of the least", "largest", "seed of the largest", "seeds"),
 )
@@ -44,8 +44,8 @@ def seeds_sheet(frame: pd.DataFrame, *, has_alerts: bool = True) -> Sheet:
         name="seeds",
         title="Spread between seeds",
         note=_NOTE,
-        heads=_HEADS,
-        lines=tuple(_lines(frame, groups, _listed_shares(frame, has_alerts=has_alerts))),
+        heads=_COLUMN_HEADS,
+        lines=tuple(_sheet_lines(frame, groups, _event_and_base_pairs(frame, has_alerts=has_alerts))),
     )
 
 
@@ -56,12 +56,12 @@ def seeds_by_fault_type_sheet(frame: pd.DataFrame) -> Sheet:
         name="seeds_by_fault_type",
         title="Spread between seeds by fault type",
         note=_NOTE,
-        heads=("fault type", *_HEADS[1:]),
-        lines=tuple(_lines(frame, groups, _SHARES_BY_FAULT_TYPE)),
+        heads=("fault type", *_COLUMN_HEADS[1:]),
+        lines=tuple(_sheet_lines(frame, groups, _SHARES_BY_FAULT_TYPE)),
     )
 
 
-def _listed_shares(frame: pd.DataFrame, *, has_alerts: bool) -> list[tuple[str, str]]:
+def _event_and_base_pairs(frame: pd.DataFrame, *, has_alerts: bool) -> list[tuple[str, str]]:
     """Return the shares to compute, each as (what is counted, the base)."""
     shares = [(_ACTIVATED, _INJECTED), ("manifested", _ACTIVATED), *_SHARES_BY_FAULT_TYPE[1:]]
     shares += [(name, whole) for name in hazard_names(frame) for whole in (_ACTIVATED, _INJECTED)]
@@ -86,7 +86,7 @@ def _event_flags(frame: pd.DataFrame) -> dict[str, np.ndarray]:
     }
 
 
-def _lines(
+def _sheet_lines(
     frame: pd.DataFrame, groups: Mapping[str, np.ndarray], shares: Sequence[tuple[str, str]]
 ) -> Iterator[tuple[SheetCell, ...]]:
     seeds = seeds_of(frame)
@@ -104,13 +104,13 @@ def _lines(
 
 
 def _spread_cells(seeds: Sequence[str], counts: np.ndarray, wholes: np.ndarray) -> tuple[SheetCell, ...]:
-    low, high = resampled_interval((counts, wholes), _rate)
+    low, high = resampled_interval((counts, wholes), _rate_of_sums)
     rates = [
         (count / total, int(seed)) for seed, count, total in zip(seeds, counts, wholes, strict=True) if total
     ]
     least, largest = min(rates, default=None), min(rates, key=lambda k: (-k[0], k[1]), default=None)
     return (
-        share(int(counts.sum()), int(wholes.sum())),
+        share_with_interval(int(counts.sum()), int(wholes.sum())),
         *(PercentRate(low), PercentRate(high)),
         *((PercentRate(least[0]), least[1]) if least else (None, None)),
         *((PercentRate(largest[0]), largest[1]) if largest else (None, None)),
@@ -118,6 +118,6 @@ def _spread_cells(seeds: Sequence[str], counts: np.ndarray, wholes: np.ndarray) 
     )
 
 
-def _rate(counts: Any, wholes: Any, axis: int = -1) -> Any:
+def _rate_of_sums(counts: Any, wholes: Any, axis: int = -1) -> Any:
     with np.errstate(invalid="ignore"):  # if a draw has nothing to count, the result is NaN
         return np.sum(counts, axis=axis) / np.sum(wholes, axis=axis)

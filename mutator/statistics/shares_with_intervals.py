@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
-CONFIDENCE = 0.95
-_DECIMALS = 12
+CONFIDENCE_LEVEL = 0.95
+_INTERVAL_DECIMALS = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,12 +30,17 @@ class Share:
         return f"{100 * self.rate:.1f} % ({self.count}/{self.of}; {interval})"
 
 
-def share(count: int, of: int) -> Share:
+def share_with_interval(count: int, of: int) -> Share:
     """Return the share `count`/`of`, with its 95 % Wilson interval (statsmodels)."""
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
     if not of:
         return Share(count=count, of=of, low=math.nan, high=math.nan)
-    low, high = proportion_confint(count, of, alpha=1 - CONFIDENCE, method="wilson")
+    low, high = proportion_confint(count, of, alpha=1 - CONFIDENCE_LEVEL, method="wilson")
     # rounded, because last bits differ between machines, and the interval of 0 of n must begin at exactly 0
-    return Share(count=count, of=of, low=round(float(low), _DECIMALS), high=round(float(high), _DECIMALS))
+    return Share(
+        count=count,
+        of=of,
+        low=round(float(low), _INTERVAL_DECIMALS),
+        high=round(float(high), _INTERVAL_DECIMALS),
+    )

@@ -3,11 +3,11 @@
 from collections.abc import Iterable
 
 from mutator.statistics.published_counts import THIS_RUN, PublishedCounts, TallyByGroup
-from mutator.statistics.shares_with_intervals import Share, share
+from mutator.statistics.shares_with_intervals import Share, share_with_interval
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 from mutator.statistics.tallies import Tally, sum_tallies
 
-_MEASURES = (
+_PART_AND_WHOLE_PAIRS = (
     ("activated", "injected"),
     ("manifested", "activated"),
     ("hazards", "activated"),
@@ -32,7 +32,7 @@ def summary_sheet(
     published_tallies = published.by_scenario if published else {}
     sources = _tallies_by_source(method, run_counts, published, published_tallies, scenarios)
     lines: list[tuple[SheetCell, ...]] = []
-    for part, whole in _MEASURES:
+    for part, whole in _PART_AND_WHOLE_PAIRS:
         if "alerts" in part and not has_alerts:
             continue
         for source, tallies in sources.items():
@@ -62,7 +62,8 @@ def coverage_sheet(method: str, run_counts: TallyByGroup, published: PublishedCo
         for source, tallies in sources.items():
             tally = _total_of_published(tallies.values()) if kind == "total" else tallies[kind]
             cells = [
-                _share_of_tally(tally, *measure) for measure in (_MEASURES[0], _MEASURES[2], _MEASURES[3])
+                _share_of_tally(tally, *measure)
+                for measure in (_PART_AND_WHOLE_PAIRS[0], _PART_AND_WHOLE_PAIRS[2], _PART_AND_WHOLE_PAIRS[3])
             ]
             lines.append((kind, source, *cells))
     notes = (_NOTE, *((published.counts_note, published.fault_type_note) if published else ()))
@@ -104,4 +105,4 @@ def _total_of_published(tallies: Iterable[Tally | None]) -> Tally:
 
 def _share_of_tally(tally: Tally | None, part: str, whole: str) -> Share | None:
     count, of = (getattr(tally, part), getattr(tally, whole)) if tally else (None, None)
-    return None if count is None or of is None else share(count, of)
+    return None if count is None or of is None else share_with_interval(count, of)

@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypeVar, overload
 
 from mutator._common.bounded_reading import check_file_size, open_regular, read_bounded_lines
 from mutator._common.files import raising_disk_full, writing_atomic
-from mutator._common.hashing import added_values, as_json_types, canonical_json
+from mutator._common.hashing import as_json_types, canonical_json, non_default_added_fields
 from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
@@ -282,7 +282,7 @@ def _line_values(experiment: Experiment) -> dict[str, Any]:
         "trigger": experiment.trigger_as_json,
         "seed": experiment.seed,
         "setting": experiment.setting,
-        **added_values(experiment),
+        **non_default_added_fields(experiment),
     }
 
 

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from mutator._common.confined_files import unlink_below
-from mutator._common.extension_doors import EXPORTS
+from mutator._common.extension_doors import EXPORT_DOOR
 from mutator._common.files import final_name_of_half_written, is_half_written, read_json, remove_folder
 from mutator._common.folder_locks import lock_run_folder
 from mutator.errors import MutatorError
@@ -110,7 +110,7 @@ def _run_file_globs() -> tuple[str, ...]:
 
     An export that is one file for the whole run is named after its format.
     """
-    return (*ALLOWED_FILE_GLOBS, *(f"exports/{name}.*" for name in EXPORTS.names()))
+    return (*ALLOWED_FILE_GLOBS, *(f"exports/{name}.*" for name in EXPORT_DOOR.names()))
 
 
 def _matches_any(name: str, patterns: Iterable[str]) -> bool:

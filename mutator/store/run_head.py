@@ -9,7 +9,7 @@ from mutator._common.confined_files import checked_name_not_path, checked_relati
 from mutator._common.files import json_bytes, read_json
 from mutator._common.hashing import added_field, as_json_types
 from mutator._common.library_and_run_folder_search import RUN_HEAD_FILE
-from mutator._common.typed_json import from_json_types
+from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError, TypeMisfit
 from mutator.model import Limits
 from mutator.store.plan_choices import Choices
@@ -117,7 +117,7 @@ def load_head(run: Path) -> RunHead:
     """Read the head of a run folder; MutatorError if it is damaged or has another schema."""
     path = run / HEAD
     try:
-        head = from_json_types(RunHead, _with_unknown_keys_apart(read_json(path, RUN_SCHEMA)))
+        head = typed_value_from_json(RunHead, _with_unknown_keys_apart(read_json(path, RUN_SCHEMA)))
     except TypeMisfit as err:
         raise _damage_error(path, err) from None
     for name in head.golden_files:

@@ -11,7 +11,7 @@ from pathlib import Path
 from mutator._common.confined_files import read_below, unlink_below, write_below
 from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.hashing import as_json_types
-from mutator._common.typed_json import from_json_types
+from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError, TypeMisfit
 from mutator.store.run_progress import Progress
 
@@ -43,8 +43,8 @@ def read_session_progress(run: Path) -> SessionProgress | None:
     """Return what the file says; None without a file that can be read, or with values that no session has."""
     try:
         stored = parse_json_object(read_below(run, PROGRESS_FILE), run / PROGRESS_FILE, PROGRESS_SCHEMA)
-        problem = from_json_types(str, stored.pop("problem", ""))
-        progress = from_json_types(Progress, {key: stored[key] for key in stored if key != "schema"})
+        problem = typed_value_from_json(str, stored.pop("problem", ""))
+        progress = typed_value_from_json(Progress, {key: stored[key] for key in stored if key != "schema"})
     except (OSError, MutatorError, TypeMisfit):
         return None
     numbers = (progress.done, progress.total, progress.per_s or 0, progress.remaining_s or 0)

@@ -7,7 +7,7 @@ from pathlib import Path
 from mutator._common.confined_files import read_below, write_below
 from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.hashing import as_json_types
-from mutator._common.typed_json import from_json_types
+from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record
 from mutator.store import plan_file
@@ -48,7 +48,7 @@ class StoredTrial:
                 experiment=experiment_from_json(
                     stored["experiment"] | {"fault": fault.id}, {fault.id: fault}
                 ),
-                record=from_json_types(Record, stored["record"]),
+                record=typed_value_from_json(Record, stored["record"]),
             )
         except OSError:
             raise MutatorError(

@@ -9,17 +9,17 @@ TIP_OUTLINE = "M0,0 L10,5 L0,10 z"  # outline of an arrow's tip
 _LINE_SPACING = 15  # line spacing of a label's second text
 
 
-def tip_marker(name: str, size: int, shape: str) -> str:
+def tip_marker(name: str, size: int, path_attributes: str) -> str:
     """Return the marker that ends arrows. `shape` are the attributes of its path, with `TIP_OUTLINE` as
     `d`.
     """
     return (
         f'<marker id="{name}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="{size}" '
-        f'markerHeight="{size}" markerUnits="userSpaceOnUse" orient="auto"><path {shape}/></marker>'
+        f'markerHeight="{size}" markerUnits="userSpaceOnUse" orient="auto"><path {path_attributes}/></marker>'
     )
 
 
-def path_data(points: Iterable[Point]) -> str:
+def svg_path_data(points: Iterable[Point]) -> str:
     """Return the data of the path through these points."""
     return "M" + " L".join(f"{x:.1f},{y:.1f}" for x, y in points)
 

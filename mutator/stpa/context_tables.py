@@ -152,7 +152,7 @@ def load_context_table(path: Path, variables: Collection[str] | None = None) -> 
         path=path,
         constants=dict(model.constants),
         rows=rows,
-        coverage=_complete_coverage(rows, source),
+        coverage=_checked_complete_coverage(rows, source),
         source=source,
     )
 
@@ -180,7 +180,7 @@ def _check_actions(rows: tuple[ContextRow, ...], source: YamlSource) -> None:
             )
 
 
-def _complete_coverage(rows: tuple[ContextRow, ...], source: YamlSource) -> TableCoverage:
+def _checked_complete_coverage(rows: tuple[ContextRow, ...], source: YamlSource) -> TableCoverage:
     coverage = measure_coverage({row.id: row.condition for row in rows})
     if coverage.first_gap_or_overlap is None:
         return coverage

@@ -31,7 +31,7 @@ class ComponentBox:
     width: float
     height: float
     row: int
-    lines: tuple[str, ...]
+    text_lines: tuple[str, ...]
 
     @property
     def bottom(self) -> float:
@@ -46,14 +46,14 @@ class ComponentBox:
 class LinkArrow:
     """A drawn link: its corners from tail to tip, and the place of its label."""
 
-    points: tuple[Point, ...]
+    corners: tuple[Point, ...]
     label: PlacedLabel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StructureLayout:
-    boxes: dict[str, ComponentBox]
-    arrows: dict[str, LinkArrow]
+    box_by_component: dict[str, ComponentBox]
+    arrow_by_link: dict[str, LinkArrow]
     width: float
     height: float
 
@@ -81,8 +81,8 @@ def lay_out_structure(structure: ControlStructureModel, least_text_lines: int = 
     areas = [(box.x, box.y, box.x + box.width, box.bottom) for box in boxes.values()]
     labels = place_labels(words, points, areas)
     return StructureLayout(
-        boxes=boxes,
-        arrows={name: LinkArrow(points=points[name], label=labels[name]) for name in structure.links},
+        box_by_component=boxes,
+        arrow_by_link={name: LinkArrow(corners=points[name], label=labels[name]) for name in structure.links},
         width=max(box.x + box.width for box in boxes.values()) + DRAWING_EDGE,
         height=max(box.bottom for box in boxes.values()) + DRAWING_EDGE,
     )
@@ -109,7 +109,7 @@ def _place_boxes(structure: ControlStructureModel, least_text_lines: int) -> dic
             width=width * COLUMN_PITCH - BOX_GAP + all_along,
             height=heights[row],
             row=row,
-            lines=_box_lines(component),
+            text_lines=_box_lines(component),
         )
     return boxes
 

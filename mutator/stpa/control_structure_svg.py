@@ -13,7 +13,7 @@ from mutator.stpa.control_structure_layout import (
 )
 from mutator.stpa.hazard_analysis_yaml import ComponentKind, HazardAnalysis
 
-FILL_BY_KIND = {
+FILL_BY_COMPONENT_KIND = {
     ComponentKind.HUMAN: "#ececec",
     ComponentKind.CONTROLLER: "#dbe9f6",
     ComponentKind.ESTIMATOR: "#e3f1ea",
@@ -79,13 +79,13 @@ def _link_arrows(analysis: HazardAnalysis, layout: StructureLayout) -> Iterator[
     for name, link in analysis.structure.links.items():
         colour = FAULT_COLOUR if name in faulty else ACTION_COLOUR if name in actions else FEEDBACK_COLOUR
         width = 2.6 if colour != FEEDBACK_COLOUR else 1.4
-        yield _arrow_path(layout.arrows[name].points, colour, width, dashed=not link.studied)
+        yield _arrow_path(layout.arrow_by_link[name].corners, colour, width, dashed=not link.studied)
 
 
 def _arrow_path(points: Iterable[Point], colour: str, width: float, *, dashed: bool = False) -> str:
     dashes = ' stroke-dasharray="6 4"' if dashed else ""
     return (
-        f'<path d="{arrow_and_box_svg.path_data(points)}" fill="none" stroke="{colour}" '
+        f'<path d="{arrow_and_box_svg.svg_path_data(points)}" fill="none" stroke="{colour}" '
         f'stroke-width="{width}"{dashes} marker-end="url(#tip-{colour[1:]})"/>'
     )
 
@@ -93,9 +93,9 @@ def _arrow_path(points: Iterable[Point], colour: str, width: float, *, dashed: b
 def _component_boxes(analysis: HazardAnalysis, layout: StructureLayout) -> Iterator[str]:
     faulty = factors_with_faults_by_place(analysis)
     for name, component in analysis.structure.components.items():
-        box = layout.boxes[name]
+        box = layout.box_by_component[name]
         edge, width = (FAULT_COLOUR, 3) if name in faulty else (INK_COLOUR, 1.2)
-        look = f' fill="{FILL_BY_KIND[component.kind]}" stroke="{edge}" stroke-width="{width}"'
+        look = f' fill="{FILL_BY_COMPONENT_KIND[component.kind]}" stroke="{edge}" stroke-width="{width}"'
         rectangle = arrow_and_box_svg.box_rectangle(box, look)
         yield f"<g><title>{_escaped_line(component.about)}</title>{rectangle}"
         yield from _box_text(box)
@@ -103,8 +103,8 @@ def _component_boxes(analysis: HazardAnalysis, layout: StructureLayout) -> Itera
 
 
 def _box_text(box: ComponentBox) -> Iterator[str]:
-    first = box.y + box.height / 2.0 - 17 * (len(box.lines) - 1) / 2.0 + 5
-    for i, line in enumerate(box.lines):
+    first = box.y + box.height / 2.0 - 17 * (len(box.text_lines) - 1) / 2.0 + 5
+    for i, line in enumerate(box.text_lines):
         name = "" if i else ' class="name"'
         yield (
             f'<text{name} x="{box.x + box.width / 2.0:.1f}" y="{first + 17 * i:.1f}" '
@@ -115,7 +115,7 @@ def _box_text(box: ComponentBox) -> Iterator[str]:
 def _link_labels(analysis: HazardAnalysis, layout: StructureLayout) -> Iterator[str]:
     faulty = factors_with_faults_by_place(analysis)
     for name, link in analysis.structure.links.items():
-        arrow = layout.arrows[name]
+        arrow = layout.arrow_by_link[name]
         yield arrow_and_box_svg.label_line(arrow, _escaped_line(link.label))
         if name in faulty:
             yield arrow_and_box_svg.label_line(

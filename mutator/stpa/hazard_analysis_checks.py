@@ -244,11 +244,11 @@ def _factor_problems(
                     remedy="correct the name" + spelling_suggestion(fault, list(specs)),
                 )
         if all_exist and factor.faults:
-            yield from _wrong_places(analysis, keys, factor, specs, manifest)
-            yield from _wrong_aims(analysis, keys, factor, specs)
+            yield from _factor_place_problems(analysis, keys, factor, specs, manifest)
+            yield from _factor_aim_problems(analysis, keys, factor, specs)
 
 
-def _wrong_places(
+def _factor_place_problems(
     analysis: HazardAnalysis,
     keys: KeyPath,
     factor: CausalFactorModel,
@@ -265,7 +265,7 @@ def _wrong_places(
         )
 
 
-def _wrong_aims(
+def _factor_aim_problems(
     analysis: HazardAnalysis, keys: KeyPath, factor: CausalFactorModel, specs: SpecsByName
 ) -> Iterator[MutatorError]:
     hazards = {hazard for action in factor.leads_to for hazard in analysis.unsafe_actions[action].hazards}

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from mutator._common.hashing import added_field
-from mutator._common.phrase_texts import measured_number
+from mutator._common.phrase_texts import measured_number_text
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 
 SEVERITY_CLASSES = ("S0", "S1", "S2", "S3")  # from ISO 26262-3, the mildest first
@@ -68,7 +68,7 @@ class SeverityRule:
         """Return the rule as it applies to a hazard of a target."""
         return replace(self, hazard=hazard, metrics=tuple(metric_by_value[name] for name, _ in self.units))
 
-    def class_of(self, metrics: Mapping[str, float]) -> str | None:
+    def class_of_metrics(self, metrics: Mapping[str, float]) -> str | None:
         """Return the highest class whose bounds all metrics reach; None if a metric has no value."""
         if any(name not in metrics for name in self.metrics):
             return None
@@ -116,25 +116,25 @@ class SeverityScale:
             name: f"{words.get(name) or about} (severity {name})".lstrip() for name, _, about in self.classes
         }
 
-    def class_of(self, delta_v_mps: float) -> str:
+    def class_of_delta_v(self, delta_v_mps: float) -> str:
         """Return the class of a delta-v in m/s, 0 or more; a value on a bound is in the upper class."""
         return [name for name, least, _ in self.classes if delta_v_mps >= least][-1]
 
-    def with_rules_over(self, metrics: Collection[str]) -> "SeverityScale":
+    def with_only_rules_of_metrics(self, metrics: Collection[str]) -> "SeverityScale":
         """Return the scale with those rules alone whose metrics are all among `metrics`."""
         return replace(self, rules=tuple(rule for rule in self.rules if {*rule.metrics} <= {*metrics}))
 
-    def describe_basis(self, hazard: str, metrics: Mapping[str, float]) -> str:
+    def describe_values_behind_class(self, hazard: str, metrics: Mapping[str, float]) -> str:
         """Return the values that give a hazard its class: `delta-v 9.77 m/s`."""
         for rule in self.rules:
             if rule.hazard == hazard:
                 values = zip(rule.metrics, rule.units, strict=True)
                 texts = [
-                    f"{name.replace('_', ' ')} {measured_number(metrics[name], unit)}"
+                    f"{name.replace('_', ' ')} {measured_number_text(metrics[name], unit)}"
                     for name, (_, unit) in values
                 ]
                 return f"{hazard}: {', '.join(texts)} ({rule.name.replace('_', ' ')})"
-        return f"delta-v {measured_number(metrics[DELTA_V_NAME], 'm/s')}"
+        return f"delta-v {measured_number_text(metrics[DELTA_V_NAME], 'm/s')}"
 
     def worst_hazard(
         self, hazards: Iterable[tuple[str, float]], metrics: Mapping[str, float], t_end: float | None
@@ -151,9 +151,9 @@ class SeverityScale:
         classified = []
         for name in in_drive:
             if name in rule_by_hazard:
-                severity = rule_by_hazard[name].class_of(metrics)
+                severity = rule_by_hazard[name].class_of_metrics(metrics)
             else:
-                severity = self.class_of(delta_v) if name == contact and delta_v is not None else None
+                severity = self.class_of_delta_v(delta_v) if name == contact and delta_v is not None else None
             if severity is not None:
                 classified.append(ClassifiedHazard(name, severity))
         return max(classified, key=lambda hazard: hazard.severity, default=None)

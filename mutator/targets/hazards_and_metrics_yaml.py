@@ -161,7 +161,8 @@ def _build_hazard(
         when=when,
         required_stl=model.required_stl or "",
         for_s=model.for_s,
-        margin=manifest_formula(model.margin, names, source, (*keys, "margin")) or _margin_of(when),
+        margin=manifest_formula(model.margin, names, source, (*keys, "margin"))
+        or _margin_formula_of_comparison(when),
         unit=model.unit,
         phrase=build_phrase(model.phrase, (LATER_HOLE, *metrics), source, (*keys, "phrase")),
         terminal_condition=manifest_condition(terminal, names, source, (*keys, "terminal"))
@@ -170,7 +171,7 @@ def _build_hazard(
     )
 
 
-def _margin_of(when: str) -> str:
+def _margin_formula_of_comparison(when: str) -> str:
     """Return the margin of a single comparison: the difference of its two sides, positive while it does not
     hold.
     """

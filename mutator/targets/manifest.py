@@ -153,7 +153,7 @@ class TargetManifest:
         channels = [channel.name for channel in self.channels]
         names = self.observation.names_for_trace_formulas(channels)
         needed = self.observation.names_with_inputs(
-            _names_in_criteria(self.hazard_rules, self.metrics, names) | set(names_in(self.speed or "0"))
+            _names_used_in_criteria(self.hazard_rules, self.metrics, names) | set(names_in(self.speed or "0"))
         )
         return tuple(channel for channel in self.channels if channel.name in needed)
 
@@ -242,7 +242,7 @@ class TargetManifest:
         return replace(self, entry_args=(*self.entry_args, *self.film.run_args))
 
 
-def _names_in_criteria(
+def _names_used_in_criteria(
     rules: Iterable[Hazard], metrics: Iterable[Metric], names: Collection[str]
 ) -> set[str]:
     texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal_condition)]

@@ -51,7 +51,7 @@ def build_message_readers(
 
 def _build_reader(name: str, model: MessageReaderModel, source: YamlSource) -> MessageReader:
     keys: KeyPath = ("messages", name)
-    location = model.at.location(source, (*keys, "at"))
+    location = model.at.build_location(source, (*keys, "at"))
     if location.anchor.kind in VALUE_ANCHORS | LOAD_TIME_ANCHORS:
         raise source.error(
             (*keys, "at"), f"`{location.anchor.kind.value}`", expected="a statement, such as `entry: true`"

@@ -69,7 +69,7 @@ class ObservationModel(StrictModel, title="The observation"):
 
 
 def build_observation(model: ObservationModel, source: YamlSource) -> Observation:
-    location = model.at.location(source, ("observation", "at"))
+    location = model.at.build_location(source, ("observation", "at"))
     if location.anchor.kind in VALUE_ANCHORS | LOAD_TIME_ANCHORS:
         raise source.error(
             ("observation", "at", location.anchor.kind.value),
@@ -78,7 +78,7 @@ def build_observation(model: ObservationModel, source: YamlSource) -> Observatio
         )
     with source.locating_errors(("observation", "at", "file")):
         clean_relative_path(location.path)
-    _check_names(model, source)
+    _check_value_names(model, source)
     time = None if model.time is None else _checked_expression(model.time, source, ("observation", "time"))
     values = tuple(
         ObservedValue(
@@ -93,11 +93,11 @@ def build_observation(model: ObservationModel, source: YamlSource) -> Observatio
         location=location,
         time=time,
         values=values,
-        derived=_build_derived(model, source, [TIME, *model.values]),
+        derived=_build_derived_values(model, source, [TIME, *model.values]),
     )
 
 
-def _check_names(model: ObservationModel, source: YamlSource) -> None:
+def _check_value_names(model: ObservationModel, source: YamlSource) -> None:
     for key, names in (("values", model.values), ("derived", model.derived)):
         for name in names:
             good = name.isidentifier() and not keyword.iskeyword(name) and not name.startswith("_")
@@ -110,7 +110,7 @@ def _check_names(model: ObservationModel, source: YamlSource) -> None:
                 )
 
 
-def _build_derived(
+def _build_derived_values(
     model: ObservationModel, source: YamlSource, names: list[str]
 ) -> tuple[ObservedValue, ...]:
     values = []

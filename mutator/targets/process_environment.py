@@ -17,7 +17,7 @@ FIXED_VARIABLES = {
     "JE_ARROW_MALLOC_CONF": "background_thread:false",
 }
 _REFUSED_PREFIXES = ("PYTHON", "LD_")  # prefixes of variables that change the interpreter or what it loads
-_HARNESS_VARIABLES = ("TMPDIR", *INHERITED_VARIABLES, *FIXED_VARIABLES)
+_VARIABLES_SET_BY_HARNESS = ("TMPDIR", *INHERITED_VARIABLES, *FIXED_VARIABLES)
 _NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 
@@ -30,7 +30,7 @@ def check_environment(env: Mapping[str, str], source: YamlSource) -> None:
             continue
         if not _NAME_PATTERN.match(name):
             raise source.error(("env", name), f"'{name}'", expected="a name of letters, digits and _")
-        if name in _HARNESS_VARIABLES or name.startswith(_REFUSED_PREFIXES):
+        if name in _VARIABLES_SET_BY_HARNESS or name.startswith(_REFUSED_PREFIXES):
             fixed = f" (it sets {name} to '{FIXED_VARIABLES[name]}')" if name in FIXED_VARIABLES else ""
             raise source.error(
                 ("env", name),

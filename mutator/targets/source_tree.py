@@ -15,10 +15,10 @@ from mutator._common.files import check_path_encodable
 from mutator._common.hashing import canonical_json, digest
 from mutator.errors import MutatorError
 
-T = TypeVar("T")
+DerivedT = TypeVar("DerivedT")
 MOST_SOURCE_BYTES = 1_000_000  # bytes of a Python file
 MOST_TREE_BYTES = 128_000_000  # bytes of all files, which are kept in memory
-_FILE_COUNT_OF_LINK = 100  # files for which a link counts: it takes longer, and links in links multiply
+_FILES_COUNTED_PER_LINK = 100  # files for which a link counts: it takes longer, and links in links multiply
 MOST_FILES = 50_000  # files and folders below the folders that a manifest's globs name
 _WILDCARD_PATTERN = re.compile(r"(\*\*/|\*\*|\*|\?)")  # special characters in a glob
 
@@ -41,13 +41,13 @@ class SourceTree:
     )
     _derived_from_all: dict[Callable[..., Any], Any] = field(default_factory=dict, repr=False, compare=False)
 
-    def derive_once_from_all(self, make: Callable[["SourceTree"], T]) -> T:
+    def derive_once_from_all(self, make: Callable[["SourceTree"], DerivedT]) -> DerivedT:
         """Return `make(tree)`, called once; errors of `make` pass through."""
         if make not in self._derived_from_all:
             self._derived_from_all[make] = make(self)
-        return cast("T", self._derived_from_all[make])
+        return cast("DerivedT", self._derived_from_all[make])
 
-    def derive_once(self, path: str, make: Callable[[str, bytes, Path], T]) -> T:
+    def derive_once(self, path: str, make: Callable[[str, bytes, Path], DerivedT]) -> DerivedT:
         """Return `make(path, data, root)` for a file of the target, called once per path; `root` is the
         file's folder.
 
@@ -64,9 +64,9 @@ class SourceTree:
                 )
             root = self.overlay if self.overlay and path in self.overlaid_paths else self.root
             self._derived_by_file[key] = make(path, self.files[path], root)
-        return cast("T", self._derived_by_file[key])
+        return cast("DerivedT", self._derived_by_file[key])
 
-    def relative_name(self, path: str) -> str:
+    def path_as_in_specs(self, path: str) -> str:
         """Return the path of a file as a spec names it, relative to the root or the overlay."""
         for folder in (self.root, self.overlay or self.root):
             path = path.removeprefix(f"{folder}{os.sep}")
@@ -76,8 +76,8 @@ class SourceTree:
     def digest_by_path(self) -> dict[str, str]:
         return {path: digest(data) for path, data in self.files.items()}
 
-    def digest_with(self, changed: Mapping[str, bytes]) -> str:
-        return _digest_of({**self._digest_inputs, **_digest_inputs_of(changed)})
+    def digest_with_changes(self, changed: Mapping[str, bytes]) -> str:
+        return _tree_digest_of({**self._digest_inputs, **_digest_inputs_of(changed)})
 
 
 def _digest_inputs_of(files: Mapping[str, bytes]) -> dict[str, str]:
@@ -85,7 +85,7 @@ def _digest_inputs_of(files: Mapping[str, bytes]) -> dict[str, str]:
     return {path: canonical_json([path, digest(data)]) for path, data in files.items()}
 
 
-def _digest_of(entries: Mapping[str, str]) -> str:
+def _tree_digest_of(entries: Mapping[str, str]) -> str:
     return digest(f"[{','.join(entries[path] for path in sorted(entries))}]".encode())
 
 
@@ -118,7 +118,7 @@ def read_tree(
     return SourceTree(
         root=root,
         files=files,
-        digest=_digest_of(entries),
+        digest=_tree_digest_of(entries),
         _digest_inputs=entries,
         overlay=overlay,
         overlaid_paths=frozenset(laid_over),
@@ -131,10 +131,10 @@ def _read_files(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict
 
     def count(path: Path) -> None:
         nonlocal file_count
-        file_count += _FILE_COUNT_OF_LINK if path.is_symlink() else 1
+        file_count += _FILES_COUNTED_PER_LINK if path.is_symlink() else 1
         if file_count > MOST_FILES:
             raise MutatorError(
-                f"more than {MOST_FILES:,} files and folders (a link counts as {_FILE_COUNT_OF_LINK})",
+                f"more than {MOST_FILES:,} files and folders (a link counts as {_FILES_COUNTED_PER_LINK})",
                 where=root,
                 expected="the source of one controller",
                 remedy="name narrower folders in the manifest's `files`",

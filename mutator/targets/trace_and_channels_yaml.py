@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator._common.extension_doors import IMPORTERS
+from mutator._common.extension_doors import TRACE_IMPORTER_DOOR
 from mutator.config.phrases_yaml import ChangePhraseModel, build_phrase
 from mutator.config.unit_symbol_field import UnitSymbol
 from mutator.config.yaml_files import StrictModel
@@ -84,8 +84,8 @@ def build_channels(
 ) -> tuple[Channel, ...]:
     """Read a manifest's channels, in order; MutatorError for an invalid trace or channel."""
     suffix = Path(trace.file).suffix.removeprefix(".")
-    if Path(trace.file).name != trace.file or not (suffix and IMPORTERS.has_name(suffix)):
-        suffixes = ", ".join(f".{name}" for name in IMPORTERS.names())
+    if Path(trace.file).name != trace.file or not (suffix and TRACE_IMPORTER_DOOR.has_name(suffix)):
+        suffixes = ", ".join(f".{name}" for name in TRACE_IMPORTER_DOOR.names())
         raise source.error(
             ("trace", "file"),
             f"'{trace.file}'",

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from functools import lru_cache
 
-from mutator._common.message_text import counted, operator_hint, spelling_suggestion
+from mutator._common.message_text import counted, python_operator_hint, spelling_suggestion
 from mutator.errors import MutatorError
 
 TIME = "t"  # s; every target has it
@@ -134,7 +134,7 @@ def parse_expression(text: str) -> ast.expr:
         tree = ast.parse(text.strip(), mode="eval").body
         return _GoldenNameJoiner().visit(tree) if GOLDEN_PREFIX in text else tree
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        hint = operator_hint(text) or "rewrite it"
+        hint = python_operator_hint(text) or "rewrite it"
         raise _syntax_error(f"{getattr(error, 'msg', error)}", text, None, hint) from None
 
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from mutator._common.phrase_texts import planned_number
+from mutator._common.phrase_texts import planned_number_text
 from mutator._common.random_streams import random_generator
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
@@ -30,7 +30,7 @@ def trigger_at_time(time_s: float, *, name: str | None = None, hold_s: float | N
     if not math.isfinite(time_s):
         raise MutatorError(f"time {time_s}", expected="a finite number of seconds")
     hold = Hold.TO_END if hold_s is None else Hold.FOR
-    name = name or f"at {planned_number(time_s, 's')}"
+    name = name or f"at {planned_number_text(time_s, 's')}"
     return Trigger(name=name, condition=f"t >= {float(time_s)!r}", hold=hold, hold_s=hold_s)
 
 
@@ -43,7 +43,7 @@ def named_with_hold(trigger: Trigger) -> Trigger:
     """Return the trigger with its hold in its name, `at 3 s for 2 s`; unchanged without the hold `for`."""
     if trigger.hold is not Hold.FOR or trigger.hold_s is None:
         return trigger
-    return replace(trigger, name=f"{trigger.name} for {planned_number(trigger.hold_s, 's')}")
+    return replace(trigger, name=f"{trigger.name} for {planned_number_text(trigger.hold_s, 's')}")
 
 
 def trigger_time_s(trigger: Trigger) -> float | None:

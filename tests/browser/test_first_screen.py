@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from mutator._common.message_text import bind_numbers
+from mutator._common.message_text import with_unbreakable_numbers
 from mutator.outcomes.series_sampling import write_sampled_series
 from mutator.report import report_builder
 from mutator.report.panels import figures_panel
@@ -75,14 +75,14 @@ def test_the_worst_experiment_is_first_and_opens(replayed: Path, opened: Callabl
     page.wait_for_selector("#worst-replay .replay-player")
     rows = {row.experiment_id: row for row in Results(replayed).rows()}
     worst = rows[worst_id(replayed)]
-    assert page.inner_text(".worst .fault") == bind_numbers(worst.fault)
-    assert page.inner_text(".worst h2") == bind_numbers(worst.sentence or worst.fault)
+    assert page.inner_text(".worst .fault") == with_unbreakable_numbers(worst.fault)
+    assert page.inner_text(".worst h2") == with_unbreakable_numbers(worst.sentence or worst.fault)
     box = page.locator("#worst-replay .controls").bounding_box()
     assert box["y"] + box["height"] < 900, "the controls are not on the first screen"
     page.click(".worst a")
     assert page.evaluate("location.hash") == f"#e={worst.experiment_id}"
     page.wait_for_selector("#experiment .replay-player")
-    assert page.inner_text("#experiment-title") == bind_numbers(worst.sentence or worst.fault)
+    assert page.inner_text("#experiment-title") == with_unbreakable_numbers(worst.sentence or worst.fault)
 
 
 def test_the_replay_needs_no_other_file(replayed: Path, opened: Callable[..., Any]) -> None:

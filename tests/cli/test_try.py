@@ -96,7 +96,7 @@ def test_a_sentence_is_not_folded_between_a_number_and_its_unit(
     result = SimpleNamespace(
         record=record(), sentence=sentence, verdict={"reaction_time_s": None}, _manifest=lambda: None
     )
-    experiment_printing.print_answer(Terminal(), cast(Any, result))
+    experiment_printing.print_ending_in_words(Terminal(), cast(Any, result))
     out = capsys.readouterr().out
     assert sentence in " ".join(out.split())
     assert all(value in out for value in ("11.7 m/s", "9.5 s", "20 mph"))

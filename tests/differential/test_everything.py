@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
-from mutator._common.extension_doors import OPERATORS
+from mutator._common.extension_doors import OPERATOR_DOOR
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import AnchorKind
 from mutator.workspace import Workspace
@@ -127,7 +127,7 @@ def everything(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Work
     campaign = yaml.safe_load((toy.library / "campaigns" / "toy.yaml").read_text())
     del campaign["sample"]
     operators = {
-        "operators": list(OPERATORS.shipped_names()),
+        "operators": list(OPERATOR_DOOR.shipped_names()),
         "in": ["toycar/sensing.py", "toycar/driver.py"],
         "sample": 40,
     }

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.execution.campaign_running import run_campaign
-from mutator.outcomes.hazard_and_metric_judgement import formula_variables
+from mutator.outcomes.hazard_and_metric_judgement import formula_values_by_name
 from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.triggers.trace_formulas import condition_at_each_step
 from mutator.workspace import Workspace
@@ -82,7 +82,7 @@ def test_golden_runs_reach_the_contexts_of_the_original(
     manifest = workspace.manifest("openpilot")
     trace = load_trace(manifest, quickstart / "golden" / scenario)
     table = workspace.context_table("accelerate_decelerate")
-    values = formula_variables(manifest, trace)
+    values = formula_values_by_name(manifest, trace)
     armed = trace["t"] >= 1.5
     reached = [row.id for row in table.rows if (condition_at_each_step(row.condition, values) & armed).any()]
     assert len(reached) == CONTEXTS[scenario]

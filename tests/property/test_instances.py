@@ -45,7 +45,7 @@ def statements(file: ParsedFile) -> Iterator[FaultLocation]:
                     site = file.resolve_statement(location)
                 except MutatorError:
                     continue
-                if site.is_alone and site.first_line != site.end_line:
+                if site.is_alone_on_line and site.first_line != site.end_line:
                     yield location
 
 

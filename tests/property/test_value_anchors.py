@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.extension_doors import OPERATORS
+from mutator._common.extension_doors import OPERATOR_DOOR
 from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FaultModels
@@ -177,7 +177,7 @@ def mutations(file: ParsedFile) -> Iterator[Mutation]:
     tree = SourceTree(root=Path(), files={file.path: file.data}, digest="", _digest_inputs={})
     facts = statement_facts_of(tree, file.path)
     for function in file.functions_by_name:
-        yield from mutations_of(file, facts, function, models(), OPERATORS.shipped_names())
+        yield from mutations_of(file, facts, function, models(), OPERATOR_DOOR.shipped_names())
 
 
 def checked_mutations(names: Sequence[str], count: int) -> int:

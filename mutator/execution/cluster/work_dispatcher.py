@@ -14,7 +14,7 @@ from typing import Any
 
 from distributed import Client, Future
 
-from mutator._common.typed_json import from_json_types
+from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import DiskFull, MutatorError, SchedulerGone, WorkerCutOff, WorkerRefused
 from mutator.execution.cluster import worker_tasks
 from mutator.execution.cluster.bundle import Bundle
@@ -292,7 +292,7 @@ class WorkDispatcher:
             worker.unstored_machine_facts
         ):  # before its first results are written, run.json must name the worker
             self._session.note_machine(
-                from_json_types(WorkerMachine, {"worker": worker.name, **worker.unstored_machine_facts})
+                typed_value_from_json(WorkerMachine, {"worker": worker.name, **worker.unstored_machine_facts})
             )
             worker.unstored_machine_facts = {}
         for (

@@ -16,14 +16,14 @@ from mutator.results.result_rows import ResultRow
 from mutator.results.table_reader import Results
 from mutator.store.plan_file import load_experiments
 
-POSSIBLE_FAILURES = (Outcome.HAZARD, Outcome.SDC, Outcome.MASKED, Status.CRASHED, Status.TIMEOUT)
+ENDINGS_THAT_CAN_FAIL = (Outcome.HAZARD, Outcome.SDC, Outcome.MASKED, Status.CRASHED, Status.TIMEOUT)
 _NOT_XML_PATTERN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def _junit_xml(request: ExportRequest) -> bytes:
     """Return the XML. MutatorError for an outcome that cannot be a failure."""
     folder, failures = request.folder, request.selection.failures
-    names = [ending.value for ending in POSSIBLE_FAILURES]
+    names = [ending.value for ending in ENDINGS_THAT_CAN_FAIL]
     if unknown := [name for name in failures if name not in names]:
         raise MutatorError(f"'{unknown[0]}'", argument="failures", expected=f"one of {', '.join(names)}")
     rows = {row.experiment_id: row for row in Results.up_to_date(folder.path).rows()}
@@ -36,8 +36,8 @@ def _junit_xml(request: ExportRequest) -> bytes:
         suite = ET.SubElement(root, "testsuite", name=name)
         for experiment in suites[name]:
             suite.append(_test_case_element(experiment, rows.get(experiment.id), failures))
-        _set_counts(suite)
-    _set_counts(root)
+        _set_suite_counts(suite)
+    _set_suite_counts(root)
     ET.indent(root)
     data: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
     return data + b"\n"
@@ -72,7 +72,7 @@ def _test_case_element(
     return case
 
 
-def _set_counts(element: ET.Element) -> None:
+def _set_suite_counts(element: ET.Element) -> None:
     element.set("tests", str(len(list(element.iter("testcase")))))
     for attribute, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         element.set(attribute, str(len(list(element.iter(tag)))))

@@ -41,7 +41,7 @@ TimedValues = list[tuple[float, float]]  # time (s) and value
 
 
 @dataclass(frozen=True, kw_only=True)
-class Topic:
+class TraceTopic:
     name: str
     metadata: Mapping[str, str]  # unit, role, component, about
     values: TimedValues
@@ -134,12 +134,12 @@ class ExperimentFileBuilder:
             )
         return self._traces.traces_of(experiment_id)
 
-    def _series_topics(self, record: Record) -> tuple[list[Topic], list[Topic]]:
+    def _series_topics(self, record: Record) -> tuple[list[TraceTopic], list[TraceTopic]]:
         stored_series = self._series.load_series(record.experiment_id, record)
         assert stored_series is not None  # `has` was checked
         golden, faulty = stored_series
         points = faulty.extra_points
-        topics: tuple[list[Topic], list[Topic]] = ([], [])
+        topics: tuple[list[TraceTopic], list[TraceTopic]] = ([], [])
         for row, about in enumerate(golden.facts["channels"]):
             is_of_channel = points.channel_numbers == row
             runs = ((golden, points.golden_values), (faulty, points.faulty_values))
@@ -149,7 +149,7 @@ class ExperimentFileBuilder:
                     *_timed_values(points.t[is_of_channel], more[is_of_channel]),
                 ]
                 topics_of_run.append(
-                    Topic(name=about["name"], metadata=_topic_metadata(about), values=sorted(pairs))
+                    TraceTopic(name=about["name"], metadata=_topic_metadata(about), values=sorted(pairs))
                 )
         return topics
 
@@ -190,7 +190,7 @@ class _McapWriter:
     def add_metadata(self, name: str, facts: dict[str, str]) -> None:
         self._writer.add_metadata(name, facts)
 
-    def add_topic(self, run: str, topic: Topic) -> None:
+    def add_topic(self, run: str, topic: TraceTopic) -> None:
         unit = topic.metadata["unit"]
         text = f"{topic.metadata['about'] or topic.name} [{unit}]"
         schema = self._register_schema(
@@ -246,14 +246,16 @@ def _selected_ids(folder: RunFolder, only: str | None) -> list[str]:
     return [row["experiment_id"] for row in matching_items(rows, only, columns, lambda row: row)]
 
 
-def _trace_topics(trace: Trace, manifest: TargetManifest) -> Iterator[Topic]:
+def _trace_topics(trace: Trace, manifest: TargetManifest) -> Iterator[TraceTopic]:
     for channel in (*manifest.compared_channels, *manifest.non_actuator_channels):
         if channel.name in trace:
             clock = own_times(channel.name)
             time = trace[clock if clock in trace else manifest.time_channel]
             about = {"unit": channel.unit, "role": channel.role.value}
             about |= {"component": channel.component, "about": channel.about}
-            yield Topic(name=channel.name, metadata=about, values=_timed_values(time, trace[channel.name]))
+            yield TraceTopic(
+                name=channel.name, metadata=about, values=_timed_values(time, trace[channel.name])
+            )
 
 
 def _topic_metadata(about: Mapping[str, Any]) -> dict[str, str]:

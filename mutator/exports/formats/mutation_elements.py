@@ -157,7 +157,7 @@ def mutant_status_as_json(experiments: Sequence[Experiment], records: Mapping[st
     if hazardous:
         names = sorted({name for e in hazardous for name, _ in record_by_experiment[e].hazards})
         status, reason = "Survived", f"{', '.join(names)} in {len(hazardous)} of {drives}"
-        reason += f": {_listed([e.drive_label for e in hazardous])}"
+        reason += f": {_joined_names([e.drive_label for e in hazardous])}"
     elif missing:
         status, reason = "Pending", f"not run yet: {missing} of {drives}"
     elif records_by_status[Status.INVALID_MUTANT]:
@@ -185,7 +185,7 @@ def mutant_status_as_json(experiments: Sequence[Experiment], records: Mapping[st
     }
 
 
-def _listed(names: Sequence[str]) -> str:
+def _joined_names(names: Sequence[str]) -> str:
     """Return the names joined by `; `; only the first few of many."""
     more = len(names) - _MOST_LISTED_DRIVES
     return "; ".join(names[:_MOST_LISTED_DRIVES]) + (f"; and {more} more" if more > 0 else "")

@@ -11,7 +11,7 @@ from mutator.operators.statement_facts import StatementFacts, extent_of
 
 def _rules(expression: Expression, facts: StatementFacts) -> Iterator[MutationRule]:
     node = expression.node
-    if isinstance(node, ast.Name) and extent_of(node) not in facts.reported_name_extents:
+    if isinstance(node, ast.Name) and extent_of(node) not in facts.logged_name_extents:
         for name in replacements_of_name(facts.function_names, node, facts.types_at(node.lineno)):
             yield mutation_rule("operator_name", to=name)
 

@@ -5,7 +5,7 @@ the pages beside the report. The function returns None if there is nothing to sh
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from mutator._common.extension_doors import STUDIES
+from mutator._common.extension_doors import STUDY_DOOR
 from mutator.report.panel import Panel, ReportPage
 from mutator.report.panels import (
     failed_runs_panel,
@@ -85,7 +85,7 @@ def build_study_page(run: ReportedRun) -> ReportPage | None:
     """
     if not run.published_work:
         return None
-    with STUDIES.blaming_package(run.folder.head.study or ""):
+    with STUDY_DOOR.blaming_package(run.folder.head.study or ""):
         panels = build_panels(run, run.published_work.panels)
         if not panels:
             return None

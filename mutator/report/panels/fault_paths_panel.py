@@ -103,7 +103,7 @@ def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
     html = rendered(
         _HTML_TEMPLATE,
         about=_INTRODUCTION,
-        drawing=_draw(structure, counts, links) if structure else None,
+        drawing=_draw_path_counts(structure, counts, links) if structure else None,
         kinds=list(counts),
         all=ALL_FAULT_TYPES,
         counts=counts,
@@ -122,7 +122,7 @@ class _Drawing(NamedTuple):
     omitted: str  # components that no path leads to
 
 
-def _draw(
+def _draw_path_counts(
     structure: ControlStructureModel, counts: Mapping[str, PathCounts], links: LinkPartsByName
 ) -> _Drawing:
     drawn = structure_with_paths(structure, links)

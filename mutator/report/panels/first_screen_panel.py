@@ -63,7 +63,7 @@ def build_first_screen_panel(run: ReportedRun) -> Panel:
     worst = worst_row(run)
     frame = run.frame.assign(warning=warning_filter_values(run.frame))
     numbers, note = key_numbers(frame, has_alerts=run.folder.has_alerts), sample_note(run.folder)
-    kicker = _kicker(worst) if worst else ""
+    kicker = _words_before_worst_experiment(worst) if worst else ""
     change = describe_change(run)
     lines = [f"* **{number.value}** {number.meaning} ({number.evidence})" for number in numbers]
     no_canary = no_canary_note(run.folder, run.results)
@@ -86,7 +86,7 @@ def build_first_screen_panel(run: ReportedRun) -> Panel:
     return Panel(anchor="first", link="Summary", markdown="\n\n".join(filter(None, parts)), html=html)
 
 
-def _kicker(worst: ResultRow) -> str:
+def _words_before_worst_experiment(worst: ResultRow) -> str:
     return "The worst experiment" if worst.hazards else "No hazard occurred. The worst experiment"
 
 

@@ -16,7 +16,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines_with_outcomes import (
     ENDINGS_WORST_FIRST,
-    LASTING_VALUES,
+    PERMANENCE_VALUES,
     LineMark,
     MarkedFile,
 )
@@ -85,7 +85,7 @@ def build_source_panel(run: ReportedRun) -> Panel | None:
         signs=_ENDING_SIGNS,
         meanings=_ENDING_MEANINGS,
         files=source.files,
-        lasting=LASTING_VALUES,
+        lasting=PERMANENCE_VALUES,
         describe=_describe_file,
         rows=_rows_html,
     )
@@ -111,11 +111,11 @@ def _worst_lines_table(files: Sequence[MarkedFile]) -> TextTable:
         (
             f"{files[number].path}:{line}",
             f"`{files[number].lines[line - 1].strip()}`",
-            *(_describe_mark(marks[name]) if name in marks else "-" for name in LASTING_VALUES),
+            *(_describe_mark(marks[name]) if name in marks else "-" for name in PERMANENCE_VALUES),
         )
         for _, number, line, marks in sorted(ranked_lines, key=lambda ranked: ranked[:3])[:_MOST_LISTED_LINES]
     ]
-    return TextTable(heads=("line", "source (the worst lines)", *LASTING_VALUES), rows=rows)
+    return TextTable(heads=("line", "source (the worst lines)", *PERMANENCE_VALUES), rows=rows)
 
 
 def _describe_mark(mark: LineMark) -> str:
@@ -138,7 +138,7 @@ def _row_html(file: MarkedFile, line: int, text: Markup) -> Markup:
     marks, place = file.marks.get(line, {}), f"{file.path}:{line}"
     cells = [
         _mark_html(marks[name], line, place, name) if name in marks else _EMPTY_CELL_HTML
-        for name in LASTING_VALUES
+        for name in PERMANENCE_VALUES
     ]
     number = Markup('<a href="#{}" title="list the experiments of line {}">{}</a>').format(
         _search_fragment(place), line, line

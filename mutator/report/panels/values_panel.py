@@ -11,7 +11,7 @@ _INTRODUCTION = (
     "Each mark is an experiment: the value of its fault, in the unit of the spec, and how near it came "
     "to a hazard."
 )
-_TIMES_S = (0.5, 1.0, 2.0, 5.0, 10.0)  # reaction times of the table, besides the assumed one
+_HAZARD_WITHIN_TIMES_S = (0.5, 1.0, 2.0, 5.0, 10.0)  # reaction times of the table, besides the assumed one
 _HTML_TEMPLATE = """\
 <h2>Value and margin</h2>
 <p class="no-print">{{ about }} Colour and shape show the scenario; the dashed line is the limit. Select a
@@ -28,10 +28,10 @@ def build_values_panel(run: ReportedRun) -> Panel | None:
     """Return the panel; None if no usable experiment has a number as its value."""
     if not run.frame["value"].notna().any():
         return None
-    times = sorted({*_TIMES_S, DEFAULT_DRIVER_REACTION_S})
+    times = sorted({*_HAZARD_WITHIN_TIMES_S, DEFAULT_DRIVER_REACTION_S})
     table = TextTable(
         heads=("time from activation", "hazards that have come by then"),
-        rows=[(f"{time:g} s", _text(share_of_hazards_within(run.frame, time))) for time in times],
+        rows=[(f"{time:g} s", _share_text(share_of_hazards_within(run.frame, time))) for time in times],
     )
     markdown = (
         "## Value and margin",
@@ -46,5 +46,5 @@ def build_values_panel(run: ReportedRun) -> Panel | None:
     )
 
 
-def _text(share: Share) -> str:
+def _share_text(share: Share) -> str:
     return str(share) if share.of else "no hazard"

@@ -17,7 +17,7 @@ def pipe(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     reading, writing = os.pipe()
     os.set_inheritable(writing, True)
     monkeypatch.setenv(command_progress_events.EVENTS_FD_VARIABLE, str(writing))
-    monkeypatch.setattr(command_progress_events, "_events_pipe", None)
+    monkeypatch.setattr(command_progress_events, "_events_pipe_descriptor", None)
     yield reading
     os.close(writing)
     os.close(reading)
@@ -68,8 +68,8 @@ def test_a_file_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> N
 def test_a_command_goes_on_when_nobody_reads_its_events(monkeypatch: pytest.MonkeyPatch) -> None:
     reading, writing = os.pipe()
     os.close(reading)
-    monkeypatch.setattr(command_progress_events, "_events_pipe", writing)
+    monkeypatch.setattr(command_progress_events, "_events_pipe_descriptor", writing)
     command_progress_events.report_result("done")
     command_progress_events.report_result("again")
-    assert command_progress_events._events_pipe is None
+    assert command_progress_events._events_pipe_descriptor is None
     os.close(writing)

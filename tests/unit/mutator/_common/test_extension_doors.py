@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common import extension_doors
-from mutator._common.extension_doors import DOORS, EXPORTS, Door
+from mutator._common.extension_doors import ALL_DOORS, EXPORT_DOOR, Door
 from mutator.errors import MutatorError
 
 CLONE = Path(__file__).parents[4]
@@ -34,7 +34,7 @@ def test_a_broken_addition_is_an_error_that_names_its_package(
     monkeypatch.delitem(sys.modules, "strange_door", raising=False)
     install(project(tmp_path, "strange", source))
     with pytest.raises(MutatorError, match=r"export 'strange' of package strange 2\.5") as error:
-        EXPORTS.load("strange")
+        EXPORT_DOOR.load("strange")
     monkeypatch.delitem(sys.modules, "strange_door", raising=False)
     assert words in str(error.value) and "uninstall this package" in str(error.value)
 
@@ -42,19 +42,19 @@ def test_a_broken_addition_is_an_error_that_names_its_package(
 def test_a_name_that_two_packages_use_is_refused(tmp_path: Path, install: Callable[[Path], None]) -> None:
     install(project(tmp_path, "csv", "THING = 3"))
     with pytest.raises(MutatorError, match=r"comes from mutator and strange 2\.5"):
-        EXPORTS.load("csv")
+        EXPORT_DOOR.load("csv")
 
 
 def test_an_unknown_name_lists_those_that_exist(door_examples: Path) -> None:
     with pytest.raises(MutatorError, match=r"no export 'cvs'.*csv.*counts"):
-        EXPORTS.load("cvs")
+        EXPORT_DOOR.load("cvs")
 
 
 def test_the_page_lists_every_door() -> None:
-    assert {door for door in vars(extension_doors).values() if isinstance(door, Door)} == set(DOORS)
+    assert {door for door in vars(extension_doors).values() if isinstance(door, Door)} == set(ALL_DOORS)
     page = (CLONE / "docs" / "reference" / "doors.md").read_text()
-    for door in DOORS:
-        assert f'[project.entry-points."{door.group}"]' in page
+    for door in ALL_DOORS:
+        assert f'[project.entry-points."{door.entry_point_group}"]' in page
         assert all(f"| `{name}` |" in page for name in door.shipped_names())
 
 

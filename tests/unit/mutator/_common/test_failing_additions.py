@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import mutator
-from mutator._common.extension_doors import DOORS, EXPORTS, OPERATORS, STUDIES
+from mutator._common.extension_doors import ALL_DOORS, EXPORT_DOOR, OPERATOR_DOOR, STUDY_DOOR
 from mutator.cli.app import main
 from mutator.errors import EXIT_WRONG_INPUT, BadAddition, ResourceShortage
 from mutator.execution.distributor_choice import choose_distributor
@@ -114,8 +114,8 @@ def test_a_study_whose_panel_fails_is_named_with_its_package(tmp_path: Path) -> 
 
 
 def test_only_the_code_of_other_packages_is_blamed() -> None:
-    for door in DOORS:
-        for name in (*door.shipped_names(), *(["driving_agent_resilience"] if door is STUDIES else [])):
+    for door in ALL_DOORS:
+        for name in (*door.shipped_names(), *(["driving_agent_resilience"] if door is STUDY_DOOR else [])):
             with pytest.raises(ZeroDivisionError), door.blaming_package(name):
                 _ = 1 / 0
 
@@ -124,7 +124,7 @@ def test_only_the_code_of_other_packages_is_blamed() -> None:
     "error", [KeyboardInterrupt(), MemoryError(), ResourceShortage("no memory"), OSError(28, "full")]
 )
 def test_an_interrupt_and_a_machine_that_is_full_are_no_failures_of_a_package(error: BaseException) -> None:
-    for door, name in ((OPERATORS, "boom"), (EXPORTS, "tally")):
+    for door, name in ((OPERATOR_DOOR, "boom"), (EXPORT_DOOR, "tally")):
         with pytest.raises(type(error)) as caught, door.blaming_package(name):
             raise error
         assert caught.value is error

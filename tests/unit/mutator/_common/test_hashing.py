@@ -6,7 +6,14 @@ from dataclasses import dataclass, replace
 import pytest
 
 from mutator import model
-from mutator._common.hashing import added_field, added_values, as_json_types, content_id, digest, parse_json
+from mutator._common.hashing import (
+    added_field,
+    as_json_types,
+    content_id,
+    digest,
+    non_default_added_fields,
+    parse_json,
+)
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Method
 
 LOCATION = FaultLocation(
@@ -65,7 +72,7 @@ def test_an_added_field_at_its_default_changes_no_id() -> None:
     assert as_json_types(new_fault) == as_json_types(OLD_FAULT) and as_json_types(
         new.trigger
     ) == as_json_types(OLD.trigger)
-    assert (added_values(new), added_values(OLD)) == ({}, {})
+    assert (non_default_added_fields(new), non_default_added_fields(OLD)) == ({}, {})
 
 
 def test_an_added_field_with_another_value_changes_the_id() -> None:
@@ -78,7 +85,7 @@ def test_an_added_field_with_another_value_changes_the_id() -> None:
     fading = replace(new, trigger=Trigger(name="C1", condition=CONDITION, fade=Hold.FOR))
     assert len({OLD.id, replace(new, repeat=1).id, fading.id, of_tagged.id}) == 4
     assert as_json_types(fading.trigger)["fade"] == "for"
-    assert added_values(replace(new, repeat=1)) == {"repeat": 1}
+    assert non_default_added_fields(replace(new, repeat=1)) == {"repeat": 1}
 
 
 def test_fields_of_the_first_release_are_hashed_even_at_their_defaults() -> None:

@@ -2,7 +2,12 @@
 
 import pytest
 
-from mutator._common.message_text import bind_numbers, operator_hint, shortened_ids, unbreakable_parts
+from mutator._common.message_text import (
+    python_operator_hint,
+    shortened_ids,
+    unbreakable_parts,
+    with_unbreakable_numbers,
+)
 from mutator.campaigns.row_filters import compile_filter
 from mutator.errors import MutatorError
 from mutator.triggers.conditions import canonical_condition
@@ -19,7 +24,7 @@ from mutator.triggers.conditions import canonical_condition
     ],
 )
 def test_operators_of_other_languages_get_a_hint(text: str, hint: str) -> None:
-    assert operator_hint(text) == hint
+    assert python_operator_hint(text) == hint
 
 
 @pytest.mark.parametrize("text", ["t > 2 && v > 3", "t > 2 || v > 3", "!(t > 2)", "t = 2"])
@@ -27,8 +32,8 @@ def test_errors_in_conditions_and_filters_contain_the_hint(text: str) -> None:
     for refused in (canonical_condition, lambda text: compile_filter(text, ("t", "v"))):
         with pytest.raises(MutatorError) as caught:
             refused(text)
-        assert operator_hint(text) in str(caught.value)
-        assert caught.value.remedy == operator_hint(text)
+        assert python_operator_hint(text) in str(caught.value)
+        assert caught.value.remedy == python_operator_hint(text)
 
 
 def test_units_comparisons_and_commands_are_not_folded() -> None:
@@ -49,7 +54,7 @@ def test_a_number_in_a_page_stays_with_its_unit() -> None:
     """Commands and lists of a page are copied, so they keep their spaces."""
     text = "from 24.60 s at 3.35 m/s by 12 deg, 95 % of 3 faults: `run -n 2 --out x`"
     bound = "from 24.60_s at 3.35_m/s by 12_deg, 95_% of 3 faults: `run -n 2 --out x`"
-    assert bind_numbers(text) == bound.replace("_", "\u00a0")
+    assert with_unbreakable_numbers(text) == bound.replace("_", "\u00a0")
 
 
 def test_ids_have_eight_characters_where_that_is_unique() -> None:

@@ -3,11 +3,11 @@
 import pytest
 
 from mutator._common.phrase_texts import (
-    converted_number,
+    converted_number_text,
     fill_phrase,
-    measured_number,
-    measured_time,
-    planned_number,
+    measured_number_text,
+    measured_time_text,
+    planned_number_text,
 )
 
 
@@ -16,7 +16,7 @@ from mutator._common.phrase_texts import (
     [(123.7, "124 s"), (24.63, "24.6 s"), (37.02, "37 s"), (0.4567, "0.46 s"), (1e-12, "0 s")],
 )  # fmt: skip
 def test_a_converted_number_is_rounded_as_one_says_it(number: float, text: str) -> None:
-    assert converted_number(number, "s") == text
+    assert converted_number_text(number, "s") == text
 
 
 @pytest.mark.parametrize(
@@ -25,19 +25,19 @@ def test_a_converted_number_is_rounded_as_one_says_it(number: float, text: str) 
 )
 def test_a_measured_number_has_the_hundredths_of_tables(number: float, text: str) -> None:
     """A margin of -1.445 m in a list and an excursion of 1.445 m in a sentence are one number."""
-    assert measured_number(number, "m") == text
+    assert measured_number_text(number, "m") == text
 
 
 @pytest.mark.parametrize(
     ("number", "text"), [(50, "50 mph"), (8.0, "8 mph"), (-12.34, "-12.34 mph"), (1e20, "1e+20 mph")]
 )
 def test_a_planned_number_has_all_its_digits(number: float, text: str) -> None:
-    assert planned_number(number, "mph") == text
+    assert planned_number_text(number, "mph") == text
 
 
 def test_a_number_without_a_unit_stands_alone() -> None:
     """`-` is a unit that means none."""
-    assert (measured_number(2.0), planned_number(2.0, "-")) == ("2.00", "2")
+    assert (measured_number_text(2.0), planned_number_text(2.0, "-")) == ("2.00", "2")
 
 
 def test_the_first_text_whose_holes_have_values_is_used() -> None:
@@ -60,4 +60,4 @@ def test_the_first_text_whose_holes_have_values_is_used() -> None:
     ],
 )
 def test_a_time_has_the_hundredths_of_tables(seconds: float, text: str) -> None:
-    assert measured_time(seconds) == text
+    assert measured_time_text(seconds) == text

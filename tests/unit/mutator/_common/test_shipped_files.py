@@ -24,7 +24,7 @@ def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     with ZipFile(path, "w") as file:
         for name, data in FILES.items():
             file.writestr(name, data)
-    monkeypatch.setattr(shipped_files, "ARCHIVE_PATH", path)
+    monkeypatch.setattr(shipped_files, "SHIPPED_ARCHIVE_PATH", path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     return path
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from mutator._common.hashing import added_field, as_json_types
-from mutator._common.typed_json import from_json_types
+from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import TypeMisfit
 
 
@@ -56,7 +56,7 @@ WHOLE = Whole(
 def test_what_was_written_is_read() -> None:
     for whole in (WHOLE, Whole(parts=(), by_name=None, points=(), spans=(), more=("m",), anything=None)):
         data = json.loads(json.dumps(as_json_types(whole)))
-        found = from_json_types(Whole, data)
+        found = typed_value_from_json(Whole, data)
         assert found == whole
         assert json.dumps(as_json_types(found)) == json.dumps(data)
 
@@ -96,22 +96,25 @@ def test_what_does_not_fit_is_refused_with_its_place(
 ) -> None:
     data = as_json_types(WHOLE) | change
     if path is None:
-        assert from_json_types(Whole, data).more == tuple(change["more"])
+        assert typed_value_from_json(Whole, data).more == tuple(change["more"])
         return
     with pytest.raises(TypeMisfit) as refused:
-        from_json_types(Whole, data)
+        typed_value_from_json(Whole, data)
     assert (refused.value.path, refused.value.got, refused.value.expected) == (path, got, expected)
 
 
 def test_a_value_in_a_message_is_short_and_printable() -> None:
     with pytest.raises(TypeMisfit) as refused:
-        from_json_types(int, "\x1b[2J" * 99)
+        typed_value_from_json(int, "\x1b[2J" * 99)
     assert refused.value.got.isprintable() and len(refused.value.got) < 70
 
 
 def test_text_that_no_file_can_have_is_refused() -> None:
     """JSON can spell half of a character, but UTF-8 has none."""
     with pytest.raises(TypeMisfit) as error:
-        from_json_types(Part, json.loads(r'{"name": "a\ud800", "size": null}'))
+        typed_value_from_json(Part, json.loads(r'{"name": "a\ud800", "size": null}'))
     assert (error.value.got, error.value.path) == (r"'a\ud800'", ["name"])
-    assert from_json_types(Part, json.loads(r'{"name": "\ud83d\ude00", "size": null}')).name == "\U0001f600"
+    assert (
+        typed_value_from_json(Part, json.loads(r'{"name": "\ud83d\ude00", "size": null}')).name
+        == "\U0001f600"
+    )

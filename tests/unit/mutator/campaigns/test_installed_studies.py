@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common import extension_doors
-from mutator._common.extension_doors import STUDIES
+from mutator._common.extension_doors import STUDY_DOOR
 from mutator.campaigns.installed_studies import load_installed_study
 from mutator.campaigns.plan import build_plan, load_plan
 from mutator.campaigns.plan_freezing import freeze_plan
@@ -32,14 +32,14 @@ def installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.syspath_prepend(package.parent)
     [name, value] = re.findall(r"(?m)^(crash_tests) = \"(.*)\"$", PAGE.read_text())[0]
     points = EntryPoints(
-        EntryPoint(name, value, STUDIES.group)
+        EntryPoint(name, value, STUDY_DOOR.entry_point_group)
         for name, value in ((name, value), ("broken", "crash_tests.study:MISSING"))
     )
     monkeypatch.setattr(extension_doors, "_entry_points", lambda group: points.select(group=group))
 
 
 def test_the_shipped_study_is_installed() -> None:
-    assert "driving_agent_resilience" in STUDIES.names(), "install again: pip install -e . --no-deps"
+    assert "driving_agent_resilience" in STUDY_DOOR.names(), "install again: pip install -e . --no-deps"
     assert list(load_installed_study("driving_agent_resilience").check(Workspace.find(root=CLONE))) == []
 
 
@@ -115,7 +115,7 @@ def strangers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: strange-studies\nVersion: 1\n")
     lines = [f"{name} = {value}" for name, (value, _) in (STRANGERS | BAD_CHECKS).items()]
-    (info / "entry_points.txt").write_text("\n".join([f"[{STUDIES.group}]", *lines]))
+    (info / "entry_points.txt").write_text("\n".join([f"[{STUDY_DOOR.entry_point_group}]", *lines]))
     monkeypatch.syspath_prepend(package.parent)
 
 

@@ -13,7 +13,7 @@ from mutator.campaigns.plan import Plan, build_plan, load_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
 from mutator.model import Hold, Limits, Method
-from mutator.operators.executed_lines_and_types import ExecutedLines, GoldenRunInputs
+from mutator.operators.executed_lines_and_types import ExecutedLinesByFile, GoldenRunInputs
 from mutator.review.mutant_groups import groups_of_plan
 from mutator.store.plan_choices import Choices
 from mutator.targets.manifest import TargetManifest
@@ -28,7 +28,7 @@ def lines(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def known(
         manifest: TargetManifest, drives: Sequence[GoldenRunInputs], limits: Limits
-    ) -> list[ExecutedLines]:
+    ) -> list[ExecutedLinesByFile]:
         return [{"toycar/driver.py": frozenset(range(1, 17))} for _ in drives]
 
     monkeypatch.setattr(operator_faults, "measure_executed_lines", known)

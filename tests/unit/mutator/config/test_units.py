@@ -12,14 +12,14 @@ CLONE = Path(__file__).parents[4]
 
 
 def test_the_longest_suffix_of_a_key_is_its_unit() -> None:
-    assert units.split_unit("offset_m") == ("offset", units.UNITS["m"])
-    assert units.split_unit("per_step_kph") == ("per_step", units.UNITS["kph"])
-    assert units.split_unit("by_per_m") == ("by", units.UNITS["per_m"])
-    assert units.split_unit("per_m") == ("per", units.UNITS["m"])
-    assert units.split_unit("torque_nm") == ("torque", units.UNITS["nm"])
-    assert units.split_unit("target") == ("target", None)
-    assert units.split_unit("nth_hit") == ("nth_hit", None)
-    assert units.split_unit("_m") == ("_m", None)
+    assert units.split_key_at_unit("offset_m") == ("offset", units.UNITS["m"])
+    assert units.split_key_at_unit("per_step_kph") == ("per_step", units.UNITS["kph"])
+    assert units.split_key_at_unit("by_per_m") == ("by", units.UNITS["per_m"])
+    assert units.split_key_at_unit("per_m") == ("per", units.UNITS["m"])
+    assert units.split_key_at_unit("torque_nm") == ("torque", units.UNITS["nm"])
+    assert units.split_key_at_unit("target") == ("target", None)
+    assert units.split_key_at_unit("nth_hit") == ("nth_hit", None)
+    assert units.split_key_at_unit("_m") == ("_m", None)
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_units_of_different_dimensions_cannot_be_converted() -> None:
 
 
 def test_every_unit_is_recognized_as_a_suffix() -> None:
-    assert {suffix: units.split_unit(f"by_{suffix}") for suffix in units.UNITS} == {
+    assert {suffix: units.split_key_at_unit(f"by_{suffix}") for suffix in units.UNITS} == {
         suffix: ("by", unit) for suffix, unit in units.UNITS.items()
     }
     assert len({unit.symbol for unit in units.UNITS.values()}) == len(units.UNITS)
@@ -65,7 +65,7 @@ def test_the_shipped_library_uses_only_expected_units() -> None:
     first = {"m", "mps", "kph", "mph", "mps2", "rad", "deg", "s", "ms", "mmph", "lx", "px"}
     for path in (*CLONE.glob("fault_library/faults/**/*.yaml"), *CLONE.glob("templates/*.yaml")):
         for key in re.findall(r"[{ ]([a-z][a-z0-9_]*):", path.read_text()):
-            unit = units.split_unit(key)[1]
+            unit = units.split_key_at_unit(key)[1]
             assert unit is None or unit.suffix in first, f"{path}: {key}"
 
 

@@ -32,7 +32,10 @@ def texts(svg: bytes) -> list[str]:
 
 
 def test_time_panels_include_only_runs_with_both_events(frame: pd.DataFrame) -> None:
-    panels = {axis.get_title(loc="left"): axis for axis in propagation_time_figure.draw(frame).axes}
+    panels = {
+        axis.get_title(loc="left"): axis
+        for axis in propagation_time_figure.draw_times_by_scenario(frame).axes
+    }
     assert [t.get_text() for t in panels["activation to manifest"].texts] == ["3", "1"]
     assert [t.get_text() for t in panels["alert to hazard"].texts] == ["2", "1"]
     means = {line.get_label(): list(line.get_ydata()) for line in panels["alert to hazard"].lines}

@@ -31,7 +31,7 @@ def _draw(path: Path) -> bytes:
     line = {"kind": "a/b", "scenario": "S1", "method": "guided", "is_activated": True, "is_hazard": True}
     times = dict.fromkeys(("t_activation", "t_manifest", "t_alert", "t_hazard"), 1.0)
     flags = {"is_manifested": True, "is_alert": False}
-    save_figure(propagation_time_figure.draw(pd.DataFrame([line | times | flags])), [path])
+    save_figure(propagation_time_figure.draw_times_by_scenario(pd.DataFrame([line | times | flags])), [path])
     return path.read_bytes()
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.mutants.classes_copying_defaults import copying_ancestor
+from mutator.mutants.classes_copying_defaults import reason_field_is_copied
 from mutator.targets.source_tree import read_tree
 
 FIELD = "    gain: float = -2.0\n"
@@ -49,7 +49,7 @@ def test_a_copying_ancestor_is_found(tmp_path: Path, text: str, words: str) -> N
     (tmp_path / "pkg").mkdir()
     for path in ("other.py", "pkg/other.py"):
         (tmp_path / path).write_text("from pydantic import BaseModel\nclass Base(BaseModel):\n    pass\n")
-    assert words in str(copying_ancestor(read_tree(tmp_path, ["**"]), "m.py", "S", "gain"))
+    assert words in str(reason_field_is_copied(read_tree(tmp_path, ["**"]), "m.py", "S", "gain"))
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_a_copying_ancestor_is_found(tmp_path: Path, text: str, words: str) -> N
 def test_other_classes_keep_their_values(tmp_path: Path, text: str) -> None:
     """Values of ordinary classes, dataclasses and attrs classes can be set where they live."""
     (tmp_path / "m.py").write_text(text + FIELD)
-    assert copying_ancestor(read_tree(tmp_path, ["**"]), "m.py", "S", "gain") is None
+    assert reason_field_is_copied(read_tree(tmp_path, ["**"]), "m.py", "S", "gain") is None
 
 
 @pytest.mark.parametrize("annotation", ["ClassVar[float]", "typing.ClassVar", "'ClassVar[float]'"])
@@ -76,5 +76,5 @@ def test_a_class_variable_is_no_field(tmp_path: Path, annotation: str) -> None:
     text = f"from pydantic import BaseModel\nclass S(BaseModel):\n    limit: {annotation} = 2.0\n" + FIELD
     (tmp_path / "m.py").write_text(text)
     tree = read_tree(tmp_path, ["**"])
-    assert copying_ancestor(tree, "m.py", "S", "limit") is None
-    assert copying_ancestor(tree, "m.py", "S", "gain")
+    assert reason_field_is_copied(tree, "m.py", "S", "limit") is None
+    assert reason_field_is_copied(tree, "m.py", "S", "gain")

@@ -11,7 +11,8 @@ def test_injected_lines_are_recognized_by_their_tags(clone: Workspace) -> None:
     lines = {
         injected_line_syntax.probe_import_line("car"): ("probe", 0, False),
         injected_line_syntax.tagged_line(
-            injected_line_syntax.observe_call([("t", "now.time")]), injected_line_syntax.OBSERVATION_TAG
+            injected_line_syntax.observation_call_source([("t", "now.time")]),
+            injected_line_syntax.OBSERVATION_TAG,
         ): (
             "observe",
             0,

@@ -7,9 +7,9 @@ import pytest
 
 from mutator.mutants import imported_names
 from mutator.mutants.jit_compiled_code_in_tree import (
-    compiler_of_constant,
-    compiler_of_function,
-    tracer_of_function,
+    jit_compiler_freezing_constant,
+    jit_compiler_of_function,
+    tracing_call_of_function,
 )
 from mutator.targets.source_tree import SourceTree, read_tree
 
@@ -50,7 +50,7 @@ def tree_of(folder: Path, **texts: str) -> SourceTree:
 def test_a_decorator_is_recognised_under_any_name(tmp_path: Path, text: str, compiler: str) -> None:
     """The decorator is found through aliases, options and `partial`."""
     tree = tree_of(tmp_path, m=text + BODY)
-    assert compiler_of_function(tree, "m.py", "law", {}) == compiler
+    assert jit_compiler_of_function(tree, "m.py", "law", {}) == compiler
 
 
 @pytest.mark.parametrize(
@@ -66,8 +66,8 @@ def test_a_decorator_is_recognised_under_any_name(tmp_path: Path, text: str, com
 def test_a_function_that_is_given_to_a_compiler_is_compiled(tmp_path: Path, after: str) -> None:
     """A call of the compiler counts like its decorator, wherever it stands."""
     tree = tree_of(tmp_path, m=f"from numba import njit\ndef law(y):\n{BODY}\ndef free(y):\n{BODY}\n{after}")
-    assert compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
-    assert compiler_of_function(tree, "m.py", "free", {}) is None
+    assert jit_compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
+    assert jit_compiler_of_function(tree, "m.py", "free", {}) is None
 
 
 def test_methods_and_inner_functions_belong_to_what_is_compiled(tmp_path: Path) -> None:
@@ -77,9 +77,9 @@ def test_methods_and_inner_functions_belong_to_what_is_compiled(tmp_path: Path) 
     text += "@jax.jit\ndef outer(y):\n    def inner(x):\n        return x\n    return inner(y)\n"
     text += "class Net:\n    def forward(self, y):\n        return y\nnet = torch.compile(Net())\n"
     tree = tree_of(tmp_path, m=text)
-    assert compiler_of_function(tree, "m.py", "A.f", {}) == "numba.experimental.jitclass"
-    assert compiler_of_function(tree, "m.py", "outer.inner", {}) == "jax.jit"
-    assert compiler_of_function(tree, "m.py", "Net.forward", {}) == "torch.compile"
+    assert jit_compiler_of_function(tree, "m.py", "A.f", {}) == "numba.experimental.jitclass"
+    assert jit_compiler_of_function(tree, "m.py", "outer.inner", {}) == "jax.jit"
+    assert jit_compiler_of_function(tree, "m.py", "Net.forward", {}) == "torch.compile"
 
 
 def test_another_file_can_compile_a_function(tmp_path: Path) -> None:
@@ -87,35 +87,38 @@ def test_another_file_can_compile_a_function(tmp_path: Path) -> None:
     tree = tree_of(
         tmp_path, m=f"def law(y):\n{BODY}", use="from m import law\nimport numba\nf = numba.njit(law)\n"
     )
-    assert compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
+    assert jit_compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
 
 
 def test_a_compiler_that_the_manifest_turns_off_compiles_nothing(tmp_path: Path) -> None:
     """With NUMBA_DISABLE_JIT, numba leaves functions to Python."""
     tree = tree_of(tmp_path, m="from numba import njit\n@njit\ndef law(y):\n" + BODY)
-    assert compiler_of_function(tree, "m.py", "law", {"NUMBA_DISABLE_JIT": "1"}) is None
-    assert compiler_of_function(tree, "m.py", "law", {"NUMBA_DISABLE_JIT": "0"}) == "numba.njit"
+    assert jit_compiler_of_function(tree, "m.py", "law", {"NUMBA_DISABLE_JIT": "1"}) is None
+    assert jit_compiler_of_function(tree, "m.py", "law", {"NUMBA_DISABLE_JIT": "0"}) == "numba.njit"
 
 
 def test_names_of_the_target_are_no_compilers(tmp_path: Path) -> None:
     """A decorator of the target's own that is called njit compiles nothing."""
     text = "# not numba\nfrom tools import njit\n@njit\ndef law(y):\n" + BODY
-    assert compiler_of_function(tree_of(tmp_path, m=text), "m.py", "law", {}) is None
+    assert jit_compiler_of_function(tree_of(tmp_path, m=text), "m.py", "law", {}) is None
 
 
 def test_a_constant_that_only_compiled_functions_read_is_frozen(tmp_path: Path) -> None:
     """numba keeps the value that a global has when it compiles; one that Python reads, too, is free."""
     text = "from numba import njit\nGAIN = 2\nFREE = 3\n@njit\ndef law(y):\n    return GAIN * FREE * y\n"
     tree = tree_of(tmp_path, m=text + "def f():\n    return FREE\n")
-    assert compiler_of_constant(tree, "m.py", "GAIN", {}) == "numba.njit"
-    assert compiler_of_constant(tree, "m.py", "FREE", {}) is None
+    assert jit_compiler_freezing_constant(tree, "m.py", "GAIN", {}) == "numba.njit"
+    assert jit_compiler_freezing_constant(tree, "m.py", "FREE", {}) is None
 
 
 @pytest.mark.parametrize("other", ["from m import GAIN\n", "from m import *\n", "import m\nprint(m.GAIN)\n"])
 def test_a_constant_that_another_file_reads_is_not_frozen(tmp_path: Path, other: str) -> None:
     text = "from numba import njit\nGAIN = 2\n@njit\ndef law(y):\n" + BODY
-    assert compiler_of_constant(tree_of(tmp_path, m=text, n="import m\n"), "m.py", "GAIN", {}) == "numba.njit"
-    assert compiler_of_constant(tree_of(tmp_path, m=text, n=other), "m.py", "GAIN", {}) is None
+    assert (
+        jit_compiler_freezing_constant(tree_of(tmp_path, m=text, n="import m\n"), "m.py", "GAIN", {})
+        == "numba.njit"
+    )
+    assert jit_compiler_freezing_constant(tree_of(tmp_path, m=text, n=other), "m.py", "GAIN", {}) is None
 
 
 def test_a_function_that_builds_a_graph_is_noted(tmp_path: Path) -> None:
@@ -123,8 +126,8 @@ def test_a_function_that_builds_a_graph_is_noted(tmp_path: Path) -> None:
     text = "import casadi as ca\ndef law(y):\n    return y\ndef free(y):\n    return y\n"
     text += "class C:\n    def __init__(self, y):\n        self.f = ca.Function('law', [y], [law(y)])\n"
     tree = tree_of(tmp_path, m=text)
-    assert tracer_of_function(tree, "m.py", "law") == "casadi.Function"
-    assert tracer_of_function(tree, "m.py", "free") is None
+    assert tracing_call_of_function(tree, "m.py", "law") == "casadi.Function"
+    assert tracing_call_of_function(tree, "m.py", "free") is None
 
 
 GUARDED = (
@@ -143,7 +146,7 @@ def test_a_package_that_the_file_can_do_without_counts_if_it_is_installed(
 ) -> None:
     """Without numba, the file's own `njit` leaves the function to Python."""
     monkeypatch.setattr(imported_names, "find_spec", lambda name: object() if is_installed else None)
-    compiler = compiler_of_function(tree_of(tmp_path, m=text + BODY), "m.py", "law", {})
+    compiler = jit_compiler_of_function(tree_of(tmp_path, m=text + BODY), "m.py", "law", {})
     # a name that the file also defines is its own, so a star import is then no evidence
     expected = "numba.njit" if is_installed and "*" not in text else None
     assert compiler == expected
@@ -151,7 +154,7 @@ def test_a_package_that_the_file_can_do_without_counts_if_it_is_installed(
 
 def test_a_name_of_the_file_is_not_from_a_star_import(tmp_path: Path) -> None:
     text = "from numba import *\ndef njit(law):\n    return law\n@njit\ndef law(y):\n" + BODY
-    assert compiler_of_function(tree_of(tmp_path, m=text), "m.py", "law", {}) is None
+    assert jit_compiler_of_function(tree_of(tmp_path, m=text), "m.py", "law", {}) is None
 
 
 CALLER = "from numba import njit\n@njit\ndef law(y):\n    return inner(y)\n"
@@ -162,10 +165,10 @@ DEEP = "BIAS = 1\ndef deep(y):\n    return y\n"
 def test_what_only_compiled_functions_call_is_compiled(tmp_path: Path) -> None:
     """A function counts if nothing else reads its name, in this file or another; so do its constants."""
     tree = tree_of(tmp_path, m=CALLER + INNER + DEEP)
-    assert compiler_of_function(tree, "m.py", "inner", {}) == "numba.njit"
-    assert compiler_of_function(tree, "m.py", "deep", {}) == "numba.njit"
-    assert compiler_of_function(tree, "m.py", "deep", {"NUMBA_DISABLE_JIT": "1"}) is None
-    assert compiler_of_constant(tree, "m.py", "BIAS", {}) == "numba.njit"
+    assert jit_compiler_of_function(tree, "m.py", "inner", {}) == "numba.njit"
+    assert jit_compiler_of_function(tree, "m.py", "deep", {}) == "numba.njit"
+    assert jit_compiler_of_function(tree, "m.py", "deep", {"NUMBA_DISABLE_JIT": "1"}) is None
+    assert jit_compiler_freezing_constant(tree, "m.py", "BIAS", {}) == "numba.njit"
 
 
 @pytest.mark.parametrize(
@@ -175,10 +178,10 @@ def test_what_only_compiled_functions_call_is_compiled(tmp_path: Path) -> None:
 def test_what_python_calls_too_is_not_compiled(tmp_path: Path, more: str, other: str) -> None:
     """Neither it, nor what it calls, nor the constants of both."""
     tree = tree_of(tmp_path, m=CALLER + INNER + DEEP + more, n=other)
-    assert compiler_of_function(tree, "m.py", "inner", {}) is None
-    assert compiler_of_function(tree, "m.py", "deep", {}) is None
-    assert compiler_of_constant(tree, "m.py", "BIAS", {}) is None
-    assert compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
+    assert jit_compiler_of_function(tree, "m.py", "inner", {}) is None
+    assert jit_compiler_of_function(tree, "m.py", "deep", {}) is None
+    assert jit_compiler_freezing_constant(tree, "m.py", "BIAS", {}) is None
+    assert jit_compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
 
 
 @pytest.mark.parametrize("call", ["import m\n", "from m import inner\n"])
@@ -187,9 +190,9 @@ def test_a_function_of_another_file_that_only_compiled_functions_call_is_compile
 ) -> None:
     name = "inner" if "from" in call else "m.inner"
     use = f"import jax\n{call}@jax.jit\ndef law(y):\n    return {name}(y)\n"
-    assert compiler_of_function(tree_of(tmp_path, m=INNER, n=use), "m.py", "inner", {}) == "jax.jit"
+    assert jit_compiler_of_function(tree_of(tmp_path, m=INNER, n=use), "m.py", "inner", {}) == "jax.jit"
     use += f"def slow(y):\n    return {name}(y)\n"
-    assert compiler_of_function(tree_of(tmp_path, m=INNER, n=use), "m.py", "inner", {}) is None
+    assert jit_compiler_of_function(tree_of(tmp_path, m=INNER, n=use), "m.py", "inner", {}) is None
 
 
 def test_methods_and_lambdas_are_followed(tmp_path: Path) -> None:
@@ -198,8 +201,8 @@ def test_methods_and_lambdas_are_followed(tmp_path: Path) -> None:
     text += "    def inner(self, y):\n        return y\n"
     text += "def deep(y):\n    return y\nfast = jax.jit(lambda y: deep(y))\n"
     tree = tree_of(tmp_path, m=text)
-    assert compiler_of_function(tree, "m.py", "A.inner", {}) == "jax.jit"
-    assert compiler_of_function(tree, "m.py", "deep", {}) == "jax.jit"
+    assert jit_compiler_of_function(tree, "m.py", "A.inner", {}) == "jax.jit"
+    assert jit_compiler_of_function(tree, "m.py", "deep", {}) == "jax.jit"
 
 
 @pytest.mark.parametrize(
@@ -216,11 +219,11 @@ def test_methods_and_lambdas_are_followed(tmp_path: Path) -> None:
 def test_an_import_is_recognised_however_its_line_is_written(tmp_path: Path, line: str) -> None:
     """The search that spares most files from being parsed misses no form of an import."""
     tree = tree_of(tmp_path, m=f"{line}\n@numba.njit\ndef law(y):\n{BODY}")
-    assert compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
+    assert jit_compiler_of_function(tree, "m.py", "law", {}) == "numba.njit"
 
 
 def test_files_without_a_compiler_are_not_parsed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A word in a comment, or a module of the target with a compiler's name, costs no parsing."""
     tree = tree_of(tmp_path, m="from sim import warp  # not numba\ndef law(y):\n" + BODY, other="jax = 1\n")
     monkeypatch.setattr(ast, "parse", None)
-    assert compiler_of_function(tree, "m.py", "law", {}) is None
+    assert jit_compiler_of_function(tree, "m.py", "law", {}) is None

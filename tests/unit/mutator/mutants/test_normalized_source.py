@@ -4,7 +4,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mutator.mutants.normalized_source import compiles, normalize_numbers_and_ids
+from mutator.mutants.normalized_source import normalize_numbers_and_ids, normalized_source_compiles
 
 NUMBERS = st.one_of(
     st.floats(allow_nan=False, allow_infinity=False).map(lambda x: repr(abs(x))), st.integers(0).map(str)
@@ -43,12 +43,14 @@ def test_different_ids_stay_different() -> None:
 
 
 def test_if_a_source_depends_on_its_numbers_its_normalized_form_does_not_compile() -> None:
-    assert compiles(b"x = 12345678")
-    assert not compiles(normalize_numbers_and_ids("x = 12345678", ["12345678"]).encode())
-    assert not compiles(
+    assert normalized_source_compiles(b"x = 12345678")
+    assert not normalized_source_compiles(normalize_numbers_and_ids("x = 12345678", ["12345678"]).encode())
+    assert not normalized_source_compiles(
         normalize_numbers_and_ids("match x:\n    case {1: a, 2: b}:\n        pass", ()).encode()
     )
-    assert not compiles(normalize_numbers_and_ids(r"x = '\U0000abcd'", ["0000abcd"]).encode())
+    assert not normalized_source_compiles(
+        normalize_numbers_and_ids(r"x = '\U0000abcd'", ["0000abcd"]).encode()
+    )
 
 
 @pytest.mark.filterwarnings("ignore")  # warnings about escapes in the generated texts
@@ -57,7 +59,7 @@ def test_if_a_source_depends_on_its_numbers_its_normalized_form_does_not_compile
 @example("x = {}", "07")
 def test_a_source_compiles_with_any_number_if_its_normalized_form_does(around: str, number: str) -> None:
     text = around.replace("{{", "\0").replace("{}", number).replace("\0", "{").replace("}}", "}")
-    if compiles(normalize_numbers_and_ids(text, ()).encode()):
+    if normalized_source_compiles(normalize_numbers_and_ids(text, ()).encode()):
         compile(text, "x", "exec")
 
 
@@ -69,5 +71,5 @@ def test_a_source_compiles_with_any_number_if_its_normalized_form_does(around: s
 @example("x = 1{}", "00000000")
 def test_a_source_compiles_with_any_id_if_its_normalized_form_does(around: str, name: str) -> None:
     text = around.replace("{{", "\0").replace("{}", name).replace("\0", "{").replace("}}", "}")
-    if compiles(normalize_numbers_and_ids(text, [name]).encode()):
+    if normalized_source_compiles(normalize_numbers_and_ids(text, [name]).encode()):
         compile(text, "x", "exec")

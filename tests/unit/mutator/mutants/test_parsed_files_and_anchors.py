@@ -185,7 +185,7 @@ def test_the_entry_of_a_function_is_below_its_docstring() -> None:
     ],
 )
 def test_the_probe_is_imported_below_the_head_of_the_file(source: str, line: int) -> None:
-    assert parsed(source).import_line + 1 == line
+    assert parsed(source).import_insertion_line_index + 1 == line
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,7 @@ def test_an_ambiguous_place_is_listed_with_nth(listed: list[ListedPlace]) -> Non
 
 def test_each_listed_anchor_finds_its_own_line(listed: list[ListedPlace]) -> None:
     source = YamlSource(path=Path("spec.yaml"), data={}, lines={})
-    assert [LocationModel(**one.at).location(source, ()) for one in listed] == [
+    assert [LocationModel(**one.at).build_location(source, ()) for one in listed] == [
         one.location for one in listed
     ]
     file = parse_file("m.py", SOURCE, Path("x"))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.extension_doors import LIBRARY_IMPORTERS
+from mutator._common.extension_doors import LIBRARY_IMPORTER_DOOR
 from mutator.errors import BadAddition, MutatorError
 from mutator.onboarding.library_import import (
     EntryOutcome,
@@ -56,7 +56,7 @@ def importer(monkeypatch: pytest.MonkeyPatch, library: ImportedLibrary | Excepti
         return library
 
     monkeypatch.setattr(
-        type(LIBRARY_IMPORTERS), "load", lambda door, name: LibraryImporter(about="a test", read=read)
+        type(LIBRARY_IMPORTER_DOOR), "load", lambda door, name: LibraryImporter(about="a test", read=read)
     )
 
 

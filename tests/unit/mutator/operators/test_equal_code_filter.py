@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.extension_doors import OPERATORS
+from mutator._common.extension_doors import OPERATOR_DOOR
 from mutator.engines.code_swap_planning import behaviour_key
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
@@ -165,7 +165,7 @@ def decisions(file: ParsedFile, mutations: list[Mutation]) -> list[Mutation]:
 def mutations_in(folder: Path, name: str, models: FaultModels) -> tuple[ParsedFile, list[Mutation]]:
     tree = read_tree(folder, [name])
     file, facts = parsed_file(tree, name), statement_facts_of(tree, name)
-    functions, operators = file.functions_by_name, OPERATORS.shipped_names()
+    functions, operators = file.functions_by_name, OPERATOR_DOOR.shipped_names()
     return file, [
         one for function in functions for one in mutations_of(file, facts, function, models, operators)
     ]

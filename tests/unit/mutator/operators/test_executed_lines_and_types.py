@@ -47,9 +47,11 @@ def test_executed_lines_are_cached(
     manifest = toycar.manifest("toycar")
     drive = GoldenRunInputs(scenario=toycar.scenario("A"), changes=(), seed=7)
     runs: list[str] = []
-    measured = executed_lines_and_types._run_and_note
+    measured = executed_lines_and_types._run_and_read_report
     monkeypatch.setattr(
-        executed_lines_and_types, "_run_and_note", lambda *given: (runs.append("run"), measured(*given))[1]
+        executed_lines_and_types,
+        "_run_and_read_report",
+        lambda *given: (runs.append("run"), measured(*given))[1],
     )
     [first] = measure_executed_lines(manifest, [drive], LIMITS)
     assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 1

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.extension_doors import OPERATORS
+from mutator._common.extension_doors import OPERATOR_DOOR
 from mutator.errors import MutatorError
 from mutator.mutants.mutant_building import build, build_without_reusing_changed_files
 from mutator.mutants.parsed_files_and_anchors import parsed_file
@@ -32,7 +32,7 @@ def make(tmp_path: Path, clone: Workspace) -> Make:
     def made(body: str, *operators: str, head: str = "def f(self, a, b):") -> list[Mutation]:
         (tmp_path / "m.py").write_text(f"{head}\n    {body}\n")
         tree = read_tree(tmp_path, ["m.py"])
-        file, names = parsed_file(tree, "m.py"), unique_operator_names(operators or OPERATORS.names())
+        file, names = parsed_file(tree, "m.py"), unique_operator_names(operators or OPERATOR_DOOR.names())
         return list(
             drop_equal_code(
                 file, mutations_of(file, statement_facts_of(tree, "m.py"), "f", models, names)
@@ -42,7 +42,7 @@ def make(tmp_path: Path, clone: Workspace) -> Make:
     return made
 
 
-@pytest.mark.parametrize("name", OPERATORS.names())
+@pytest.mark.parametrize("name", OPERATOR_DOOR.names())
 def test_each_operator_makes_the_changes_of_its_examples(name: str, make: Make) -> None:
     examples = find_operator(name).examples
     assert any(examples.values())
@@ -136,7 +136,7 @@ def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
     def found(place: str, executed: dict[str, list[int]] | None = None) -> SelectedMutations:
-        return select_mutations(manifest, models, OPERATORS.shipped_names(), [place], executed)
+        return select_mutations(manifest, models, OPERATOR_DOOR.shipped_names(), [place], executed)
 
     whole, part = found("toycar/sensing.py"), found("toycar/sensing.py::Sensor.*")
     assert part.mutations and set(part.mutations) <= set(whole.mutations)
@@ -182,14 +182,14 @@ def test_text_that_the_encoding_of_the_file_lacks_is_no_mutation(tmp_path: Path,
     (tmp_path / "m.py").write_bytes(source.encode("latin-1"))
     tree = read_tree(tmp_path, ["m.py"])
     file, facts = parsed_file(tree, "m.py"), statement_facts_of(tree, "m.py")
-    mutations = mutations_of(file, facts, "f", clone.fault_models(), OPERATORS.shipped_names())
+    mutations = mutations_of(file, facts, "f", clone.fault_models(), OPERATOR_DOOR.shipped_names())
     assert {one.operator for one in mutations} == {"constant", "return"}
     assert drop_equal_code(file, mutations).mutations == tuple(mutations)
 
 
 def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
-    found = select_mutations(manifest, models, OPERATORS.shipped_names(), ["toycar/**"])
+    found = select_mutations(manifest, models, OPERATOR_DOOR.shipped_names(), ["toycar/**"])
     drawn = sample_mutations(found, len(found.mutations) // 3, 4)
     assert (
         drawn
@@ -205,7 +205,7 @@ def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
 def test_every_mutant_of_the_toy_can_be_built(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = select_mutations(
-        manifest, models, OPERATORS.shipped_names(), ["toycar/sensing.py", "toycar/driver.py"]
+        manifest, models, OPERATOR_DOOR.shipped_names(), ["toycar/sensing.py", "toycar/driver.py"]
     )
     faults = [one.to_fault("as_described") for one in found.mutations]
     assert len({fault.id for fault in faults}) == len(faults)

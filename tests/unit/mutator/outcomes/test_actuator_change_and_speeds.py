@@ -7,8 +7,8 @@ import pytest
 
 from mutator.model import ObservedActivation
 from mutator.outcomes.actuator_change_and_speeds import (
-    change_share,
     first_actuator_change,
+    share_in_direction,
     speeds_after_activation,
 )
 from mutator.outcomes.trace_and_record_loading import Trace
@@ -65,17 +65,17 @@ def test_the_share_of_a_direction_is_that_of_the_areas(
     gas: list[float], end: float | None, share: float | None
 ) -> None:
     """It says whether the first change is what the fault did in the whole."""
-    assert change_share(GOLDEN, changed(gas=gas), "t", ("gas", "higher"), end) == pytest.approx(share)
-    lower = change_share(GOLDEN, changed(gas=gas), "t", ("gas", "lower"), end)
+    assert share_in_direction(GOLDEN, changed(gas=gas), "t", ("gas", "higher"), end) == pytest.approx(share)
+    lower = share_in_direction(GOLDEN, changed(gas=gas), "t", ("gas", "lower"), end)
     assert lower == (None if share is None else pytest.approx(1.0 - share))
-    assert change_share(GOLDEN, changed(gas=gas), "t", None, end) is None
+    assert share_in_direction(GOLDEN, changed(gas=gas), "t", None, end) is None
 
 
 def test_a_value_counts_as_long_as_it_holds() -> None:
     """Steps can have different lengths."""
     times = {"t": np.array([0.0, 0.1, 0.4, 0.5])}
     golden, faulty = (times | {"gas": np.array(gas)} for gas in ([0.0] * 4, [0.0, 1.0, -1.0, 0.0]))
-    assert change_share(golden, faulty, "t", ("gas", "higher"), None) == pytest.approx(0.75)
+    assert share_in_direction(golden, faulty, "t", ("gas", "higher"), None) == pytest.approx(0.75)
 
 
 def test_speeds_cover_the_time_from_activation_to_the_end(clone: Workspace) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mutator._common.typed_json import from_json_types
+from mutator._common.typed_json import typed_value_from_json
 from mutator.model import ObservedActivation, Outcome, Record, Status
 from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.golden_trace_comparison import compare_traces
@@ -102,7 +102,7 @@ def test_the_table_keeps_the_order_of_records_and_departures() -> None:
         left=(("seen", 0.1 + 0.2, 2.5), ("gas", 0.4, 1.0)),
     )
     facts = [["gas", "-", "actuator", "pedals", ""], ["seen", "m", "internal", "eyes", ""]]
-    found = propagation_cells([record], from_json_types(tuple[ChannelFacts, ...], facts))
+    found = propagation_cells([record], typed_value_from_json(tuple[ChannelFacts, ...], facts))
     assert list(found) == [column.name for column in PROPAGATION_COLUMNS]
     assert list(zip(*found.values(), strict=True)) == [
         ("e1", "seen", "eyes", "internal", 0.3, 2.5),

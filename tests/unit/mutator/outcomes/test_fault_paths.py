@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from mutator._common.typed_json import from_json_types
+from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError
 from mutator.model import (
     Anchor,
@@ -67,12 +67,12 @@ STRUCTURE = ControlStructureModel.model_validate(
     }
 )
 CHANNELS = [
-    from_json_types(ChannelFacts, ["seen", "m", "internal", "finder", ""]),
-    from_json_types(ChannelFacts, ["wanted", "m/s", "internal", "speed", ""]),
-    from_json_types(ChannelFacts, ["angle", "rad", "internal", "wheel", ""]),
-    from_json_types(ChannelFacts, ["gas", "-", "actuator", "pedals", ""]),
-    from_json_types(ChannelFacts, ["torque", "-", "actuator", "rack", ""]),
-    from_json_types(ChannelFacts, ["place", "m", "truth", "car", ""]),
+    typed_value_from_json(ChannelFacts, ["seen", "m", "internal", "finder", ""]),
+    typed_value_from_json(ChannelFacts, ["wanted", "m/s", "internal", "speed", ""]),
+    typed_value_from_json(ChannelFacts, ["angle", "rad", "internal", "wheel", ""]),
+    typed_value_from_json(ChannelFacts, ["gas", "-", "actuator", "pedals", ""]),
+    typed_value_from_json(ChannelFacts, ["torque", "-", "actuator", "rack", ""]),
+    typed_value_from_json(ChannelFacts, ["place", "m", "truth", "car", ""]),
 ]
 WAYS = FaultPathFinder(CHANNELS, STRUCTURE)
 
@@ -231,7 +231,7 @@ def test_the_first_changed_input_decides_between_fault_and_feedback(
     left: dict[str, float], state: ComponentState
 ) -> None:
     """The car moved differently before the speed control changed."""
-    pace = from_json_types(ChannelFacts, ["pace", "m/s", "internal", "gauge", ""])
+    pace = typed_value_from_json(ChannelFacts, ["pace", "m/s", "internal", "gauge", ""])
     fault_paths = FaultPathFinder([*CHANNELS, pace], STRUCTURE)
     found = path("finder", "wheel", fault_paths=fault_paths, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
@@ -281,9 +281,9 @@ def test_a_chain_has_feedback_too() -> None:
     """The fault is injected after the interface, whose channels change only after the car."""
     fault_paths = FaultPathFinder(
         [
-            from_json_types(ChannelFacts, ["seen", "", "internal", "interface", ""]),
-            from_json_types(ChannelFacts, ["ask", "", "actuator", "control", ""]),
-            from_json_types(ChannelFacts, ["gap", "", "truth", "car", ""]),
+            typed_value_from_json(ChannelFacts, ["seen", "", "internal", "interface", ""]),
+            typed_value_from_json(ChannelFacts, ["ask", "", "actuator", "control", ""]),
+            typed_value_from_json(ChannelFacts, ["gap", "", "truth", "car", ""]),
         ],
         None,
     )

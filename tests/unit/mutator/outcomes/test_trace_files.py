@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from mutator._common.extension_doors import IMPORTERS
+from mutator._common.extension_doors import TRACE_IMPORTER_DOOR
 from mutator.errors import BadOutput
 from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.targets.channels import Channel
@@ -29,5 +29,5 @@ def test_a_trace_of_another_package_is_read(tmp_path: Path, door_examples: Path)
 
 
 def test_a_suffix_is_only_accepted_while_its_package_is_installed(door_examples: Path) -> None:
-    assert IMPORTERS.has_name("jsonl")
-    assert not IMPORTERS.has_name("jsonl2")
+    assert TRACE_IMPORTER_DOOR.has_name("jsonl")
+    assert not TRACE_IMPORTER_DOOR.has_name("jsonl2")

@@ -21,7 +21,7 @@ from mutator.paper.observation_judging import (
     judge_observations,
 )
 from mutator.paper.published_numbers import load_published_numbers
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.statistics.tallies import Tally
 
 from ..statistics.results_frame import results
@@ -92,7 +92,7 @@ def test_a_query_finds_the_published_counts_of_table_2(table_2: dict[str, Judged
     [answer] = one.answers
     published = one.claim.published_estimate()
     assert published is not None
-    assert answer.result.text == published.text
+    assert answer.estimate.text == published.text
     assert answer.verdict == one.verdict_on_paper
 
 
@@ -101,7 +101,7 @@ def test_a_query_finds_the_published_counts_of_table_3(table_3: dict[str, Judged
     one = table_3[number]
     published = one.claim.published_estimate()
     assert published is not None
-    assert one.answers[0].result.text == published.text
+    assert one.answers[0].estimate.text == published.text
 
 
 def test_guided_faults_are_ahead_only_per_activated_fault(table_3: dict[str, JudgedClaim]) -> None:
@@ -132,26 +132,38 @@ def test_claims_about_a_driver_use_the_cited_reaction_time() -> None:
 @pytest.mark.parametrize(
     ("rule", "found", "verdict"),
     [
-        (ClaimRule(above=0.5), estimate_of_share(share(60, 100)), HOLDS),
-        (ClaimRule(above=0.5), estimate_of_share(share(40, 100)), FAILS),
-        (ClaimRule(above=0.5), estimate_of_share(share(52, 100)), UNDECIDED),
+        (ClaimRule(above=0.5), estimate_of_share(share_with_interval(60, 100)), HOLDS),
+        (ClaimRule(above=0.5), estimate_of_share(share_with_interval(40, 100)), FAILS),
+        (ClaimRule(above=0.5), estimate_of_share(share_with_interval(52, 100)), UNDECIDED),
         (
             ClaimRule(above=0.5),
-            estimate_of_share(share(9, 9)),
+            estimate_of_share(share_with_interval(9, 9)),
             UNDECIDED,
         ),  # few runs, so undecided for any interval
-        (ClaimRule(below=0.05), estimate_of_share(share(0, 100)), HOLDS),
-        (ClaimRule(below=0.05), estimate_of_share(share(20, 100)), FAILS),
-        (ClaimRule(below=0.05), estimate_of_share(share(0, 0)), UNDECIDED),
-        (ClaimRule(within=0.1), estimate_of_difference(share(500, 1000), share(510, 1000)), HOLDS),
-        (ClaimRule(within=0.1), estimate_of_difference(share(500, 1000), share(900, 1000)), FAILS),
-        (ClaimRule(within=0.1), estimate_of_difference(share(5, 10), share(5, 10)), UNDECIDED),
-        (ClaimRule(some=0.05), estimate_of_share(share(1, 2)), HOLDS),
-        (ClaimRule(some=0.05), estimate_of_share(share(0, 100)), FAILS),
-        (ClaimRule(some=0.05), estimate_of_share(share(0, 20)), UNDECIDED),
-        (ClaimRule(never=0.05), estimate_of_share(share(0, 100)), HOLDS),
-        (ClaimRule(never=0.05), estimate_of_share(share(1, 1000)), FAILS),
-        (ClaimRule(never=0.05), estimate_of_share(share(0, 0)), UNDECIDED),
+        (ClaimRule(below=0.05), estimate_of_share(share_with_interval(0, 100)), HOLDS),
+        (ClaimRule(below=0.05), estimate_of_share(share_with_interval(20, 100)), FAILS),
+        (ClaimRule(below=0.05), estimate_of_share(share_with_interval(0, 0)), UNDECIDED),
+        (
+            ClaimRule(within=0.1),
+            estimate_of_difference(share_with_interval(500, 1000), share_with_interval(510, 1000)),
+            HOLDS,
+        ),
+        (
+            ClaimRule(within=0.1),
+            estimate_of_difference(share_with_interval(500, 1000), share_with_interval(900, 1000)),
+            FAILS,
+        ),
+        (
+            ClaimRule(within=0.1),
+            estimate_of_difference(share_with_interval(5, 10), share_with_interval(5, 10)),
+            UNDECIDED,
+        ),
+        (ClaimRule(some=0.05), estimate_of_share(share_with_interval(1, 2)), HOLDS),
+        (ClaimRule(some=0.05), estimate_of_share(share_with_interval(0, 100)), FAILS),
+        (ClaimRule(some=0.05), estimate_of_share(share_with_interval(0, 20)), UNDECIDED),
+        (ClaimRule(never=0.05), estimate_of_share(share_with_interval(0, 100)), HOLDS),
+        (ClaimRule(never=0.05), estimate_of_share(share_with_interval(1, 1000)), FAILS),
+        (ClaimRule(never=0.05), estimate_of_share(share_with_interval(0, 0)), UNDECIDED),
     ],
 )
 def test_each_rule_reaches_each_verdict(rule: ClaimRule, found: Estimate, verdict: ClaimVerdict) -> None:
@@ -221,7 +233,7 @@ def test_the_query_in_the_report_gives_the_reported_numbers() -> None:
     exec("from mutator.paper.measures import *", names)
     answers = [answer for one in told for claim in one.claims for answer in claim.answers]
     assert len(answers) > 30
-    assert [eval(answer.query, names).text for answer in answers] == [a.result.text for a in answers]
+    assert [eval(answer.query, names).text for answer in answers] == [a.estimate.text for a in answers]
     assert all(
         a.query in observations_markdown_and_table.render_observations_markdown(told, (), "") for a in answers
     )

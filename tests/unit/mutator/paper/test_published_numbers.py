@@ -10,7 +10,7 @@ from mutator.errors import MutatorError
 from mutator.paper.published_numbers import PublishedNumbers, load_published_numbers
 from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random_tables import hazard_odds_sheet, hazards_by_fault_type_sheet
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
 from mutator.statistics.tallies import Tally, sum_tallies, tally_by_fault_type, tally_by_scenario
 
@@ -49,7 +49,7 @@ def test_the_cited_tables_have_the_sums_that_the_paper_gives(paper: PublishedNum
 def test_the_guided_advantage_reverses_per_injected_fault(paper: PublishedNumbers) -> None:
     guided, random = of(paper.tally_by_scenario, "guided"), of(paper.tally_by_scenario, "random")
     rates = [
-        round(100 * share(one.hazards, whole).rate, 1)
+        round(100 * share_with_interval(one.hazards, whole).rate, 1)
         for one, whole in (
             (guided, guided.activated),
             (random, random.activated),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.checks.library_check import library_problems
-from mutator.paper.published_numbers import FILE_NAMES
+from mutator.paper.published_numbers import PUBLISHED_FILE_NAMES
 from mutator.paper.published_numbers_check import check_published_numbers
 from mutator.workspace import Workspace
 
@@ -30,7 +30,7 @@ def test_missing_numbers_are_reported_with_a_remedy(workspace: Workspace) -> Non
     shutil.rmtree(references)
     [problem] = check_published_numbers(workspace)
     assert problem.where == str(references)
-    for file in FILE_NAMES:
+    for file in PUBLISHED_FILE_NAMES:
         assert file in problem.got
         assert file in str(problem.expected)
     assert "copy them" in str(problem.remedy)

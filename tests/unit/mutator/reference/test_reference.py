@@ -139,7 +139,7 @@ def test_a_schema_accepts_a_users_fault_model() -> None:
 
 def test_pages_are_written_only_in_a_clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An installed wheel has no clone to write to."""
-    monkeypatch.setattr(shipped_files, "ARCHIVE_PATH", tmp_path)
+    monkeypatch.setattr(shipped_files, "SHIPPED_ARCHIVE_PATH", tmp_path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     library = tmp_path / "mutator" / "shipped" / "0" / "fault_library"
     with pytest.raises(MutatorError, match="ships with mutator"):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.message_text import bind_numbers
+from mutator._common.message_text import with_unbreakable_numbers
 from mutator.report import report_builder
 from mutator.report.change_since_run_before import ChangeSinceRunBefore, find_change, stored_change
 from mutator.report.report_audit import audit_report
@@ -61,7 +61,7 @@ def test_the_first_screen_says_what_changed_and_links_to_it(folder: Path) -> Non
     said = "1 new hazard, 1 gone, 0 changed otherwise, of 3 experiments that are also in before"
     assert f"**Since the run before:** {said} (2026-11-24 01:02 UTC)." in text
     assert (
-        bind_numbers(said) in page
+        with_unbreakable_numbers(said) in page
         and f'new: <a href="#e={SECOND}">' in page
         and f'gone: <a href="#e={FIRST}">' in page
     )

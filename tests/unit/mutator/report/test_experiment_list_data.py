@@ -101,5 +101,5 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
 
 def test_the_list_does_not_depend_on_the_order_of_results() -> None:
     frame = results({"experiment_id": "b"}, {"experiment_id": "a"}, {"module": "car"})
-    listed = frame.sort_values(experiment_list_data.LIST_ORDER)
+    listed = frame.sort_values(experiment_list_data.LIST_SORT_COLUMNS)
     assert list(listed["experiment_id"]) == ["2", "a", "b"]

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable
 from math import inf
 
-from mutator._common.typed_json import from_json_types
+from mutator._common.typed_json import typed_value_from_json
 from mutator.model import Record
 from mutator.outcomes.fault_paths import (
     ComponentState,
@@ -22,9 +22,9 @@ from mutator.targets.stored_target_facts import ChannelFacts
 from mutator.workspace import Workspace
 
 CHANNELS = [
-    from_json_types(ChannelFacts, ["seen", "m", "internal", "eyes", "what is seen"]),
-    from_json_types(ChannelFacts, ["gas", "-", "actuator", "pedals", ""]),
-    from_json_types(ChannelFacts, ["gap", "m", "truth", "car", ""]),
+    typed_value_from_json(ChannelFacts, ["seen", "m", "internal", "eyes", "what is seen"]),
+    typed_value_from_json(ChannelFacts, ["gas", "-", "actuator", "pedals", ""]),
+    typed_value_from_json(ChannelFacts, ["gap", "m", "truth", "car", ""]),
 ]
 
 

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from mutator._common.hashing import as_json_types
-from mutator._common.message_text import bind_numbers
+from mutator._common.message_text import with_unbreakable_numbers
 from mutator.model import Status
 from mutator.report.first_screen_facts import key_numbers, sample_note, worst_record, worst_row
 from mutator.report.panels.first_screen_panel import build_first_screen_panel
@@ -101,7 +101,7 @@ def test_the_worst_usable_experiment_is_the_first(tmp_path: Path) -> None:
     assert worst is not None and worst.experiment_id == "0" * 16
     panel = build_first_screen_panel(run)
     assert (
-        bind_numbers("radar/chaff/distance 35.0 m") in panel.html
+        with_unbreakable_numbers("radar/chaff/distance 35.0 m") in panel.html
         and 'href="#e=0000000000000000"' in panel.html
     )
     assert panel.markdown.startswith(

@@ -158,7 +158,7 @@ def test_tables_built_in_batches_have_the_same_bytes(
 def test_row_groups_of_a_long_table_have_the_same_size(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(csv_and_parquet_writers, "_MOST_GROUP_ROWS", 4)
+    monkeypatch.setattr(csv_and_parquet_writers, "_MOST_ROW_GROUP_ROWS", 4)
     columns = (TableColumn("n", "count", "", ""),)
     for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
         for batch in (1, 3, 20):

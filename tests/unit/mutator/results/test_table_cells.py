@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from mutator._common.hashing import as_json_types
-from mutator._common.typed_json import from_json_types
+from mutator._common.typed_json import typed_value_from_json
 from mutator.model import Experiment, Method, Outcome, Record, Status
 from mutator.results.finished_experiments_and_columns import FinishedExperiment
 from mutator.results.severity_and_sentence_columns import severity_and_time_columns
@@ -132,7 +132,7 @@ def test_a_scale_determines_the_columns_of_severity() -> None:
         severity = severity_and_time_columns(has_classes=has_classes)
         columns = [c.name for c in result_columns(("H1",), ("gas",), (), severity)]
         assert columns[columns.index("max_dev_gas") + 1 : columns.index("variant")] == names
-    assert from_json_types(SeverityScale, as_json_types(SCALE)) == SCALE
+    assert typed_value_from_json(SeverityScale, as_json_types(SCALE)) == SCALE
     with pytest.raises(ValueError, match="no class of severity begins at 0"):
         replace(SCALE, classes=SCALE.classes[1:])
 

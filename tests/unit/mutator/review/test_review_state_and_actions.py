@@ -280,7 +280,7 @@ def test_a_failed_write_leaves_the_old_file(toycar: Workspace, monkeypatch: pyte
 def test_a_library_from_a_wheel_cannot_store_decisions(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shipped_files, "ARCHIVE_PATH", tmp_path)
+    monkeypatch.setattr(shipped_files, "SHIPPED_ARCHIVE_PATH", tmp_path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "cache"))
     library = tmp_path / "cache" / "mutator" / "shipped" / "0"
     with pytest.raises(MutatorError, match=r"reviews/toycar.yaml: .*ships with mutator.*mutator init DIR"):

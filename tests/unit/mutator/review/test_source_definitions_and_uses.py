@@ -2,7 +2,7 @@
 
 import ast
 
-from mutator.review.source_definitions_and_uses import uses_in
+from mutator.review.source_definitions_and_uses import external_names_used_in
 
 SOURCE = """\
 import tools
@@ -32,7 +32,7 @@ class Lines:
 
 
 def names(selection: Lines | None) -> list[tuple[str, ...]]:
-    return [use.words for use in uses_in(ast.parse(SOURCE), selection=selection)]
+    return [use.name_parts for use in external_names_used_in(ast.parse(SOURCE), selection=selection)]
 
 
 def test_only_selected_parts_are_searched() -> None:

@@ -33,10 +33,10 @@ def test_times_are_measured_from_the_activation() -> None:
     found = event_time_statistics.propagation_spreads_by_step(
         results(run(7.0, 9.0, t_manifest=5.5), run(6.0, nan), run(nan, nan), {})
     )
-    assert (found["activation to manifest"].n, found["activation to manifest"].mean) == (1, 0.5)
-    assert (found["activation to alert"].n, found["activation to alert"].mean) == (2, 1.5)
-    assert (found["activation to hazard"].n, found["activation to hazard"].median) == (1, 4.0)
-    assert (found["alert to hazard"].n, found["alert to hazard"].mean) == (1, 2.0)
+    assert (found["activation to manifest"].time_count, found["activation to manifest"].mean) == (1, 0.5)
+    assert (found["activation to alert"].time_count, found["activation to alert"].mean) == (2, 1.5)
+    assert (found["activation to hazard"].time_count, found["activation to hazard"].median) == (1, 4.0)
+    assert (found["alert to hazard"].time_count, found["alert to hazard"].mean) == (1, 2.0)
 
 
 def test_a_hazard_exactly_at_a_time_has_come_by_then() -> None:
@@ -47,7 +47,7 @@ def test_a_hazard_exactly_at_a_time_has_come_by_then() -> None:
 
 def test_a_reaction_time_needs_an_earlier_alert() -> None:
     frame = results(run(9.0, 9.0), run(9.5, 9.0), run(nan, 9.0))
-    assert event_time_statistics.propagation_spreads_by_step(frame)["alert to hazard"].n == 0
+    assert event_time_statistics.propagation_spreads_by_step(frame)["alert to hazard"].time_count == 0
     found = event_time_statistics.alert_to_hazard_times(frame, ENDS, DRIVER_S)
     assert (found.runs_alerted_first, found.hazards_after_alert, found.runs_alerted_too_late) == (0, 0, 2)
     assert isnan(found.no_hazard_share)

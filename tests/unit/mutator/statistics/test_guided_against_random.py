@@ -87,7 +87,7 @@ def test_pairs_have_the_same_fault_scenario_and_row(frame: pd.DataFrame) -> None
     found = guided_against_random.matched_pairs(frame)
     assert list(found["fault_id"]) == ["a", "b", "c", "d", "e"]
     assert guided_against_random.mcnemar_of_pairs(found) == PairCounts(
-        both=1, first_only=1, second_only=2, neither=1, p=1.0
+        both=1, first_only=1, second_only=2, neither=1, p_value=1.0
     )
 
 
@@ -96,7 +96,7 @@ def test_mcnemar_is_exact() -> None:
     made = [row for i in range(8) for row in pair(str(i), HIT, RAN)]
     assert guided_against_random.mcnemar_of_pairs(
         guided_against_random.matched_pairs(results(*made))
-    ).p == pytest.approx(2 * 0.5**8)
+    ).p_value == pytest.approx(2 * 0.5**8)
 
 
 def test_pairs_are_counted_per_injected_and_per_activated_fault(frame: pd.DataFrame) -> None:

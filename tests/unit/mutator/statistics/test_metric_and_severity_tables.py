@@ -95,7 +95,7 @@ def test_the_interval_of_a_median_resamples_whole_faults(
     pairs: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A simple loop that copies the runs of each drawn fault gives the same interval."""
-    monkeypatch.setattr(bootstrap_median_intervals, "RESAMPLES", 40)
+    monkeypatch.setattr(bootstrap_median_intervals, "RESAMPLE_COUNT", 40)
     monkeypatch.setattr(
         bootstrap_median_intervals, "_MOST_BATCH_CELLS", 300
     )  # the draws need several batches

@@ -8,7 +8,7 @@ import pytest
 
 from mutator.model import OPERATOR_FAULTS_MODULE, Experiment, Fault
 from mutator.statistics.mutation_score import mutant_effect_flags, mutation_score_sheet
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.shares_with_intervals import share_with_interval
 
 from .results_frame import results
 
@@ -51,12 +51,12 @@ def test_a_mutant_is_counted_once_for_all_its_runs(faults: dict[str, Fault]) -> 
     found = lines(mutation_score_sheet(frame, faults, GOLDEN))
     total = found["all", "mutants", "permanent"]
     assert (total["number"], total["not activated"], total["no effect"]) == (3, 1, 0)
-    assert total["actuator changed"] == share(2, 2)
-    assert total["hazard"] == share(1, 2)
+    assert total["actuator changed"] == share_with_interval(2, 2)
+    assert total["hazard"] == share_with_interval(1, 2)
     drives = found["all", "drives", "permanent"]
     assert (drives["number"], drives["not activated"], drives["no effect"]) == (4, 1, 1)
     assert (drives["hazard"].count, drives["hazard"].of) == (1, 3)
-    assert found["pkg/radar.py::f", "mutants", "permanent"]["hazard"] == share(1, 2)
+    assert found["pkg/radar.py::f", "mutants", "permanent"]["hazard"] == share_with_interval(1, 2)
     none = found["pkg/radar.py::g", "mutants", "permanent"]["hazard"]
     assert (none.count, none.of) == (0, 0)  # without an interval: its bounds are NaN, which equals nothing
 
@@ -64,9 +64,9 @@ def test_a_mutant_is_counted_once_for_all_its_runs(faults: dict[str, Fault]) -> 
 def test_permanent_and_transient_mutants_have_separate_lines(faults: dict[str, Fault]) -> None:
     frame = results(drive("a", HIT), drive("a", ACTIVE, trigger="C1"), drive("b", ACTIVE, trigger="C1"))
     found = lines(mutation_score_sheet(frame, faults, GOLDEN))
-    assert found["all", "mutants", "permanent"]["hazard"] == share(1, 1)
-    assert found["all", "mutants", "transient"]["hazard"] == share(0, 2)
-    assert found["all", "mutants", "either"]["hazard"] == share(1, 2)
+    assert found["all", "mutants", "permanent"]["hazard"] == share_with_interval(1, 1)
+    assert found["all", "mutants", "transient"]["hazard"] == share_with_interval(0, 2)
+    assert found["all", "mutants", "either"]["hazard"] == share_with_interval(1, 2)
     assert not any(counted == "drives" for _, counted, _ in found)
 
 
@@ -75,7 +75,7 @@ def test_alerts_of_the_fault_free_run_are_not_attributed_to_a_mutant(faults: dic
         drive("a", ACTIVE, alerts="own", t_alert="2.0"), drive("b", ACTIVE, alerts="own;brake", t_alert="2.0")
     )
     found = lines(mutation_score_sheet(frame, faults, GOLDEN))
-    assert found["all", "mutants", "permanent"]["new alert"] == share(1, 2)
+    assert found["all", "mutants", "permanent"]["new alert"] == share_with_interval(1, 2)
     assert found["all", "mutants", "permanent"]["no effect"] == 1
     unknown = mutation_score_sheet(frame, faults, None)
     assert lines(unknown)["all", "mutants", "permanent"]["new alert"] is None
@@ -95,8 +95,8 @@ def test_harness_errors_are_excluded_from_all_shares(faults: dict[str, Fault]) -
     assert "Chosen: `pkg/**: 4 of 9 mutants; left out: 5`." in sheet.note
     total = lines(sheet)["all", "mutants", "permanent"]
     assert (total["number"], total["not activated"]) == (2, 0)
-    assert total["crash or timeout"] == share(1, 2)
-    assert total["hazard"] == share(0, 2)
+    assert total["crash or timeout"] == share_with_interval(1, 2)
+    assert total["hazard"] == share_with_interval(0, 2)
     assert "Without a result, and therefore not counted: 2 of 4." in sheet.note
 
 
@@ -111,8 +111,8 @@ def test_the_note_warns_of_several_draws(faults: dict[str, Fault]) -> None:
 def test_scores_are_given_by_operator(faults: dict[str, Fault]) -> None:
     frame = results(drive("a", HIT), drive("b", ACTIVE, fault_type="branch"), {"fault_id": "x"} | HIT)
     found = lines(mutation_score_sheet(frame, faults, GOLDEN))
-    assert found["arithmetic", "mutants", "permanent"]["hazard"] == share(1, 1)
-    assert found["branch", "mutants", "permanent"]["hazard"] == share(0, 1)
+    assert found["arithmetic", "mutants", "permanent"]["hazard"] == share_with_interval(1, 1)
+    assert found["branch", "mutants", "permanent"]["hazard"] == share_with_interval(0, 1)
     assert found["all", "mutants", "permanent"]["number"] == 2
 
 

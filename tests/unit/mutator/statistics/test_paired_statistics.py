@@ -10,7 +10,7 @@ import pytest
 from mutator.statistics.paired_statistics import (
     PairCounts,
     PairedDifference,
-    mcnemar,
+    mcnemar_test,
     paired_times,
     rate_difference,
 )
@@ -21,7 +21,7 @@ def flags(text: str) -> pd.Series:
 
 
 def test_mcnemar_uses_the_pairs_that_differ() -> None:
-    found = mcnemar(flags("1111111100"), flags("1000000010"))
+    found = mcnemar_test(flags("1111111100"), flags("1000000010"))
     assert (found.both, found.first_only, found.second_only, found.neither, found.pair_count) == (
         1,
         7,
@@ -29,12 +29,12 @@ def test_mcnemar_uses_the_pairs_that_differ() -> None:
         1,
         10,
     )
-    assert found.p == pytest.approx(2 * (1 + 8) / 2**8)
+    assert found.p_value == pytest.approx(2 * (1 + 8) / 2**8)
 
 
 def test_equal_flags_have_a_p_value_of_one_and_no_interval() -> None:
     same = flags("1100")
-    assert mcnemar(same, same) == PairCounts(both=2, first_only=0, second_only=0, neither=2, p=1.0)
+    assert mcnemar_test(same, same) == PairCounts(both=2, first_only=0, second_only=0, neither=2, p_value=1.0)
     found = rate_difference(same, same, pd.Series(list("abcd")))
     assert found.difference == 0.0
     assert math.isnan(found.low) and math.isnan(found.high)
@@ -62,12 +62,12 @@ def test_median_times_use_pairs_with_both_times() -> None:
     found = paired_times(first, second)
     assert (found.pair_count, found.first_median, found.second_median) == (7, 4.0, 4.8)
     assert found.median_difference == PairedDifference(difference=0.8, low=0.5, high=1.1)
-    assert found.p == pytest.approx(2 / 2**7)
+    assert found.p_value == pytest.approx(2 / 2**7)
 
 
 def test_equal_or_missing_times_have_no_result() -> None:
     same = pd.Series([1.0, 0.1 + 0.2])
-    assert math.isnan(paired_times(same, pd.Series([1.0, 0.3])).p)
+    assert math.isnan(paired_times(same, pd.Series([1.0, 0.3])).p_value)
     none = paired_times(pd.Series([None], dtype=float), pd.Series([1.0]))
     assert none.pair_count == 0
     assert math.isnan(none.median_difference.difference)
@@ -114,4 +114,4 @@ def test_wilcoxon_is_exact_for_few_pairs(size: int) -> None:
     ]
     least = min(ranks[change > 0].sum(), ranks[change < 0].sum())
     expected = min(1.0, 2 * sum(total <= least for total in sums) / 2**size)
-    assert paired_times(pd.Series(np.zeros(size)), change).p == pytest.approx(expected)
+    assert paired_times(pd.Series(np.zeros(size)), change).p_value == pytest.approx(expected)

@@ -8,8 +8,8 @@ import pytest
 from mutator.paper.measures import estimate_of_difference, mean_time, paired
 from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random import FaultTypeStratum
-from mutator.statistics.paired_statistics import mcnemar, paired_times
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.paired_statistics import mcnemar_test, paired_times
+from mutator.statistics.shares_with_intervals import share_with_interval
 
 from . import by_hand
 from .results_frame import results
@@ -28,7 +28,7 @@ def stratum(a: int, b: int, c: int, d: int) -> FaultTypeStratum:
 )
 def test_wilson(count: int, of: int, low: float, high: float) -> None:
     """The intervals are those in Newcombe, Statistics in Medicine 17 (1998) 857-872, table I, method 3."""
-    found = share(count, of)
+    found = share_with_interval(count, of)
     assert (round(found.low, 4), round(found.high, 4)) == (low, high)
 
 
@@ -75,7 +75,7 @@ def test_fisher(table: tuple[int, int, int, int], p: float) -> None:
 def test_mcnemar() -> None:
     """The numbers are those of Liddell, Journal of Epidemiology and Community Health 37 (1983)."""
     first = pd.Series([True] * 21 + [False] * 9)
-    assert mcnemar(first, ~first).p == pytest.approx(0.0428, abs=5e-5)
+    assert mcnemar_test(first, ~first).p_value == pytest.approx(0.0428, abs=5e-5)
 
 
 def test_wilcoxon() -> None:
@@ -85,14 +85,14 @@ def test_wilcoxon() -> None:
     before = pd.Series([1.83, 0.50, 1.62, 2.48, 1.68, 1.88, 1.55, 3.06, 1.30])
     after = pd.Series([0.878, 0.647, 0.598, 2.05, 1.06, 1.29, 1.06, 3.14, 1.29])
     found = paired_times(before, after)
-    assert found.p == pytest.approx(0.0390625)
+    assert found.p_value == pytest.approx(0.0390625)
     differences = sorted((after - before).round(9))
     assert (found.median_difference.low, found.median_difference.high) == (differences[1], differences[7])
 
 
 def test_newcombe() -> None:
     """The example is in Newcombe, Statistics in Medicine 17 (1998) 873-890, table II, method 10."""
-    found = estimate_of_difference(share(56, 70), share(48, 80))
+    found = estimate_of_difference(share_with_interval(56, 70), share_with_interval(48, 80))
     assert found.value == pytest.approx(0.2)
     assert (round(found.low, 4), round(found.high, 4)) == (0.0524, 0.3339)
 

@@ -8,7 +8,7 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.results.table_columns import result_columns
 from mutator.statistics.results_frame import load_usable_results
-from mutator.statistics.shares_with_intervals import share
+from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
 from mutator.statistics.tallies import Tally, tally_by_fault_type, tally_by_scenario
 from tests.made_head import made_head
@@ -21,9 +21,9 @@ HIT = {"t_activation": 7.0, "t_manifest": 7.1, "h1": 1, "t_h1": 18.0}
 
 def test_wilson_interval_of_a_published_example() -> None:
     """The example is in Newcombe 1998, table I, method 3."""
-    assert str(share(81, 263)) == "30.8 % (81/263; 25.5 to 36.6)"
-    assert share(0, 20).low == 0
-    assert str(share(0, 0)) == "- (0/0)"
+    assert str(share_with_interval(81, 263)) == "30.8 % (81/263; 25.5 to 36.6)"
+    assert share_with_interval(0, 20).low == 0
+    assert str(share_with_interval(0, 0)) == "- (0/0)"
 
 
 def test_a_table_without_published_counts_has_only_ours() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.extension_doors import EXPORTS
+from mutator._common.extension_doors import EXPORT_DOOR
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
@@ -41,7 +41,7 @@ def test_everything_that_a_run_wrote_is_deleted(run: Path) -> None:
     assert run.parent.exists()
 
 
-@pytest.mark.parametrize("name", EXPORTS.shipped_names())
+@pytest.mark.parametrize("name", EXPORT_DOOR.shipped_names())
 def test_the_file_of_each_export_is_no_stranger(run: Path, name: str) -> None:
     """A new format is one module, which cleaning need not know."""
     for table in ExportTable:

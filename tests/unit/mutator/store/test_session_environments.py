@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mutator._common.hashing import as_json_types
-from mutator._common.typed_json import from_json_types
+from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import TypeMisfit
 from mutator.store.session_environments import (
     Blas,
@@ -34,7 +34,10 @@ def test_stretches_are_read_as_written() -> None:
         worker="w", mutator="0.2", host="h", python="3", platform="p", cpu=None, blas=BEFORE.blas, packages={}
     )
     for stretch in (BEFORE, replace(BEFORE, machines=(machine,))):
-        assert from_json_types(SessionEnvironment, json.loads(json.dumps(as_json_types(stretch)))) == stretch
+        assert (
+            typed_value_from_json(SessionEnvironment, json.loads(json.dumps(as_json_types(stretch))))
+            == stretch
+        )
 
 
 @pytest.mark.parametrize(
@@ -48,7 +51,7 @@ def test_stretches_are_read_as_written() -> None:
 )
 def test_a_damaged_stretch_is_refused(stretch: Any, got: str) -> None:
     with pytest.raises(TypeMisfit, match=got):
-        from_json_types(SessionEnvironment, stretch)
+        typed_value_from_json(SessionEnvironment, stretch)
 
 
 def test_every_difference_is_named() -> None:

@@ -43,9 +43,9 @@ def meets(box: ComponentBox, start: Point, end: Point) -> bool:
 
 
 def test_boxes_do_not_overlap_and_are_inside(layout: StructureLayout) -> None:
-    for one, other in combinations(layout.boxes.values(), 2):
+    for one, other in combinations(layout.box_by_component.values(), 2):
         assert not meets(one, (other.x, other.y), (other.x + other.width, other.bottom))
-    for box in layout.boxes.values():
+    for box in layout.box_by_component.values():
         assert box.x >= 0 and box.x + box.width < layout.width and box.bottom < layout.height
 
 
@@ -53,18 +53,18 @@ def test_arrows_join_their_boxes_and_cross_no_other_box(
     analysis: HazardAnalysis, layout: StructureLayout
 ) -> None:
     for name, link in analysis.structure.links.items():
-        points = layout.arrows[name].points
+        points = layout.arrow_by_link[name].corners
         for place, point in ((link.from_, points[0]), (link.to, points[-1])):
-            box = layout.boxes[place]
+            box = layout.box_by_component[place]
             assert point[1] in (box.y, box.bottom) or point[0] in (box.x, box.x + box.width), name
-        for box in layout.boxes.values():
+        for box in layout.box_by_component.values():
             assert not any(meets(box, start, end) for start, end in pairwise(points)), name
 
 
 def test_arrows_do_not_overlap(layout: StructureLayout) -> None:
-    for (one, first), (other, second) in combinations(layout.arrows.items(), 2):
-        for a, b in pairwise(first.points):
-            for c, d in pairwise(second.points):
+    for (one, first), (other, second) in combinations(layout.arrow_by_link.items(), 2):
+        for a, b in pairwise(first.corners):
+            for c, d in pairwise(second.corners):
                 for i in (0, 1):  # along x, along y
                     if a[1 - i] == b[1 - i] and c[1 - i] == d[1 - i]:
                         together = min(max(a[i], b[i]), max(c[i], d[i])) > max(
@@ -79,18 +79,18 @@ def test_arrows_do_not_overlap(layout: StructureLayout) -> None:
 def test_labels_overlap_nothing(analysis: HazardAnalysis, layout: StructureLayout) -> None:
     areas = {}
     for name, link in analysis.structure.links.items():
-        arrow, width = layout.arrows[name], 7.0 * len(link.label)
+        arrow, width = layout.arrow_by_link[name], 7.0 * len(link.label)
         (x, y), apart = arrow.label.baseline, arrow.label.line_distance
         left = x - {"start": 0.0, "middle": width / 2, "end": width}[arrow.label.anchor]
-        areas[name] = ComponentBox(x=left, y=y - 12, width=width, height=apart + 15, row=0, lines=())
+        areas[name] = ComponentBox(x=left, y=y - 12, width=width, height=apart + 15, row=0, text_lines=())
     for (name, area), (other, beside) in combinations(areas.items(), 2):
         assert not meets(area, (beside.x, beside.y), (beside.x + beside.width, beside.bottom)), (name, other)
     for name, area in areas.items():
-        for box in layout.boxes.values():
+        for box in layout.box_by_component.values():
             assert not meets(area, (box.x, box.y), (box.x + box.width, box.bottom)), name
-        for other, arrow in layout.arrows.items():
+        for other, arrow in layout.arrow_by_link.items():
             if other != name:
-                assert not any(meets(area, a, b) for a, b in pairwise(arrow.points)), (name, other)
+                assert not any(meets(area, a, b) for a, b in pairwise(arrow.corners)), (name, other)
 
 
 def test_only_places_with_faults_have_the_colour_of_faults(analysis: HazardAnalysis) -> None:

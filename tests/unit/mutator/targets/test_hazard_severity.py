@@ -30,7 +30,7 @@ def test_the_shipped_scale_is_that_of_sae_j2980(kph: float, severity: str) -> No
     workspace = Workspace.find()
     scale = workspace.scale_of(workspace.manifest("openpilot"))
     assert scale is not None
-    assert scale.class_of(kph * KPH) == severity
+    assert scale.class_of_delta_v(kph * KPH) == severity
 
 
 def test_a_class_is_shown_with_the_words_of_its_scale(tmp_path: Path) -> None:

@@ -119,7 +119,7 @@ def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
     with pytest.raises(MutatorError) as caught:
         build(pole.manifest("pole"), pole.fault_models(), None, always_trigger())
     assert caught.value.where == str(overlay / "drive.py")
-    assert pole.manifest("pole").tree.relative_name(caught.value.where) == "drive.py"
+    assert pole.manifest("pole").tree.path_as_in_specs(caught.value.where) == "drive.py"
     (found,) = [finding for finding in examine_machine(pole) if finding.name == "target pole"]
     assert f"{pole.manifest('pole').root} and {overlay}: 6 files" in found.found
 

@@ -58,7 +58,7 @@ def test_the_highest_class_of_a_run_counts() -> None:
     assert scale.worst_hazard(hazards, left | {"delta_v": 2.0}, 5.0) == ("H3", "S3")
     assert scale.worst_hazard(hazards, left | {"delta_v": 12.0}, 5.0) == ("H3", "S3")  # the first
     assert scale.worst_hazard(hazards, {"delta_v": 12.0}, 5.0) == ("H1", "S3")
-    fewer = scale.with_rules_over(["lost_speed", "peak_deceleration", "lane_excursion"])
+    fewer = scale.with_only_rules_of_metrics(["lost_speed", "peak_deceleration", "lane_excursion"])
     assert [rule.hazard for rule in fewer.rules] == ["H2"]
 
 
