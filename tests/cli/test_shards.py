@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from mutator.audit.seal import Seals
+from mutator.audit.run_digests_and_seal import Seals
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
