@@ -102,10 +102,10 @@ def report(page: Any, path: Path, name: str) -> None:
     page.wait_for_selector("#worst-replay .replay-player")
     save(page.screenshot(), "report" + name)
     page.locator(WORST_CONTACT).first.click()
-    page.wait_for_selector(".replay-player")
-    page.locator(".jumps button").last.click()
+    page.wait_for_selector("#experiment .replay-player")
+    page.locator("#experiment .jumps button").last.click()
     page.mouse.move(0, 0)  # so that the pointer highlights nothing
-    show(page, ".replay-player", below="#experiment > header")
+    show(page, "#experiment .replay-player", below="#experiment > header")
     save(page.screenshot(), "experiment" + name)
     page.add_style_tag(content=FILM_STYLE)
     film(page, "replay" + name)
@@ -131,19 +131,21 @@ def show(page: Any, what: str, *, below: str) -> None:
 def film(page: Any, name: str) -> None:
     """Step the replay from one second before the activation to the last event, and save the frames."""
     end = time(page)
-    page.locator(".jumps button").first.click()
+    page.locator("#experiment .jumps button").first.click()
     page.mouse.move(0, 0)
-    page.locator(".timebar").focus()
+    page.locator("#experiment .timebar").focus()
     page.keyboard.press("Shift+ArrowLeft")
-    show(page, ".stage", below=".jumps")
-    clip = around(page.locator(".stage").bounding_box(), page.locator(".gauges").bounding_box())
+    show(page, "#experiment .stage", below="#experiment .jumps")
+    clip = around(
+        page.locator("#experiment .stage").bounding_box(), page.locator("#experiment .gauges").bounding_box()
+    )
     frames = []
     while (now := time(page)) < end:
         frames.append(Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB"))
         for _ in range(STEPS):
             page.keyboard.press("ArrowRight")
         assert time(page) > now
-    page.locator(".jumps button").last.press("Enter")
+    page.locator("#experiment .jumps button").last.press("Enter")
     time(page)
     frames.append(Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB"))
     column = Image.new("RGB", (frames[0].width, frames[0].height * len(frames)))
@@ -170,7 +172,7 @@ def around(top: dict[str, float], bottom: dict[str, float]) -> dict[str, float]:
 
 def time(page: Any) -> float:
     page.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
-    return float(page.get_attribute(".replay-player", "data-t"))
+    return float(page.get_attribute("#experiment .replay-player", "data-t"))
 
 
 def save(data: bytes, name: str) -> None:
