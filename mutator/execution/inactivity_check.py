@@ -11,6 +11,7 @@ from mutator.engines.engine_jobs import EngineArguments, Job
 from mutator.engines.reach_jobs import watched_job
 from mutator.engines.reference_engine import ReferenceEngine, make_reference_engine
 from mutator.errors import MutatorError
+from mutator.faults.message_places import changes_messages, describe_message
 from mutator.model import Experiment, FaultLocation, Status
 from mutator.mutants.execution_counting_mutant import build_counting_mutant
 from mutator.mutants.probe_contract import was_triggered
@@ -38,7 +39,7 @@ class InactivityCheck:
         unset = probe_report.get("unset")
         if isinstance(unset, dict) and unset:
             return "; ".join(dict.fromkeys(map(str, unset.values())))
-        locations = tuple(dict.fromkeys(injection.location for injection in experiment.fault.injections))
+        locations = _locations(experiment)
         key = (
             experiment.scenario,
             experiment.scenario_digest,
@@ -53,8 +54,21 @@ class InactivityCheck:
     def _text(self, experiment: Experiment, places: tuple[tuple[Reach, str], ...]) -> str:
         limited = any(i.where or i.call or i.every for i in experiment.fault.injections)
         selected = " and `where`, `call` or `every` selects it" if limited else ""
-        texts = [f"{text}{selected if reach is Reach.IN_RUN else ''}" for reach, text in places]
+        texts = []
+        for location, (reach, text) in zip(_locations(experiment), places, strict=False):
+            awaited = self._awaited_messages(experiment, location)
+            texts.append(f"{text}{selected}{awaited}" if reach is Reach.IN_RUN else text)
         return "; ".join(dict.fromkeys(texts))
+
+    def _awaited_messages(self, experiment: Experiment, location: FaultLocation) -> str:
+        """Return ` and a message of topic 'gap' comes`, for faults of messages at the location; else ''."""
+        messages = [
+            describe_message(injection, self._arguments.manifest)
+            for injection in experiment.fault.injections
+            if injection.location == location
+            and changes_messages(self._arguments.models.get(injection.model))
+        ]
+        return f" and {' or '.join(dict.fromkeys(messages))} comes" if messages else ""
 
     def _find_reach(
         self, experiment: Experiment, scenario: Path, locations: tuple[FaultLocation, ...]
@@ -94,3 +108,7 @@ class InactivityCheck:
     def close(self) -> None:
         if self._engine is not None:
             self._engine.close()
+
+
+def _locations(experiment: Experiment) -> tuple[FaultLocation, ...]:
+    return tuple(dict.fromkeys(injection.location for injection in experiment.fault.injections))

@@ -24,6 +24,7 @@ _EXPECTED_BY_NAME_TYPE = {
     "variable": "a name as in the source",
     "import": "a module of the target and a name in it",
 }
+_MOST_INTEGER_EXACT_AS_FLOAT = 2**53  # every integer up to this is exact as a double
 _ANCHOR_KINDS_WITHOUT_TARGET = VALUE_ANCHORS | LOAD_TIME_ANCHORS
 _ANCHOR_KINDS_WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
@@ -67,8 +68,8 @@ def resolve_injection(
             )
     for schema in model.params:
         if schema.type == "seed":
-            # up to 2**53, every whole number is exact as a float, too
-            params[schema.name] = int(random_generator(seed, f"{key}/{schema.name}").random() * 2**53)
+            drawn = random_generator(seed, f"{key}/{schema.name}").random()
+            params[schema.name] = int(drawn * _MOST_INTEGER_EXACT_AS_FLOAT)
         elif schema.name == "target" and location.anchor.kind in _ANCHOR_KINDS_WITH_DEFAULT_TARGET:
             params.setdefault("target", location.anchor.name)
         at_value = schema.name == "target" and location.anchor.kind in _ANCHOR_KINDS_WITHOUT_TARGET
@@ -131,11 +132,18 @@ class _ParameterResolver:
         return schema
 
     def is_verbatim(self, param: ParamSpec, schema: ParamSchema) -> bool:
-        """Return whether a constant is a truth value, None, or a text other than the draw's name."""
+        """Return whether a constant is used as it is written.
+
+        That is a literal one, a truth value, None, an integer that is not exact as a float, and a text other
+        than the draw's name.
+        """
         if schema.type != "constant" or param.unit:
             return False
+        if param.is_literal:
+            return True
         if not isinstance(param.value, str):
-            return param.value is None or isinstance(param.value, bool)
+            is_large = isinstance(param.value, int) and abs(param.value) > _MOST_INTEGER_EXACT_AS_FLOAT
+            return param.value is None or isinstance(param.value, bool) or is_large
         drawn = parse_draw_reference(param.value)
         return drawn is None or drawn.name not in self.drawn_by_name
 
@@ -203,7 +211,9 @@ class _ParameterResolver:
     def _constant_value(self, param: ParamSpec) -> Value:
         """Return the value; MutatorError for a text that resembles the draw's name, a likely typo."""
         assert not isinstance(param.value, DrawReference)
-        if isinstance(param.value, str) and spelling_suggestion(param.value, list(self.drawn_by_name)):
+        if param.is_literal or not isinstance(param.value, str):
+            return param.value
+        if spelling_suggestion(param.value, list(self.drawn_by_name)):
             raise self._value_error(param, f"{self._draw_names}, or a text that is less similar")
         return param.value
 

@@ -29,12 +29,16 @@ ParamValue = int | float | str | bool | None | DrawReference
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParamSpec:
-    """A parameter as written: `name` without its unit suffix, `unit` the suffix or None."""
+    """A parameter as written: `name` without its unit suffix, `unit` the suffix or None.
+
+    A constant that `is_literal` keeps its value: it is no draw's name, and an integer stays one.
+    """
 
     name: str
     unit: str | None
     value: ParamValue
     keys: KeyPath  # its position in the file
+    is_literal: bool = False
 
     @property
     def key(self) -> str:

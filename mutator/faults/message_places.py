@@ -8,7 +8,7 @@ from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels
 from mutator.faults.injection_specs import InjectionSpec, ParamSpec
-from mutator.model import FaultLocation
+from mutator.model import FaultLocation, Injection
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.message_readers import MessageReader
 
@@ -19,7 +19,7 @@ def locate_injection(injection: InjectionSpec, manifest: TargetManifest, source:
     """Return the injection at the place where its message is read; others unchanged.
 
     The reader's variables become parameters, and its `where` part of the injection's. MutatorError with file
-    and line if the manifest declares no such reader or topic.
+    and line if the manifest declares no such reader or topic, or if the spec sets these parameters, too.
     """
     place = injection.message
     if place is None:
@@ -42,6 +42,14 @@ def locate_injection(injection: InjectionSpec, manifest: TargetManifest, source:
             expected=f"{describe_choices(topics)}, {declared}",
             remedy="correct it, or declare the topic" + spelling_suggestion(place.topic, list(topics)),
         )
+    for param in injection.params:
+        if param.name in _READER_PARAMS:
+            raise source.error(
+                param.keys,
+                f"'{param.key}' in the parameters of a message",
+                expected=f"no such parameter: {manifest.path.name} sets it for reader '{reader.name}'",
+                remedy="leave it out, or name the place with `at` instead of `message`",
+            )
     return replace(
         injection,
         location=reader.location,
@@ -63,6 +71,25 @@ def check_changes_messages(located: InjectionSpec, model: FaultModel, models: Fa
         )
 
 
+def changes_messages(model: FaultModel) -> bool:
+    """Return whether a fault model changes messages of a topic."""
+    topic = model.param("topic")
+    return topic is not None and topic.type == "expression"
+
+
+def describe_message(injection: Injection, manifest: TargetManifest) -> str:
+    """Return `a message of topic 'gap'`; without the topic's name if the manifest has no such reader."""
+    params = dict(injection.params)
+    topic, value = params.get("topic"), params.get("name")
+    for reader in manifest.message_readers.values():
+        if reader.location != injection.location or reader.topic != topic:
+            continue
+        for name, value_of_topic in reader.value_by_topic.items():
+            if topic is None or value_of_topic == value:
+                return f"a message of topic '{name}'"
+    return "a message" if topic is None else f"a message with `{topic} == {value!r}`"
+
+
 def _can_change(model: FaultModel, needed: set[str]) -> bool:
     return all(model.param(name) for name in needed)
 
@@ -80,7 +107,7 @@ def _params_of(reader: MessageReader, topic: str, injection: InjectionSpec) -> l
         values |= {"topic": reader.topic, "name": reader.value_by_topic[topic]}
     keys = (*injection.keys, "message")
     return [
-        ParamSpec(name=name, unit=None, value=value, keys=keys)
+        ParamSpec(name=name, unit=None, value=value, keys=keys, is_literal=True)
         for name, value in values.items()
         if value is not None
     ]

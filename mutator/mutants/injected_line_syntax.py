@@ -27,10 +27,11 @@ _TAG_START_BYTES = _TAG_START.encode()
 _TAG_PATTERN = rf"{_TAG_START}([0-9a-z]+(?:\+[0-9a-z]+)*)(?: guard:(\d+)| was:([^\r\n]*))?"
 # only at the end of a line, because a string of the target can contain the text of a tag
 _TAG_AT_LINE_END_PATTERN = re.compile(rf"[ \t]*{_TAG_PATTERN}(?=\r?\n?\Z)".encode())
-_ACTIVE_CHECK_PATTERN = (  # checks of the instance or execution come first
+# checks of the instance or execution come first; `listens` is the check of faults of messages
+_ACTIVE_CHECK_PATTERN = (
     rf"(?:{PROBE_MODULE_NAME}\.on\(\) and \(.*?\) and )?"
     rf'(?:{PROBE_MODULE_NAME}\.(?:call|every)\("[0-9a-z]+", \d+\) and )?'
-    rf'{PROBE_MODULE_NAME}\.active\("(?P<id>[0-9a-z]+)"\)'
+    rf'{PROBE_MODULE_NAME}\.(?:active|listens)\("(?P<id>[0-9a-z]+)"\)'
 )
 # a drift that stays after its trigger has ended guards its lines with `or _fi.steps()`
 _GUARD_PATTERN = re.compile(
@@ -164,16 +165,22 @@ def active_check_source(tag: str) -> str:
     return f'{PROBE_MODULE_NAME}.active("{tag}")'
 
 
-def activation_condition(tag: str, injection: Injection) -> str:
+def listening_check_source(tag: str) -> str:
+    """Return the call that asks the probe whether the injection changes messages now."""
+    return f'{PROBE_MODULE_NAME}.listens("{tag}")'
+
+
+def activation_condition(tag: str, injection: Injection, check: str | None = None) -> str:
     """Return the condition under which an injection is active, with its limits to instances or executions.
 
-    The limits are checked only while the fault is active.
+    It ends with `check`, by default that of `active_check_source`. The limits are checked only while the
+    fault is active.
     """
     terms = [f"{PROBE_MODULE_NAME}.on()", f"({injection.where})"] if injection.where else []
     for name in ("call", "every"):
         if (number := getattr(injection, name)) is not None:
             terms.append(f'{PROBE_MODULE_NAME}.{name}("{tag}", {number})')
-    return " and ".join([*terms, active_check_source(tag)])
+    return " and ".join([*terms, check or active_check_source(tag)])
 
 
 def changed_value_prefix(condition: str, changed: str) -> str:

@@ -18,6 +18,7 @@ from mutator.mutants.injected_line_syntax import (
     active_check_source,
     constant_setting_line,
     default_setting_line,
+    listening_check_source,
 )
 from mutator.mutants.modules_importing_constants import dotted_names_importing_constant
 from mutator.mutants.name_scopes import bound_names, normalize_identifier, rescoped_names
@@ -230,7 +231,10 @@ def _snippet_limited_to_instances(
     code: tuple[str, ...], injection: Injection, tag: str, model: FaultModel
 ) -> tuple[str, ...]:
     """Add to the snippet a check for the instance or executions that the injection selects, if any."""
-    check, condition = active_check_source(tag), activation_condition(tag, injection)
+    check, listening = active_check_source(tag), listening_check_source(tag)
+    if any(listening in line for line in code):
+        check = listening
+    condition = activation_condition(tag, injection, check)
     if condition == check:
         return code
     limited_lines = {f"if {check}:": f"if {condition}:", f"if not {check}:": f"if not ({condition}):"}

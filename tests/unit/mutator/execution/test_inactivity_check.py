@@ -152,6 +152,57 @@ def test_a_file_with_two_names_names_the_other(tmp_path: Path, link: bool) -> No
     )
 
 
+READER = """\
+class Control:
+    def __init__(self):
+        self.y = 1.0
+
+    def take(self, frames):
+        for name, content in frames:
+            if name == "place":
+                self.y = content
+
+    def update(self, y, dt):
+        self.take([("place", y)])
+        return -2.0 * self.y
+"""
+MESSAGES = """\
+messages:
+  law:
+    at: {file: law.py, function: Control.take, entry: true}
+    queue: frames
+    topic: message[0]
+    topics: {place: place, speed: spede}
+"""
+LOST = """\
+schema: fault_spec/1
+module: c
+fault_type: m
+about: Messages are lost.
+variants:
+  one:
+    about: They are lost.
+    as_described:
+      injections:
+        - message: {topic: place, reader: law}
+          model: message_loss
+"""
+
+
+def test_a_topic_that_never_comes_is_the_reason(tmp_path: Path) -> None:
+    """A fault of messages is active only at readings at which a message of its topic comes."""
+    workspace = small_loop(tmp_path, {"law.py": READER}, manifest=MESSAGES)
+    spec = workspace.library / "faults" / "c" / "m.yaml"
+    spec.write_text(LOST)
+    activation = mutator.try_fault("c/m/one", "s", "t>=0.5", workspace=workspace).record.activation
+    assert activation is not None and (activation.first, activation.count) == (0.5, 10)
+    spec.write_text(LOST.replace("topic: place", "topic: speed"))
+    record = mutator.try_fault("c/m/one", "s", "t>=0.5", workspace=workspace).record
+    assert (record.status, record.outcome) == (Status.OK, Outcome.NOT_ACTIVATED)
+    assert record.detail.startswith("it runs 20 times")
+    assert record.detail.endswith("while the trigger holds and a message of topic 'speed' comes")
+
+
 FORKING = """\
 import os
 

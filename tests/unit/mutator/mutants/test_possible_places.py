@@ -42,6 +42,7 @@ VALUES: dict[str, Value] = {
     "boolean": False,
     "constant": 3.0,
     "seed": 5,
+    "expression": "message.topic",
 }
 
 
