@@ -1,7 +1,7 @@
 """Benches: ask list after list of experiments, at the price of the engine."""
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import Any
 
 from mutator._common.argument_checks import check_whole_number
 from mutator.api.campaigns import describe_unfinished
-from mutator.api.experiments import ExperimentBuilder
+from mutator.api.experiments import ExperimentBuilder, checked_after_hazard
 from mutator.api.runs import Run
 from mutator.api.target_and_fault_selection import (
     FaultLike,
@@ -22,6 +22,7 @@ from mutator.campaigns.campaign_files import load_campaign
 from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.errors import EXIT_CHECK_FAILED, IncompleteRun, MutatorError, MutatorWarning
 from mutator.execution import bench as bench_in_folder
+from mutator.execution.bench_opening import opened_bench
 from mutator.execution.session_summary import Summary
 from mutator.model import AfterHazard, Experiment, Fault, Record
 from mutator.preflight.equivalence_check import EquivalenceResult
@@ -58,32 +59,24 @@ def open_bench(
     MutatorError for an invalid argument, and if `out` holds another run or is in use. After the block, an
     IncompleteRun warning is issued if experiments have no result.
     """
-    check_whole_number("workers", workers)
     check_whole_number("seed", seed)
     check_engine_is_offered(engine)
+    check_whole_number("workers", workers)
     if workers < 1:
         raise MutatorError(f"{workers}", argument="workers", expected="a whole number, at least 1")
     opened_workspace = open_workspace(workspace)
     shared = _values_of_campaign(opened_workspace, campaign)
     selected_target = SelectedTarget.of(opened_workspace, target or shared.pop("target", None))
-    readings = opened_workspace.readings()
-    if reading is not None:
-        readings.check_name(reading)
     values = {
-        "name": "bench",
-        "about": "Experiments that were asked for in batches.",
         **shared,
         **{name: value for name, value in (("canary", canary), ("limits", limits)) if value is not None},
         "target": selected_target.manifest.name,
-        "reading": readings.default_name if reading is None else reading,
+        "reading": _checked_reading(opened_workspace, reading),
         "seed": seed,
-        "after_hazard": AfterHazard(after_hazard).value,
+        "after_hazard": checked_after_hazard(after_hazard).value,
     }
-    with bench_in_folder.opened_bench(
-        opened_workspace, Path(out), values, workers=workers, engine=engine
-    ) as opened:
-        bench = Bench(opened, selected_target, str(values["reading"]))
-        yield bench
+    with opened_bench(opened_workspace, Path(out), values, workers=workers, engine=engine) as opened:
+        yield Bench(opened, selected_target, values["reading"])
     _warn_of_end(opened.summary)
 
 
@@ -135,7 +128,7 @@ class Bench:
             beyond=beyond,
         )
 
-    def run(self, experiments: Sequence[Experiment], reason: str = "") -> list[Record]:
+    def run(self, experiments: Iterable[Experiment], reason: str = "") -> list[Record]:
         """Return the record of each experiment, in order.
 
         An experiment that has a result is not run again. `reason` is kept with the batch. MutatorError for an
@@ -167,12 +160,24 @@ def _warn_of_end(summary: Summary | None) -> None:
         warnings.warn(describe_unfinished(summary), IncompleteRun, stacklevel=4)
 
 
+def _checked_reading(workspace: Workspace, reading: str | None) -> str:
+    """Return the reading, by default the library's; MutatorError unless the library has it."""
+    readings = workspace.readings()
+    if reading is None:
+        return readings.default_name
+    readings.check_name(reading)
+    return reading
+
+
 def _values_of_campaign(workspace: Workspace, campaign: str | Path | None) -> dict[str, Any]:
-    """Return what a bench takes over from a campaign: target, canary, and the limits that its file names."""
+    """Return name and purpose of a bench, and what it takes over from a campaign: target, canary, and the
+    limits that its file names.
+    """
+    values: dict[str, Any] = {"name": "bench", "about": "Experiments that were asked for in batches."}
     if campaign is None:
-        return {}
+        return values
     loaded = load_campaign(workspace.campaign(campaign))
-    values: dict[str, Any] = {"target": loaded.target}
+    values["target"] = loaded.target
     if loaded.canary is not None:
         values["canary"] = asdict(loaded.canary)
     if limits := loaded.yaml_source.data.get("limits"):

@@ -100,7 +100,7 @@ class ExperimentBuilder:
             trigger=chosen_trigger,
             seed=seed,
             setting=tuple(setting),
-            after_hazard=_after_hazard(after_hazard),
+            after_hazard=checked_after_hazard(after_hazard),
         )
 
     def _scenario_digest(self, scenario: str) -> str:
@@ -141,7 +141,8 @@ def _held_trigger(fault: Fault, trigger: Trigger, hold_s: float) -> Trigger:
     return named_with_hold(held_for(trigger, hold_s))
 
 
-def _after_hazard(after_hazard: AfterHazard | str) -> AfterHazard:
+def checked_after_hazard(after_hazard: AfterHazard | str) -> AfterHazard:
+    """Return what the argument `after_hazard` names; MutatorError unless it is a choice."""
     try:
         return AfterHazard(after_hazard)
     except ValueError:

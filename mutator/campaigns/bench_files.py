@@ -13,6 +13,7 @@ from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.campaigns.campaign_model import Canary
 from mutator.campaigns.campaign_triggers import EVERY_READING
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
+from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Limits, Method
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
@@ -37,9 +38,21 @@ class BenchModel(StrictModel, title="The file"):
 
 
 def bench_file_bytes(values: Mapping[str, Any]) -> bytes:
-    """Return the file with these values. JSON is YAML, one key a line."""
-    lines = (f"{key}: {json.dumps(value)}\n" for key, value in {"schema": BENCH_SCHEMA, **values}.items())
-    return "".join(lines).encode()
+    """Return the file with these values. JSON is YAML, one key a line. MutatorError for a value that JSON
+    does not have, such as a number of numpy.
+    """
+    return "".join(
+        f"{key}: {_json(key, value)}\n" for key, value in {"schema": BENCH_SCHEMA, **values}.items()
+    ).encode()
+
+
+def _json(key: str, value: Any) -> str:
+    try:
+        return json.dumps(value, allow_nan=False)
+    except (TypeError, ValueError) as err:
+        raise MutatorError(
+            f"{value!r} ({err})", argument=key, expected="plain numbers, text, lists and mappings"
+        ) from None
 
 
 def load_bench_file(path: Path) -> Campaign:

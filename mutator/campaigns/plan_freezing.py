@@ -15,7 +15,7 @@ from mutator._common.files import (
     write_atomic,
     writing_atomic,
 )
-from mutator._common.folder_locks import lock_run_folder
+from mutator._common.folder_locks import OWNER_LOCK_FILE, lock_run_folder
 from mutator._common.hashing import as_json_types, digest
 from mutator._common.version import VERSION
 from mutator.campaigns.campaign_files import load_campaign_study
@@ -28,6 +28,7 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.store import file_digests, plan_file
+from mutator.store.allowed_contents import SCRATCH_FOLDER
 from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
 from mutator.store.plain_contents_check import check_plain_contents
 from mutator.store.run_folder import RunFolder
@@ -38,7 +39,7 @@ from mutator.workspace import Workspace
 
 PLAN_CSV = "plan.csv"
 _FILES_OF_KILLED_FREEZE = (
-    "owner.lock",
+    OWNER_LOCK_FILE,
     "workers",
     "plan",
     PLAN_CSV,
@@ -76,10 +77,12 @@ def make_run_folder(out: Path) -> None:
     if out.is_dir():
         check_plain_contents(out.resolve())
     if out.exists() and not RunFolder.exists(out):
-        names = [path.name for path in out.iterdir()] if out.is_dir() else [out.name]
+        names = {path.name for path in out.iterdir()} if out.is_dir() else {out.name}
         foreign_names = [
             name for name in names if name not in _FILES_OF_KILLED_FREEZE and not is_half_written(name)
         ]
+        if names >= {OWNER_LOCK_FILE, CAMPAIGN_FILE}:  # of a killed bench, which checks before it plans
+            foreign_names = [name for name in foreign_names if name != SCRATCH_FOLDER]
         if foreign_names:
             raise MutatorError(
                 f"this folder has no {HEAD} and is not empty ({', '.join(sorted(foreign_names)[:3])})",

@@ -67,7 +67,6 @@ class GrowingPlan:
         out: Path,
     ) -> None:
         self.ids: set[str] = set()
-        self.variants: set[str] = set()
         self.campaign, self.canary = campaign, canary
         self._workspace, self._manifest, self._run = workspace, manifest, out
         self._tally = PlanTally(canary=canary, has_several_seeds=True)
@@ -81,9 +80,16 @@ class GrowingPlan:
         self._chunks: list[plan_file.Chunk] = []
         self._batches = BatchChain()
         self._head = self._first_head()
+        if not RunFolder.exists(out):
+            for name in APPENDED_FILES:  # what a killed command left
+                (out / name).unlink(missing_ok=True)
         self._files = {name: AppendedFile(out, name) for name in APPENDED_FILES}
         if RunFolder.exists(out):
             self._read_existing()
+
+    def read_again(self) -> "GrowingPlan":
+        """Return the plan as it is in the run folder, after a batch that could not be added."""
+        return GrowingPlan(self._workspace, self._manifest, self.campaign, self.canary, self._run)
 
     @property
     def origin(self) -> str:
@@ -124,7 +130,6 @@ class GrowingPlan:
         self._used.add(experiment.fault for experiment in experiments)
         for experiment in experiments:
             self.ids.add(experiment.id)
-            self.variants.add(experiment.fault.spec)
             self._fault_ids.add(experiment.fault.id)
             self._triggers.add((experiment.trigger.name, experiment.trigger.condition))
             first, last = self._seeds or (experiment.seed, experiment.seed)
@@ -149,8 +154,6 @@ class GrowingPlan:
                 write_atomic(self._run / HEAD, head)
             return
         plan_file.create_plan_folder(self._run)
-        for name in APPENDED_FILES:  # what a killed command left
-            (self._run / name).unlink(missing_ok=True)
         write_atomic(self._run / CAMPAIGN_FILE, self.campaign.file_bytes)
         for file in self._files.values():
             file.write_added()

@@ -13,8 +13,6 @@ from mutator.workspace import Workspace
 _FileState = tuple[int, int, int]
 _LIBRARY_GLOBS = ("faults/**/*.yaml", "severity/*.yaml", "readings.yaml")
 
-_TEMPLATE_GLOBS = ("*.yaml", "*.j2")
-
 
 class SourceWatch:
     """The files that must stay as they are: target, manifest, templates, fault specs, and added ones."""

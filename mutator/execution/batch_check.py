@@ -1,16 +1,29 @@
 """What a batch must meet before it is planned: experiments that fit the bench, and unchanged files."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import fields
 from pathlib import Path
 
+from mutator._common.argument_checks import check_type
 from mutator._common.confined_files import checked_name_not_path
 from mutator._common.message_text import describe_choices
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.source_watch import SourceWatch
 from mutator.errors import MutatorError
 from mutator.model import Experiment
+from mutator.store import plan_file
+from mutator.store.plan_lines import parse_experiment, parse_fault
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
+
+
+def check_reason(reason: object) -> None:
+    """Raise MutatorError unless `reason` is text that a file can have."""
+    check_type("reason", reason, str, "text")
+    try:
+        str(reason).encode()
+    except UnicodeEncodeError:
+        raise MutatorError(ascii(reason), argument="reason", expected="text of whole characters") from None
 
 
 class BatchCheck:
@@ -26,22 +39,22 @@ class BatchCheck:
         """The file of each scenario that a batch or the plan has."""
         return self._scenario_files
 
-    def check(self, experiments: Iterable[Experiment]) -> dict[str, Experiment]:
-        """Return the experiments by id; MutatorError for one that does not fit, and for a file that was
-        edited while the bench was open.
+    def check(self, experiments: Iterable[Experiment]) -> list[Experiment]:
+        """Return the experiments; MutatorError for one that does not fit, and for a file that was edited
+        while the bench was open.
         """
-        if isinstance(experiments, Experiment | str):
+        if isinstance(experiments, Experiment | str) or not isinstance(experiments, Iterable):
             raise MutatorError(repr(experiments), argument="experiments", expected="a list of experiments")
-        batch: dict[str, Experiment] = {}
-        for experiment in experiments:
+        batch = list(experiments)
+        for experiment in batch:
             if not isinstance(experiment, Experiment):
                 raise MutatorError(
                     repr(experiment),
                     argument="experiments",
                     expected="experiments, as `build_experiment` makes them",
                 )
+            _check_can_be_stored(experiment)
             self._check_fits(experiment)
-            batch[experiment.id] = experiment
         self._watch.check_unchanged()
         return batch
 
@@ -77,3 +90,23 @@ class BatchCheck:
                     expected=describe_choices(self._manifest.args_by_change),
                     remedy="name a change of the target's manifest",
                 )
+
+
+def _check_can_be_stored(experiment: Experiment) -> None:
+    """Raise MutatorError unless the plan's files give the experiment back as it is."""
+    try:
+        fault = parse_fault(plan_file.fault_line(experiment.fault))
+        stored = parse_experiment(plan_file.experiment_line(experiment), {fault.id: fault})
+        misfits = [
+            f"{field.name} {value!r}"
+            for field in fields(Experiment)
+            if type(value := getattr(experiment, field.name)) is not type(getattr(stored, field.name))
+        ]
+    except (MutatorError, AttributeError, LookupError, TypeError, ValueError) as err:
+        misfits = [f"{type(err).__name__}: {err}"]
+    if misfits:
+        raise MutatorError(
+            f"an experiment that the plan cannot store ({misfits[0]})",
+            argument="experiments",
+            expected="experiments, as `build_experiment` makes them",
+        )

@@ -4,30 +4,20 @@ Its workers stay between batches, with their fork servers and golden runs. Its p
 """
 
 import os
-import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from functools import wraps
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from mutator._common.bounded_reading import read_bounded
-from mutator._common.files import remove_anything_at, remove_folder, write_atomic
-from mutator._common.folder_locks import lock_run_folder
-from mutator._common.interrupts import delaying_interrupts, raising_keyboard_interrupts
-from mutator.campaigns.bench_files import bench_file_bytes, load_bench_file
-from mutator.campaigns.campaign_expansion import CampaignExpansion
+from mutator._common.interrupts import delaying_interrupts
 from mutator.campaigns.campaign_files import Campaign
-from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.plan_growth import APPENDED_FILES, GrowingPlan
 from mutator.campaigns.run_inputs import RunInputs
-from mutator.campaigns.run_provenance import accepted_version_differences, check_sources, check_version
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
 from mutator.engines.engine_choice import choose_engine
 from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import ensure_work_folder
 from mutator.errors import MutatorError
-from mutator.execution.batch_check import BatchCheck
+from mutator.execution.batch_check import BatchCheck, check_reason
+from mutator.execution.bench_calls import BenchCalls
 from mutator.execution.bench_crew import BenchCrew
 from mutator.execution.bench_messages import BenchWorkerStart
 from mutator.execution.session import Session
@@ -42,34 +32,9 @@ from mutator.store.appended_files import undo_unfinished_growth
 from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.preflight_results import golden_digests
 from mutator.store.run_folder import GoldenRun, RunFolder
-from mutator.store.run_head import CAMPAIGN_FILE
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
-
-_P = ParamSpec("_P")
-_R = TypeVar("_R")
-
-
-def _one_caller_at_a_time(
-    method: Callable[Concatenate["Bench", _P], _R],
-) -> Callable[Concatenate["Bench", _P], _R]:
-    @wraps(method)
-    def call(bench: "Bench", /, *args: _P.args, **keywords: _P.kwargs) -> _R:
-        if not bench.caller_lock.acquire(blocking=False):
-            raise MutatorError(
-                "another call is running",
-                where=bench.path,
-                expected="one caller of a bench at a time",
-                remedy="wait for it, or open another bench in another folder",
-            )
-        try:
-            with raising_keyboard_interrupts():
-                return method(bench, *args, **keywords)
-        finally:
-            bench.caller_lock.release()
-
-    return call
 
 
 class Bench:
@@ -87,7 +52,7 @@ class Bench:
         engine: str | None = None,
     ) -> None:
         self.path = path.resolve()
-        self.caller_lock = threading.Lock()
+        self.calls = BenchCalls(self.path)
         self._workspace, self._manifest = workspace, manifest
         check_requirements(manifest)
         self._requested_engine, self._engine = engine, choose_engine(engine, manifest)
@@ -121,8 +86,7 @@ class Bench:
         planned = PlannedExperiments(self.path)
         return tuple(planned[name] for name in planned if not self._has_final_record(name))
 
-    @_one_caller_at_a_time
-    def run(self, experiments: Sequence[Experiment], reason: str = "") -> list[Record]:
+    def run(self, experiments: Iterable[Experiment], reason: str = "") -> list[Record]:
         """Return the record of each experiment, in order.
 
         An experiment that has a record is not run again, unless the harness failed. `reason` is kept with the
@@ -130,36 +94,43 @@ class Bench:
         it was open, and if a worker fails; CheckFailed if a golden run fails its checks. Nothing of the batch
         is then planned, except after the failure of a worker.
         """
-        batch = self._batch_check.check(experiments)
-        self._plan_new([e for e in batch.values() if e.id not in self._plan.ids], reason)
-        self._obtain_records(list(batch.values()))
-        return [self._records_by_id(experiment.id) for experiment in experiments]
+        with self.calls.calling():
+            check_reason(reason)
+            batch = self._batch_check.check(experiments)
+            experiment_by_id = {experiment.id: experiment for experiment in batch}
+            new = [e for name, e in experiment_by_id.items() if name not in self._plan.ids]
+            self._plan_new(new, reason)
+            self._obtain_records(list(experiment_by_id.values()))
+            return [self._records_by_id(experiment.id) for experiment in batch]
 
-    @_one_caller_at_a_time
     def prove(self) -> EquivalenceResult | None:
         """Run again, on the reference engine, what the final sample contains of the experiments so far.
 
         None if no experiment was forked. CheckFailed if a record differs.
         """
-        return self._prove()
+        with self.calls.calling():
+            return self._prove()
 
-    def finish(self) -> Summary | None:
-        """Prove the bench if all planned experiments have a record, and write tables, seal and series.
-
-        None if nothing was ever planned.
+    def finish(self) -> None:
+        """Close the bench: prove it if all planned experiments have a record, and write tables, seal and
+        series. A call of another thread ends first.
         """
-        if self._session is None:
-            return None
-        if not self.pending:
-            self._prove()
-        self._crew.close()
-        return self._session.finish()
+        with self.calls.closing():
+            self._check_plan_is_whole()
+            if self._session is None:
+                return
+            if not self.pending:
+                self._prove()
+            self._crew.close()
+            self._crew.end()
+            self.summary = self._session.finish()
 
-    def stop_work(self) -> None:
-        """End all workers at once, for example after Ctrl-C. The next call starts new ones."""
-        self._crew.kill()
-        if self._session is not None:
-            self._read_records()
+    def abandon(self) -> None:
+        """Close the bench after an error: end all workers at once. A call of another thread fails first."""
+        self.calls.refuse()
+        self._crew.stop()
+        with self.calls.closing():
+            self._crew.end()
 
     def _resume(self) -> None:
         folder = RunFolder(self.path)
@@ -179,25 +150,45 @@ class Bench:
 
     def _plan_new(self, experiments: Sequence[Experiment], reason: str) -> None:
         """Check what is new, and add it to the plan."""
-        if self._is_plan_half_written:
-            raise MutatorError(
-                "the plan could not be written",
-                where=self.path,
-                remedy="close this bench, and open it again: what has finished is not repeated",
-            )
+        self._check_plan_is_whole()
         if not experiments and self._session is None:
             return
         self._checks.check_anchors(experiment.fault for experiment in experiments)
         if self._session is not None:
-            self._session.check_ledger()
+            self._session.check_own_files()
         ensure_work_folder(self.path / "work")
         new_goldens = self._checks.check_goldens(self._plan.golden_runs_with(experiments))
         if not experiments and not new_goldens:
             return
-        self._is_plan_half_written = True
         with delaying_interrupts():
-            self._write_growth(experiments, reason, new_goldens)
-        self._is_plan_half_written = False
+            self._is_plan_half_written = True
+            try:
+                self._write_growth(experiments, reason, new_goldens)
+            except BaseException:
+                self._undo_growth()
+                self._is_plan_half_written = False
+                raise
+            self._is_plan_half_written = False
+
+    def _check_plan_is_whole(self) -> None:
+        if self._is_plan_half_written:
+            raise MutatorError(
+                "the plan could not be written",
+                where=self.path,
+                remedy="open this bench again: what has finished is not repeated",
+            )
+
+    def _undo_growth(self) -> None:
+        """Go back to what the run folder had before a batch that could not be added, for example because the
+        disk is full.
+        """
+        if RunFolder.exists(self.path):
+            undo_unfinished_growth(self.path, APPENDED_FILES)
+            file_digests.save_ledger(self.path, file_digests.settled_ledger(self.path))
+            folder = RunFolder(self.path)
+            self._session = self._session or self._open_session(folder)
+            self._session.note_own_files(folder)
+        self._plan = self._plan.read_again()
 
     def _write_growth(
         self, experiments: Sequence[Experiment], reason: str, new_goldens: Sequence[GoldenRun]
@@ -208,7 +199,7 @@ class Bench:
         assert self._session is not None
         if new_goldens:
             limits = RunFolder(self.path).limits
-            self._checks.store(self.path, self._plan.golden_runs, new_goldens, len(self._plan.variants))
+            self._checks.store(self.path, self._plan.golden_runs, new_goldens)
             if RunFolder(self.path).limits != limits:  # workers have the limits with which they began
                 self._crew.close()
         self._session.note_growth(RunFolder(self.path))
@@ -281,77 +272,3 @@ class Bench:
 
     def _records_by_id(self, experiment_id: str) -> Record:
         return self._new_records.get(experiment_id) or self._stored_records[experiment_id]
-
-
-@contextmanager
-def opened_bench(
-    workspace: Workspace,
-    out: Path,
-    values: Mapping[str, Any],
-    *,
-    workers: int = 1,
-    engine: str | None = None,
-) -> Iterator[Bench]:
-    """Lock the run folder `out`, open the bench in it or begin one, and finish it at the end of the block.
-
-    `values` are those of `bench_files.BenchModel`. An error in the block leaves the run unfinished: it can be
-    opened again.
-    """
-    is_new = not out.exists()
-    make_run_folder(out)
-    with lock_run_folder(out):
-        try:
-            bench = _build_bench(workspace, out, values, workers=workers, engine=engine)
-            try:
-                yield bench
-            except BaseException:
-                bench.stop_work()
-                raise
-            bench.summary = bench.finish()
-        finally:
-            remove_anything_at(out / "work")
-            if RunFolder.exists(out):
-                file_digests.add_segments_to_ledger(out)
-    if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is worth keeping
-        remove_folder(out)
-
-
-def _build_bench(
-    workspace: Workspace, out: Path, values: Mapping[str, Any], *, workers: int, engine: str | None
-) -> Bench:
-    file_bytes = bench_file_bytes(values)
-    if RunFolder.exists(out):
-        _check_existing(workspace, out, file_bytes)
-    else:
-        write_atomic(out / CAMPAIGN_FILE, file_bytes)
-    campaign = load_bench_file(out / CAMPAIGN_FILE)
-    manifest = workspace.manifest(campaign.target)
-    expansion = CampaignExpansion(workspace, campaign, manifest, campaign.seed, campaign.reading or "")
-    return Bench(workspace, manifest, campaign, expansion.build_canary(), out, workers=workers, engine=engine)
-
-
-def _check_existing(workspace: Workspace, out: Path, file_bytes: bytes) -> None:
-    """Undo what a killed command left half done; MutatorError unless `out` is this bench's run folder."""
-    undo_unfinished_growth(out, APPENDED_FILES)
-    folder = RunFolder.open(out)
-    if not folder.is_bench:
-        raise MutatorError(
-            f"holds a run of campaign '{folder.head.campaign}'",
-            where=out,
-            argument="out",
-            expected="a bench's run folder, or a new or empty folder",
-            remedy="choose another folder",
-        )
-    check_version(folder)
-    if read_bounded(out / CAMPAIGN_FILE) != file_bytes:
-        raise MutatorError(
-            "this bench was opened with other arguments",
-            where=out / CAMPAIGN_FILE,
-            expected="the same target, canary, limits, seed and reading each time",
-            remedy="give the same arguments, or choose another folder",
-        )
-    accepted_version_differences(folder)
-    current = RunInputs.from_workspace(workspace, workspace.manifest(folder.head.target), folder.scenarios)
-    check_sources(out, folder.head.sources, current.digest_by_source())
-    file_digests.add_segments_to_ledger(out)
-    remove_anything_at(folder.scratch_folder)

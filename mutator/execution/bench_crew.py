@@ -6,11 +6,14 @@ import socket
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
+from mutator._common.interrupts import delaying_interrupts
 from mutator.errors import MutatorError
 from mutator.execution.bench_messages import AssignedExperiments, BenchWorkerStart, WorkEnding
 from mutator.execution.worker import python_command_dying_with
@@ -50,6 +53,9 @@ class BenchCrew:
     on_written: Callable[[str, Mapping[str, str]], None]
     _workers: list[_CrewWorker] = field(default_factory=list)
     _started_count: int = 0
+    _is_stopped: bool = False
+    # Linux ends a process with the thread that started it, and a caller's thread can be short-lived
+    _starter: ThreadPoolExecutor = field(default_factory=partial(ThreadPoolExecutor, 1))
 
     def run(
         self,
@@ -63,41 +69,20 @@ class BenchCrew:
 
         MutatorError if a worker fails; the others then end what they have begun, and all are closed.
         """
-        pieces = _cut_into_pieces(runs, self.size)
-        self._remove_dead_workers()
-        while len(self._workers) < min(self.size, len(pieces)):
-            self._workers.append(self._start_worker())
-        problems: list[str] = []
-        busy: dict[Connection, _CrewWorker] = {}
-
-        def deal(worker: _CrewWorker) -> None:
-            if pieces and not problems:
-                piece = _pop_piece_for(worker, pieces)
-                assigned = _assignment(worker, piece, golden_digests, scenario_files, is_proof)
-                with suppress(OSError):  # of a dead worker: receiving from it gives the reason
-                    worker.connection.send(assigned)
-                busy[worker.connection] = worker
-
+        dealing = _Dealing(_cut_into_pieces(runs, self.size), golden_digests, scenario_files, is_proof)
+        self._start_workers(len(dealing.pieces))
         for worker in self._workers:
-            deal(worker)
-        while busy:
-            for connection in wait(list(busy)):
-                assert isinstance(connection, Connection)
-                message = _receive(busy[connection])
-                if isinstance(message, Record):
-                    yield message
-                    continue
-                worker = busy.pop(connection)
-                if message.problem:
-                    problems.append(message.problem)
-                deal(worker)
-        if problems:
+            dealing.deal(worker)
+        yield from dealing.receive_records()
+        if dealing.problems:
             self.close()
-            raise MutatorError(
-                problems[0],
-                expected="workers that finish what they are given",
-                remedy="ask again: what has finished is not repeated",
-            )
+            raise _work_error(dealing.problems[0])
+
+    def stop(self) -> None:
+        """Make the work of another thread fail, and start no further worker."""
+        self._is_stopped = True
+        for worker in self._workers:
+            worker.process.kill()
 
     def close(self) -> None:
         """End all workers, and report what they wrote."""
@@ -120,8 +105,22 @@ class BenchCrew:
         for worker in workers:
             worker.kill()
 
+    def end(self) -> None:
+        """End all workers and the thread that started them. The crew cannot be used further."""
+        self.kill()
+        self._starter.shutdown()
+
+    def _start_workers(self, piece_count: int) -> None:
+        """Start workers until there is one for each piece, or the crew is complete."""
+        self._remove_dead_workers()
+        while len(self._workers) < min(self.size, piece_count):
+            if self._is_stopped:
+                raise _work_error("the bench was closed")
+            with delaying_interrupts():  # so that no process is forgotten
+                self._workers.append(self._starter.submit(self._start_worker).result())
+
     def _remove_dead_workers(self) -> None:
-        """Forget workers that have died, for example with the thread that started them."""
+        """Forget workers that have died."""
         living = [worker for worker in self._workers if worker.process.poll() is None]
         for worker in self._workers:
             if worker not in living:
@@ -129,7 +128,7 @@ class BenchCrew:
         self._workers = living
 
     def _start_worker(self) -> _CrewWorker:
-        """Start a process that dies with this thread."""
+        """Start a process that dies with the thread that calls this."""
         start = self.start_of(self._started_count)
         self._started_count += 1
         here, there = socket.socketpair()
@@ -150,6 +149,47 @@ class BenchCrew:
         finally:
             there.close()
         return _CrewWorker(start.assignment.worker_name, process, Connection(here.detach()))
+
+
+@dataclass
+class _Dealing:
+    """The dealing of `pieces` to workers, until all are done or there are `problems`."""
+
+    pieces: list[list[Run]]
+    golden_digests: Mapping[str, str]
+    scenario_files: Mapping[str, Path]
+    is_proof: bool
+    problems: list[str] = field(default_factory=list)
+    _busy: dict[Connection, _CrewWorker] = field(default_factory=dict)
+
+    def deal(self, worker: _CrewWorker) -> None:
+        if self.pieces and not self.problems:
+            piece = _pop_piece_for(worker, self.pieces)
+            assigned = _assignment(worker, piece, self.golden_digests, self.scenario_files, self.is_proof)
+            with suppress(OSError):  # of a dead worker: receiving from it gives the reason
+                worker.connection.send(assigned)
+            self._busy[worker.connection] = worker
+
+    def receive_records(self) -> Iterator[Record]:
+        while self._busy:
+            for connection in wait(list(self._busy)):
+                assert isinstance(connection, Connection)
+                message = _receive(self._busy[connection])
+                if isinstance(message, Record):
+                    yield message
+                    continue
+                worker = self._busy.pop(connection)
+                if message.problem:
+                    self.problems.append(message.problem)
+                self.deal(worker)
+
+
+def _work_error(problem: str) -> MutatorError:
+    return MutatorError(
+        problem,
+        expected="workers that finish what they are given",
+        remedy="ask again: what has finished is not repeated",
+    )
 
 
 def _receive(worker: _CrewWorker) -> Record | WorkEnding:

@@ -22,12 +22,10 @@ class AssignedExperiments:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkEnding:
     """The end of assigned experiments. `problem`: why not all of them have a record; empty if they have.
-
-    `is_defect`: the problem is a defect of the harness. `written`: what a worker wrote that ends.
+    `written`: what a worker wrote that ends.
     """
 
     problem: str = ""
-    is_defect: bool = False
     written: FileDigests = field(default_factory=dict)
 
 

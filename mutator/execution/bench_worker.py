@@ -38,7 +38,7 @@ def _ending_of_error(err: Exception) -> WorkEnding:
     reported_error = err if isinstance(err, MutatorError) else find_shortage(err)
     if reported_error:
         return WorkEnding(problem=str(reported_error))
-    return WorkEnding(problem="".join(traceback.format_exception(err)).rstrip(), is_defect=True)
+    return WorkEnding(problem="".join(traceback.format_exception(err)).rstrip())
 
 
 def _serve(connection: Connection, start: BenchWorkerStart) -> None:

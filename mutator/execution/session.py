@@ -17,6 +17,8 @@ from pathlib import Path
 from secrets import token_bytes
 from typing import Any
 
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import write_below
 from mutator._common.files import is_half_written, remove_anything_at
 from mutator._common.folder_locks import lock_run_folder, wait_for_workers
 from mutator._common.interrupts import raising_keyboard_interrupts
@@ -60,10 +62,12 @@ from mutator.results import table_building
 from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experiment
 from mutator.store import file_digests
+from mutator.store.file_digests import FileDigest
 from mutator.store.plan_choices import Choices
 from mutator.store.preflight_results import golden_digests
 from mutator.store.records import LINE_SCHEMA_BY_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import HEAD
 from mutator.store.run_progress import Progress, ProgressCallback, progress_label
 from mutator.store.series_packing import list_unpacked_worker_files, pack_series
 from mutator.store.session_environments import WorkerMachine
@@ -102,6 +106,7 @@ class Session:
         self.golden_digests: Mapping[str, str] = {}
         self.written = WrittenFiles()
         self._ledger_at_start: file_digests.DigestLedger | None = None  # as it was when the work began
+        self._head_at_start = b""
         self.workers_note = ""  # the present workers, if known
         self._start_s = time.monotonic()
         self._finished_count_before = 0
@@ -150,32 +155,46 @@ class Session:
             raise with_golden_run_pages(error, self.folder.path, self.workspace) from None
 
     def note_machine(self, machine: WorkerMachine) -> None:
-        self.folder = append_worker_machine(self.folder, machine)
-        self._ledger_at_start = file_digests.load_ledger(self.folder.path)
+        self.note_own_files(append_worker_machine(self.folder, machine))
 
     def note_growth(self, folder: RunFolder) -> None:
         """Note that the plan of a bench has grown, and which packages its golden runs load."""
-        self.folder = add_loaded_packages(folder)
-        self._ledger_at_start = file_digests.load_ledger(folder.path)
+        self.note_own_files(add_loaded_packages(folder))
 
     def begin_environment(self, records_glob: str) -> None:
         """Record the software and machine of a bench, before its first run."""
-        self.folder = begin_session_environment(
+        folder = begin_session_environment(
             self.folder,
             self.workspace,
             records_glob=records_glob,
             accept_versions=self.accept_versions,
         )
-        self._ledger_at_start = file_digests.load_ledger(self.folder.path)
+        self.note_own_files(folder)
 
-    def check_ledger(self) -> None:
-        """Restore the digests of the run folder, and raise MutatorError, if a mutant has changed them."""
-        expected, run = self._ledger_at_start, self.folder.path
-        if expected is not None and not file_digests.is_ledger_unchanged(run, expected):
-            file_digests.save_ledger(run, expected)
+    def note_own_files(self, folder: RunFolder) -> None:
+        """Note run.json and the digests of the run folder as this command has just written them."""
+        self.folder = folder
+        self._head_at_start = read_bounded(folder.path / HEAD)
+        self._ledger_at_start = file_digests.load_ledger(folder.path)
+
+    def check_own_files(self) -> None:
+        """Restore run.json and the digests of the run folder, and raise MutatorError, if a mutant has changed
+        them.
+        """
+        ledger, run = self._ledger_at_start, self.folder.path
+        if ledger is None:
+            return
+        changed_name = ""
+        if not file_digests.is_ledger_unchanged(run, ledger):
+            changed_name = file_digests.DIGESTS_FILE
+            file_digests.save_ledger(run, ledger)
+        if not FileDigest.of_bytes(self._head_at_start).has_same_bytes(FileDigest.of_file_below(run, HEAD)):
+            changed_name = HEAD
+            write_below(run, HEAD, self._head_at_start)
+        if changed_name:
             raise MutatorError(
                 "was changed by a mutant, or by another program",
-                where=run / file_digests.DIGESTS_FILE,
+                where=run / changed_name,
                 remedy="it is restored: ask again",
             )
 

@@ -23,7 +23,6 @@ from mutator.preflight.check_run_problems import output_digest_of
 from mutator.preflight.preflight_check_runner import GOLDEN, CheckRunner
 from mutator.preflight.preflight_checks import (
     anchor_problem,
-    anchor_result,
     build_check_result,
     golden_run_results,
     loaded_packages,
@@ -76,6 +75,7 @@ class BenchChecks:
     scratch_folder: Path
     workers: int = 1
     goldens: dict[GoldenRun, CheckedGolden] = field(default_factory=dict)
+    _stored: set[GoldenRun] = field(default_factory=set)  # which of them are in the run folder
     _variants: set[str] = field(default_factory=set)
     _digests_elsewhere: dict[GoldenRun, str] = field(default_factory=dict)  # of another machine or software
 
@@ -109,6 +109,7 @@ class BenchChecks:
                 continue
             if stored["digest"] == _environment_digest():
                 self.goldens[golden_run] = golden
+                self._stored.add(golden_run)
             else:
                 self._digests_elsewhere[golden_run] = golden.output_digest
 
@@ -124,8 +125,8 @@ class BenchChecks:
         self._variants |= new.keys()
 
     def check_goldens(self, golden_runs: Sequence[GoldenRun]) -> tuple[GoldenRun, ...]:
-        """Check the golden runs that were not checked yet, and return them; CheckFailed if one fails."""
-        new = tuple(golden_run for golden_run in golden_runs if golden_run not in self.goldens)
+        """Check the golden runs that are not stored yet, and return them; CheckFailed if one fails."""
+        new = tuple(golden_run for golden_run in golden_runs if golden_run not in self._stored)
         if not new:
             return ()
         remove_folder(self.pending_folder)
@@ -133,8 +134,6 @@ class BenchChecks:
         failed += [result for result in self._equal_scenario_results(golden_runs) if not result.passed]
         failed += self._changed_golden_results(new)
         if failed:
-            for golden_run in new:
-                self.goldens.pop(golden_run, None)
             text = "; ".join(f"{result.name}: {result.detail}" for result in failed[:3])
             raise CheckFailed(
                 f"checks failed: {text}",
@@ -193,9 +192,7 @@ class BenchChecks:
             pending_folder=self.pending_folder,
         )
 
-    def store(
-        self, run: Path, golden_runs: Sequence[GoldenRun], new: Sequence[GoldenRun], variants: int
-    ) -> None:
+    def store(self, run: Path, golden_runs: Sequence[GoldenRun], new: Sequence[GoldenRun]) -> None:
         """Move new golden runs into the run folder, and write checks.json."""
         files: dict[str, FileDigest | None] = {}
         for golden_run in new:
@@ -203,7 +200,7 @@ class BenchChecks:
                 if path.is_file():
                     name = path.relative_to(self.pending_folder).as_posix()
                     files[name] = FileDigest.of_bytes(read_bounded(path))
-        checks = json_bytes(self._as_json(golden_runs, variants))
+        checks = json_bytes(self._as_json(golden_runs))
         with file_digests.announcing_rewrites(run, {**files, CHECKS_FILE: FileDigest.of_bytes(checks)}):
             for golden_run in new:
                 destination = path_below(run / "golden", golden_run.key)
@@ -211,18 +208,15 @@ class BenchChecks:
                 destination.parent.mkdir(parents=True, exist_ok=True)
                 path_below(self.pending_folder / "golden", golden_run.key).rename(destination)
             write_atomic(run / CHECKS_FILE, checks)
+        self._stored |= set(new)
 
-    @property
-    def packages(self) -> tuple[str, ...]:
-        """The packages that golden runs loaded."""
-        return tuple(sorted({name for golden in self.goldens.values() for name in golden.packages}))
-
-    def _as_json(self, golden_runs: Sequence[GoldenRun], variants: int) -> dict[str, Any]:
+    def _as_json(self, golden_runs: Sequence[GoldenRun]) -> dict[str, Any]:
         checked = [self.goldens[golden_run] for golden_run in golden_runs]
         cpu_s = [golden.cpu_s for golden in checked]
         limits = measure_limits(self.campaign.limits, self.campaign.measured_limit_names, cpu_s)
         results = [
-            anchor_result("", variants),
+            # without their number, which changes with every batch
+            build_check_result("anchors", "", "all variants found their statements"),
             *(result for golden in checked for result in golden.results),
             *self._equal_scenario_results(golden_runs),
             *(golden.canary for golden in checked if golden.canary),
@@ -235,7 +229,7 @@ class BenchChecks:
                 golden_run.key: golden.output_digest
                 for golden_run, golden in zip(golden_runs, checked, strict=True)
             },
-            "packages": list(self.packages),
+            "packages": sorted({name for golden in checked for name in golden.packages}),
             "run_cpu_s": sum(cpu_s) / len(cpu_s),
             CHECKED_GOLDENS_KEY: {
                 golden_run.key: golden.as_json()

@@ -6,7 +6,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import open_descriptor_below, path_below, read_below, write_below
+from mutator._common.confined_files import open_descriptor_below, path_below, read_below
 from mutator._common.files import raising_disk_full
 from mutator._common.hashing import digest
 from mutator.store import file_digests
@@ -47,7 +47,9 @@ class AppendedFile:
 
 
 def undo_unfinished_growth(run: Path, names: Iterable[str]) -> None:
-    """Cut off what a killed command added to these files, unless it also wrote the run.json that has it."""
+    """Cut off what a failed or killed command added to these files, unless it also wrote the run.json that
+    has it.
+    """
     ledger = file_digests.load_ledger(run)
     new_head = ledger.rewriting.get(HEAD)
     if not ledger.rewriting or (new_head and new_head.has_same_bytes(FileDigest.of_file_below(run, HEAD))):
@@ -58,4 +60,14 @@ def undo_unfinished_growth(run: Path, names: Iterable[str]) -> None:
             continue
         data = read_below(run, name)
         if len(data) > before.size and digest(data[: before.size]) == before.sha256:
-            write_below(run, name, data[: before.size])
+            _cut_in_place(run, name, before.size)
+
+
+def _cut_in_place(run: Path, name: str, size: int) -> None:
+    """Cut a file where it was appended to, which needs no space on a full disk."""
+    file = open_descriptor_below(run, name, os.O_WRONLY)
+    try:
+        os.ftruncate(file, size)
+        os.fsync(file)
+    finally:
+        os.close(file)

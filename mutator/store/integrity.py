@@ -24,7 +24,13 @@ from mutator.store.shards import Shard
 # folders in which a finished run has no unknown files
 FULLY_DIGESTED_FOLDERS = ("plan", "golden", *file_digests.SEGMENT_FOLDERS)
 # files that cannot be recreated
-IRREPLACEABLE_FILES = (HEAD, CAMPAIGN_FILE, plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE)
+IRREPLACEABLE_FILES = (
+    HEAD,
+    CAMPAIGN_FILE,
+    plan_file.EXPERIMENTS_FILE,
+    plan_file.FAULTS_FILE,
+    plan_file.BATCHES_FILE,
+)
 DIGESTED_TOP_FILES = (HEAD, CAMPAIGN_FILE, "plan.csv", "checks.json", "reviewed.json")
 _MOST_NAMED_EXPERIMENTS = 5  # in one message: the ids of a million experiments would fill it
 

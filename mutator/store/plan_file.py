@@ -233,15 +233,16 @@ def batch_problems(run: Path, experiment_count: int) -> Iterator[MutatorError]:
     for number, line in enumerate(read_plan_lines(path), start=1):
         try:
             values = json.loads(line)
-            total += int(values["experiments"])
-            follows = values["before"] == before and values["batch"] == number
+            batch, count, reason = (values[name] for name in ("batch", "experiments", "reason"))
+            has_types = type(batch) is type(count) is int and isinstance(reason, str)
+            follows = has_types and count > 0 and batch == number and values["before"] == before
         except (ValueError, LookupError, TypeError, RecursionError):
             follows = False
         if not follows:
             got = "a line that does not follow from the line before"
             yield MutatorError(got, where=path, line=number, remedy=DAMAGED_PLAN_REMEDY)
             return
-        before = sha256(line).hexdigest()
+        before, total = sha256(line).hexdigest(), total + count
     if total != experiment_count:
         yield MutatorError(
             f"batches of {counted(total, 'experiment')}",

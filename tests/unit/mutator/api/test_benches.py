@@ -120,7 +120,7 @@ def test_a_second_caller_is_refused(toycar: Workspace, tmp_path: Path) -> None:
             except MutatorError as err:
                 errors.append(err)
 
-        with bench._opened.caller_lock:
+        with bench._opened.calls.calling():
             thread = threading.Thread(target=call)
             thread.start()
             thread.join()

@@ -1,0 +1,98 @@
+"""Opens a bench in a run folder, which it owns until the end of a `with` block."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.files import remove_anything_at, remove_folder, write_atomic
+from mutator._common.folder_locks import lock_run_folder
+from mutator.campaigns.bench_files import bench_file_bytes, load_bench_file
+from mutator.campaigns.campaign_expansion import CampaignExpansion
+from mutator.campaigns.plan_freezing import make_run_folder
+from mutator.campaigns.plan_growth import APPENDED_FILES
+from mutator.campaigns.run_inputs import RunInputs
+from mutator.campaigns.run_provenance import accepted_version_differences, check_sources, check_version
+from mutator.errors import MutatorError
+from mutator.execution.bench import Bench
+from mutator.store import file_digests
+from mutator.store.appended_files import undo_unfinished_growth
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import CAMPAIGN_FILE
+from mutator.workspace import Workspace
+
+
+@contextmanager
+def opened_bench(
+    workspace: Workspace,
+    out: Path,
+    values: Mapping[str, Any],
+    *,
+    workers: int = 1,
+    engine: str | None = None,
+) -> Iterator[Bench]:
+    """Lock the run folder `out`, open the bench in it or begin one, and finish it at the end of the block.
+
+    `values` are those of `bench_files.BenchModel`. An error in the block leaves the run unfinished: it can be
+    opened again.
+    """
+    is_new = not out.exists()
+    make_run_folder(out)
+    with lock_run_folder(out):
+        try:
+            bench = _build_bench(workspace, out, values, workers=workers, engine=engine)
+            try:
+                yield bench
+                bench.finish()
+            except BaseException:
+                bench.abandon()
+                raise
+        finally:
+            remove_anything_at(out / "work")
+            if RunFolder.exists(out):
+                undo_unfinished_growth(out, APPENDED_FILES)
+                file_digests.add_segments_to_ledger(out)
+            elif is_new:  # nothing was planned, so nothing is worth keeping
+                remove_folder(out)
+
+
+def _build_bench(
+    workspace: Workspace, out: Path, values: Mapping[str, Any], *, workers: int, engine: str | None
+) -> Bench:
+    file_bytes = bench_file_bytes(values)
+    if RunFolder.exists(out):
+        _check_existing(workspace, out, file_bytes)
+    else:
+        write_atomic(out / CAMPAIGN_FILE, file_bytes)
+    campaign = load_bench_file(out / CAMPAIGN_FILE)
+    manifest = workspace.manifest(campaign.target)
+    expansion = CampaignExpansion(workspace, campaign, manifest, campaign.seed, campaign.reading or "")
+    return Bench(workspace, manifest, campaign, expansion.build_canary(), out, workers=workers, engine=engine)
+
+
+def _check_existing(workspace: Workspace, out: Path, file_bytes: bytes) -> None:
+    """Undo what a killed command left half done; MutatorError unless `out` is this bench's run folder."""
+    undo_unfinished_growth(out, APPENDED_FILES)
+    folder = RunFolder.open(out)
+    if not folder.is_bench:
+        raise MutatorError(
+            f"holds a run of campaign '{folder.head.campaign}'",
+            where=out,
+            argument="out",
+            expected="a bench's run folder, or a new or empty folder",
+            remedy="choose another folder",
+        )
+    check_version(folder)
+    if read_bounded(out / CAMPAIGN_FILE) != file_bytes:
+        raise MutatorError(
+            "this bench was opened with other arguments",
+            where=out / CAMPAIGN_FILE,
+            expected="the same target, canary, limits, seed and reading each time",
+            remedy="give the same arguments, or choose another folder",
+        )
+    accepted_version_differences(folder)
+    current = RunInputs.from_workspace(workspace, workspace.manifest(folder.head.target), folder.scenarios)
+    check_sources(out, folder.head.sources, current.digest_by_source())
+    file_digests.add_segments_to_ledger(out)
+    remove_anything_at(folder.scratch_folder)
