@@ -75,7 +75,8 @@ def make_empty_folder(folder: Path) -> None:
             problem,
             where=folder,
             expected="a new or empty folder to write a library into",
-            remedy="choose another DIR",
+            remedy="choose another `folder`",
+            argument="folder",
         )
 
 

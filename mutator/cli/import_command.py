@@ -49,7 +49,7 @@ def import_faults(
     try:
         imported = mutator.import_library(format_name, folder, out)
     except MutatorError as error:
-        raise with_option_names(error, {"format": "FORMAT"}) from None
+        raise with_option_names(error, {"format": "FORMAT", "folder": "--out"}) from None
     if as_json:
         terminal.print_json(_as_json(imported, out))
         return

@@ -55,7 +55,7 @@ def init(
         mutator.init_library(folder, target=tree, files=globs or ())
     except MutatorError as error:
         # elsewhere, `target` is --manifest
-        raise with_option_names(error, {"target": "--target", "files": "--in"}) from None
+        raise with_option_names(error, {"folder": "DIR", "target": "--target", "files": "--in"}) from None
     facts: dict[str, Any] = {"folder": str(folder)}
     content = "fault_library/, templates/"
     if tree is not None:

@@ -2,17 +2,18 @@
 
 import csv
 import io
+import tempfile
 from collections.abc import Callable, Mapping, Set
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from textwrap import indent
 
-import yaml
-
-from mutator._common.confined_files import write_below
+from mutator._common.confined_files import path_below, write_below
 from mutator._common.extension_doors import LIBRARY_IMPORTER_DOOR
-from mutator._common.shipped_files import write_new_library
+from mutator._common.shipped_files import make_empty_folder, write_new_library
+from mutator.config.yaml_writing import yaml_text
 from mutator.errors import MutatorError
 from mutator.stpa.hazard_analysis_checks import injection_places
 from mutator.workspace import Workspace
@@ -76,19 +77,43 @@ def import_into_new_library(format_name: str, source: Path, folder: Path) -> Imp
     """Write a library with the faults in `source` into a new or empty `folder`, and `imported.csv`, which has
     a row for each entry.
 
-    MutatorError for an unknown format, for files that are not in it, if nothing can be imported, and for a
-    folder that is not empty.
+    MutatorError for an unknown format, for files that are not in it, if nothing can be imported, for a folder
+    that is not empty, and for specs that cannot be read back. `folder` then stays as it was.
     """
     importer = LIBRARY_IMPORTER_DOOR.load(format_name)
     with LIBRARY_IMPORTER_DOOR.blaming_package(format_name):
         imported: ImportedLibrary = importer.read(source)
     _check_not_empty(imported, source)
+    missing = [path for path in (folder.absolute(), *folder.absolute().parents) if not path.exists()]
+    make_empty_folder(folder)
+    try:
+        with tempfile.TemporaryDirectory(prefix=".import.", dir=folder) as scratch:
+            whole = Path(scratch) / "library"
+            _write_library(imported, whole)
+            for path in whole.iterdir():
+                path.rename(folder / path.name)
+    except BaseException:
+        for path in missing:
+            with suppress(OSError):
+                path.rmdir()
+        raise
+    return imported
+
+
+def _write_library(imported: ImportedLibrary, folder: Path) -> None:
     write_new_library(folder)
+    library = folder / "fault_library"
     for name, text in imported.texts.items():
-        write_below(folder / "fault_library", name, text.encode())
+        if path_below(library, name).exists():
+            raise MutatorError(
+                "a file of the library that ships with mutator",
+                where=name,
+                expected="a new name for each file that an importer adds",
+                remedy="correct the importer",
+            )
+        write_below(library, name, text.encode())
     _add_causal_factor(folder, {name for name in imported.texts if name.startswith(_SPECS_PREFIX)})
     (folder / REPORT_NAME).write_text(_report_text(imported), encoding="utf-8")
-    return imported
 
 
 def _check_not_empty(imported: ImportedLibrary, source: Path) -> None:
@@ -130,7 +155,7 @@ def _add_causal_factor(folder: Path, spec_names: Set[str]) -> None:
         "leads_to": list(analysis.unsafe_actions),
         "faults": sorted(spec.name for spec in specs),
     }
-    text = indent(yaml.safe_dump({"imported": factor}, sort_keys=False, width=110), "  ")
+    text = indent(yaml_text({"imported": factor}), "  ")
     with analysis.factors_source.path.open("a", encoding="utf-8") as file:
         file.write(text)
 
@@ -139,5 +164,13 @@ def _report_text(imported: ImportedLibrary) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(ImportedEntry.__slots__)
-    writer.writerows([getattr(entry, name) for name in ImportedEntry.__slots__] for entry in imported.entries)
+    writer.writerows(
+        [_printable_text(str(getattr(entry, name))) for name in ImportedEntry.__slots__]
+        for entry in imported.entries
+    )
     return text.getvalue()
+
+
+def _printable_text(text: str) -> str:
+    """Return the text with escapes for characters that a terminal or a table program would act on."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

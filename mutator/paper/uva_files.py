@@ -7,6 +7,7 @@ data.
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,7 +27,8 @@ _TITLE_PATTERN = re.compile(r"title:([1-9][0-9]{0,3})_[\w-]{1,80}-(H[123])", re.
 _LOCATION_PATTERN = re.compile(r"location//([\w./]{1,100})//#([\w]{1,40}):HOOK#", re.ASCII)
 _COUNT_PATTERN = re.compile(r"Total number of fault cases: ([0-9]{1,6})")
 _FAULT_PATTERN = re.compile(r"fault ([1-9][0-9]{0,5})//if (.+?):((?://.+?)+)")
-_NUMBER = r"\(?(-?[0-9]{1,12}(?:\.[0-9]{0,20})?(?:e-?[0-9]{1,2})?)\)?"
+_PLAIN_NUMBER = r"-?[0-9]{1,12}(?:\.[0-9]{0,20})?(?:e-?[0-9]{1,2})?"
+_NUMBER = rf"(\({_PLAIN_NUMBER}\)|{_PLAIN_NUMBER})"
 _NAME = r"[A-Za-z_][\w.]*(?:\[\w+\][\w.]*)?"  # `self.lLane`, `tracks[ids].dRel`
 _CHANGE_PATTERN = re.compile(rf"({_NAME})(\+=|-=|=){_NUMBER}", re.ASCII)
 _LIMIT_PATTERN = re.compile(rf"if ({_NAME})(<|>=){_NUMBER}:", re.ASCII)
@@ -50,6 +52,7 @@ class FaultLine:
     """
 
     line: int
+    number: int | None = None  # that the line gives the fault
     condition: str = ""
     changes: tuple[Change, ...] = ()
     limits: tuple[str, ...] = ()
@@ -99,18 +102,19 @@ def read_fault_files(folder: Path) -> tuple[tuple[FaultFile, ...], dict[str, str
 
 
 def _read_file(path: Path, number: int, folder: Path) -> FaultFile:
-    lines = _text_of(path).splitlines()
+    # no other character ends a line, so that numbers of lines are those of an editor
+    lines = _text_of(path).rstrip("\r\n").split("\n")
     title = _match_line(path, lines, 1, _TITLE_PATTERN, "title:<number>_<name>-H1, -H2 or -H3")
     if int(title[1]) != number:
         raise MutatorError(
             f"title number {title[1]}", where=path, line=1, expected=f"{number}, as in the file's name"
         )
     location = _match_line(path, lines, 2, _LOCATION_PATTERN, "location//<file>//#<name>:HOOK#")
-    faults = [
+    faults = _without_repeated_numbers(
         _parse_fault(text, line)
         for line, text in enumerate(lines[2:], start=3)
         if _is_fault(path, text, line, is_last=line == len(lines))
-    ]
+    )
     count = _match_line(path, lines, len(lines), _COUNT_PATTERN, "Total number of fault cases: <number>")
     if int(count[1]) != len(faults):
         raise MutatorError(
@@ -126,13 +130,13 @@ def _read_file(path: Path, number: int, folder: Path) -> FaultFile:
         aim=title[2],
         source=location[1],
         hook=location[2],
-        lines=tuple(faults),
+        lines=faults,
     )
 
 
 def _text_of(path: Path) -> str:
     try:
-        return read_bounded(path, _MOST_BYTES).decode("utf-8")
+        return read_bounded(path, _MOST_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as err:
         raise MutatorError(f"no UTF-8 at byte {err.start}", where=path, expected="a text file") from None
     except OSError as err:
@@ -156,36 +160,52 @@ def _is_fault(path: Path, text: str, line: int, *, is_last: bool) -> bool:
     raise MutatorError(shortened_repr(text), where=path, line=line, expected="`fault <number>//if ...`")
 
 
+def _without_repeated_numbers(faults: Iterable[FaultLine]) -> tuple[FaultLine, ...]:
+    """Return the faults; one with the number of an earlier one has a problem."""
+    first_by_number: dict[int, FaultLine] = {}
+    return tuple(
+        fault
+        if fault.number is None or (first := first_by_number.setdefault(fault.number, fault)) is fault
+        else FaultLine(line=fault.line, problem=f"fault number {fault.number}, as in line {first.line}")
+        for fault in faults
+    )
+
+
 def _parse_fault(text: str, line: int) -> FaultLine:
     if len(text) > _MOST_LINE_CHARACTERS:
         return FaultLine(line=line, problem=f"longer than {_MOST_LINE_CHARACTERS} characters")
     match = _FAULT_PATTERN.fullmatch(text.rstrip())
     if not match:
         return FaultLine(line=line, problem="not of the form `fault <number>//if <condition>://<statement>`")
-    condition, statements = match[2], match[3].removeprefix("//").split("//")
+    number, condition, statements = int(match[1]), match[2], match[3].removeprefix("//").split("//")
     if statements == ["none"]:
-        return FaultLine(line=line, condition=condition)
+        return FaultLine(line=line, number=number, condition=condition)
+    try:
+        changes, limits = _parse_statements(statements)
+    except ValueError as error:
+        return FaultLine(line=line, number=number, problem=str(error))
+    return FaultLine(line=line, number=number, condition=condition, changes=changes, limits=limits)
+
+
+def _parse_statements(statements: Iterable[str]) -> tuple[tuple[Change, ...], tuple[str, ...]]:
+    """Return changes and limits; ValueError, with the reason, for anything else."""
     changes: list[Change] = []
     limits: list[str] = []
     for statement in statements:
         if change := _CHANGE_PATTERN.fullmatch(statement):
-            number = _number(change[3])
-            if number is None:
-                return FaultLine(line=line, problem=f"a number beyond {_MOST_NUMBER:g}: {change[3]}")
-            changes.append(Change(variable=change[1], operator=change[2], number=number))
+            changes.append(Change(variable=change[1], operator=change[2], number=_number(change[3])))
         elif any(p.fullmatch(statement) for p in (_LIMIT_PATTERN, _LIMITED_PATTERN, _CAP_PATTERN)):
             limits.append(statement.strip())
         else:
-            return FaultLine(
-                line=line, problem=f"a statement that is not understood: {statement[:_MOST_SHOWN]}"
-            )
+            raise ValueError(f"a statement that is not understood: {statement[:_MOST_SHOWN]}")
     if not changes:
-        return FaultLine(line=line, problem="no change of a variable")
-    return FaultLine(line=line, condition=condition, changes=tuple(changes), limits=tuple(limits))
+        raise ValueError("no change of a variable")
+    return tuple(changes), tuple(limits)
 
 
-def _number(text: str) -> float | int | None:
+def _number(text: str) -> float | int:
+    text = text.strip("()")
     number = float(text)
     if not math.isfinite(number) or abs(number) > _MOST_NUMBER:
-        return None
+        raise ValueError(f"a number beyond {_MOST_NUMBER:g}: {text}")
     return int(number) if re.fullmatch(r"-?[0-9]+", text) else number

@@ -1,18 +1,19 @@
 """Build specs and campaigns from the fault files of the paper's authors."""
 
-import re
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from mutator._common.shipped_files import shipped_folder
+from mutator.checks.library_check import spec_problems
 from mutator.config.units import split_key_at_unit
+from mutator.config.yaml_writing import yaml_text
 from mutator.errors import MutatorError
-from mutator.faults.fault_specs import FaultSpec
+from mutator.faults.fault_specs import load_spec
 from mutator.onboarding.library_import import EntryOutcome, ImportedEntry, ImportedLibrary
+from mutator.paper.uva_campaigns import CODED_READING, TARGET, campaign_name, campaign_text
 from mutator.paper.uva_conditions import FileCondition, parse_condition
 from mutator.paper.uva_earlier_places import EARLIER_PLACES
 from mutator.paper.uva_files import FaultFile, FaultLine, read_fault_files
@@ -20,10 +21,7 @@ from mutator.paper.uva_places import VISION_PLACES, HookPlace
 from mutator.workspace import Workspace
 
 _FREE_ROAD_HAZARD, _FREE_ROAD = "H2", "no_lead"
-_READING, _ONLY_READING = "as_coded", "as_described"
-_SCENARIO = "S1"  # 60 mph, 100 m behind a lead of 40 mph, as in the authors' test
-_CANARY = {"spec": "vision_output/path_model/both", "scenario": _SCENARIO, "hazard": "H3", "at_s": 7.0}
-_LIMITS = {"cpu_s": 120, "wall_s": 600, "memory_mb": 4096, "steps": 6000}
+_READINGS = ("as_described", CODED_READING)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,8 +44,7 @@ class _Group:
 def import_fault_files(source: Path) -> ImportedLibrary:
     """Return what becomes of the authors' fault files in a folder; see `LibraryImporter.read`."""
     files, ignored = read_fault_files(source)
-    workspace = Workspace.find(root=shipped_folder())
-    return _LibraryBuilder(files, {spec.name: spec for spec in workspace.specs()}).build(ignored)
+    return _LibraryBuilder(files, Workspace.find(root=shipped_folder())).build(ignored)
 
 
 def _places_for(files: Sequence[FaultFile]) -> tuple[HookPlace, ...]:
@@ -73,18 +70,21 @@ def _places_for(files: Sequence[FaultFile]) -> tuple[HookPlace, ...]:
 
 
 class _LibraryBuilder:
-    def __init__(self, files: Sequence[FaultFile], specs: Mapping[str, FaultSpec]) -> None:
+    def __init__(self, files: Sequence[FaultFile], shipped: Workspace) -> None:
         self._files = files
-        self._specs = specs
+        self._shipped = shipped
+        self._specs = {spec.name: spec for spec in shipped.specs()}
+        self._models, self._manifest = shipped.fault_models(), shipped.manifest(TARGET)
         self._places = _places_for(files)
         self._texts: dict[str, str] = {}
         self._variants_by_campaign: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+        self._campaign_names: dict[tuple[str, tuple[str, ...]], str] = {}
 
     def build(self, ignored: Mapping[str, str]) -> ImportedLibrary:
         entries = [entry for file in self._files for entry in self._import_file(file)]
-        for (when, setting), variants in self._variants_by_campaign.items():
-            name = _campaign_name(when, setting)
-            self._texts[f"campaigns/{name}.yaml"] = _campaign_text(name, when, setting, variants)
+        for campaign, variants in self._variants_by_campaign.items():
+            name = self._campaign_names[campaign]
+            self._texts[f"campaigns/{name}.yaml"] = campaign_text(name, *campaign, variants)
         return ImportedLibrary(entries=tuple(entries), texts=self._texts, ignored=ignored)
 
     def _import_file(self, file: FaultFile) -> Iterable[ImportedEntry]:
@@ -112,6 +112,7 @@ class _LibraryBuilder:
         values = tuple(place.value_of(change.number) for change in changes)
         self._check_values(place, values)
         placed_line = _PlacedLine(line=line.line, values=values)
+        self._check_buildable(file, _Group(place=place, condition=condition, lines=[placed_line]))
         alike = [group for group in groups if group.place is place and group.condition == condition]
         for other in (line for group in alike for line in group.lines):
             if other.values == values:
@@ -148,6 +149,20 @@ class _LibraryBuilder:
         if draw and draw.kind == "list" and values[0] not in draw.values:
             raise ValueError(f"{values[0]:g} is not a value of {place.variant}")
 
+    def _check_buildable(self, file: FaultFile, group: _Group) -> None:
+        """Raise ValueError for a fault that `check` would refuse, such as one whose `where` names a value
+        that is not known at its place.
+        """
+        module, *_, name = group.place.variant.split("/")
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"{module}.yaml"
+            path.write_text(
+                _spec_text(file, module, {name: self._variant_data(file, group)}), encoding="utf-8"
+            )
+            spec = load_spec(path, self._shipped.readings())
+            if problem := next(spec_problems(spec, self._models, self._manifest), None):
+                raise ValueError(f"cannot be built: {problem.got}")
+
     def _shipped_draw(self, place: HookPlace) -> Any:
         if not place.is_in_shipped_library:
             return None
@@ -170,6 +185,9 @@ class _LibraryBuilder:
                 full_name = f"{module}/uva_{file.number}/{name}"
             campaign = (group.condition.when, group.place.setting)
             self._variants_by_campaign.setdefault(campaign, []).append(full_name)
+            names_in_use = {*self._shipped.campaigns, *self._campaign_names.values()}
+            if campaign not in self._campaign_names:
+                self._campaign_names[campaign] = campaign_name(*campaign, names_in_use)
             yield [
                 ImportedEntry(
                     file=file.name,
@@ -177,7 +195,7 @@ class _LibraryBuilder:
                     outcome=outcome,
                     name=full_name,
                     value=_value_text(group.place, line.values),
-                    campaign=_campaign_name(*campaign),
+                    campaign=self._campaign_names[campaign],
                 )
                 for line in group.lines
             ]
@@ -187,10 +205,14 @@ class _LibraryBuilder:
     def _variant_data(self, file: FaultFile, group: _Group) -> dict[str, Any]:
         place = group.place
         shipped = self._shipped_data(place) if place.is_in_shipped_library else {}
-        reading = shipped.get(_READING) or shipped.get(_ONLY_READING) or {}
-        injections = [dict(each) for each in place.body.get("injections", reading.get("injections", []))]
-        if group.condition.where:
-            injections = [{**injection, "where": group.condition.where} for injection in injections]
+        readings = {key: shipped[key] for key in _READINGS if key in shipped} or {
+            _READINGS[0]: {"injections": place.body["injections"]}
+        }
+        if where := group.condition.where:
+            readings = {
+                key: {**reading, "injections": [{**each, "where": where} for each in reading["injections"]]}
+                for key, reading in readings.items()
+            }
         changes = [change for change in shipped.get("changes", []) if change != _FREE_ROAD]
         changes += [_FREE_ROAD] * (file.aim == _FREE_ROAD_HAZARD)
         columns = zip(*(line.values for line in group.lines), strict=True)
@@ -198,17 +220,17 @@ class _LibraryBuilder:
         data = {
             "aim": file.aim,
             "about": place.body.get("about") or shipped["about"],
-            "phrase": reading.get("phrase") or shipped.get("phrase"),
-            "hold": reading.get("hold") or shipped.get("hold"),
+            "phrase": shipped.get("phrase"),
+            "hold": shipped.get("hold"),
             "changes": changes,
             "draw": draw,
-            _ONLY_READING: {"injections": injections},
+            **readings,
         }
         return {key: value for key, value in data.items() if value}
 
     def _is_shipped(self, group: _Group, variant: Mapping[str, Any]) -> bool:
         """Return whether the variant that ships with mutator has the same faults, all of them."""
-        if not group.place.is_in_shipped_library:
+        if not group.place.is_in_shipped_library or group.condition.where:
             return False
         shipped = self._shipped_data(group.place)
         return all(variant.get(key) == shipped.get(key) for key in ("aim", "changes", "draw"))
@@ -224,34 +246,6 @@ def _value_text(place: HookPlace, values: Sequence[float | int]) -> str:
     return ", ".join(f"{value:.12g}" for value in values) + unit
 
 
-def _campaign_name(when: str, setting: Sequence[str]) -> str:
-    """Return a name that says when: `uva_hwt_from_0_and_hwt_to_2`."""
-    words = {">=": "from", "<=": "to", ">": "after", "<": "before"}
-    text = re.sub(r">=|<=|>|<", lambda match: words[match[0]], when or "always")
-    pictures = "_pictures" * ("pictures" in setting)
-    return "uva_" + re.sub(r"[^a-z0-9]+", "_", text) + pictures
-
-
-def _campaign_text(name: str, when: str, setting: Sequence[str], variants: Sequence[str]) -> str:
-    data = {
-        "schema": "campaign/1",
-        "name": name,
-        "about": f"Imported faults that are active {f'while {when}' if when else 'all the time'}.",
-        "target": "openpilot",
-        "scenarios": [_SCENARIO],
-        "setting": list(setting),
-        "faults": [{"spec": variant} for variant in variants],
-        "reading": _READING,
-        "methods": ["guided"],
-        "triggers": {"list": [{"when": when} if when else "always"], "armed_after_s": 0.0},
-        "seed": 1,
-        "canary": _CANARY,
-        "limits": _LIMITS,
-        "chunk": 8,
-    }
-    return _yaml_text({key: value for key, value in data.items() if value != []})
-
-
 def _spec_text(file: FaultFile, module: str, variants: Mapping[str, Any]) -> str:
     data = {
         "schema": "fault_spec/1",
@@ -260,8 +254,4 @@ def _spec_text(file: FaultFile, module: str, variants: Mapping[str, Any]) -> str
         "about": f"The faults of the authors' file {file.name}, at #{file.hook}:HOOK# of {file.source}.",
         "variants": dict(variants),
     }
-    return _yaml_text(data)
-
-
-def _yaml_text(data: Mapping[str, Any]) -> str:
-    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=110)
+    return yaml_text(data)

@@ -15,7 +15,7 @@ FILES = Path(__file__).parents[1] / "fixtures" / "uva"
 def test_import_says_what_became_of_the_lines(cli: Cli, nowhere: Path) -> None:
     answer = cli("import", "uva", FILES, "--out", "authors")
     assert answer.code == 0
-    assert answer.out.startswith("authors: 9 lines in 4 files: 5 imported, 3 equal, 1 refused\n")
+    assert answer.out.startswith("authors: 11 lines in 5 files: 9 imported, 1 equal, 1 refused\n")
     assert "refused: fault_library/scenario_1.txt:5: a statement that is not understood" in answer.out
     assert (nowhere / "authors" / "imported.csv").is_file()
 
@@ -27,7 +27,7 @@ def test_the_new_library_has_no_problem_and_can_be_planned(
     monkeypatch.chdir(nowhere / "authors")
     assert cli("check").code == 0
     plan = cli("plan", "uva_hwt_from_0_and_hwt_to_1_5", "--out", "runs/plan")
-    assert plan.code == 0 and re.search(r"^total +4$", plan.out, re.MULTILINE)
+    assert plan.code == 0 and re.search(r"^total +5$", plan.out, re.MULTILINE)
 
 
 def test_one_of_a_pair_is_tried_by_its_first_value(
@@ -45,8 +45,8 @@ def test_one_of_a_pair_is_tried_by_its_first_value(
 
 def test_json_has_every_line(cli: Cli, nowhere: Path) -> None:
     document = cli("import", "uva", FILES, "--out", "authors", "--json").json
-    assert document["counts"] == {"imported": 5, "equal": 3, "refused": 1}
-    assert len(document["entries"]) == 9
+    assert document["counts"] == {"imported": 9, "equal": 1, "refused": 1}
+    assert len(document["entries"]) == 11
 
 
 @pytest.mark.parametrize(
@@ -61,6 +61,15 @@ def test_wrong_input_writes_nothing(cli: Cli, nowhere: Path, words: tuple[str, .
     answer = cli("import", *words, "--out", "authors")
     assert answer.code == 2 and said in answer.err and "Traceback" not in answer.err
     assert not (nowhere / "authors").exists()
+
+
+def test_a_folder_with_files_is_an_error_that_names_the_option(cli: Cli, nowhere: Path) -> None:
+    (nowhere / "authors").mkdir()
+    (nowhere / "authors" / "thesis.tex").touch()
+    answer = cli("import", "uva", FILES, "--out", "authors")
+    assert answer.code == 2 and "authors: not empty (thesis.tex)" in answer.err
+    assert "choose another --out" in answer.err
+    assert "choose another DIR" in cli("init", "authors").err
 
 
 def test_a_cut_file_is_an_error_with_its_line(cli: Cli, nowhere: Path) -> None:

@@ -1,6 +1,7 @@
 """An import writes a new library with all that the importer returns, or nothing."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -30,14 +31,19 @@ def test_the_imported_faults_belong_to_a_causal_factor(tmp_path: Path) -> None:
     assert [
         str(e) for e in list_analysis_problems(analysis, library.specs(), library.manifest("openpilot"))
     ] == []
-    assert analysis.factors_by_id["imported"].faults == ["radar/uva_1", "radar/uva_6", "vision_output/uva_15"]
+    assert analysis.factors_by_id["imported"].faults == [
+        "radar/uva_1",
+        "radar/uva_6",
+        "vision_input/uva_52",
+        "vision_output/uva_15",
+    ]
 
 
 def test_the_table_has_a_row_for_each_entry(tmp_path: Path) -> None:
     imported = import_into_new_library("uva", FILES, tmp_path / "out")
     with (tmp_path / "out" / "imported.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == len(imported.entries) == 9
+    assert len(rows) == len(imported.entries) == 11
     assert [row["outcome"] for row in rows].count("refused") == imported.count(EntryOutcome.REFUSED) == 1
     assert rows[0]["campaign"] == "uva_hwt_from_0_and_hwt_to_1_5"
 
@@ -83,6 +89,36 @@ def test_an_importer_cannot_write_outside_the_library(
     with pytest.raises(MutatorError, match="evil"):
         import_into_new_library("x", tmp_path, tmp_path / "out")
     assert not list(tmp_path.rglob("evil.yaml"))
+
+
+@pytest.mark.parametrize("exists", [False, True])
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        ({"faults/radar/new.yaml": "a: &x 1\nb: *x\n"}, "anchor"),
+        ({"faults/radar/new.yaml": "schema: fault_spec/1\n"}, "new.yaml"),
+        ({"faults/radar/chaff.yaml": ""}, r"faults/radar/chaff.yaml: a file of the library that ships"),
+    ],
+)
+def test_nothing_is_left_of_a_library_that_cannot_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exists: bool, texts: dict[str, str], said: str
+) -> None:
+    importer(monkeypatch, ImportedLibrary(entries=(GOOD,), texts=texts, ignored={}))
+    out = tmp_path / "new" / "out"
+    if exists:
+        out.mkdir(parents=True)
+    with pytest.raises(MutatorError, match=said):
+        import_into_new_library("x", tmp_path, out)
+    assert not (list(out.iterdir()) if exists else out.parent.exists())
+
+
+def test_the_table_has_no_control_characters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A terminal that shows it would act on them."""
+    refused = replace(REFUSED, reason="bad \x1b[31m \u2028 word")
+    importer(monkeypatch, ImportedLibrary(entries=(GOOD, refused), texts={}, ignored={}))
+    import_into_new_library("x", tmp_path, tmp_path / "out")
+    text = (tmp_path / "out" / "imported.csv").read_text()
+    assert r"bad \x1b[31m \u2028 word" in text and len(text.splitlines()) == 3
 
 
 def test_an_unknown_format_names_those_that_exist(tmp_path: Path) -> None:

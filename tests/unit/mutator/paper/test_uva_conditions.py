@@ -20,6 +20,12 @@ from mutator.paper.uva_conditions import parse_condition
         ("(frame/100)>=7 and (frame/100)<=30", "t >= 7 and t < 31"),
         ("(md.model.frameId/100)>=3 and (md.model.frameId/100)<=30", "t >= 2.99 and t < 30.99"),
         ("frameIdx/100>=0 and frameIdx/100<=3", "t < 3.99"),
+        # all digits, and no exponent
+        ("self.headway_time<=0.000001", "hwt <= 0.000001"),
+        ("self.headway_time<=1234.5678", "hwt <= 1234.5678"),
+        ("self.headway_time<=1234.5679", "hwt <= 1234.5679"),
+        ("self.headway_time<=999999.9", "hwt <= 999999.9"),
+        ("self.frameIdx>=0.123456", "t >= 0.00123456"),
     ],
 )
 def test_a_condition_becomes_a_trigger(text: str, when: str) -> None:
@@ -52,6 +58,7 @@ def test_a_free_road_is_a_need_of_the_fault() -> None:
         ("self.secret>=1", "a value that is not observed: self.secret"),
         ("self.headway_time>=1 or True", "a condition that is not understood: self.headway_time>=1 or True"),
         ("self.headway_time>=1e999", "a condition that is not understood"),
+        ("self.current_time()>\u0663", "a condition that is not understood"),
         ("True", "a condition that is not understood: True"),
     ],
 )
@@ -59,3 +66,25 @@ def test_any_other_condition_is_refused(text: str, said: str) -> None:
     with pytest.raises(ValueError, match="not") as caught:
         parse_condition(text)
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "self.headway_time>=2 and self.headway_time<=1.5",
+        "self.headway_time>2 and self.headway_time<=2",
+        "self.frameIdx>=500 and self.frameIdx<=400",
+        "frameIdx/100<0",  # before the first step
+        "(frame/100)>7 and (frame/100)<8",
+        "self.current_time()>1.001 and self.current_time()<1.009",  # between two steps
+    ],
+)
+def test_a_condition_that_never_holds_is_refused(text: str) -> None:
+    """Its faults would all be inactive."""
+    with pytest.raises(ValueError, match="a condition that never holds"):
+        parse_condition(text)
+
+
+def test_a_condition_that_holds_once_is_not_refused() -> None:
+    assert parse_condition("self.headway_time>=2 and self.headway_time<=2").when == "hwt >= 2 and hwt <= 2"
+    assert parse_condition("self.frameIdx>=29 and self.frameIdx<=29").when == "t >= 0.29 and t <= 0.29"

@@ -27,7 +27,8 @@ def test_files_are_read_by_number_with_all_their_lines() -> None:
         (1, "H1", "radar_dRel", 3),
         (6, "H2", "radar_none", 1),
         (15, "H3", "md", 2),
-        (46, "H3", "visionFault", 3),
+        (52, "H3", "visionFault", 4),
+        (53, "H3", "md_none", 1),
     ]
     assert ignored == {}
     assert [line.line for line in files[0].lines] == [3, 4, 5]
@@ -40,7 +41,7 @@ def test_the_folder_of_the_files_is_found_too_and_other_texts_are_named(tmp_path
     copy = shutil.copytree(FILES / "fault_library", tmp_path / "files")
     shutil.copyfile(copy / "scenario_1.txt", copy / "scenario_1 (copy).txt")
     files, ignored = read_fault_files(copy)
-    assert len(files) == 4
+    assert len(files) == 5
     assert ignored == {"scenario_1 (copy).txt": "its name is not scenario_<number>.txt"}
 
 
@@ -77,6 +78,9 @@ def test_a_file_in_another_format_is_an_error_with_its_line(
         ("radar_dRel+=open('/etc/passwd')", "a statement that is not understood"),
         ("radar_dRel+=9999999999", "a number beyond 1e+06: 9999999999"),
         ("radar_dRel+=1e99", "a number beyond 1e+06: 1e99"),
+        ("radar_dRel+=(5", "a statement that is not understood: radar_dRel+=(5"),
+        ("radar_dRel+=5)", "a statement that is not understood: radar_dRel+=5)"),
+        ("radar_dRel+=\u20285", "a statement that is not understood"),
         ("radar_dRel+=nan", "a statement that is not understood: radar_dRel+=nan"),
         ("radar_dRel+=" + "1" * 2000, "longer than 1000 characters"),
         ("", "not of the form"),
@@ -92,6 +96,28 @@ def test_a_line_that_cannot_be_understood_is_kept_with_its_problem(
     files, _ = read_fault_files(folder_with(tmp_path, TITLE + LOCATION + line + COUNT))
     assert problem in files[0].lines[0].problem
     assert [path.name for path in tmp_path.iterdir()] == ["scenario_1.txt"]
+
+
+def test_a_byte_order_mark_and_a_blank_last_line_are_no_fault(tmp_path: Path) -> None:
+    """Editors add both."""
+    text = f"\ufeff{TITLE}{LOCATION}{FAULT}{COUNT}\n\n".replace("\n", "\r\n")
+    files, _ = read_fault_files(folder_with(tmp_path, text))
+    assert [line.changes[0].number for line in files[0].lines] == [12]
+
+
+@pytest.mark.parametrize("character", ["\f", "\v", "\x1c", "\x85", "\u2028"])
+def test_lines_are_counted_as_editors_do(tmp_path: Path, character: str) -> None:
+    """Only a line feed ends a line, so an error names the line that an editor shows."""
+    bad = f"fault 1//if self.headway_time<=1.5{character}://none\n"
+    with pytest.raises(MutatorError, match=r"scenario_1\.txt:4: 'wrong'"):
+        read_fault_files(folder_with(tmp_path, f"{TITLE}{LOCATION}{bad}wrong\n{COUNT}"))
+
+
+def test_a_repeated_number_of_a_fault_is_noticed(tmp_path: Path) -> None:
+    again = FAULT.replace("12", "13")
+    text = TITLE + LOCATION + FAULT + again + COUNT.replace("1", "2")
+    files, _ = read_fault_files(folder_with(tmp_path, text))
+    assert [line.problem for line in files[0].lines] == ["", "fault number 1, as in line 3"]
 
 
 def test_folders_without_readable_files_are_refused(tmp_path: Path) -> None:
