@@ -91,7 +91,7 @@ def import_into_new_library(format_name: str, source: Path, folder: Path) -> Imp
             whole = Path(scratch) / "library"
             _write_library(imported, whole)
             for path in whole.iterdir():
-                path.rename(folder / path.name)
+                path.rename(path_below(folder, path.name))
     except BaseException:
         for path in missing:
             with suppress(OSError):
