@@ -27,10 +27,12 @@ from mutator.audit.record_audit import load_stored_records
 from mutator.audit.series_repair import repair_series
 from mutator.campaigns.plan import load_plan
 from mutator.campaigns.plan_freezing import PLAN_CSV, plan_csv_bytes
+from mutator.campaigns.plan_growth import APPENDED_FILES
 from mutator.errors import MutatorError, TooLarge, UnsafePath
 from mutator.model import Status
 from mutator.store import file_digests, integrity
 from mutator.store.allowed_contents import DAMAGED_FOLDER
+from mutator.store.appended_files import undo_unfinished_growth
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.checksummed_lines import Segment, line_file_bytes, read_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
@@ -49,7 +51,7 @@ def repair_run(folder: RunFolder, workspace: Workspace | None = None) -> list[st
     or the plan is damaged.
     """
     with lock_run_folder(folder.path, patience_s=0.0), raising_disk_full(folder.path):
-        renewed = list(_renew_damaged_ledger(folder))
+        renewed = [*_renew_damaged_ledger(folder), *_undo_unfinished_batch(folder)]
         ledger = file_digests.settled_ledger(folder.path)
         lost_patches = _experiments_with_lost_patch(folder)
         changes = [*_file_changes(folder, ledger), *_segment_changes(folder, ledger, lost_patches)]
@@ -87,6 +89,12 @@ def _renew_damaged_ledger(folder: RunFolder) -> Iterator[str]:
         )
         name = file_digests.DIGESTS_FILE
         yield f"{name} rebuilt from the current files: only an earlier seal can confirm them"
+
+
+def _undo_unfinished_batch(folder: RunFolder) -> Iterator[str]:
+    """Cut off what a killed command added to the plan of a bench."""
+    for name in undo_unfinished_growth(folder.path, APPENDED_FILES):
+        yield f"{name}: lines of a batch that was not planned completely cut off"
 
 
 def _file_changes(folder: RunFolder, ledger: DigestLedger) -> Iterator[_FileChange]:

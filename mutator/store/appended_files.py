@@ -46,14 +46,15 @@ class AppendedFile:
                 os.close(file)
 
 
-def undo_unfinished_growth(run: Path, names: Iterable[str]) -> None:
+def undo_unfinished_growth(run: Path, names: Iterable[str]) -> list[str]:
     """Cut off what a failed or killed command added to these files, unless it also wrote the run.json that
-    has it.
+    has it. Return the names of the files that were cut.
     """
+    cut_names: list[str] = []
     ledger = file_digests.load_ledger(run)
     new_head = ledger.rewriting.get(HEAD)
     if not ledger.rewriting or (new_head and new_head.has_same_bytes(FileDigest.of_file_below(run, HEAD))):
-        return
+        return cut_names
     for name in names:
         before = ledger.files.get(name)
         if before is None or not path_below(run, name).is_file():
@@ -61,6 +62,8 @@ def undo_unfinished_growth(run: Path, names: Iterable[str]) -> None:
         data = read_below(run, name)
         if len(data) > before.size and digest(data[: before.size]) == before.sha256:
             _cut_in_place(run, name, before.size)
+            cut_names.append(name)
+    return cut_names
 
 
 def _cut_in_place(run: Path, name: str, size: int) -> None:

@@ -1,6 +1,7 @@
 """Benches: lists of experiments, asked one after another."""
 
 import json
+import math
 import os
 import signal
 import threading
@@ -9,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import mutator
@@ -187,6 +189,9 @@ def test_a_failed_golden_run_leaves_no_plan(toycar: Workspace, tmp_path: Path) -
         ({"seed": 9}, "this bench was opened with other arguments"),
         ({"canary": None, "limits": {"steps": 150}}, "this bench was opened with other arguments"),
         ({"workers": 0}, "a whole number, at least 1"),
+        ({"after_hazard": "never"}, "after_hazard: 'never'; expected `go_on` or `stop`"),
+        ({"limits": {"steps": np.int64(200)}}, "limits: .*int64.*expected plain numbers"),
+        ({"limits": {"steps": math.nan}}, "limits: .*nan.*expected plain numbers"),
         ({"limits": {"stairs": 1}}, "campaign.yaml:.*stairs"),
         (
             {"canary": {"spec": "sensor/lane/none", "scenario": "A", "hazard": "H3", "at_s": 1}},
@@ -198,12 +203,13 @@ def test_a_failed_golden_run_leaves_no_plan(toycar: Workspace, tmp_path: Path) -
 def test_wrong_arguments_are_refused(
     toycar: Workspace, tmp_path: Path, change: dict[str, Any], expected: str
 ) -> None:
-    """A mistake, or arguments other than the first time, end in an error that says so."""
+    """A mistake, or arguments other than the first time, end in an error that says so, and make no folder."""
     if "other" in expected:
         with opened(toycar, tmp_path / "b") as bench:
             bench.run(shifted(bench, 5))
     with pytest.raises(MutatorError, match=expected), opened(toycar, tmp_path / "b", **change):
         pass
+    assert (tmp_path / "b").exists() == ("other" in expected)
 
 
 def test_an_experiment_must_fit_the_bench(toycar: Workspace, tmp_path: Path) -> None:
@@ -212,6 +218,10 @@ def test_an_experiment_must_fit_the_bench(toycar: Workspace, tmp_path: Path) -> 
         [good] = shifted(bench, 5)
         for asked, expected in (
             ("text", "a list of experiments"),
+            (None, "a list of experiments"),
+            ([_changed(good, method="guided")], "method 'guided'"),
+            ([_changed(good, trigger="near")], "an experiment that the plan cannot store"),
+            ([_changed(good, fault=_changed(good.fault, injections=("text",)))], "the plan cannot store"),
             (good, "a list of experiments"),
             ([good.fault], "experiments, as `build_experiment` makes them"),
             (
@@ -224,6 +234,21 @@ def test_an_experiment_must_fit_the_bench(toycar: Workspace, tmp_path: Path) -> 
         ):
             with pytest.raises(MutatorError, match=expected):
                 bench.run(asked)  # type: ignore[arg-type]
+
+
+def test_experiments_can_come_from_a_generator(toycar: Workspace, tmp_path: Path) -> None:
+    """A generator is read once, and each of its experiments has its record."""
+    with opened(toycar, tmp_path / "b") as bench:
+        assert len(bench.run(experiment for experiment in shifted(bench, 5, 40))) == 2
+
+
+@pytest.mark.parametrize("reason", [None, 3, Path("x"), "\ud800"])
+def test_a_reason_is_text(toycar: Workspace, tmp_path: Path, reason: Any) -> None:
+    """Anything else is refused before the batch, and the bench can be used further."""
+    with opened(toycar, tmp_path / "b") as bench:
+        with pytest.raises(MutatorError, match=r"reason: .*; expected text"):
+            bench.run(shifted(bench, 5), reason)
+        assert bench.run([], "text") == []
 
 
 def test_a_campaigns_folder_is_no_bench(toycar: Workspace, tmp_path: Path) -> None:

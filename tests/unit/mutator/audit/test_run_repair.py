@@ -3,14 +3,17 @@
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from mutator import open_bench
 from mutator._common.folder_locks import lock_run_folder
 from mutator.audit.run_repair import _set_aside, repair_run
 from mutator.errors import MutatorError, UnsafePath
 from mutator.store import file_digests, plan_file
+from mutator.store.appended_files import AppendedFile
 from mutator.store.checksummed_lines import line_file_bytes, read_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.packed_patches import PatchFolder
@@ -283,3 +286,38 @@ def test_a_file_with_holes_is_moved_and_not_copied(run: Path) -> None:
     _set_aside(run, name)
     aside = run / "damaged" / name
     assert not (run / name).exists() and aside.stat().st_size == 1 << 40 and aside.stat().st_blocks < 100
+
+
+@pytest.fixture
+def bench_run(toycar: Workspace, tmp_path: Path, kept_checks: None) -> Path:
+    """The run folder of a bench with one experiment."""
+    with open_bench(toycar, tmp_path / "bench", campaign="small") as bench:
+        bench.run([bench.build_experiment("sensor/distance/longer", "A", 1.0, value=5)], "first")
+    return bench.path
+
+
+def test_a_benchs_unfinished_batch_is_cut_off(bench_run: Path) -> None:
+    """After a kill in a batch, the repaired folder has the batches before it."""
+    ledger = file_digests.load_ledger(bench_run)
+    files = [AppendedFile(bench_run, name) for name in (plan_file.EXPERIMENTS_FILE, "plan.csv")]
+    for file in files:
+        file.add(b"a line\n")
+    announced = {file.name: file.digest for file in files}
+    file_digests.save_ledger(bench_run, replace(ledger, finished=False, rewriting=announced))
+    for file in files:
+        file.write_added()
+    with pytest.raises(MutatorError):
+        RunFolder.open(bench_run)
+    sentences = repair_run(RunFolder(bench_run))
+    assert [sentence.split(":")[0] for sentence in sentences] == [plan_file.EXPERIMENTS_FILE, "plan.csv"]
+    assert RunFolder.open(bench_run).planned_experiment_count == 1
+
+
+def test_a_benchs_damaged_batches_stay(bench_run: Path) -> None:
+    """Nothing can rebuild the reasons of batches, so they are left for a copy to replace."""
+    path = bench_run / plan_file.BATCHES_FILE
+    path.write_text(path.read_text().replace("first", "other"))
+    assert repair_run(RunFolder(bench_run)) == []
+    assert "other" in path.read_text()
+    with pytest.raises(MutatorError, match=r"batches\.jsonl.*restore it from a copy"):
+        RunFolder.open(bench_run)

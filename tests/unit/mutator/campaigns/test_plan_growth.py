@@ -2,6 +2,9 @@
 
 import json
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 from mutator.campaigns.plan_growth import BatchChain
 from mutator.store import plan_file
@@ -34,6 +37,18 @@ def test_a_changed_reason_breaks_the_chain(tmp_path: Path) -> None:
     assert problem.line == 3 and "does not follow" in str(problem)
     path.write_text("".join([*lines[:2], json.dumps(json.loads(lines[2]) | {"reason": "none"}) + "\n"]))
     assert plan_file.last_batch_digest(tmp_path) != digest
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"experiments": "2"}, {"experiments": 2.0}, {"experiments": True}, {"batch": True}, {"reason": 1}],
+)
+def test_a_value_of_another_type_is_a_problem(tmp_path: Path, change: dict[str, Any]) -> None:
+    """What only looks like a count is no batch."""
+    path = write_batches(tmp_path, 2)
+    path.write_text(json.dumps(json.loads(path.read_text()) | change) + "\n")
+    [problem] = plan_file.batch_problems(tmp_path, 2)
+    assert problem.line == 1
 
 
 def test_a_line_that_is_no_batch_is_a_problem(tmp_path: Path) -> None:
