@@ -145,6 +145,8 @@ def trial(tmp_path: Path, capfd: pytest.CaptureFixture[str], *words: str) -> str
         ),
         (("messages/lost", "--variant", "planner_radar_state", "--scenario", "brakes"), "alert comm_issue"),
         (("messages/lost", "--variant", "control_car_state", "--scenario", "brakes"), "verdict: "),
+        (("messages/frozen", "--variant", "radard_model_v2", "--scenario", "brakes"), "manifested: "),
+        (("vision/lead", "--variant", "late", "--value", "4", "--scenario", "brakes"), "manifested: "),
     ],
 )
 def test_a_fault_in_each_loop_does_what_it_says(
@@ -158,6 +160,16 @@ def test_a_message_is_lost_for_one_reader_only(tmp_path: Path, capfd: pytest.Cap
     words = ("messages/lost", "--variant", "radard_live_tracks", "--scenario", "brakes", "--trigger", "5")
     printed = trial(tmp_path, capfd, *words)
     assert "'liveTracks' in self.services" in printed and "_fi.messages_lost(" in printed
+
+
+@pytest.mark.parametrize("words", [("missing",), ("doubtful", "--value", "0.3")])
+def test_vision_is_unsure_of_the_first_lead_only(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], words: tuple[str, ...]
+) -> None:
+    printed = trial(
+        tmp_path, capfd, "vision/lead", "--variant", *words, "--scenario", "brakes", "--trigger", "5"
+    )
+    assert "if _fi.on() and (i == 0) and _fi.active(" in printed
 
 
 @pytest.mark.slow

@@ -1,35 +1,47 @@
-"""Fuses the radar's points with the lead that vision reports."""
+"""Combines what radar and camera report about the cars ahead: a stand-in."""
 
 from cereal import Content, messaging
 
 RADAR_TO_CAMERA = 1.5
+LEAST_PROBABILITY, MOST_M, MOST_SHARE, MOST_MPS = 0.5, 5.0, 0.25, 10.0
+COLUMNS = "dRel", "yRel", "vRel", "measured"
 
 
 class Track:
-    def __init__(self, identifier):
-        self.identifier = identifier
+    def __init__(self, number):
+        self.identifier = number
 
     def update(self, d_rel, y_rel, v_rel, v_lead, measured):
-        self.dRel, self.yRel, self.vRel, self.vLead = d_rel, y_rel, v_rel, v_lead
+        self.gap, self.aside, self.closing, self.speed = d_rel, y_rel, v_rel, v_lead
 
 
 def match_vision_to_track(v_ego, lead, tracks):
-    offset_vision_dist = lead.x[0] - RADAR_TO_CAMERA
-
-    def distance(track):
-        return abs(track.dRel - offset_vision_dist) + abs(track.vRel + v_ego - lead.v[0]) + abs(track.yRel)
+    offset_vision_dist = -RADAR_TO_CAMERA + lead.x[0]
 
     def prob(track):
-        return 1 / (1 + distance(track)) if lead.v[0] >= 0 else 0.0
+        errors = track.gap - offset_vision_dist, track.aside, track.closing + v_ego - lead.v[0]
+        return -sum(map(abs, errors))
 
-    track = max(tracks.values(), key=prob)
-    near = abs(track.dRel - offset_vision_dist) < max(offset_vision_dist * 0.25, 5.0)
-    return track if near and abs(track.vRel + v_ego - lead.v[0]) < 10 else None
+    best = sorted(tracks.values(), key=prob)[-1]
+    errors = abs(best.gap - offset_vision_dist), abs(best.closing + v_ego - lead.v[0])
+    limits = max(MOST_M, MOST_SHARE * offset_vision_dist), MOST_MPS
+    return best if all(error < limit for error, limit in zip(errors, limits, strict=True)) else None
 
 
 def get_RadarState_from_vision(lead_msg, v_ego):
-    speed = lead_msg.v[0]
-    return Content(status=True, dRel=lead_msg.x[0] - RADAR_TO_CAMERA, vLead=speed)
+    seen_gap, seen_speed = lead_msg.x[0], lead_msg.v[0]
+    return report(seen_gap - RADAR_TO_CAMERA, seen_speed)
+
+
+def report(gap, speed):
+    return Content(status=True, dRel=gap, vLead=speed)
+
+
+def choose(v_ego, lead, probability, tracks):
+    if probability <= LEAST_PROBABILITY:
+        return Content(status=False, dRel=0.0, vLead=0.0)
+    track = match_vision_to_track(v_ego, lead, tracks) if tracks else None
+    return report(track.gap, track.speed) if track else get_RadarState_from_vision(lead, v_ego)
 
 
 class RadarD:
@@ -37,25 +49,20 @@ class RadarD:
         self.tracks = {}
 
     def update(self, sm, rr):
-        self.v_ego = sm["carState"].vEgo
-        ar_pts = {pt.trackId: [pt.dRel, pt.yRel, pt.vRel, pt.measured] for pt in rr.points}
-        self.tracks = {name: self.tracks.get(name) or Track(name) for name in ar_pts}
-        for name, point in ar_pts.items():
-            self.tracks[name].update(point[0], point[1], point[2], point[2] + self.v_ego, point[3])
-        leads = sm["modelV2"].leadsV3
-        one = Content(status=False, dRel=0.0, vLead=0.0)
-        for lead in leads[:1]:
+        state, model = sm["carState"], sm["modelV2"]
+        self.v_ego = state.vEgo
+        ar_pts = {point.trackId: [getattr(point, name) for name in COLUMNS] for point in rr.points}
+        self.tracks = {number: self.tracks.get(number) or Track(number) for number in ar_pts}
+        for number, (gap, aside, closing, measured) in ar_pts.items():
+            self.tracks[number].update(gap, aside, closing, closing + self.v_ego, measured)
+        leads_v3, probabilities = model.leadsV3, {}
+        for i, lead in enumerate(leads_v3):
             lead_prob = lead.prob
-            if lead_prob > 0.5:
-                track = match_vision_to_track(self.v_ego, lead, self.tracks) if self.tracks else None
-                one = get_RadarState_from_vision(lead, self.v_ego)
-                if track:
-                    one = Content(status=True, dRel=track.dRel, vLead=track.vLead)
-        self.radar_state = Content(leadOne=one)
-        self.radar_state_valid = sm.all_checks()
+            probabilities[i] = lead_prob
+        self.radar_state = Content(leadOne=choose(self.v_ego, leads_v3[0], probabilities[0], self.tracks))
+        self.is_valid = sm.all_checks()
 
     def publish(self, pm):
-        radar_msg = messaging.new_message("radarState")
-        radar_msg.valid = self.radar_state_valid
-        radar_msg.radarState = self.radar_state
-        pm.send("radarState", radar_msg)
+        message = messaging.new_message("radarState", valid=self.is_valid)
+        message.radarState = self.radar_state
+        pm.send(message.topic, message)

@@ -1,28 +1,27 @@
-"""Plans an acceleration."""
+"""Plans an acceleration: a stand-in."""
 
-from cereal import messaging
+from cereal import messaging as messages
 
 from openpilot.selfdrive.controls.lib.longitudinal_mpc_lib.long_mpc import LongitudinalMpc
+
+LOWEST_ACCEL, HIGHEST_ACCEL, FORCED_ACCEL = -3.5, 2.0, -2.0
+NEEDED = "carState", "controlsState", "selfdriveState", "radarState"
 
 
 class LongitudinalPlanner:
     def __init__(self, params, init_v=0.0):
-        self.mpc = LongitudinalMpc()
-        self.fcw = False
-        self.output_a_target = 0.0
+        self.mpc, self.fcw, self.output_a_target = LongitudinalMpc(), False, 0.0
 
     def update(self, sm):
-        v_ego = sm["carState"].vEgo
-        v_cruise = sm["carState"].vCruise / 3.6
-        output_a_target = self.mpc.update(sm["radarState"], v_ego, v_cruise)
-        if sm["controlsState"].forceDecel:
-            output_a_target = -2.0
-        self.fcw = self.mpc.crash_cnt > 2
-        self.output_a_target = max(-3.5, min(2.0, output_a_target))
+        car, controls = sm["carState"], sm["controlsState"]
+        v_ego = car.vEgo
+        accel = self.mpc.update(sm["radarState"], v_ego, car.vCruise / 3.6)
+        self.fcw = self.mpc.alarmed_steps > 2
+        wanted = FORCED_ACCEL if controls.forceDecel else accel
+        self.output_a_target = sorted((LOWEST_ACCEL, wanted, HIGHEST_ACCEL))[1]
 
     def publish(self, sm, pm):
-        plan_send = messaging.new_message("longitudinalPlan")
-        plan_send.valid = sm.all_checks(["carState", "controlsState", "selfdriveState", "radarState"])
-        plan_send.longitudinalPlan.aTarget = self.output_a_target
-        plan_send.longitudinalPlan.shouldStop = False
-        pm.send("longitudinalPlan", plan_send)
+        message = messages.new_message("longitudinalPlan", valid=sm.all_checks(NEEDED))
+        plan = message.longitudinalPlan
+        plan.aTarget, plan.shouldStop = self.output_a_target, False
+        pm.send(message.topic, message)
