@@ -4,7 +4,7 @@ import math
 import operator
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 FREE_ROAD_TERM = "not self.lead_relevancy"
 _COMPARISON_PATTERN = re.compile(r"(\(?[\w.\[\]/]+\)?)(>=|<=|>|<)(\d{1,6}(?:\.\d{1,6})?)", re.ASCII)
@@ -45,7 +45,7 @@ class FileCondition:
 
     when: str
     where: str | None
-    needs_free_road: bool
+    needs_free_road: bool = field(compare=False)  # the trigger is the same
 
 
 def parse_condition(text: str) -> FileCondition:

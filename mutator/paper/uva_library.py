@@ -84,7 +84,7 @@ class _LibraryBuilder:
         entries = [entry for file in self._files for entry in self._import_file(file)]
         for campaign, variants in self._variants_by_campaign.items():
             name = self._campaign_names[campaign]
-            self._texts[f"campaigns/{name}.yaml"] = campaign_text(name, *campaign, variants)
+            self._texts[f"campaigns/{name}.yaml"] = campaign_text(name, *campaign, [*dict.fromkeys(variants)])
         return ImportedLibrary(entries=tuple(entries), texts=self._texts, ignored=ignored)
 
     def _import_file(self, file: FaultFile) -> Iterable[ImportedEntry]:

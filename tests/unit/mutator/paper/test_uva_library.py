@@ -238,3 +238,25 @@ def test_the_effect_of_the_camera_can_have_a_point(tmp_path: Path) -> None:
         "vision_input/uva_1/thickness",
         "",
     ]
+
+
+def test_a_campaign_names_a_fault_of_two_files_once(tmp_path: Path) -> None:
+    """Its experiments are planned once."""
+    for number in (1, 2):
+        head = HEAD.format(file="test/plant/plant.py", hook="md_none").replace("1_x-H1", f"{number}_x-H3")
+        (tmp_path / f"scenario_{number}.txt").write_text(
+            f"{head}fault 1//if self.headway_time>=1://none\nTotal number of fault cases: 1"
+        )
+    imported = import_fault_files(tmp_path)
+    assert imported.count(EntryOutcome.EQUAL) == 2
+    text = imported.texts["campaigns/uva_hwt_from_1.yaml"]
+    assert text.count("spec: vision_output/camera_unavailable/no_data") == 1
+
+
+def test_a_need_of_the_free_road_makes_no_second_fault(tmp_path: Path) -> None:
+    lines = [f"if {need}self.headway_time>=1://v_rel-=3" for need in ("", "not self.lead_relevancy and ")]
+    folder = folder_with(tmp_path, PLANT_HEAD.replace("-H1", "-H2"), *lines)
+    assert [entry.reason for entry in import_fault_files(folder).entries] == [
+        "",
+        "the same fault as in line 3",
+    ]
