@@ -108,11 +108,11 @@ def verify(
 ) -> Audit:
     """Audit the run folder at `run`, finished or not, even if `load_run` can no longer open it.
 
-    `rerun` is the number of randomly drawn experiments to rerun on the reference engine. `expect` is the seal
-    or the results digest that the run must have, `expect_review` its review digest. `signed_by` is a file of
-    allowed signers (`man ssh-keygen`), one of whom must have signed the run. With `report`, the report is
-    built again and compared with the stored one. With `repair`, damaged parts are set aside, and the next run
-    of the campaign in this folder redoes them; otherwise nothing is written.
+    `rerun` is the number of randomly drawn experiments to rerun on the reference engine. `expect` is the
+    seal, the results digest or a bench's batches digest that the run must have, `expect_review` its review
+    digest. `signed_by` is a file of allowed signers (`man ssh-keygen`), one of whom must have signed the run.
+    With `report`, the report is built again and compared with the stored one. With `repair`, damaged parts
+    are set aside, and the next run of the campaign in this folder redoes them; otherwise nothing is written.
 
     MutatorError if `run` is not a run folder, if its run.json cannot be read, or if `signed_by` is missing.
     """
@@ -184,9 +184,10 @@ def _check_digest(argument: str, value: str | None) -> None:
 
 
 def _expected_digest_check(folder: RunFolder, seals: Seals, expected: str) -> AuditCheck:
-    """Compare with the seal or the results digest, whichever it is."""
-    if expected == seals.results_digest:
-        return _digest_check(folder, "results digest", expected, expected)
+    """Compare with the seal, the results digest or the batches digest, whichever it is."""
+    for name, actual in (("results digest", seals.results_digest), ("batches digest", seals.batches_digest)):
+        if expected == actual:
+            return _digest_check(folder, name, expected, expected)
     return _digest_check(folder, "seal", seals.seal, expected)
 
 

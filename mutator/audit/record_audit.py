@@ -234,19 +234,21 @@ def proof_problems(
         return
     record_by_id = {stored.record.experiment_id: stored.record for stored in records}
     sampled = set(equivalence_check.sample_ids_in_folder(folder))
+    proven_ids = {stored.record.experiment_id for stored in proven}
+    # earlier, all experiments of a small plan were proved, which is more than its sample
+    is_small = folder.head.experiments < equivalence_check.SMALL_PLAN_SIZE
+    is_all_proven = is_small and proven_ids >= folder.planned_positions().keys()
     for proven_record in proven:
         record = record_by_id.get(proven_record.record.experiment_id)
         if record is not None and record != proven_record.record:
             yield proven_record.difference_error(
                 equivalence_check.describe_difference(proven_record.record, record), "what the run recorded"
             )
-        # until version 0.2, up to 20 experiments of a small plan were proved, which is more than its sample
-        is_small = folder.head.experiments < equivalence_check.SMALL_PLAN_SIZE
-        if proven_record.record.experiment_id not in sampled and not is_small:
+        if proven_record.record.experiment_id not in sampled and not is_all_proven:
             yield proven_record.difference_error(
                 "in the proof", "only experiments of the sample that the plan determines"
             )
-    missing = sorted(sampled - {proven_again.record.experiment_id for proven_again in proven})
+    missing = sorted(sampled - proven_ids)
     if folder.is_finished and missing:
         yield MutatorError(
             f"no record of {missing[0]}", where=proof_folder, expected="a record of each sampled experiment"

@@ -41,7 +41,8 @@ def verify(
     ],
     rerun: Annotated[int, typer.Option(metavar="N", min=0, help="Rerun N randomly drawn experiments.")] = 0,
     expect: Annotated[
-        str | None, typer.Option(metavar="DIGEST", help="The expected seal or results digest, 64 hex digits.")
+        str | None,
+        typer.Option(metavar="DIGEST", help="The expected seal, results or batches digest, 64 hex digits."),
     ] = None,
     expect_review: Annotated[
         str | None, typer.Option(metavar="DIGEST", help="The expected review digest, 64 hex digits.")

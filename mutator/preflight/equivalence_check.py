@@ -6,7 +6,7 @@ records are in the run's folder `proof/`, which is removed if no experiment was 
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
@@ -67,12 +67,18 @@ class EquivalenceResult:
         """The state of the check, without what a small sample can exclude."""
         if not self.chosen:
             return self._describe_sample()
-        chosen = f"{self.same_chosen} of {self.chosen} chosen for their fault type or scenario"
+        # the rules of `sample_of_bench`: each chosen experiment follows one of them
+        chosen = (
+            f"{self.same_chosen} of {self.chosen} chosen among the first {_LEAST_CHOSEN} or as the first of "
+            "their fault type or scenario"
+        )
         if not self.sampled:
             return f"{chosen} came out the same on the reference engine; no experiment was drawn"
         return f"{self._describe_sample()}; besides, {chosen}"
 
     def _describe_sample(self) -> str:
+        if not self.sampled:
+            return "no experiment of this part is in the sample"
         sampled = counted(self.sampled, "experiment")
         drawn = f"{sampled} that were drawn" if self.chosen else sampled
         same = f"{self.same} of {drawn} came out the same on the reference engine"
@@ -98,11 +104,13 @@ def mark_check_as_needed(run: Path) -> None:
 def choose_sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ...]:
     """Choose one experiment in a hundred, at least 20, with every fault type and every scenario.
 
-    Of fewer than 40 experiments, choose one in ten, at least three: 20 would be most of them.
+    Of fewer than 40 experiments, draw one in ten, at least three: 20 would be most of them. Each is equally
+    likely, so that the sample can say what it excludes.
     """
     if len(experiments) < SMALL_PLAN_SIZE:
         count = max(_MIN_SMALL_SAMPLE, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_IN_SMALL_PLAN))
-        return draw_balanced(experiments, count, seed)
+        drawn_ids = {e.id for e in sorted(experiments, key=lambda e: digest([seed, e.id]))[:count]}
+        return tuple(experiment for experiment in experiments if experiment.id in drawn_ids)
     count = max(_MIN_SAMPLE, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_EXPERIMENT))
     chosen = list(draw_balanced(experiments, count, seed))
     covered = {mark for experiment in chosen for mark in _traits_to_cover(experiment)}
@@ -191,10 +199,15 @@ def reason_check_not_needed(folder: RunFolder) -> str | None:
         if name not in finished_ids:  # not run yet; any timing is from an earlier session
             return None
         timing = timings.get(name, {})
-        if timing.get("engine", "unknown") not in (RunMode.REFERENCE.value, None):
+        if _was_forked(timing):
             return None
         reasons[str(timing.get("why", ""))] += 1
     return next((why for why, _ in reasons.most_common() if why), "the reference engine ran them all")
+
+
+def _was_forked(timing: Mapping[str, object]) -> bool:
+    """Whether an experiment's result needs a proof. Without a timing, nobody knows, so it does."""
+    return timing.get("engine", "unknown") not in (RunMode.REFERENCE.value, None)
 
 
 def remove_proof(folder: RunFolder) -> None:
@@ -260,26 +273,46 @@ def compare_sample(folder: RunFolder, records: Mapping[str, Record]) -> Equivale
         errors=tuple(sorted(errors)),
         chosen=len(chosen),
         same_chosen=same_chosen,
-        note=_note_on_small_sample(folder),
+        note=_note_on_small_sample(folder, chosen),
     )
 
 
-def _note_on_small_sample(folder: RunFolder) -> str:
-    """Say what the sample of a small campaign can exclude, and which fault types are not in it."""
-    if folder.is_bench or folder.head.experiments >= SMALL_PLAN_SIZE:
+def _note_on_small_sample(folder: RunFolder, chosen_ids: Collection[str]) -> str:
+    """Say what the sample of a small plan can exclude, and which fault types are not in it.
+
+    Only what this folder forked counts: of those, each drawn experiment was equally likely.
+    """
+    if folder.head.experiments >= SMALL_PLAN_SIZE:
         return ""
-    experiments = plan_file.load_experiments(folder.path)
-    sampled_ids = _sample_ids_of_plan(folder)
-    if len(sampled_ids) == len(experiments):
-        return ""
-    covered = {_fault_type_of(experiment) for experiment in experiments if experiment.id in sampled_ids}
-    uncovered = sorted({_fault_type_of(experiment) for experiment in experiments} - covered)
-    share = _share_found(len(experiments), len(sampled_ids))
-    exclusion = (
+    sample_ids, timings = sample_ids_in_folder(folder), folder.timings()
+    forked_ids = {name for name in folder.planned_positions() if _was_forked(timings.get(name, {}))}
+    proven_ids = forked_ids.intersection(sample_ids)
+    notes = []
+    if count := len(sample_ids) - len(proven_ids):
+        notes.append(f"{count} of them had run on that engine before, which proves nothing")
+    if proven_ids != forked_ids:
+        notes.append(_describe_exclusion(len(forked_ids), len(proven_ids.difference(chosen_ids))))
+        notes += _describe_uncovered_fault_types(folder, forked_ids, proven_ids)
+    return "; ".join(notes)
+
+
+def _describe_exclusion(count: int, drawn_count: int) -> str:
+    if not drawn_count:
+        return "how many other records an engine could have changed is not known"
+    share = _share_found(count, drawn_count)
+    return (
         f"an engine that changes {share:.0%} of the records or more would have been noticed with a chance of "
         f"{_CONFIDENCE:.0%}"
     )
-    return f"{exclusion}; no sample of {', '.join(uncovered)}" if uncovered else exclusion
+
+
+def _describe_uncovered_fault_types(
+    folder: RunFolder, forked_ids: Collection[str], proven_ids: Collection[str]
+) -> list[str]:
+    forked = [e for e in plan_file.iterate_experiments(folder.path) if e.id in forked_ids]
+    covered = {_fault_type_of(experiment) for experiment in forked if experiment.id in proven_ids}
+    uncovered = sorted({_fault_type_of(experiment) for experiment in forked} - covered)
+    return [f"no sample of {', '.join(uncovered)}"] if uncovered else []
 
 
 def _share_found(count: int, sample_size: int) -> float:

@@ -78,10 +78,13 @@ def _describe_equivalence(folder: RunFolder, records: Mapping[str, Record]) -> t
     if check is None:
         text = "All experiments ran on the reference engine, so no equivalence check is needed."
         return text, "none needed", False
-    same = f"{check.same} of {check.sampled} same"
+    same_of_all = f"{check.same + check.same_chosen} of {check.sampled + check.chosen}"
     if not check.is_complete:
-        judged = f"{check.same} of {check.sampled} judged, none differs"
+        judged = f"{same_of_all} judged, none differs"
         return f"The equivalence check is not finished: {check}.", f"not finished: {judged}", False
     note = f" {check.note[:1].upper()}{check.note[1:]}." if check.note else ""
-    text = f"Equivalence check: of a sample rerun from the start, {check.without_note}, byte for byte.{note}"
-    return text, same, False
+    text = (
+        "Equivalence check: a sample was rerun from the start and compared byte for byte: "
+        f"{check.without_note}.{note}"
+    )
+    return text, f"{same_of_all} same", False

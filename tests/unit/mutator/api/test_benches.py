@@ -66,14 +66,18 @@ def test_borders_of_batches_and_openings_change_neither_records_nor_seal(
     with opened(toycar, tmp_path / "many") as bench:
         assert repr(bench) == "<Bench many: 3 experiments>"
         second += bench.run(asked[3:])
+        proof = str(bench.prove())
     assert first == second
+    assert "3 of 3 chosen among the first 3 or as the first of their fault type or scenario" in proof
+    assert proof.endswith("how many other records an engine could have changed is not known")
     one, many = (mutator.load_run(tmp_path / name).seals for name in ("one", "many"))
     assert one.seal == many.seal is not None
     assert one.results_digest == many.results_digest
     assert one.batches_digest != many.batches_digest
     lines = (tmp_path / "many" / "plan" / "batches.jsonl").read_text().splitlines()
     assert [json.loads(line)["experiments"] for line in lines] == [1, 2, 1]
-    assert differences(tmp_path / "many", toycar) == []
+    audit = mutator.verify(tmp_path / "many", expect=many.batches_digest, workspace=toycar)
+    assert audit.differences == () and "batches digest as expected" in str(audit)
 
 
 def test_nothing_is_computed_twice(

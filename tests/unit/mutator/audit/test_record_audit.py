@@ -8,10 +8,13 @@ from typing import Any
 
 import pytest
 
-from mutator.audit.record_audit import StoredRecord, verdict_problems
+from mutator.audit.record_audit import StoredRecord, proof_problems, verdict_problems
 from mutator.model import ObservedActivation, Outcome, Record, Status
+from mutator.preflight import equivalence_check
+from mutator.store.run_folder import RunFolder
 from mutator.targets.channels import Channel, Role
 from mutator.targets.stored_target_facts import ChannelFacts
+from mutator.workspace import Workspace
 from tests.made_head import HEAD as MADE_UP
 
 CHANNELS = tuple(ChannelFacts(name, "-", Role.INTERNAL, "", "") for name in ("gas", "brake", "seen"))
@@ -99,3 +102,19 @@ def test_contradictions_are_reported_with_their_line(
 ) -> None:
     found = flaws(record(**FINE | fields))
     assert any(f"r.jsonl:7: {'e' * 16}: {told}" in text for text in found), found
+
+
+def test_a_record_outside_of_the_sample_of_a_small_run_is_reported(
+    toycar: Workspace, tmp_path: Path, write_finished: Callable[..., Path]
+) -> None:
+    """The plan decides what is proved. Only a proof of all experiments, as made earlier, has more."""
+    folder = RunFolder.open_unverified(write_finished(toycar, tmp_path / "run"))
+    stored = [StoredRecord(Path("r.jsonl"), 7, record) for record in folder.records().values()]
+    sample = equivalence_check.sample_ids_in_folder(folder)
+    proven = [one for one in stored if one.record.experiment_id in sample]
+    foreign = next(one for one in stored if one not in proven)
+    assert len(proven) < len(stored) - 1 < equivalence_check.SMALL_PLAN_SIZE
+    assert not [*proof_problems(folder, stored, proven)]
+    assert not [*proof_problems(folder, stored, stored)]
+    (problem,) = proof_problems(folder, stored, [*proven, foreign])
+    assert "only experiments of the sample that the plan determines" in str(problem)

@@ -44,6 +44,20 @@ def test_the_sample_has_every_fault_type_and_scenario(experiment: Callable[..., 
     ]
 
 
+@pytest.mark.parametrize("rare_count", [0, 2, 12])
+def test_a_small_sample_notices_what_its_statement_claims(
+    experiment: Callable[..., Experiment], rare_count: int
+) -> None:
+    """Of 39 experiments, 4 are drawn. If 20 records are changed, 95 % of the samples have one, wherever the
+    changed records lie."""
+    rare = [experiment(1.0, spec=f"vision/rain/rate{number}") for number in range(rare_count)]
+    planned = [*(experiment(value) for value in range(39 - rare_count)), *rare]
+    changed_ids = {changed.id for changed in planned[:20]}
+    samples = [equivalence_check.choose_sample(planned, seed) for seed in range(300)]
+    noticed = [any(drawn.id in changed_ids for drawn in sample) for sample in samples]
+    assert 0.93 <= sum(noticed) / len(samples) < 1.0
+
+
 @pytest.fixture
 def proven(toycar: Workspace, tmp_path: Path) -> Path:
     """A run folder with two experiments from the fork engine and their equivalence check."""
@@ -261,11 +275,11 @@ def test_chosen_members_are_no_part_of_the_share() -> None:
     assert both.is_complete
     assert str(both) == (
         "12 of 12 experiments that were drawn came out the same on the reference engine; besides, 4 of 4 "
-        "chosen for their fault type or scenario"
+        "chosen among the first 3 or as the first of their fault type or scenario"
     )
     chosen = equivalence_check.EquivalenceResult(sampled=0, same=0, chosen=4, same_chosen=3)
     assert not chosen.is_complete
     assert str(chosen) == (
-        "3 of 4 chosen for their fault type or scenario came out the same on the reference engine; no "
-        "experiment was drawn"
+        "3 of 4 chosen among the first 3 or as the first of their fault type or scenario came out the same "
+        "on the reference engine; no experiment was drawn"
     )

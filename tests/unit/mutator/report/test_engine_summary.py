@@ -133,8 +133,8 @@ def record_ids(run: Path) -> list[str]:
     [
         (
             3,
-            "3 of 3 experiments came out the same on the reference engine, byte for byte. An engine that "
-            "changes 50% of the records or more would have been noticed with a chance of 95%.",
+            "compared byte for byte: 3 of 3 experiments came out the same on the reference engine. 1 of them "
+            "had run on that engine before, which proves nothing.",
             "3 of 3 same",
         ),
         (
@@ -159,6 +159,28 @@ def test_complete_partial_and_missing_proofs_are_distinguished(
     assert told.equivalence_text.endswith(said)
     assert told.equivalence_in_brief == state
     assert not told.has_failed_equivalence
+
+
+def test_only_what_was_forked_proves_the_engine(finish: Finish) -> None:
+    """The statement of a small sample is about the forked experiments, drawn and not drawn."""
+    told = summary(finish(3, ways=[("fork", "")] * 4))
+    assert told is not None
+    assert told.equivalence_text.endswith(
+        "3 of 3 experiments came out the same on the reference engine. An engine that changes 50% of the "
+        "records or more would have been noticed with a chance of 95%."
+    )
+
+
+def test_a_sample_that_ran_on_the_reference_engine_excludes_nothing(finish: Finish) -> None:
+    """If only an experiment outside of the sample was forked, the proof says that it shows nothing."""
+    run = finish(3, ways=[("reference", "")] * 4)
+    (forked,) = set(record_ids(run)) - set(sampled_ids(run))
+    write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, [timing(forked) | {"engine": "fork", "why": ""}])
+    told = summary(run)
+    assert told is not None
+    assert "3 of them had run on that engine before, which proves nothing" in told.equivalence_text
+    assert "how many other records an engine could have changed is not known" in told.equivalence_text
+    assert "no sample of sensor/" in told.equivalence_text
 
 
 def test_a_failed_proof_is_reported_first(finish: Finish) -> None:
