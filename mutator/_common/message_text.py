@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable
 from typing import Any
 
 SHORT_ID_LENGTH = 8  # characters of an id for people, or as many as make it unique
+_MOST_LISTED_SEEDS = 10  # of more, the number and the ends
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
@@ -138,3 +139,11 @@ def _indentation(line: str) -> int:
 
 def describe_seeds(seeds: range) -> str:
     return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
+
+
+def list_seeds(seeds: Iterable[int]) -> str:
+    """Return the different seeds of experiments that were asked for one by one: `0, 3, 7`."""
+    ordered = sorted(set(seeds))
+    if len(ordered) > _MOST_LISTED_SEEDS:
+        return f"{len(ordered)} seeds from {ordered[0]} to {ordered[-1]}"
+    return ", ".join(map(str, ordered))

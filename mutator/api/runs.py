@@ -164,16 +164,22 @@ class Run(RunFigures):
         """Return the golden run of a scenario: one column per channel, indexed by time in s.
 
         `changes` chooses a variant of the scenario, e.g. `("alone",)`; default: the most frequent. `seed`
-        chooses one of several seeds; default: the first. MutatorError if there is no such run.
+        chooses one of several seeds; default: the lowest of the scenario. MutatorError if there is no such
+        run.
         """
         scenario_variants = [e.changes for e in self.experiments.values() if e.scenario == scenario]
         if changes is None and scenario_variants:
             # of equally frequent ones, the first of the plan
             changes = max(dict.fromkeys(scenario_variants), key=scenario_variants.count)
         seeds = self.folder.seeds
-        if seed is not None and seed not in seeds:
+        seeds_of_scenario = (
+            e.seed
+            for e in self.experiments.values()
+            if e.scenario == scenario and e.changes == (changes or ())
+        )
+        if seed is not None and seed not in seeds and not self.folder.is_bench:
             raise MutatorError(f"seed {seed}", argument="seed", expected=describe_seeds(seeds))
-        selected_seed = seeds[0] if seed is None else seed
+        selected_seed = min(seeds_of_scenario, default=seeds[0]) if seed is None else seed
         # a run with one seed stores its golden runs without it
         golden_seed = selected_seed if self.folder.has_seeded_goldens else None
         golden_run = GoldenRun(scenario, changes or (), golden_seed)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mutator._common.hashing import as_json_types
+from mutator._common.message_text import list_seeds
 from mutator.comparison.compared_runs import ComparedRun
 from mutator.comparison.experiment_matching import ExperimentMatching, ExperimentPair
 from mutator.store.run_folder import RunFolder
@@ -48,7 +49,9 @@ def input_facts(a: ComparedRun, b: ComparedRun) -> tuple[InputFact, ...]:
 def _facts_of_run(run: ComparedRun) -> dict[str, str]:
     head, stretches = run.folder.head, run.folder.session_environments
     values = {name: str(getattr(head, name)) for name in _COMPARED_HEAD_FIELDS}
-    if len(seeds := run.folder.seeds) > 1:
+    if run.folder.is_bench:
+        values["seed"] = list_seeds(e.seed for e in run.experiments)
+    elif len(seeds := run.folder.seeds) > 1:
         values["seed"] = f"{seeds[0]} to {seeds[-1]}"
     values["setting"] = ", ".join(dict.fromkeys(c for e in run.experiments for c in e.setting)) or "-"
     values["chosen"] = (

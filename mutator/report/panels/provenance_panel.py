@@ -1,5 +1,6 @@
 """The provenance panel: how the experiments were executed, and what is needed to reproduce them."""
 
+from mutator._common.message_text import list_seeds
 from mutator._common.table_rendering import TextTable
 from mutator.audit.run_digests_and_seal import (
     UNSEALED_KEYS_BY_FILE,
@@ -74,9 +75,7 @@ def _provenance_facts(run: ReportedRun) -> list[tuple[str, str]]:
         "campaign": head.campaign,
         **_study_fact(run),
         "plan": head.plan,
-        **(
-            {"seed": seeds[0]} if len(seeds := folder.seeds) == 1 else {"seeds": f"{seeds[0]} to {seeds[-1]}"}
-        ),
+        **_seeds_fact(run),
         **({"reading": head.reading} if head.reading else {}),
         **{f"chosen: {name}": value for name, value in chosen.items() if value is not None},
         **{f"digest of {name}": value for name, value in head.sources.items()},
@@ -89,6 +88,13 @@ def _provenance_facts(run: ReportedRun) -> list[tuple[str, str]]:
         **{name: packages[name] for name in LISTED_PACKAGES if name in packages},
     }
     return [(name, str(value)) for name, value in facts.items()]
+
+
+def _seeds_fact(run: ReportedRun) -> dict[str, str]:
+    if run.folder.is_bench:  # its experiments have any seeds, not all of a range
+        return {"seeds": list_seeds(map(int, run.results["seed"].unique()))}
+    seeds = run.folder.seeds
+    return {"seed": str(seeds[0])} if len(seeds) == 1 else {"seeds": f"{seeds[0]} to {seeds[-1]}"}
 
 
 def _study_fact(run: ReportedRun) -> dict[str, str]:

@@ -1,4 +1,7 @@
-"""The panel that shows how much results vary between seeds. Runs with one seed have no such panel."""
+"""The panel that shows how much results vary between seeds.
+
+Runs with one seed have no such panel, and benches neither: their seeds have different experiments.
+"""
 
 from mutator._common.table_rendering import TextTable
 from mutator.report.panel import Panel, rendered
@@ -23,7 +26,7 @@ _HTML_TEMPLATE = """\
 def build_seeds_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the spread of each share between seeds."""
     seeds = seeds_of(run.frame)
-    if len(seeds) < 2:
+    if len(seeds) < 2 or run.folder.is_bench:
         return None
     sheets = (seeds_sheet(run.frame, has_alerts=run.folder.has_alerts), seeds_by_fault_type_sheet(run.frame))
     about = f"{len(seeds)} seeds ({seeds[0]} to {seeds[-1]}). Each seed repeats the campaign with new draws."

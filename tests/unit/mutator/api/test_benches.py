@@ -280,3 +280,18 @@ def _changed(what: Any, **values: Any) -> Any:
     from dataclasses import replace
 
     return replace(what, **values)
+
+
+def test_a_bench_has_just_the_seeds_that_were_asked_for(toycar: Workspace, tmp_path: Path) -> None:
+    """Report, comparison and golden runs name these seeds; seeds are not compared as if they were repeats."""
+    with opened(toycar, tmp_path / "b") as bench:
+        for scenario, seed in (("A", 0), ("A", 2**63 - 1), ("B", 7)):
+            bench.run([bench.build_experiment("sensor/lane/shifted", scenario, 1.0, seed=seed)])
+    run = mutator.load_run(tmp_path / "b", workspace=toycar)
+    text = run.report().markdown.read_text()
+    assert f"| seeds | 0, 7, {2**63 - 1} |" in text
+    assert "## Seeds" not in text and "repeats the campaign" not in text
+    assert len(run.golden("B")) == len(run.golden("B", seed=7)) > 0
+    with pytest.raises(MutatorError, match="no golden run A"):
+        run.golden("A", seed=7)
+    assert mutator.compare(run, run).not_compared == {}
