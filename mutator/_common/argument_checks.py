@@ -28,4 +28,7 @@ def check_type(argument: str, value: object, kind: type, expected: str) -> None:
 
 
 def _is_finite_and_at_least(value: float, least: float) -> bool:
-    return math.isfinite(value) and value >= least
+    try:
+        return math.isfinite(value) and value >= least
+    except OverflowError:  # a whole number that is too large for a float
+        return False

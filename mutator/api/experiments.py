@@ -14,7 +14,8 @@ from mutator.api.target_and_fault_selection import (
     WorkspaceLike,
 )
 from mutator.errors import MutatorError
-from mutator.model import AfterHazard, Experiment, Fault, Hold, Method, Trigger
+from mutator.model import MOST_LIMIT_OR_TIME, AfterHazard, Experiment, Fault, Hold, Method, Trigger
+from mutator.triggers.conditions import canonical_condition
 from mutator.triggers.trigger_kinds import CONDITION_NAME, held_for, named_with_hold
 
 
@@ -34,12 +35,13 @@ def build_experiment(
     target: str | None = None,
     workspace: WorkspaceLike = None,
 ) -> Experiment:
-    """Build an experiment, without running anything. It has the id that it has in a campaign.
+    """Build an experiment, without running anything. It has the id that it has in a campaign (see `hold_s`).
 
     * `fault`, `value`, `trigger`, `target`: as for `build_mutant`; `armed_after_s` as for `try_fault`.
     * `beyond`: accept a value outside the range that the spec declares.
     * `hold_s`: how long the fault stays active after its trigger first fires, in s. The trigger's name then
-      says it: `at 3 s for 2 s`.
+      says it: `at 3 s for 2 s`. A campaign says so only if its list has several holds of the trigger; for the
+      id of another one, take the trigger from its plan, and no `hold_s`.
     * `scenario`: a name in the library. `setting`: changes of it, which the manifest names.
     * `after_hazard`: `stop` ends the run at its first terminal hazard.
 
@@ -87,6 +89,7 @@ class ExperimentBuilder:
             fault, value=value, seed=seed, reading=reading, beyond=beyond
         )
         chosen_trigger = self.selected_target.trigger(trigger, armed_after_s)
+        self._check_condition(chosen_trigger)
         if chosen_trigger.name == CONDITION_NAME:  # campaigns name a listed condition by its text
             chosen_trigger = replace(chosen_trigger, name=chosen_trigger.condition)
         if hold_s is not None:
@@ -114,10 +117,22 @@ class ExperimentBuilder:
             )
         return digest(read_bounded(self.selected_target.workspace.scenario(scenario)))
 
+    def _check_condition(self, trigger: Trigger) -> None:
+        try:
+            canonical_condition(
+                trigger.condition, variables=self.selected_target.manifest.observation.variables
+            )
+        except MutatorError as err:
+            raise MutatorError(
+                err.got, argument="trigger", expected=err.expected or "", remedy=err.remedy or "correct it"
+            ) from None
+
     def _check_setting(self, setting: Sequence[str]) -> None:
         changes = self.selected_target.manifest.args_by_change
-        if isinstance(setting, str):
+        if isinstance(setting, str) or not isinstance(setting, Sequence):
             raise MutatorError(repr(setting), argument="setting", expected="a list of changes")
+        if len(set(setting)) < len(setting):
+            raise MutatorError(f"{list(setting)}", argument="setting", expected="each change once")
         for change in setting:
             if change not in changes:
                 raise MutatorError(
@@ -130,8 +145,9 @@ class ExperimentBuilder:
 
 def _held_trigger(fault: Fault, trigger: Trigger, hold_s: float) -> Trigger:
     check_number("hold_s", hold_s)
-    if hold_s <= 0.0:
-        raise MutatorError(f"{hold_s}", argument="hold_s", expected="a number of seconds above 0")
+    if not 0.0 < hold_s <= MOST_LIMIT_OR_TIME:
+        expected = f"a number of seconds above 0, at most {MOST_LIMIT_OR_TIME}"
+        raise MutatorError(f"{hold_s}", argument="hold_s", expected=expected)
     if fault.hold not in (None, Hold.FOR):
         raise MutatorError(
             f"hold_s {hold_s:g}, but the spec of {fault.spec} declares the hold `{fault.hold.value}`",

@@ -12,13 +12,14 @@ from typing import TypeAlias
 
 from mutator._common.argument_checks import check_number, check_whole_number
 from mutator._common.message_text import spelling_suggestion
+from mutator._common.phrase_texts import planned_number_text
 from mutator.campaigns.neutral_faults import is_neutral_fault
 from mutator.checks.library_check import spec_problems
 from mutator.config import units
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec, Variant
-from mutator.faults.spec_expansion import expand_spec
+from mutator.faults.spec_expansion import draw_values, expand_spec
 from mutator.model import Fault, Trigger
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
@@ -56,7 +57,7 @@ class FaultChoice:
             raise MutatorError(f"no variant {self.variant!r}", where=spec.path, expected=f"one of {names}")
         if self.value is not None:
             check_number("value", self.value)
-            variants = tuple(_with_value(spec, v, self.value) for v in variants)
+            variants = tuple(_with_value(spec, v, self.value, self.seed or 0) for v in variants)
         return dataclasses.replace(spec, variants=variants)
 
 
@@ -117,6 +118,8 @@ class SelectedTarget:
                 )
             return fault_like
         spec, variant = _split_variant(str(fault_like))
+        # the ranges of other variants do not matter
+        variant = variant or next(iter(self.workspace.spec(spec))).name
         choice = FaultChoice(
             spec=spec, variant=variant, value=value, seed=seed, reading=reading, beyond=beyond
         )
@@ -213,7 +216,8 @@ def _check_range(
                 outside.append(f"{declared_spec.name}/{variant.name}, {low:g} to {high:g}{unit}")
     if not outside or choice.beyond:
         return
-    text = f"value {value:g} is outside the range that the spec declares: {'; '.join(outside)}"
+    exact_value = planned_number_text(value if isinstance(value, int) else float(value))
+    text = f"value {exact_value} is outside the range that the spec declares: {'; '.join(outside)}"
     if choice.beyond is None:
         warnings.warn(text, MutatorWarning, stacklevel=4)
         return
@@ -225,7 +229,8 @@ def _check_range(
     )
 
 
-def _with_value(spec: FaultSpec, variant: Variant, value: float) -> Variant:
+def _with_value(spec: FaultSpec, variant: Variant, value: float, seed: int) -> Variant:
+    """Return a variant with only this value. One that a campaign draws keeps its number."""
     if variant.draw is None:
         raise MutatorError(
             f"variant {variant.name!r} takes no value",
@@ -234,11 +239,15 @@ def _with_value(spec: FaultSpec, variant: Variant, value: float) -> Variant:
             remedy="leave `value` out",
         )
     # as YAML would give it: 40, not 40.0, in the id and in the injected line
-    exact_value = int(value) if float(value).is_integer() else value
+    exact_value = int(value) if float(value).is_integer() else float(value)
     if variant.paired_draws:
         return _with_listed_value(spec, variant, exact_value)
+    drawn_values, number = draw_values(variant.draw, seed), 0
+    if exact_value in drawn_values:
+        number = drawn_values.index(exact_value)
+        exact_value = drawn_values[number]  # 21.0 in the id, if so drawn
     draw = dataclasses.replace(variant.draw, kind="list", ranges=(), values=(exact_value,))
-    return dataclasses.replace(variant, draw=draw)
+    return dataclasses.replace(variant, draw=draw, first_value_number=number)
 
 
 def _with_listed_value(spec: FaultSpec, variant: Variant, value: float) -> Variant:
@@ -253,4 +262,4 @@ def _with_listed_value(spec: FaultSpec, variant: Variant, value: float) -> Varia
         )
     number = first.values.index(value)
     draw, *paired = (dataclasses.replace(each, values=(each.values[number],)) for each in variant.all_draws)
-    return dataclasses.replace(variant, draw=draw, paired_draws=tuple(paired))
+    return dataclasses.replace(variant, draw=draw, paired_draws=tuple(paired), first_value_number=number)

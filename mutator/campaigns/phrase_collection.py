@@ -10,6 +10,7 @@ from mutator.faults.fault_specs import FaultSpec
 from mutator.model import OPERATOR_FAULTS_MODULE, Experiment, Fault, Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import PhraseByCase, Phrases
+from mutator.triggers.trigger_kinds import name_without_hold
 from mutator.workspace import Workspace
 
 
@@ -61,7 +62,12 @@ def phrases_of_experiment(workspace: Workspace, manifest: TargetManifest, experi
 
 def phrases_of_trigger(workspace: Workspace, trigger: Trigger) -> Mapping[str, PhraseByCase]:
     """Return the phrase of the context that a trigger is; nothing for another trigger."""
-    return phrases_of_contexts(workspace, {(trigger.name, trigger.condition)})
+    return phrases_of_contexts(workspace, {context_key(trigger)})
+
+
+def context_key(trigger: Trigger) -> tuple[str, str]:
+    """Return the name and condition that a context has if the trigger is one, with or without a hold."""
+    return name_without_hold(trigger.name, trigger.hold_s), trigger.condition
 
 
 def phrases_of_contexts(

@@ -28,6 +28,7 @@ class Variant:
     `injections_by_reading` starts with the default reading. `hold_by_reading` overrides how long the fault
     stays active; `phrase_by_reading` says what the fault does, in words. An empty `aimed_hazard`: none.
     `paired_draws` are lists as long as `draw`'s: the n-th values of all belong to one fault.
+    `first_value_number` counts the values before the first one, of a variant that has only some of them.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Variant:
     keys: KeyPath
     keys_by_reading: Mapping[str, KeyPath]  # the mappings that have the injections
     paired_draws: tuple[DrawSpec, ...] = ()
+    first_value_number: int = 0
 
     def injections_in_reading(self, reading: str) -> tuple[InjectionSpec, ...]:
         return self.injections_by_reading[self._reading_or_default(reading)]

@@ -108,7 +108,8 @@ class _SpecExpander:
         self._check_variant(variant)
         draw = variant.draw
         unit = units.UNITS[draw.unit].symbol if draw and draw.unit else "-"
-        for number, drawn in enumerate(drawn_values_of(variant, self.seed)):
+        drawn_values = drawn_values_of(variant, self.seed)
+        for number, drawn in enumerate(drawn_values, start=variant.first_value_number):
             yield Fault(
                 spec=f"{self.spec.name}/{variant.name}",
                 module=self.spec.module,

@@ -37,6 +37,7 @@ from mutator.targets.stored_phrases import (
     Phrases,
 )
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN, HazardFacts, hazard_facts
+from mutator.triggers.trigger_kinds import name_without_hold
 
 if TYPE_CHECKING:
     from mutator.store.run_head import RunHead
@@ -119,18 +120,26 @@ class ExperimentSentences:
             text = f"{clause} from {measured_time_text(begin)}{situation}"
             return f"{text}." if is_name else _as_sentence(text)
         planned = clause if is_name else _decapitalized(clause)
-        return f"Planned: {planned}{_planned_begin_clause(row)}{situation}."
+        context = self._context_phrase(row)
+        begin_clause = "" if context and context in situation else _planned_begin_clause(row)
+        return f"Planned: {planned}{begin_clause}{situation}."
 
     def _situation_clause(self, row: ResultCells) -> str:
         """` for 2 s`, ` while the car is close behind a slower vehicle`; '' for a fault that stays."""
         hold, condition = row.get("hold") or "", str(row.get("condition") or "")
+        context = self._context_phrase(row)
         if hold == Hold.FOR:
             seconds = _number_in_row(row, "hold_s")
-            return "" if seconds is None else f" for {planned_number_text(seconds, 's')}"
+            start = f", starting {context}" if context else ""
+            return "" if seconds is None else f" for {planned_number_text(seconds, 's')}{start}"
         if hold != Hold.WHILE or condition == "True" or _TIME_CONDITION_PATTERN.match(condition):
             return ""
-        phrase = self.phrases.situations.get(str(row.get("trigger") or ""), {}).get("", ())
-        return f" {fill_phrase(phrase, {}) or f'while {condition}'}"
+        return f" {context or f'while {condition}'}"
+
+    def _context_phrase(self, row: ResultCells) -> str:
+        """Return the phrase of the context that triggers the fault, also for a hold; '' without one."""
+        name = name_without_hold(str(row.get("trigger") or ""), _number_in_row(row, "hold_s"))
+        return fill_phrase(self.phrases.situations.get(name, {}).get("", ()), {})
 
     def _effect(self, row: ResultCells) -> str:
         """Say what the car did, and which hazards followed."""

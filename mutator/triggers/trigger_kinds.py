@@ -43,7 +43,16 @@ def named_with_hold(trigger: Trigger) -> Trigger:
     """Return the trigger with its hold in its name, `at 3 s for 2 s`; unchanged without the hold `for`."""
     if trigger.hold is not Hold.FOR or trigger.hold_s is None:
         return trigger
-    return replace(trigger, name=f"{trigger.name} for {planned_number_text(trigger.hold_s, 's')}")
+    return replace(trigger, name=f"{trigger.name}{_hold_in_name(trigger.hold_s)}")
+
+
+def name_without_hold(name: str, hold_s: float | None) -> str:
+    """Return a trigger's name without the hold that `named_with_hold` added; unchanged without one."""
+    return name if hold_s is None else name.removesuffix(_hold_in_name(hold_s))
+
+
+def _hold_in_name(hold_s: float) -> str:
+    return f" for {planned_number_text(hold_s, 's')}"
 
 
 def trigger_time_s(trigger: Trigger) -> float | None:

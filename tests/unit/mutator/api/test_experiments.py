@@ -5,7 +5,7 @@ import pytest
 import mutator
 from mutator.campaigns.plan import build_plan
 from mutator.errors import MutatorError
-from mutator.model import AfterHazard, Hold
+from mutator.model import AfterHazard, Hold, Trigger
 from mutator.workspace import Workspace
 
 
@@ -14,6 +14,26 @@ def test_an_experiment_has_the_id_that_it_has_in_a_campaign(toycar: Workspace) -
     planned = next(e for e in build_plan(toycar, "small").experiments if e.trigger.name == "near")
     built = mutator.build_experiment(planned.fault, "A", "near", seed=3, armed_after_s=1.0, workspace=toycar)
     assert built == planned and built.id == planned.id
+
+
+def test_a_value_that_a_campaign_draws_keeps_its_number(clone: Workspace) -> None:
+    """The seed of an image effect follows from the value's number, and a drawn 21.0 is not 21."""
+    for variant, effects in (("vision_weather/rain/rate", True), ("car_sensors/steer/angle", False)):
+        drawn = [fault for fault in clone.faults(variant.rpartition("/")[0], seed=3) if fault.spec == variant]
+        assert {i.model == "image_effect" for fault in drawn for i in fault.injections} == {effects}
+        for fault in drawn[:3]:
+            built = mutator.build_experiment(variant, "S1", value=fault.value, seed=3, workspace=clone)
+            assert built.fault == fault and built.fault.id == fault.id
+
+
+def test_the_range_of_another_variant_does_not_matter(toycar: Workspace) -> None:
+    """Without a variant, the first one is chosen, and only its range counts."""
+    first, *others = toycar.spec("sensor/distance")
+    assert others
+    built = mutator.build_experiment(
+        "sensor/distance", "A", value=first.draw.least_and_greatest[1], workspace=toycar
+    )
+    assert built.fault.spec == f"sensor/distance/{first.name}"
 
 
 def test_a_value_beyond_the_declared_range_must_be_asked_for(toycar: Workspace) -> None:
@@ -51,6 +71,14 @@ def test_experiments_that_differ_only_in_the_hold_are_told_apart(toycar: Workspa
         ({"setting": ["lonely"]}, "change 'lonely'; expected one of alone"),
         ({"after_hazard": "end"}, "'end'; expected `go_on` or `stop`"),
         ({"seed": -1}, "seed"),
+        ({"hold_s": 1e300}, "hold_s.*above 0, at most"),
+        ({"hold_s": 10**400}, "hold_s.*a number"),
+        ({"value": 10**400}, "value.*a number"),
+        ({"value": 2.5000001}, r"value 2.5000001 is outside .*, \S+ to 2.5 m"),
+        ({"setting": None}, "None; expected a list of changes"),
+        ({"setting": ["alone", "alone"]}, "expected each change once"),
+        ({"trigger": Trigger(name="x", condition="import os")}, "trigger.*import os"),
+        ({"trigger": Trigger(name="x", condition="nope > 1")}, "trigger.*nope"),
     ],
 )
 def test_a_wrong_argument_is_named(toycar: Workspace, arguments: dict[str, object], expected: str) -> None:

@@ -206,6 +206,19 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
         "The speed sensor reads 50 mph too low from 24.60 s for 2 s. It changes no actuator. "
         "No hazard follows. No alert.",
     ),
+    "for a time, starting in a context": (
+        NO_HAZARD
+        | {"outcome": "masked", "hold": "for", "hold_s": 2.0}
+        | {"trigger": "C2 for 2 s", "condition": "hwt <= 2.0"},
+        "The speed sensor reads 50 mph too low from 24.60 s for 2 s, starting while the car is close behind "
+        "a slower lead. It changes no actuator. No hazard follows. No alert.",
+    ),
+    "never active for a time in a context": (
+        NEVER
+        | {"condition": "hwt <= 2.0", "hold": "for", "hold_s": 2.0, "trigger": "C2"},
+        "Planned: the speed sensor reads 50 mph too low for 2 s, starting while the car is close behind a "
+        "slower lead. It was never active: the changed code did not run at any such time.",
+    ),
     "never active after a time": (
         NEVER | {"condition": "t >= 24.63", "hold": "to_end"},
         "Planned: the speed sensor reads 50 mph too low from 24.63 s. It was never active: the changed code "

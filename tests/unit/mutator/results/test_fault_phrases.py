@@ -16,6 +16,7 @@ from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
 from mutator.results.fault_phrases import describe_fault
 from mutator.targets.stored_phrases import Phrases
+from mutator.triggers.trigger_kinds import held_for, named_with_hold
 from mutator.workspace import Workspace
 
 
@@ -47,6 +48,9 @@ def test_a_context_without_a_campaign_has_its_phrase(clone: Workspace) -> None:
     [context] = table.triggers(rows=("C2",))
     assert phrases_of_trigger(clone, context)["C2"][""][0].startswith("while the car is close")
     assert phrases_of_trigger(clone, replace(context, condition="t >= 1.0")) == {}
+    held_context = named_with_hold(held_for(context, 2.0))
+    assert held_context.name == "C2 for 2 s"
+    assert phrases_of_trigger(clone, held_context) == phrases_of_trigger(clone, context)
 
 
 def test_every_shipped_fault_model_describes_its_examples(clone: Workspace) -> None:
