@@ -1,7 +1,7 @@
 """Files of a run folder that only grow, with the digest of all that is in them."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from pathlib import Path
 
@@ -9,8 +9,10 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import open_descriptor_below, path_below, read_below
 from mutator._common.files import raising_disk_full
 from mutator._common.hashing import digest
+from mutator.errors import MutatorError
 from mutator.store import file_digests
-from mutator.store.file_digests import FileDigest
+from mutator.store.file_digests import DigestLedger, FileDigest
+from mutator.store.plan_file import EXPERIMENTS_FILE
 from mutator.store.run_head import HEAD
 
 
@@ -52,8 +54,7 @@ def undo_unfinished_growth(run: Path, names: Iterable[str]) -> list[str]:
     """
     cut_names: list[str] = []
     ledger = file_digests.load_ledger(run)
-    new_head = ledger.rewriting.get(HEAD)
-    if not ledger.rewriting or (new_head and new_head.has_same_bytes(FileDigest.of_file_below(run, HEAD))):
+    if not ledger.rewriting or _has_new_head(run, ledger):
         return cut_names
     for name in names:
         before = ledger.files.get(name)
@@ -64,6 +65,22 @@ def undo_unfinished_growth(run: Path, names: Iterable[str]) -> list[str]:
             _cut_in_place(run, name, before.size)
             cut_names.append(name)
     return cut_names
+
+
+def unfinished_growth_problems(run: Path, ledger: DigestLedger) -> Iterator[MutatorError]:
+    """Yield why a plan does not match its digests, if a killed command had begun to add a batch."""
+    if EXPERIMENTS_FILE in ledger.rewriting and not _has_new_head(run, ledger):
+        yield MutatorError(
+            "a killed command had begun to plan a batch",
+            where=run,
+            expected="whole batches",
+            remedy=f"open the bench again, or cut the batch off with `mutator verify {run} --repair`",
+        )
+
+
+def _has_new_head(run: Path, ledger: DigestLedger) -> bool:
+    new_head = ledger.rewriting.get(HEAD)
+    return new_head is not None and new_head.has_same_bytes(FileDigest.of_file_below(run, HEAD))
 
 
 def _cut_in_place(run: Path, name: str, size: int) -> None:

@@ -19,6 +19,7 @@ from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import file_digests, integrity, plan_file
 from mutator.store.allowed_contents import SCRATCH_FOLDER, TRACES_FOLDER
+from mutator.store.appended_files import unfinished_growth_problems
 from mutator.store.checks_file import limits_of_run
 from mutator.store.packed_patches import PatchFolder
 from mutator.store.plain_contents_check import check_plain_contents
@@ -118,7 +119,7 @@ class RunFolder:
             # with another ledger than before, the owner wrote files while they were being compared
             if not problems or file_digests.load_ledger(self.path) == ledger:
                 break
-        return problems
+        return [*unfinished_growth_problems(self.path, ledger), *problems] if problems else []
 
     @property
     def is_finished(self) -> bool:

@@ -306,7 +306,7 @@ def test_a_benchs_unfinished_batch_is_cut_off(bench_run: Path) -> None:
     file_digests.save_ledger(bench_run, replace(ledger, finished=False, rewriting=announced))
     for file in files:
         file.write_added()
-    with pytest.raises(MutatorError):
+    with pytest.raises(MutatorError, match=r"had begun to plan a batch.*open the bench again"):
         RunFolder.open(bench_run)
     sentences = repair_run(RunFolder(bench_run))
     assert [sentence.split(":")[0] for sentence in sentences] == [plan_file.EXPERIMENTS_FILE, "plan.csv"]
