@@ -16,7 +16,12 @@ from mutator._common.hashing import as_json_types, canonical_json, digest
 from mutator._common.version import VERSION
 from mutator.campaigns.bench_files import EXPERIMENTS_PER_CHUNK
 from mutator.campaigns.campaign_files import Campaign
-from mutator.campaigns.phrase_collection import UsedPhraseSources, phrases_of_campaign, phrases_of_contexts
+from mutator.campaigns.phrase_collection import (
+    UsedPhraseSources,
+    context_key,
+    phrases_of_campaign,
+    phrases_of_contexts,
+)
 from mutator.campaigns.plan_freezing import PLAN_CSV, collect_target_facts, plan_csv_lines
 from mutator.campaigns.plan_tally import PlanDigestBuilder, PlanPart, PlanTally
 from mutator.campaigns.run_inputs import RunInputs
@@ -131,7 +136,7 @@ class GrowingPlan:
         for experiment in experiments:
             self.ids.add(experiment.id)
             self._fault_ids.add(experiment.fault.id)
-            self._triggers.add((experiment.trigger.name, experiment.trigger.condition))
+            self._triggers.add(context_key(experiment.trigger))
             first, last = self._seeds or (experiment.seed, experiment.seed)
             self._seeds = min(first, experiment.seed), max(last, experiment.seed)
             self._extend_chunks(len(plan_file.experiment_line(experiment)))

@@ -295,3 +295,13 @@ def test_a_bench_has_just_the_seeds_that_were_asked_for(toycar: Workspace, tmp_p
     with pytest.raises(MutatorError, match="no golden run A"):
         run.golden("A", seed=7)
     assert mutator.compare(run, run).not_compared == {}
+
+
+def test_a_context_with_a_hold_keeps_its_phrase(toycar: Workspace, tmp_path: Path) -> None:
+    """A situation is told in words, also if the fault holds for a time from when it begins."""
+    table = toycar.library / "stpa" / "contexts" / "near_far.yaml"
+    words = "about: far behind the lead"
+    table.write_text(table.read_text().replace(words, f"{words}\n    phrase: the lead is far ahead"))
+    with opened(toycar, tmp_path / "b") as bench:
+        bench.run([bench.build_experiment("sensor/distance/longer", "A", "far", value=5, hold_s=1)])
+    assert set(mutator.load_run(tmp_path / "b").folder.head.phrases.situations) == {"far"}
