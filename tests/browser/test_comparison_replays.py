@@ -78,7 +78,10 @@ def test_the_page_leads_from_the_verdict_to_both_replays(
     """Both play at once, although one drive is shorter. The statistics come after them."""
     page = opened(comparison_files.write_comparison(found, tmp_path / "out").page)
     changed = len(found.changed_pairs)
-    assert page.inner_text(".verdict") == f"Worse: of 24 experiments in both runs, {changed} for the worse."
+    assert (
+        page.inner_text(".verdict").replace("\u00a0", " ")
+        == f"Worse: of 24 experiments in both runs, {changed} for the worse."
+    )
     tops = [
         page.locator(selector).first.bounding_box()["y"]
         for selector in (".verdict", "#changed", "#pair", "h2:text('What differs')")

@@ -117,7 +117,7 @@ def test_the_control_structure_shows_counts_and_filters_the_list(opened: "Page")
         f"{held} masked",
     ]
     cell = opened.page.text_content("#path-counts-table [data-link='commands'] td:last-child")
-    assert cell.startswith(f"{share}; 95 % interval ")
+    assert cell.replace("\u00a0", " ").startswith(f"{share}; 95 % interval ")
     opened.page.select_option("#path-counts-kind", "sensor/distance")
     assert opened.page.text_content(count) == f"0 of {held}, 0 %"
     title = opened.page.text_content("#path-counts [data-link='commands'] title")

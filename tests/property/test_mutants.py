@@ -101,6 +101,7 @@ def values(param: ParamSchema, names: list[str]) -> st.SearchStrategy[Value]:
         "choice": st.sampled_from(param.choices or ("",)),
         "unit": st.sampled_from(("m", "km", "mps", "kph", "rad", "deg")),
         "seed": st.integers(0, 2**53),
+        "expression": st.sampled_from(("message[0]", "message.topic", "message")),
     }[param.type]
 
 

@@ -152,7 +152,7 @@ _WRITER = """
 import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from test_decisions import ReviewAction, ReviewActionKind, Workspace, group, record_actions
+from test_review_state_and_actions import ReviewAction, ReviewActionKind, Workspace, group, record_actions
 library, by = Path(sys.argv[2]), sys.argv[3]
 toy = Workspace(library=library, templates=library.parent / "templates")
 print("ready", flush=True)
