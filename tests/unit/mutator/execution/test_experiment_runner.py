@@ -172,12 +172,12 @@ def test_a_run_without_usable_outputs_is_a_crash_only_if_its_fault_was_active(
 
 
 IMPORTER = """\
-from mutator._common.extension_doors import IMPORTERS
+from mutator._common.extension_doors import TRACE_IMPORTER_DOOR
 from mutator.errors import BadTrace
 from mutator.outcomes.trace_files import Importer
 
 def read(request):
-    arrays = IMPORTERS.load("npz").read(request)
+    arrays = TRACE_IMPORTER_DOOR.load("npz").read(request)
     if request.path.parent.name == "faulty":
         return RESULT
     return arrays
