@@ -23,7 +23,7 @@ from mutator.figures.golden_and_faulty_plot import save_figure
 line = {"kind": "a/b", "scenario": "$1", "method": "guided", "is_activated": True, "is_hazard": True}
 line |= dict.fromkeys(("t_activation", "t_manifest", "t_alert", "t_hazard"), 1.0)
 line |= {"is_manifested": True, "is_alert": False}
-save_figure(propagation_time_figure.draw(pd.DataFrame([line])), [Path("a.svg")])
+save_figure(propagation_time_figure.draw_times_by_scenario(pd.DataFrame([line])), [Path("a.svg")])
 """
 
 
