@@ -138,8 +138,26 @@ class Bench:
         """
         return self._opened.run(experiments, reason)
 
+    def submit(self, experiments: Iterable[Experiment], reason: str = "") -> None:
+        """Ask for a list as `run` does, and return while it runs: `results` gives its records.
+
+        Several lists can be in flight, so that the workers need not wait for the next one. The plan has them
+        in the order in which they were submitted.
+        """
+        self._opened.submit(experiments, reason)
+
+    def results(self) -> Iterator[Record]:
+        """Yield the records of all submitted lists as they come, until none is in flight.
+
+        More can be submitted meanwhile. An experiment has a record for each time it was submitted. The order
+        depends on the machine; tables and seal do not. MutatorError if a worker fails; like after an
+        interruption, nothing is then in flight, and `pending` has what did not finish.
+        """
+        return self._opened.results()
+
     def prove(self) -> EquivalenceResult | None:
-        """Run again, on the reference engine, what the final sample contains of the experiments so far.
+        """Run again, on the reference engine, what the final sample contains of the experiments so far, once
+        no list is in flight.
 
         None if no experiment was forked. CheckFailed if a record differs.
         """

@@ -1,10 +1,12 @@
 """A bench: a run folder that stays open, and answers one list of experiments after another.
 
-Its workers stay between batches, with their fork servers and golden runs. Its plan grows with each batch.
+Its workers stay between batches, with their fork servers and golden runs. Its plan grows with each batch, in
+the order in which batches are asked for. Several batches can be in flight.
 """
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from contextlib import contextmanager
 from pathlib import Path
 
 from mutator._common.interrupts import delaying_interrupts
@@ -16,10 +18,12 @@ from mutator.engines.engine_choice import choose_engine
 from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import ensure_work_folder
 from mutator.errors import MutatorError
+from mutator.execution.awaited_records import AwaitedRecords
 from mutator.execution.batch_check import BatchCheck, check_reason
 from mutator.execution.bench_calls import BenchCalls
-from mutator.execution.bench_crew import BenchCrew
+from mutator.execution.bench_crew import BenchCrew, CrewBatch
 from mutator.execution.bench_messages import BenchWorkerStart
+from mutator.execution.bench_progress import BenchProgress
 from mutator.execution.session import Session
 from mutator.execution.session_summary import Summary
 from mutator.execution.worker import WorkerAssignment
@@ -32,6 +36,7 @@ from mutator.store.appended_files import undo_unfinished_growth
 from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.preflight_results import golden_digests
 from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_progress import ProgressCallback
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
@@ -50,6 +55,7 @@ class Bench:
         *,
         workers: int = 1,
         engine: str | None = None,
+        notify: ProgressCallback = lambda progress: None,
     ) -> None:
         self.path = path.resolve()
         self.calls = BenchCalls(self.path)
@@ -58,14 +64,18 @@ class Bench:
         self._requested_engine, self._engine = engine, choose_engine(engine, manifest)
         self._batch_check = BatchCheck(workspace, manifest, campaign)
         self._plan = GrowingPlan(workspace, manifest, campaign, canary, self.path)
-        self._checks = BenchChecks(workspace, manifest, campaign, canary, self.path / "work", workers=workers)
+        self._checks = BenchChecks(
+            workspace, manifest, campaign, canary, self.path / "work", workers=workers, notify=notify
+        )
         self._stored_records: Mapping[str, Record] = {}
         self._new_records: dict[str, Record] = {}
+        self._awaited = AwaitedRecords()
         self._session: Session | None = None
         self._worker_prefix, self._has_begun = "", False
-        self._is_plan_half_written = False
+        self._is_plan_half_written = self._has_crew_old_limits = False
         self.summary: Summary | None = None  # known once the bench is closed
-        self._crew = BenchCrew(workers, self._start_of_worker, self._note_written)
+        self._progress = BenchProgress(notify)
+        self._crew = BenchCrew(workers, self._start_of_worker, self._note_written, self._progress.note_record)
         if RunFolder.exists(self.path):
             self._resume()
 
@@ -94,21 +104,33 @@ class Bench:
         it was open, and if a worker fails; CheckFailed if a golden run fails its checks. Nothing of the batch
         is then planned, except after the failure of a worker.
         """
-        with self.calls.calling():
-            check_reason(reason)
-            batch = self._batch_check.check(experiments)
-            experiment_by_id = {experiment.id: experiment for experiment in batch}
-            new = [e for name, e in experiment_by_id.items() if name not in self._plan.ids]
-            self._plan_new(new, reason)
-            self._obtain_records(list(experiment_by_id.values()))
+        with self._calling():
+            batch = self._begin_batch(experiments, reason)
+            self._receive_records({experiment.id for experiment in batch})
             return [self._records_by_id(experiment.id) for experiment in batch]
 
+    def submit(self, experiments: Iterable[Experiment], reason: str = "") -> None:
+        """Plan a batch as `run` does, and return while it runs: `results` gives its records."""
+        with self._calling():
+            batch = self._begin_batch(experiments, reason)
+            self._awaited.request(experiment.id for experiment in batch)
+
+    def results(self) -> Iterator[Record]:
+        """Yield the records of all submitted batches as they come, until none is in flight.
+
+        An experiment has a record for each time it was submitted. MutatorError if a worker fails; like after
+        an interruption, nothing is then in flight, and `pending` has what did not finish.
+        """
+        while (experiment_id := self._next_result()) is not None:
+            yield self._records_by_id(experiment_id)
+
     def prove(self) -> EquivalenceResult | None:
-        """Run again, on the reference engine, what the final sample contains of the experiments so far.
+        """Run again, on the reference engine, what the final sample contains of the experiments so far, once
+        no batch is in flight.
 
         None if no experiment was forked. CheckFailed if a record differs.
         """
-        with self.calls.calling():
+        with self._calling():
             return self._prove()
 
     def finish(self) -> None:
@@ -119,10 +141,10 @@ class Bench:
             self._check_plan_is_whole()
             if self._session is None:
                 return
+            self._receive_records(self._awaited.running)
             if not self.pending:
                 self._prove()
             self._crew.close()
-            self._crew.end()
             self.summary = self._session.finish()
 
     def abandon(self) -> None:
@@ -130,7 +152,53 @@ class Bench:
         self.calls.refuse()
         self._crew.stop()
         with self.calls.closing():
-            self._crew.end()
+            self._crew.kill()
+
+    @contextmanager
+    def _calling(self) -> Iterator[None]:
+        """Make a call, whose interruption ends all work."""
+        with self.calls.calling():
+            try:
+                yield
+            except KeyboardInterrupt:
+                self._stop_work()
+                raise
+
+    def _begin_batch(self, experiments: Iterable[Experiment], reason: str) -> list[Experiment]:
+        """Check, plan and hand out a batch; return its experiments."""
+        check_reason(reason)
+        batch = self._batch_check.check(experiments)
+        experiment_by_id = {experiment.id: experiment for experiment in batch}
+        self._plan_new([e for name, e in experiment_by_id.items() if name not in self._plan.ids], reason)
+        self._obtain_records(list(experiment_by_id.values()))
+        return batch
+
+    def _next_result(self) -> str | None:
+        with self._calling():
+            while (experiment_id := self._awaited.next_arrived()) is None and self._awaited.is_any_requested:
+                self._receive_record()
+            return experiment_id
+
+    def _receive_records(self, experiment_ids: Set[str]) -> None:
+        """Wait until none of these experiments runs."""
+        while self._awaited.running & experiment_ids:
+            self._receive_record()
+
+    def _receive_record(self) -> None:
+        try:
+            record = self._crew.receive()
+        except MutatorError:
+            self._stop_work()
+            raise
+        self._new_records[record.experiment_id] = record
+        self._awaited.note_record(record.experiment_id)
+
+    def _stop_work(self) -> None:
+        """End all workers. What has finished stays."""
+        self._crew.kill()
+        if self._session is not None:
+            self._read_records()
+        self._awaited.stop(self._has_final_record)
 
     def _resume(self) -> None:
         folder = RunFolder(self.path)
@@ -139,9 +207,17 @@ class Bench:
         self._checks.read(self.path, self._plan.golden_runs)
         self._session = self._open_session(folder)
         self._read_records()
+        self._progress.note_stored(self._stored_records.values())
+        self._progress.note_planned(self.experiment_count)
 
     def _open_session(self, folder: RunFolder) -> Session:
-        session = Session(self._workspace, folder, workers=self._crew.size, engine=self._requested_engine)
+        session = Session(
+            self._workspace,
+            folder,
+            workers=self._crew.size,
+            engine=self._requested_engine,
+            notify=self._progress.notify,
+        )
         self._worker_prefix = session.new_worker_name("")
         return session
 
@@ -160,6 +236,7 @@ class Bench:
         new_goldens = self._checks.check_goldens(self._plan.golden_runs_with(experiments))
         if not experiments and not new_goldens:
             return
+        self._crew.wait_until_ready()  # a worker that begins reads what is now written
         with delaying_interrupts():
             self._is_plan_half_written = True
             try:
@@ -200,26 +277,31 @@ class Bench:
         if new_goldens:
             limits = RunFolder(self.path).limits
             self._checks.store(self.path, self._plan.golden_runs, new_goldens)
-            if RunFolder(self.path).limits != limits:  # workers have the limits with which they began
-                self._crew.close()
+            self._has_crew_old_limits |= RunFolder(self.path).limits != limits
         self._session.note_growth(RunFolder(self.path))
+        self._progress.note_planned(self.experiment_count)
 
     def _obtain_records(self, experiments: Sequence[Experiment]) -> None:
-        """Get a record of each planned experiment. This is the one place where records come from."""
-        missing = [experiment for experiment in experiments if not self._has_final_record(experiment.id)]
-        if not missing:
-            return
-        self._new_records |= self._run_by_crew(missing)
+        """Let each planned experiment without a record get one. This is the one place where records come
+        from.
+        """
+        missing = [
+            experiment
+            for experiment in experiments
+            if not self._has_final_record(experiment.id) and experiment.id not in self._awaited.running
+        ]
+        if missing:
+            self._hand_out(missing)
 
     def _prove(self) -> EquivalenceResult | None:
         if self._session is None:
             return None
+        self._receive_records(self._awaited.running)
         folder = self._session.folder
         planned = PlannedExperiments(self.path)
         sampled = equivalence_check.remaining_sampled_experiments(folder)
         experiments = [planned[s.id] for s in sampled if self._has_final_record(s.id)]
-        if experiments:
-            self._run_by_crew(experiments, is_proof=True)
+        self._prove_by_crew(experiments)
         return equivalence_check.compare_sample(folder, folder.records())
 
     def _begin_work(self) -> None:
@@ -231,19 +313,35 @@ class Bench:
             self._session.begin_environment(f"{self._worker_prefix}*")
             self._has_begun = True
 
-    def _run_by_crew(self, experiments: Sequence[Experiment], *, is_proof: bool = False) -> dict[str, Record]:
-        assert self._session is not None
-        self._begin_work()
-        runs = order_for_sharing(group_by_run(self._manifest, experiments))
-        digests = golden_digests(self._session.folder)
-        files = self._batch_check.scenario_files
+    def _prove_by_crew(self, experiments: Sequence[Experiment]) -> None:
+        if not experiments:
+            return
+        self._progress.note_proof(len(experiments))
+        self._hand_out(experiments, is_proof=True)
         try:
-            records = self._crew.run(runs, digests, files, is_proof=is_proof)
-            return {record.experiment_id: record for record in records}
-        except BaseException:
-            self._crew.kill()
-            self._read_records()  # what has finished stays
+            for _ in experiments:
+                self._crew.receive()
+        except MutatorError:
+            self._stop_work()
             raise
+        self._awaited.running.clear()
+        self._progress.note_proof_ended()
+
+    def _hand_out(self, experiments: Sequence[Experiment], *, is_proof: bool = False) -> None:
+        assert self._session is not None
+        if self._has_crew_old_limits:  # workers have the limits with which they began
+            self._receive_records(self._awaited.running)
+            self._crew.close()
+            self._has_crew_old_limits = False
+        self._begin_work()
+        batch = CrewBatch(
+            runs=order_for_sharing(group_by_run(self._manifest, experiments)),
+            golden_digests=golden_digests(self._session.folder),
+            scenario_files=dict(self._batch_check.scenario_files),
+            is_proof=is_proof,
+        )
+        self._crew.hand_out(batch)
+        self._awaited.running |= {experiment.id for experiment in experiments}
 
     def _start_of_worker(self, number: int) -> BenchWorkerStart:
         assert self._session is not None

@@ -1,19 +1,23 @@
-"""The workers of a bench: processes that stay between batches, and the dealing of experiments to them."""
+"""The workers of a bench: processes that stay between batches, and the dealing of experiments to them.
+
+Each worker has a thread here, which starts its process, deals to it, and receives its records. So the workers
+go on while the caller of the bench does something else.
+"""
 
 import os
 import pickle
 import socket
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
-from functools import partial
-from multiprocessing.connection import Connection, wait
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
+from queue import SimpleQueue
 
-from mutator._common.interrupts import delaying_interrupts
 from mutator.errors import MutatorError
 from mutator.execution.bench_messages import AssignedExperiments, BenchWorkerStart, WorkEnding
 from mutator.execution.worker import python_command_dying_with
@@ -27,161 +31,262 @@ _END_PATIENCE_S = 30.0  # for a worker to close its files
 Run = Sequence[Experiment]  # experiments that share a run
 
 
-@dataclass
-class _CrewWorker:
-    """A worker's process. `golden_key`: that of its last experiments, whose run it still has in memory."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrewBatch:
+    """Work for the crew: runs, in order, and what their workers must know. `is_proof`: run them for the
+    proof.
+    """
 
-    name: str
-    process: subprocess.Popen[bytes]
-    connection: Connection
-    golden_key: tuple[object, ...] = ()
-    sent_goldens: set[str] = field(default_factory=set)
-    sent_scenarios: set[str] = field(default_factory=set)
-
-    def kill(self) -> None:
-        self.connection.close()
-        self.process.kill()
-        self.process.wait()
+    runs: Sequence[Run]
+    golden_digests: Mapping[str, str]
+    scenario_files: Mapping[str, Path]
+    is_proof: bool = False
 
 
-@dataclass
 class BenchCrew:
-    """Runs experiments in `size` processes. `start_of` makes what the worker of a number begins with."""
+    """Runs batches in `size` processes. `start_of` makes what the worker of a number begins with; `on_record`
+    gets each record at once, in another thread; `on_written` gets what a closed worker wrote.
+    """
 
-    size: int
-    start_of: Callable[[int], BenchWorkerStart]
-    on_written: Callable[[str, Mapping[str, str]], None]
-    _workers: list[_CrewWorker] = field(default_factory=list)
-    _started_count: int = 0
-    _is_stopped: bool = False
-    # Linux ends a process with the thread that started it, and a caller's thread can be short-lived
-    _starter: ThreadPoolExecutor = field(default_factory=partial(ThreadPoolExecutor, 1))
-
-    def run(
+    def __init__(
         self,
-        runs: Sequence[Run],
-        golden_digests: Mapping[str, str],
-        scenario_files: Mapping[str, Path],
-        *,
-        is_proof: bool = False,
-    ) -> Iterator[Record]:
-        """Run experiments, and yield each record when it is there.
+        size: int,
+        start_of: Callable[[int], BenchWorkerStart],
+        on_written: Callable[[str, Mapping[str, str]], None],
+        on_record: Callable[[Record], None] = lambda record: None,
+    ) -> None:
+        self.size = size
+        self._start_of, self._on_written, self._on_record = start_of, on_written, on_record
+        self._workers: list[_CrewWorker] = []
+        self._board = _Board(on_record)
+        self._started_count, self._is_stopped = 0, False
 
-        MutatorError if a worker fails; the others then end what they have begun, and all are closed.
+    def hand_out(self, batch: CrewBatch) -> None:
+        """Give a batch to the workers, and return at once. MutatorError once the crew was stopped."""
+        if self._is_stopped:
+            raise _work_error(_CLOSED)
+        self._remove_dead_workers()
+        piece_count = self._board.add(batch, self.size)
+        while len(self._workers) < min(self.size, piece_count):
+            self._workers.append(self._start_worker())
+
+    def receive(self) -> Record:
+        """Wait for the next record. MutatorError if a worker fails: the others then end what they have begun,
+        and all are closed.
         """
-        dealing = _Dealing(_cut_into_pieces(runs, self.size), golden_digests, scenario_files, is_proof)
-        self._start_workers(len(dealing.pieces))
+        message = self._board.arrived.get()
+        if isinstance(message, Record):
+            return message
+        self.close()
+        raise _work_error(message)
+
+    def wait_until_ready(self) -> None:
+        """Wait until no worker is starting, which reads the run folder."""
         for worker in self._workers:
-            dealing.deal(worker)
-        yield from dealing.receive_records()
-        if dealing.problems:
-            self.close()
-            raise _work_error(dealing.problems[0])
+            worker.is_ready.wait()
 
     def stop(self) -> None:
-        """Make the work of another thread fail, and start no further worker."""
+        """Make the work of another thread fail, and accept no more."""
         self._is_stopped = True
-        for worker in self._workers:
-            worker.process.kill()
+        self._board.fail(_CLOSED)
+        for worker in list(self._workers):
+            worker.kill()
 
     def close(self) -> None:
-        """End all workers, and report what they wrote."""
-        workers, self._workers = self._workers, []
-        for worker in workers:
-            with suppress(OSError):
-                worker.connection.send(None)
-        for worker in workers:
-            with suppress(EOFError, OSError):
-                while worker.connection.poll(_END_PATIENCE_S):
-                    message = worker.connection.recv()
-                    if isinstance(message, WorkEnding) and message.written:
-                        self.on_written(worker.name, message.written)
-                        break
-            worker.kill()
+        """End all workers once they have done what they began, and report what they wrote."""
+        self._board.end()
+        self._await_ends()
 
     def kill(self) -> None:
         """End all workers at once. Finished lines stay."""
-        workers, self._workers = self._workers, []
-        for worker in workers:
+        self._board.end()
+        for worker in self._workers:
             worker.kill()
+        self._await_ends()
 
-    def end(self) -> None:
-        """End all workers and the thread that started them. The crew cannot be used further."""
-        self.kill()
-        self._starter.shutdown()
+    def _await_ends(self) -> None:
+        for worker in self._workers:
+            worker.has_ended.wait()
+        workers, self._workers = self._workers, []
+        self._board = _Board(self._on_record)
+        for worker in workers:
+            if worker.written:
+                self._on_written(worker.name, worker.written)
 
-    def _start_workers(self, piece_count: int) -> None:
-        """Start workers until there is one for each piece, or the crew is complete."""
-        self._remove_dead_workers()
-        while len(self._workers) < min(self.size, piece_count):
-            if self._is_stopped:
-                raise _work_error("the bench was closed")
-            with delaying_interrupts():  # so that no process is forgotten
-                self._workers.append(self._starter.submit(self._start_worker).result())
+    def _start_worker(self) -> "_CrewWorker":
+        start = self._start_of(self._started_count)
+        self._started_count += 1
+        return _CrewWorker(start, self._board)
 
     def _remove_dead_workers(self) -> None:
-        """Forget workers that have died."""
-        living = [worker for worker in self._workers if worker.process.poll() is None]
-        for worker in self._workers:
-            if worker not in living:
-                worker.kill()
-        self._workers = living
+        """Forget idle workers that have died. Of one that had work, its thread tells."""
+        for worker in list(self._workers):
+            if (
+                worker.process is not None
+                and worker.process.poll() is not None
+                and self._board.dismiss(worker)
+            ):
+                self._workers.remove(worker)
 
-    def _start_worker(self) -> _CrewWorker:
-        """Start a process that dies with the thread that calls this."""
-        start = self.start_of(self._started_count)
-        self._started_count += 1
+
+_CLOSED = "the bench was closed"
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """Runs of a batch that one worker runs."""
+
+    runs: Sequence[Run]
+    batch: CrewBatch
+
+
+class _Board:
+    """The pieces that wait for a worker, and what has arrived: records, and the problem that ended the
+    work.
+    """
+
+    def __init__(self, on_record: Callable[[Record], None]) -> None:
+        self.arrived: SimpleQueue[Record | str] = SimpleQueue()
+        self._on_record = on_record
+        self._waiting_batches: deque[list[_Piece]] = deque()
+        self._idle_workers: list[_CrewWorker] = []
+        self._is_over = False
+        self._changed = threading.Condition()
+
+    def add(self, batch: CrewBatch, worker_count: int) -> int:
+        """Add a batch; return the number of waiting pieces."""
+        pieces = [_Piece(runs, batch) for runs in _cut_into_pieces(batch.runs, worker_count)]
+        with self._changed:
+            self._waiting_batches.append(pieces)
+            self._changed.notify_all()
+            return sum(map(len, self._waiting_batches))
+
+    def take(self, worker: "_CrewWorker") -> _Piece | None:
+        """Wait for a piece of the oldest batch; None if the worker has nothing more to do."""
+        with self._changed:
+            self._idle_workers.append(worker)
+            self._changed.wait_for(
+                lambda: self._is_over or self._waiting_batches or worker not in self._idle_workers
+            )
+            if self._is_over or worker not in self._idle_workers:
+                return None
+            self._idle_workers.remove(worker)
+            pieces = self._waiting_batches[0]
+            piece = _pop_piece_for(worker, pieces)
+            if not pieces:
+                self._waiting_batches.popleft()
+            return piece
+
+    def note(self, record: Record) -> None:
+        self._on_record(record)
+        self.arrived.put(record)
+
+    def dismiss(self, worker: "_CrewWorker") -> bool:
+        """Let a worker take nothing more, if it waits for a piece; return whether it does."""
+        with self._changed:
+            if worker not in self._idle_workers:
+                return False
+            self._idle_workers.remove(worker)
+            self._changed.notify_all()
+            return True
+
+    def end(self) -> None:
+        """Deal no more."""
+        with self._changed:
+            self._is_over = True
+            self._changed.notify_all()
+
+    def fail(self, problem: str) -> None:
+        self.end()
+        self.arrived.put(problem)
+
+
+class _CrewWorker:
+    """A worker's process, and the thread that deals to it.
+
+    Linux ends a process with the thread that started it, and the caller's thread can be short-lived.
+    """
+
+    def __init__(self, start: BenchWorkerStart, board: _Board) -> None:
+        self.name = start.assignment.worker_name
+        self.process: subprocess.Popen[bytes] | None = None
+        self.is_ready, self.has_ended = threading.Event(), threading.Event()
+        self.written: Mapping[str, str] = {}  # the digests of its files, once it has closed them
+        self.golden_key: tuple[object, ...] = ()  # of its last run, which it still has in memory
+        self.sent_goldens, self.sent_scenarios = set[str](), set[str]()
+        self._is_killed, self._lock = False, threading.Lock()
+        threading.Thread(target=self._work, args=(start, board), name=self.name, daemon=True).start()
+
+    def kill(self) -> None:
+        with self._lock:
+            self._is_killed = True
+            if self.process is not None:
+                self.process.kill()
+
+    def _work(self, start: BenchWorkerStart, board: _Board) -> None:
+        try:
+            try:
+                connection = self._start_process(start)
+            except (OSError, MutatorError) as err:
+                board.fail(f"worker {self.name} could not begin: {err}")
+                return
+            with connection:
+                problem = self._receive_ending(connection, board)
+                self.is_ready.set()
+                while not problem and (piece := board.take(self)) is not None:
+                    with suppress(OSError):  # of a dead worker: receiving from it gives the reason
+                        connection.send(_assignment(self, piece))
+                    problem = self._receive_ending(connection, board)
+                if problem:
+                    board.fail(problem)
+                self._end_process(connection)
+        finally:
+            self.is_ready.set()
+            self.has_ended.set()
+
+    def _start_process(self, start: BenchWorkerStart) -> Connection:
+        """Start a process that dies with this thread."""
         here, there = socket.socketpair()
         try:
             with tempfile.TemporaryFile() as file:  # nameless, so no run can change it
                 file.write(pickle.dumps(start))
                 file.seek(0)
                 descriptors = [there.fileno(), file.fileno()]
-                process = subprocess.Popen(
-                    [*python_command_dying_with(os.getpid()), "-m", _WORKER_MODULE, *map(str, descriptors)],
-                    pass_fds=descriptors,
-                    stdin=subprocess.DEVNULL,
-                    start_new_session=True,  # Ctrl-C is for the command only
-                )
+                with self._lock:
+                    if self._is_killed:
+                        raise MutatorError(_CLOSED)
+                    self.process = subprocess.Popen(
+                        [
+                            *python_command_dying_with(os.getpid()),
+                            "-m",
+                            _WORKER_MODULE,
+                            *map(str, descriptors),
+                        ],
+                        pass_fds=descriptors,
+                        stdin=subprocess.DEVNULL,
+                        start_new_session=True,  # Ctrl-C is for the command only
+                    )
         except BaseException:
             here.close()
             raise
         finally:
             there.close()
-        return _CrewWorker(start.assignment.worker_name, process, Connection(here.detach()))
+        return Connection(here.detach())
 
+    def _receive_ending(self, connection: Connection, board: _Board) -> str:
+        """Pass records on until the end of the work; return why it failed, empty if it did not."""
+        while isinstance(message := _receive(self, connection), Record):
+            board.note(message)
+        return message.problem
 
-@dataclass
-class _Dealing:
-    """The dealing of `pieces` to workers, until all are done or there are `problems`."""
-
-    pieces: list[list[Run]]
-    golden_digests: Mapping[str, str]
-    scenario_files: Mapping[str, Path]
-    is_proof: bool
-    problems: list[str] = field(default_factory=list)
-    _busy: dict[Connection, _CrewWorker] = field(default_factory=dict)
-
-    def deal(self, worker: _CrewWorker) -> None:
-        if self.pieces and not self.problems:
-            piece = _pop_piece_for(worker, self.pieces)
-            assigned = _assignment(worker, piece, self.golden_digests, self.scenario_files, self.is_proof)
-            with suppress(OSError):  # of a dead worker: receiving from it gives the reason
-                worker.connection.send(assigned)
-            self._busy[worker.connection] = worker
-
-    def receive_records(self) -> Iterator[Record]:
-        while self._busy:
-            for connection in wait(list(self._busy)):
-                assert isinstance(connection, Connection)
-                message = _receive(self._busy[connection])
-                if isinstance(message, Record):
-                    yield message
-                    continue
-                worker = self._busy.pop(connection)
-                if message.problem:
-                    self.problems.append(message.problem)
-                self.deal(worker)
+    def _end_process(self, connection: Connection) -> None:
+        assert self.process is not None
+        with suppress(EOFError, OSError):
+            connection.send(None)
+            if connection.poll(_END_PATIENCE_S) and isinstance(message := connection.recv(), WorkEnding):
+                self.written = message.written
+        self.process.kill()
+        self.process.wait()
 
 
 def _work_error(problem: str) -> MutatorError:
@@ -192,11 +297,12 @@ def _work_error(problem: str) -> MutatorError:
     )
 
 
-def _receive(worker: _CrewWorker) -> Record | WorkEnding:
+def _receive(worker: _CrewWorker, connection: Connection) -> Record | WorkEnding:
     try:
-        message: Record | WorkEnding = worker.connection.recv()
+        message: Record | WorkEnding = connection.recv()
         return message
     except (EOFError, OSError):
+        assert worker.process is not None
         with suppress(subprocess.TimeoutExpired):
             worker.process.wait(5.0)
         return WorkEnding(problem=f"worker {worker.name} died (status {worker.process.returncode})")
@@ -219,27 +325,26 @@ def _cut_into_pieces(runs: Sequence[Run], worker_count: int) -> list[list[Run]]:
     return pieces
 
 
-def _pop_piece_for(worker: _CrewWorker, pieces: list[list[Run]]) -> list[Run]:
+def _pop_piece_for(worker: _CrewWorker, pieces: list[_Piece]) -> _Piece:
     """Return the next piece with the golden run that the worker has in memory, or else the next one."""
-    matching = (i for i, piece in enumerate(pieces) if _golden_key_of(piece[0]) == worker.golden_key)
+    matching = (i for i, piece in enumerate(pieces) if _golden_key_of(piece.runs[0]) == worker.golden_key)
     piece = pieces.pop(next(matching, 0))
-    worker.golden_key = _golden_key_of(piece[0])
+    worker.golden_key = _golden_key_of(piece.runs[0])
     return piece
 
 
-def _assignment(
-    worker: _CrewWorker,
-    piece: list[Run],
-    golden_digests: Mapping[str, str],
-    scenario_files: Mapping[str, Path],
-    is_proof: bool,
-) -> AssignedExperiments:
+def _assignment(worker: _CrewWorker, piece: _Piece) -> AssignedExperiments:
     """Return the worker's next work, with digests and scenarios that were not sent to it before."""
-    goldens = {key: value for key, value in golden_digests.items() if key not in worker.sent_goldens}
-    scenarios = {name: path for name, path in scenario_files.items() if name not in worker.sent_scenarios}
+    batch = piece.batch
+    goldens = {key: value for key, value in batch.golden_digests.items() if key not in worker.sent_goldens}
+    scenarios = {
+        name: path for name, path in batch.scenario_files.items() if name not in worker.sent_scenarios
+    }
     worker.sent_goldens |= goldens.keys()
     worker.sent_scenarios |= scenarios.keys()
-    experiments = tuple(experiment for run in piece for experiment in run)
     return AssignedExperiments(
-        experiments=experiments, golden_digests=goldens, scenario_files=scenarios, is_proof=is_proof
+        experiments=tuple(experiment for run in piece.runs for experiment in run),
+        golden_digests=goldens,
+        scenario_files=scenarios,
+        is_proof=batch.is_proof,
     )

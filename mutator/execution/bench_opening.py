@@ -16,10 +16,12 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import accepted_version_differences, check_sources, check_version
 from mutator.errors import MutatorError
 from mutator.execution.bench import Bench
+from mutator.execution.watched_progress import writing_progress
 from mutator.store import file_digests
 from mutator.store.appended_files import undo_unfinished_growth
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
+from mutator.store.run_progress import ProgressCallback
 from mutator.workspace import Workspace
 
 
@@ -41,13 +43,16 @@ def opened_bench(
     make_run_folder(out)
     with lock_run_folder(out):
         try:
-            bench = _build_bench(workspace, out, values, workers=workers, engine=engine)
-            try:
-                yield bench
-                bench.finish()
-            except BaseException:
-                bench.abandon()
-                raise
+            with writing_progress(out, None) as progress:
+                bench = _build_bench(
+                    workspace, out, values, workers=workers, engine=engine, notify=progress.notify
+                )
+                try:
+                    yield bench
+                    bench.finish()
+                except BaseException:
+                    bench.abandon()
+                    raise
         finally:
             remove_anything_at(out / "work")
             if RunFolder.exists(out):
@@ -58,7 +63,13 @@ def opened_bench(
 
 
 def _build_bench(
-    workspace: Workspace, out: Path, values: Mapping[str, Any], *, workers: int, engine: str | None
+    workspace: Workspace,
+    out: Path,
+    values: Mapping[str, Any],
+    *,
+    workers: int,
+    engine: str | None,
+    notify: ProgressCallback,
 ) -> Bench:
     file_bytes = bench_file_bytes(values)
     if RunFolder.exists(out):
@@ -68,7 +79,16 @@ def _build_bench(
     campaign = load_bench_file(out / CAMPAIGN_FILE)
     manifest = workspace.manifest(campaign.target)
     expansion = CampaignExpansion(workspace, campaign, manifest, campaign.seed, campaign.reading or "")
-    return Bench(workspace, manifest, campaign, expansion.build_canary(), out, workers=workers, engine=engine)
+    return Bench(
+        workspace,
+        manifest,
+        campaign,
+        expansion.build_canary(),
+        out,
+        workers=workers,
+        engine=engine,
+        notify=notify,
+    )
 
 
 def _check_existing(workspace: Workspace, out: Path, file_bytes: bytes) -> None:

@@ -1,7 +1,8 @@
 """The process of a bench's worker, which stays between batches with its engine and what it has loaded.
 
 `python -m mutator.execution.bench_worker FD FILE` reads its assignment from the open file FILE. Over the
-connection FD, it receives assignments of experiments; for each, it sends records, then a `WorkEnding`.
+connection FD, it sends a `WorkEnding` when it is ready, and receives assignments of experiments; for each, it
+sends records, then a `WorkEnding`.
 """
 
 import os
@@ -46,7 +47,6 @@ def _serve(connection: Connection, start: BenchWorkerStart) -> None:
     try:
         worker = Worker(RunInputs.from_bytes(start.inputs), start.assignment)
     except Exception as err:
-        connection.recv()
         connection.send(_ending_of_error(err))
         return
 
@@ -54,6 +54,7 @@ def _serve(connection: Connection, start: BenchWorkerStart) -> None:
         worker.was_suspended = True
 
     on_resume(note_suspension)
+    connection.send(WorkEnding())
     try:
         while (assigned := connection.recv()) is not None:
             connection.send(_run_assigned(connection, worker, assigned))

@@ -37,6 +37,7 @@ from mutator.store.checks_file import (
 from mutator.store.file_digests import FileDigest
 from mutator.store.preflight_results import CheckResult
 from mutator.store.run_folder import GoldenRun
+from mutator.store.run_progress import ProgressCallback
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -74,6 +75,7 @@ class BenchChecks:
     canary: Experiment | None
     scratch_folder: Path
     workers: int = 1
+    notify: ProgressCallback = lambda progress: None
     goldens: dict[GoldenRun, CheckedGolden] = field(default_factory=dict)
     _stored: set[GoldenRun] = field(default_factory=set)  # which of them are in the run folder
     _variants: set[str] = field(default_factory=set)
@@ -147,7 +149,7 @@ class BenchChecks:
         """Run what is needed; note what passed, and return what failed."""
         canary_golden = self._canary_golden
         runner = self._runner(new, canary=self.canary if canary_golden in new else None)
-        runs, verdict = runner.run_all(self.workers, lambda progress: None)
+        runs, verdict = runner.run_all(self.workers, self.notify)
         canary = build_check_result("canary", verdict.problem, verdict.success) if verdict else None
         for golden_run in new:
             first = runs[GOLDEN, golden_run]
@@ -283,9 +285,9 @@ class BenchChecks:
         except (MutatorError, OSError, KeyError, TypeError, AttributeError):
             return False  # missing or damaged
         again = replace(self._runner([golden_run], None), pending_folder=self.scratch_folder / "again")
-        if not all(result.passed for result in golden.results) or again.run_goldens(
-            1, lambda progress: None
-        ) != {golden_run.key: golden.output_digest}:
+        if not all(result.passed for result in golden.results) or again.run_goldens(1, self.notify) != {
+            golden_run.key: golden.output_digest
+        }:
             return False  # forged, or no longer true
         destination = path_below(self.pending_folder / "golden", golden_run.key)
         destination.parent.mkdir(parents=True, exist_ok=True)

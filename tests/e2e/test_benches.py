@@ -28,8 +28,12 @@ with mutator.open_bench(workspace, out, campaign="small", workers=workers) as be
         for value in (5, 12.5, 40)
         for hold in (None, 0.5)
     ]
+    results = bench.results()
     for begin in range(0, len(asked), size):
-        bench.run(asked[begin : begin + size], f"from {begin}")
+        bench.submit(asked[begin : begin + size], f"from {begin}")
+        if begin:  # so two batches are in flight
+            for _ in range(size):
+                next(results)
 """
 
 
@@ -44,8 +48,8 @@ def ask(workspace: Workspace, out: Path, workers: int, size: int) -> subprocess.
 def test_kills_inside_and_between_batches_change_nothing(
     toycar: Workspace, tmp_path: Path, workers: int, size: int
 ) -> None:
-    """Killed at random moments, resumed, in batches: the records, the seal and the digest of the plan of one
-    batch that was left alone; and no experiment has a second record.
+    """Killed at random moments, resumed, with two batches in flight: the records, the seal and the digest of
+    the plan of one batch that was left alone; and no experiment has a second record.
     """
     alone = ask(toycar, tmp_path / "alone", 1, 100)
     assert alone.wait(600) == 0

@@ -20,6 +20,7 @@ from mutator.audit.run_audit import run_audit_checks
 from mutator.campaigns import plan_growth
 from mutator.preflight.bench_checks import BenchChecks
 from mutator.preflight.preflight_check_runner import CheckRunner
+from mutator.serve.run_states import RUNNING, state_of_run
 from mutator.store.appended_files import AppendedFile
 from mutator.store.run_head import HEAD
 from mutator.workspace import Workspace
@@ -264,3 +265,68 @@ def test_a_changed_run_json_is_restored_before_the_next_batch(toycar: Workspace,
         assert path.read_bytes() == before
         bench.run(longer(bench, 40))
     check_whole(tmp_path / "b", toycar, 2)
+
+
+def test_batches_in_flight_change_neither_plan_nor_seal(toycar: Workspace, tmp_path: Path) -> None:
+    """Each submitted experiment has its record, once for each time; plan and seal are as in one batch, in the
+    order of submission. A refused batch, a call of `run` and an open flight at the end of the block lose
+    nothing.
+    """
+    with opened(toycar, tmp_path / "one") as bench:
+        asked = [*longer(bench, 5, 12.5, 40), *longer(bench, 5, 12.5, 40, scenario="B")]
+        records = {record.experiment_id: record for record in bench.run(asked)}
+    with opened(toycar, tmp_path / "flight", workers=2) as bench:
+        bench.submit(asked[:2], "first")
+        bench.submit(asked[1:4], "second")
+        with pytest.raises(MutatorError, match="a list of experiments"):
+            bench.submit("text")  # type: ignore[arg-type]
+        arrived = []
+        for record in bench.results():
+            arrived.append(record)
+            if len(arrived) == 1:
+                assert bench.run(asked[4:5], "third") == [records[asked[4].id]]
+        assert sorted(r.experiment_id for r in arrived) == sorted(e.id for e in [*asked[:2], *asked[1:4]])
+        assert all(records[record.experiment_id] == record for record in arrived)
+        assert list(bench.results()) == []
+        bench.submit(asked[5:], "fourth")
+    one, flight = (mutator.load_run(tmp_path / name, workspace=toycar) for name in ("one", "flight"))
+    assert one.seal == flight.seal is not None
+    assert dict(one.records) == dict(flight.records)
+    lines = (tmp_path / "flight" / "plan" / "batches.jsonl").read_text().splitlines()
+    assert [json.loads(line)["reason"] for line in lines] == ["first", "second", "third", "fourth"]
+    check_whole(tmp_path / "flight", toycar, 6)
+
+
+@pytest.mark.parametrize("is_interrupted", [False, True])
+def test_what_was_in_flight_is_pending_after_a_failure(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_interrupted: bool
+) -> None:
+    """A worker that dies and Ctrl-C end all batches in flight; what is pending can be submitted again."""
+    with opened(toycar, tmp_path / "b") as bench:
+        bench.run(longer(bench, 5))
+        [worker] = bench._opened._crew._workers
+        os.kill(worker.process.pid, signal.SIGSTOP)  # type: ignore[union-attr]
+        bench.submit(longer(bench, 40))
+        bench.submit(longer(bench, 12.5))
+        if is_interrupted:
+            threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        else:
+            os.kill(worker.process.pid, signal.SIGKILL)  # type: ignore[union-attr]
+        with pytest.raises(KeyboardInterrupt if is_interrupted else MutatorError):
+            list(bench.results())
+        assert list(bench.results()) == []
+        assert [experiment.id for experiment in bench.pending] == [e.id for e in longer(bench, 40, 12.5)]
+        bench.submit(bench.pending)
+        assert len(list(bench.results())) == 2
+    check_whole(tmp_path / "b", toycar, 3)
+
+
+def test_watchers_see_how_far_an_open_bench_is(toycar: Workspace, tmp_path: Path) -> None:
+    """Like a campaign, it has a progress while it is open, and none afterwards."""
+    with opened(toycar, tmp_path / "b") as bench:
+        bench.run(longer(bench, 5))
+        state = state_of_run(bench.load().folder)
+        assert state.state == RUNNING and state.progress is not None
+        assert (state.progress.done, state.progress.total) == (1, 1)
+        assert state.progress.detail == "waits for the next batch"
+    assert state_of_run(mutator.load_run(tmp_path / "b").folder).progress is None

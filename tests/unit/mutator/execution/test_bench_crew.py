@@ -5,12 +5,18 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
-from mutator.execution.bench_crew import _assignment, _cut_into_pieces, _pop_piece_for
+from mutator.execution.bench_crew import CrewBatch, _assignment, _cut_into_pieces, _Piece, _pop_piece_for
 from mutator.model import Experiment
 
 
 def runs_in(experiment: Callable[..., Experiment], *scenarios: str) -> list[list[Experiment]]:
     return [[experiment(scenario=name)] for name in scenarios]
+
+
+def pieces_in(experiment: Callable[..., Experiment], *scenarios: str) -> list[_Piece]:
+    runs = runs_in(experiment, *scenarios)
+    batch = CrewBatch(runs=runs, golden_digests={"A@1": "d"}, scenario_files={"A": Path("A.yaml")})
+    return [_Piece(piece, batch) for piece in _cut_into_pieces(runs, 2)]
 
 
 def worker() -> Any:
@@ -31,19 +37,19 @@ def test_a_piece_has_one_golden_run(experiment: Callable[..., Experiment]) -> No
 
 def test_a_worker_goes_on_with_the_golden_run_that_it_has(experiment: Callable[..., Experiment]) -> None:
     """A fork server that waits in a golden run is used further, if anything is left for it."""
-    pieces = _cut_into_pieces(runs_in(experiment, *"AABB"), 2)
+    pieces = pieces_in(experiment, *"AABB")
     first, second = worker(), worker()
-    dealt = [_pop_piece_for(who, pieces)[0][0].scenario for who in (first, second, second, first)]
+    dealt = [_pop_piece_for(who, pieces).runs[0][0].scenario for who in (first, second, second, first)]
     assert dealt == ["A", "A", "B", "B"]
-    pieces = _cut_into_pieces(runs_in(experiment, *"AABB"), 2)
-    first.golden_key = ("B", pieces[-1][0][0].changes, 7)
-    assert _pop_piece_for(first, pieces)[0][0].scenario == "B"
+    pieces = pieces_in(experiment, *"AABB")
+    first.golden_key = ("B", pieces[-1].runs[0][0].changes, 7)
+    assert _pop_piece_for(first, pieces).runs[0][0].scenario == "B"
 
 
 def test_a_worker_is_told_only_what_is_new(experiment: Callable[..., Experiment]) -> None:
     """Digests of golden runs and files of scenarios are sent to each worker once."""
-    who, piece = worker(), runs_in(experiment, "A")
-    sent = [_assignment(who, piece, {"A@1": "d"}, {"A": Path("A.yaml")}, False) for _ in range(2)]
+    who, [piece] = worker(), pieces_in(experiment, "A")
+    sent = [_assignment(who, piece) for _ in range(2)]
     assert (sent[0].golden_digests, sent[0].scenario_files) == ({"A@1": "d"}, {"A": Path("A.yaml")})
     assert not sent[1].golden_digests and not sent[1].scenario_files
-    assert sent[1].experiments == tuple(piece[0])
+    assert sent[1].experiments == tuple(piece.runs[0])
