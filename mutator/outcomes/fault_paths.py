@@ -158,10 +158,10 @@ class FaultPathFinder:
         if fault.id not in self._injected_by_fault:
             files = {injection.location.path for injection in fault.injections}
             components = self.structure.components if self.structure else {}
-            injected = frozenset(
+            named = frozenset(name for name, c in components.items() if c.has_fault(fault.spec))
+            self._injected_by_fault[fault.id] = named or frozenset(
                 name for name, component in components.items() if files.intersection(component.modules)
             )
-            self._injected_by_fault[fault.id] = injected
         return self._injected_by_fault[fault.id]
 
     def fault_path(self, experiment: Experiment, record: Record) -> FaultPath | None:

@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from fnmatch import fnmatchcase
 
 from mutator._common.message_text import spelling_suggestion
 from mutator.config.yaml_source_lines import KeyPath
@@ -42,6 +43,7 @@ def list_analysis_problems(
         *_unmatched_hazards(analysis),
         *_actions_without_factor(analysis),
         *_missing_files_and_places(analysis, manifest),
+        *_unknown_faults_of_components(analysis, specs),
         *_factor_problems(analysis, specs_by_name, manifest),
         *_specs_without_factor(analysis, specs),
     ]
@@ -226,6 +228,23 @@ def top_level_functions(code: bytes) -> Iterator[str]:
             yield node.name
         elif isinstance(node, ast.ClassDef):
             yield from (f"{node.name}.{item.name}" for item in node.body if isinstance(item, ast.FunctionDef))
+
+
+def _unknown_faults_of_components(
+    analysis: HazardAnalysis, specs: tuple[FaultSpec, ...]
+) -> Iterator[MutatorError]:
+    fault_names = [
+        name for spec in specs for name in (spec.name, *(f"{spec.name}/{variant.name}" for variant in spec))
+    ]
+    for component_name, component in analysis.structure.components.items():
+        for i, pattern in enumerate(component.faults):
+            if not any(fnmatchcase(name, pattern) for name in fault_names):
+                yield analysis.structure_source.error(
+                    ("components", component_name, "faults", i),
+                    f"no fault '{pattern}'",
+                    expected="a fault spec or a variant of the library",
+                    remedy="correct the name" + spelling_suggestion(pattern, fault_names),
+                )
 
 
 def _factor_problems(

@@ -7,6 +7,7 @@ with the fault specs and the target.
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from pydantic import Field
@@ -59,6 +60,12 @@ class ComponentModel(StrictModel, title="A component"):
         description="The component's source files in the target. The path of a fault in one of them begins "
         "at this component.",
     )
+    faults: list[str] = Field(
+        default_factory=list,
+        description="Faults of this component that are injected where others read its output: fault specs, "
+        "or variants (`sensor/bias/distance`); `*` is a wildcard. Their path begins at this component and at "
+        "others that name them, wherever they are injected.",
+    )
     process_model: dict[str, ProcessVariableModel] = Field(
         default_factory=dict, description="Name -> variable in a controller's process model."
     )
@@ -67,6 +74,11 @@ class ComponentModel(StrictModel, title="A component"):
         max_length=3,
         description="The place in the drawing: row from the top, column from the left, width in columns.",
     )
+
+    def has_fault(self, variant: str) -> bool:
+        """Return whether `faults` names a variant (`<module>/<fault_type>/<variant>`) or its spec."""
+        names = (variant, variant.rpartition("/")[0])
+        return any(fnmatchcase(name, pattern) for name in names for pattern in self.faults)
 
 
 class LinkModel(StrictModel, title="A link"):

@@ -3,6 +3,7 @@
 The slow tests run on openpilot itself, built, if MUTATOR_TARGET names it.
 """
 
+import math
 import os
 import shutil
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from mutator.cli.app import main
+from mutator.workspace import Workspace
 
 TESTS = Path(__file__).parents[1]
 LIBRARY = TESTS.parent / "examples" / "openpilot" / "fault_library"
@@ -112,6 +114,29 @@ def test_the_lead_that_radard_reports_is_the_real_one(tmp_path: Path) -> None:
     for row in run("slower", tmp_path, 40):
         assert row["lead_seen"] and row["lead_gap"] == pytest.approx(row["gap"], abs=1.0)
         assert row["lead_speed"] == pytest.approx(15.0, abs=0.1)
+
+
+def test_paths_begin_at_the_sensor_or_before_the_reader() -> None:
+    """The code that is changed belongs to the reader, which can stop the fault."""
+    workspace = Workspace.find(library=LIBRARY)
+    analysis = workspace.analysis()
+    assert analysis is not None
+    for spec in workspace.specs():
+        for variant in spec:
+            components = analysis.structure.components
+            begins = [n for n, one in components.items() if one.has_fault(f"{spec.name}/{variant.name}")]
+            reader = f"to_{variant.name.partition('_')[0]}"
+            expected = {"radar": ["radar"], "vision": ["vision"], "messages": [reader]}
+            assert begins == expected.get(spec.module, []), (spec.name, variant.name)
+
+
+@pytest.mark.usefixtures("overlay")
+@pytest.mark.parametrize(
+    ("scenario", "absent"), [("maneuver", "lead_seen"), ("brakes", "torque"), ("bend", "command")]
+)
+def test_a_channel_of_another_loop_has_no_value(scenario: str, absent: str, tmp_path: Path) -> None:
+    """A zero would say that radard sees no lead, or that the car does not steer."""
+    assert math.isnan(run(scenario, tmp_path, 1)[0][absent])
 
 
 @pytest.mark.usefixtures("overlay")

@@ -130,6 +130,21 @@ def link_states(found: FaultPath) -> dict[str, LinkState]:
     return {link.name: link.state for link in found.links}
 
 
+@pytest.mark.parametrize("pattern", ["a/b", "a/b/c", "a/*", "*/c"])
+def test_the_path_of_a_fault_begins_at_the_component_that_names_it(pattern: str) -> None:
+    """A sensor's fault that is injected where the estimator reads it can be stopped by the estimator."""
+    eyes = STRUCTURE.components["eyes"].model_copy(update={"faults": [pattern]})
+    structure = STRUCTURE.model_copy(update={"components": STRUCTURE.components | {"eyes": eyes}})
+    found = path("finder", outcome=Outcome.MASKED, fault_paths=FaultPathFinder(CHANNELS, structure))
+    assert (found.injected, found.stopped_at) == (("eyes",), ("finder",))
+
+
+def test_a_component_that_names_another_fault_does_not_begin_its_path() -> None:
+    eyes = STRUCTURE.components["eyes"].model_copy(update={"faults": ["a/b/d", "b"]})
+    structure = STRUCTURE.model_copy(update={"components": STRUCTURE.components | {"eyes": eyes}})
+    assert path("finder", fault_paths=FaultPathFinder(CHANNELS, structure)).injected == ("finder",)
+
+
 def test_an_estimator_that_did_not_change_stopped_the_fault() -> None:
     found = path("eyes", outcome=Outcome.MASKED)
     assert [*states(found).items()] == [

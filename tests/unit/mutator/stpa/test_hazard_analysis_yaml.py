@@ -153,6 +153,8 @@ def test_an_inconsistent_analysis_is_refused(folder: Path, file: str, old: str, 
             "selfdrive/planner.py",
             "no file 'selfdrive/planner.py'",
         ),
+        (STRUCTURE, "kind: sensor", "faults: [radar/chuff]\n    kind: sensor", "no fault 'radar/chuff'"),
+        (STRUCTURE, "kind: sensor", "faults: ['radar/*', 'rader/*']\n    kind: sensor", "no fault 'rader/*'"),
         (UNSAFE, "contexts: [accelerate_decelerate/C3]", "contexts: [accelerate_decelerate/C1]", "in accel"),
         (PEDALS, "provided: H1", "provided: null", "expected what accelerate_decelerate.yaml says there"),
         (

@@ -1,6 +1,7 @@
 """A drive in one of the loops `plant`, `lead` and `bend`; the scenario names it."""
 
 from importlib import import_module
+from math import nan
 
 from mutator.glue import Run
 
@@ -15,8 +16,10 @@ class Drive(Run):
         self.loop = loop(scenario)
 
     def step(self):
-        truth = {"lead": 0.0, "gap": 1000.0, "offset": 0.0, "road": 0.0} | self.loop.truth(self.t)
-        channels = dict.fromkeys(CHANNELS, 0.0) | truth | self.loop.step(self.t)
+        truth = {"heading": 0.0, "lead": 0.0, "gap": 1000.0, "offset": 0.0, "road": 0.0} | self.loop.truth(
+            self.t
+        )
+        channels = dict.fromkeys(CHANNELS, nan) | truth | self.loop.step(self.t)  # NaN: of other loops
         for name, now in self.loop.alerts.items():
             self.alert(name, now)
         self.record(**channels)
