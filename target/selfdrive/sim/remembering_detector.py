@@ -40,7 +40,7 @@ DETECTION_FILES = (
     "visiond/[!v]*.py",
     "visiond/voting.py",
     "visiond/*.[ch]",
-    "visiond/lane_net.npz",
+    "visiond/*_net.npz",
 )
 _NUMBERS_OF_LINES = 9  # for three lines
 

@@ -19,7 +19,7 @@ from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine
 from selfdrive.visiond.hog import WINDOW_FEATURES, WINDOW_PIXELS, WINDOW_STRIDE, Hog, detection_windows
-from selfdrive.visiond.lane_net import LaneNet
+from selfdrive.visiond.lane_net import AUTHORS_CODE_NET, LaneNet
 
 PICTURE_WIDTH, PICTURE_ROWS = 640, 480  # px, the size of pictures for all positions below
 FIRST_ROW, FIRST_COLUMN = 235, 90  # of the windows
@@ -60,7 +60,7 @@ class AuthorsCodeDetector:
                 remedy="choose another --detector",
             )
         self._hog = Hog(*WINDOWS_PART_SIZE)
-        self._net, self._threshold = LaneNet.load(), threshold
+        self._net, self._threshold = LaneNet.load(AUTHORS_CODE_NET), threshold
         self.state: tuple[float, ...] = (0.5 * LANE_WIDTH, -0.5 * LANE_WIDTH)  # y (m) of left and right line
 
     def detect(self, view: CameraView) -> LaneLines:

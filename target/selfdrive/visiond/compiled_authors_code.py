@@ -55,7 +55,7 @@ class CompiledAuthorsCodeDetector(AuthorsCodeDetector):
     ) -> None:
         super().__init__(model, threshold)
         self.calculated_by = lines.digest.hex() + windows.digest.hex()
-        self._windows = MarkWindowFinder(WINDOWS_PART_SIZE, threshold, windows)
+        self._windows = MarkWindowFinder(self._net, WINDOWS_PART_SIZE, threshold, windows)
         self._arrays = {name: np.zeros(*room) for name, room in _ARRAY_SHAPES.items()}
         self._coded = _AuthorsCodeStructure(
             **{name: array.ctypes.data for name, array in self._arrays.items()}

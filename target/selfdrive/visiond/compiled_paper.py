@@ -58,7 +58,7 @@ class CompiledPaperDetector(PaperDetector):
     def __init__(self, model: CameraModel, lines: compiled.Library, windows: compiled.Library) -> None:
         super().__init__(model)
         self.calculated_by = lines.digest.hex() + windows.digest.hex()
-        self._windows = MarkWindowFinder(self._region.shape, MIN_LOG_ODDS, windows)
+        self._windows = MarkWindowFinder(self._net, self._region.shape, MIN_LOG_ODDS, windows)
         self._arrays, self._points = (
             _build_arrays(self._region, self._lines.scale),
             {"all": _build_point_arrays(self._region), "own": _build_point_arrays(self._region)},

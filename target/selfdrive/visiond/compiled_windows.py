@@ -29,8 +29,10 @@ class _NetStructure(ctypes.Structure):
 class MarkWindowFinder:
     """Examines windows of pictures of one size with the compiled `mark_windows.c`."""
 
-    def __init__(self, size: tuple[int, int], threshold: float, library: compiled.Library) -> None:
-        net, (rows, width) = LaneNet.load(), size
+    def __init__(
+        self, net: LaneNet, size: tuple[int, int], threshold: float, library: compiled.Library
+    ) -> None:
+        rows, width = size
         coarse = np.zeros((HIDDEN_NODES, PADDED_FEATURE_COUNT), np.int16)
         coarse_steps = _coarse_steps(net)
         coarse[:, :WINDOW_FEATURES] = np.rint(net.hidden_steps.T * (coarse_steps / WEIGHT_STEPS))

@@ -7,7 +7,10 @@ import numpy as np
 
 from selfdrive.common.array_math import each
 
-WEIGHTS_PATH = Path(__file__).with_name("lane_net.npz")
+# the net of the detector as the paper describes it, and that of the detector as its authors coded it
+PAPER_NET, AUTHORS_CODE_NET = (
+    Path(__file__).with_name(f"{name}_net.npz") for name in ("paper", "authors_code")
+)
 HIDDEN_NODES = 10  # as in the paper
 FEATURE_STEPS, WEIGHT_STEPS = 2**12, 2**20  # per unit of features and weights
 WINDOWS_AT_ONCE = 32  # windows; for more, allocating memory takes longer than the sums
@@ -27,7 +30,7 @@ class LaneNet:
         self.hidden_steps = np.rint(hidden * float(WEIGHT_STEPS)).astype(float)
 
     @classmethod
-    def load(cls, path: Path = WEIGHTS_PATH) -> "LaneNet":
+    def load(cls, path: Path) -> "LaneNet":
         """Load a net that `python -m selfdrive.visiond_lab.train` wrote."""
         with np.load(path) as stored:
             return cls(stored["hidden"], stored["hidden_bias"], stored["out"], stored["out_bias"])

@@ -12,7 +12,7 @@ from selfdrive.visiond.dbscan import dbscan
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
 from selfdrive.visiond.edge_lines import EdgeLines
 from selfdrive.visiond.hog import WINDOW_FEATURES, Hog, detection_windows
-from selfdrive.visiond.lane_net import LaneNet
+from selfdrive.visiond.lane_net import PAPER_NET, LaneNet
 from selfdrive.visiond.mark_edges import find_steep_edges, tile_numbers, tiles_with_mark, windows_on_tiles
 from selfdrive.visiond.road_region import RoadRegion
 
@@ -33,7 +33,7 @@ class PaperDetector:
     def __init__(self, model: CameraModel) -> None:
         self._region = RoadRegion(model)
         self._hog = Hog(*self._region.shape)
-        self._net = LaneNet.load()
+        self._net = LaneNet.load(PAPER_NET)
         self._tile = tile_numbers(*self._region.shape)
         self._lines = EdgeLines(model, self._region)
 

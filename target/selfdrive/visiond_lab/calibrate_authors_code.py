@@ -16,7 +16,7 @@ from selfdrive.sim.road_look import SOLID
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond import authors_code_detector as coded
 from selfdrive.visiond.hog import WINDOW_FEATURES, WINDOW_PIXELS, WINDOW_STRIDE, Hog, detection_windows
-from selfdrive.visiond.lane_net import LaneNet
+from selfdrive.visiond.lane_net import AUTHORS_CODE_NET, LaneNet
 
 MOST_MISTAKEN_SHARE = 0.003  # of the windows inside the lane
 MOST_LINE_ERROR = 0.3  # m
@@ -44,7 +44,7 @@ def evaluate_thresholds() -> list[tuple[float, float, float]]:
 def _scores_inside_lane(road: RoadRenderer, picture: np.ndarray, offset: float) -> np.ndarray:
     model = road.model
     part = np.ascontiguousarray(picture[coded.WINDOWS_PART])
-    scores = LaneNet.load().log_odds(
+    scores = LaneNet.load(AUTHORS_CODE_NET).log_odds(
         detection_windows(Hog(*part.shape).blocks(part)).reshape(-1, WINDOW_FEATURES)
     )
     inside = np.zeros(coded.WINDOW_COUNTS, bool)

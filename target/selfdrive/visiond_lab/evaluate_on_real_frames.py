@@ -71,6 +71,7 @@ class LabelledFrame:
     model: CameraModel
     left_column: float
     right_column: float
+    slopes: tuple[float, float]  # columns per row by which each line moves to the right
 
     @property
     def grey(self) -> np.ndarray:
@@ -116,6 +117,7 @@ def load_labelled_frames(folder: Path, truth: Path) -> list[LabelledFrame]:
                 remedy=f"rename it, or add a {CALIBRATION_FILE} to the frames",
             )
         left, right = _true_columns(key, entry, truth)
+        rows = LINES_COMPARED_ROW - CANONICAL_HORIZON  # below the vanishing point, for lines without slopes
         path = _image_of_key(key, images, folder)
         colour = cv2.imread(str(path), cv2.IMREAD_COLOR)
         if colour is None:
@@ -129,6 +131,10 @@ def load_labelled_frames(folder: Path, truth: Path) -> list[LabelledFrame]:
                 model=source.model,
                 left_column=left,
                 right_column=right,
+                slopes=tuple(
+                    entry[side][0] if entry.get(side) else (column - source.model.cx) / rows
+                    for side, column in (("L", left), ("R", right))
+                ),
             )
         )
     return frames

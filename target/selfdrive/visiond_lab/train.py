@@ -16,7 +16,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPClassifier
 from threadpoolctl import threadpool_limits
 
-from selfdrive.visiond.lane_net import HIDDEN_NODES, WEIGHTS_PATH, LaneNet
+from selfdrive.visiond.lane_net import HIDDEN_NODES, PAPER_NET, LaneNet
 from selfdrive.visiond_lab.training_windows import draw_labelled_windows
 
 FULL_ROADS, SMALL_ROADS = (600, 60), (12, 4)  # roads for training and testing
@@ -45,7 +45,7 @@ def train_net(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m selfdrive.visiond_lab.train", description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=WEIGHTS_PATH, help="the file to write")
+    parser.add_argument("--out", type=Path, default=PAPER_NET, help="the file to write")
     parser.add_argument("--small", action="store_true", help="few roads, for a trial")
     options = parser.parse_args(arguments)
     cv2.setNumThreads(1)

@@ -22,7 +22,7 @@ from selfdrive.visiond.compiled_robust import C_SOURCES, CompiledVote, build_rob
 from selfdrive.visiond.compiled_view import CompiledRoadView
 from selfdrive.visiond.compiled_windows import MarkWindowFinder
 from selfdrive.visiond.hog import WINDOW_FEATURES, Hog, detection_windows
-from selfdrive.visiond.lane_net import FEATURE_STEPS, LaneNet
+from selfdrive.visiond.lane_net import FEATURE_STEPS, PAPER_NET, LaneNet
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.robust_detector import RobustDetector
@@ -210,9 +210,9 @@ def test_the_library_is_not_used_if_python_computes_other_bits(name, monkeypatch
 
 def test_features_and_marked_windows_are_the_same(helpers, pictures):
     size = 112, 480
-    hog, net = Hog(*size), LaneNet.load()
+    hog, net = Hog(*size), LaneNet.load(PAPER_NET)
     for threshold in (0.0, 4.0, -2.5):
-        fast = MarkWindowFinder(size, threshold, compiled.library(compiled_windows.C_SOURCE))
+        fast = MarkWindowFinder(net, size, threshold, compiled.library(compiled_windows.C_SOURCE))
         for picture in pictures[::3]:
             part = np.ascontiguousarray(picture[200:312, 80:560])
             found = hog.blocks(part)
@@ -231,14 +231,13 @@ def test_features_and_marked_windows_are_the_same(helpers, pictures):
 def test_a_score_too_close_to_the_threshold_is_left_to_python(pictures):
     """The C code reports a score close to the threshold, and the detector asks the net."""
     part = np.ascontiguousarray(pictures[0][200:232, 280:312])
-    score = float(
-        LaneNet.load().log_odds(detection_windows(Hog(32, 32).blocks(part)).reshape(1, WINDOW_FEATURES))[0]
-    )
+    net = LaneNet.load(PAPER_NET)
+    score = float(net.log_odds(detection_windows(Hog(32, 32).blocks(part)).reshape(1, WINDOW_FEATURES))[0])
     library = compiled.library(compiled_windows.C_SOURCE)
     for threshold, decided in ((score, False), (score - 1e-8, True), (score + 1e-8, True)):
         window = np.ones(1, bool)
         assert (
-            MarkWindowFinder((32, 32), threshold, library).clear_windows_without_mark(
+            MarkWindowFinder(net, (32, 32), threshold, library).clear_windows_without_mark(
                 part.ctypes.data, window.ctypes.data
             )
             is decided

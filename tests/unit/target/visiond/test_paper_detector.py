@@ -9,7 +9,7 @@ from selfdrive.messages import CameraView
 from selfdrive.sim.road_look import RoadLook, standard_look
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.dbscan import dbscan
-from selfdrive.visiond.lane_net import LaneNet
+from selfdrive.visiond.lane_net import PAPER_NET, LaneNet
 from selfdrive.visiond.mark_edges import find_steep_edges, tile_numbers, tiles_with_mark, windows_on_tiles
 from selfdrive.visiond.paper_detector import (
     CLUSTER_REACH,
@@ -125,7 +125,7 @@ def test_real_edges_get_the_clusters_of_scikit_learn():
 
 def test_scores_do_not_depend_on_the_number_of_threads():
     features = np.random.default_rng(0).random((192, 1764), dtype=np.float32)
-    net = LaneNet.load()
+    net = LaneNet.load(PAPER_NET)
     with threadpool_limits(1):
         alone = net.log_odds(features)
     with threadpool_limits(2):
@@ -149,7 +149,7 @@ def test_the_windows_on_a_tile_are_those_that_can_mark_it():
 
 def test_a_windows_score_does_not_depend_on_other_windows():
     features = np.random.default_rng(1).random((64, 1764), dtype=np.float32)
-    net = LaneNet.load()
+    net = LaneNet.load(PAPER_NET)
     scores = net.log_odds(features)
     other = np.random.default_rng(2).permutation(64)
     assert np.array_equal(net.log_odds(features[other]), scores[other])

@@ -43,7 +43,12 @@ def test_lines_of_a_frame_are_counted_by_side() -> None:
         a * LINE_READ_ROW + b for a, b in (road.model.line_in_picture(*x) for x in road.true_lines(0.0))
     )
     frame = LabelledFrame(
-        key="f", colour=np.dstack([grey] * 3), model=road.model, left_column=left, right_column=right
+        key="f",
+        colour=np.dstack([grey] * 3),
+        model=road.model,
+        left_column=left,
+        right_column=right,
+        slopes=(0.0, 0.0),
     )
     wrong = replace(frame, left_column=left - 90.0)
     assert (count_lines(4.0, [frame]), count_lines(50.0, [frame])) == (2, 0)
