@@ -24,7 +24,8 @@ from mutator.campaigns.plan import Plan, build_plan  # noqa: E402
 from mutator.engines.engine_jobs import Engine, Job  # noqa: E402
 from mutator.engines.fork_engine import ForkEngine  # noqa: E402
 from mutator.engines.reference_engine import ReferenceEngine  # noqa: E402
-from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment  # noqa: E402
+from mutator.execution.experiment_runner import ExperimentRunner, RecordedExperiment  # noqa: E402
+from mutator.execution.loaded_goldens import LoadedGoldens  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.outcomes import trace_and_record_loading  # noqa: E402

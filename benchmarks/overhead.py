@@ -29,7 +29,8 @@ from mutator.campaigns.plan import build_plan  # noqa: E402
 from mutator.engines.engine_jobs import Job  # noqa: E402
 from mutator.engines.fork_engine import ForkEngine  # noqa: E402
 from mutator.engines.reference_engine import ReferenceEngine  # noqa: E402
-from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens  # noqa: E402
+from mutator.execution.experiment_runner import ExperimentRunner  # noqa: E402
+from mutator.execution.loaded_goldens import LoadedGoldens  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.store.checksummed_lines import LineWriter  # noqa: E402

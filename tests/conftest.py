@@ -81,8 +81,11 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 @pytest.fixture(scope="session", autouse=True)
 def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Keep the caches of module and session fixtures apart from the user's. All tests share matplotlib's font
-    cache and the bytecode, which are slow to rebuild."""
+    cache and the bytecode, which are slow to rebuild. These fixtures have no store of finished runs, so that
+    each of them really runs its experiments."""
     folder = tmp_path_factory.mktemp("caches")
+    (folder / "mutator").mkdir()
+    (folder / "mutator" / "finished").touch()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("MPLCONFIGDIR", str(folder / "matplotlib"))
         patch.setenv("XDG_CACHE_HOME", str(folder))

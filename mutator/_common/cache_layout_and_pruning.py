@@ -7,6 +7,8 @@
       lines/<digest>.json  lines that a golden run executes
       pictures/<digest>.json  effects of image faults, for review
       pages/<digest>/      reports that the server built
+      finished/<name>.runs  records and series of finished runs
+      finished/<digest>/   finished runs of a run folder whose proof is still to come
       targets/<name>/      files that a target keeps for its runs (`{cache}` in its manifest)
 
 Results never depend on the cache. Each entry is found by a digest of its inputs and checked before use. An
@@ -29,17 +31,19 @@ EXECUTED_LINES_CACHE, IMAGE_EFFECTS_CACHE, REPORTS_CACHE, TARGET_CACHES = (
     "pages",
     "targets",
 )
+FINISHED_RUNS_CACHE = "finished"
 _MOST_FOLDER_NAME_LENGTH = 200  # file systems allow 255 bytes
 MOST_TARGET_CACHE_BYTES = 4_000_000_000  # size limit for one target, enforced between seeds
 MOST_CACHED_REPORTS_BYTES = 500_000_000  # size limit for all reports that the server built
+MOST_FINISHED_RUNS_BYTES = 4_000_000_000  # size limit for the store of finished runs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CacheEntry:
     """A cached item that is kept or deleted as a whole.
 
-    `what` is the part of the cache: `checks`, `goldens`, `runs`, `lines`, `pictures`, `pages` or, for
-    example, `target openpilot`. `size` is the size on disk in bytes, `used` the time of the last use in
+    `what` is the part of the cache: `checks`, `goldens`, `runs`, `lines`, `pictures`, `pages`, `finished` or,
+    for example, `target openpilot`. `size` is the size on disk in bytes, `used` the time of the last use in
     seconds since the epoch.
     """
 
@@ -91,6 +95,10 @@ def cached_reports_folder() -> Path:
     return caches_folder() / REPORTS_CACHE
 
 
+def finished_runs_folder() -> Path:
+    return caches_folder() / FINISHED_RUNS_CACHE
+
+
 def target_cache_folder(name: str) -> Path:
     """Return the folder that all runs of a target share."""
     quoted = quote(name, safe="").replace(".", "%2E")
@@ -109,6 +117,7 @@ def list_entries() -> list[CacheEntry]:
     listed += [_build_entry(EXECUTED_LINES_CACHE, path) for path in _paths_in(cached_executed_lines_folder())]
     listed += [_build_entry(IMAGE_EFFECTS_CACHE, path) for path in _paths_in(cached_image_effects_folder())]
     listed += [_build_entry(REPORTS_CACHE, path) for path in _paths_in(cached_reports_folder())]
+    listed += [_build_entry(FINISHED_RUNS_CACHE, path) for path in _paths_in(finished_runs_folder())]
     for target in _paths_in(caches_folder() / TARGET_CACHES):
         listed += [_build_entry(f"target {target.name}", path) for path in _files_below(target)]
     return sorted(listed, key=lambda entry: (entry.what, entry.path))
@@ -138,6 +147,16 @@ def prune_cached_reports() -> list[CacheEntry]:
     return _prune_entries(
         [_build_entry(REPORTS_CACHE, path) for path in _paths_in(cached_reports_folder())],
         MOST_CACHED_REPORTS_BYTES,
+    )
+
+
+def prune_finished_runs() -> list[CacheEntry]:
+    """Delete the least recently used parts of the store of finished runs until at most
+    MOST_FINISHED_RUNS_BYTES remain; return them.
+    """
+    return _prune_entries(
+        [_build_entry(FINISHED_RUNS_CACHE, path) for path in _paths_in(finished_runs_folder())],
+        MOST_FINISHED_RUNS_BYTES,
     )
 
 

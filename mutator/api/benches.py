@@ -44,6 +44,7 @@ def open_bench(
     after_hazard: AfterHazard | str = AfterHazard.GO_ON,
     workers: int = 1,
     engine: str | None = None,
+    reuse: bool = True,
 ) -> "Iterator[Bench]":
     """Open a bench in the run folder `out`, for a `with` block: it answers list after list of experiments.
 
@@ -54,7 +55,7 @@ def open_bench(
     * `canary`, `limits`: as the keys of a campaign file; default: those of `campaign`, if one is named.
       Without a canary, results begin with a note.
     * `reading`, `after_hazard`: what all experiments have. `seed` decides what the proof draws.
-    * `workers`: number of processes. `engine`: as for `run`.
+    * `workers`: number of processes. `engine` and `reuse`: as for `run`.
 
     MutatorError for an invalid argument, and if `out` holds another run or is in use. After the block, an
     IncompleteRun warning is issued if experiments have no result.
@@ -75,7 +76,9 @@ def open_bench(
         "seed": seed,
         "after_hazard": checked_after_hazard(after_hazard).value,
     }
-    with opened_bench(opened_workspace, Path(out), values, workers=workers, engine=engine) as opened:
+    with opened_bench(
+        opened_workspace, Path(out), values, workers=workers, engine=engine, reuse=reuse
+    ) as opened:
         yield Bench(opened, selected_target, values["reading"])
     _warn_of_end(opened.summary)
 

@@ -25,6 +25,7 @@ def run(
     engine: str | None = None,
     reviewed: bool = False,
     accept_versions: bool = False,
+    reuse: bool = True,
     cluster: str | None = None,
     insecure_network: bool = False,
     progress: ProgressCallback | None = None,
@@ -39,6 +40,8 @@ def run(
     * `engine`: `reference` or `fork`; None: the fastest for this many experiments.
     * `reviewed`: refuse to run mutants without an approval.
     * `accept_versions`: resume even if versions of Python or packages have changed, and record the change.
+    * `reuse`: copy the results of experiments that earlier runs had, with the same target, faults, harness
+      and versions, on this machine. A sample is proved, as for forked experiments.
     * `cluster`: the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file. Its
       workers run the experiments; `workers` then applies only to the checks before the campaign.
     * `insecure_network`: accept a scheduler that others on the network can reach.
@@ -63,6 +66,7 @@ def run(
         engine=engine,
         reviewed=reviewed,
         accept_versions=accept_versions,
+        reuse=reuse,
         distributor=choose_distributor(cluster, insecure=insecure_network),
         notify=progress,
     )

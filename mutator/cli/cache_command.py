@@ -48,9 +48,9 @@ def cache(
 ) -> None:
     """List or delete the cached data on this machine.
 
-    The cache holds passed checks of campaigns, golden runs, the target's frames and detections, the lines
-    that golden runs execute, previews of image effects, and a list of verified runs. It is in XDG_CACHE_HOME
-    or ~/.cache. Results never depend on the cache; without it, runs take longer.
+    The cache holds passed checks of campaigns, golden runs, results of finished runs, the target's frames and
+    detections, the lines that golden runs execute, previews of image effects, and a list of verified runs. It
+    is in XDG_CACHE_HOME or ~/.cache. Results never depend on the cache; without it, runs take longer.
     """
     if path + clear + (max_size is not None) > 1:
         raise MutatorError("--path, --max and --clear together", expected="one of them")

@@ -220,6 +220,10 @@ def run(
         ),
     ] = False,
     accept_versions: AcceptVersions = False,
+    no_reuse: Annotated[
+        bool,
+        typer.Option("--no-reuse", help="Run every experiment, even if an earlier run had the same one."),
+    ] = False,
     cluster: Cluster = None,
     insecure_network: InsecureNetwork = False,
     stills: Annotated[
@@ -255,6 +259,7 @@ def run(
                 engine=engine,
                 reviewed=reviewed,
                 accept_versions=accept_versions,
+                reuse=not no_reuse,
                 cluster=cluster,
                 insecure_network=insecure_network,
                 progress=notify,
@@ -301,6 +306,7 @@ def _print_summary(
     )
     if terminal.as_json:
         counts = {"planned": summary.planned, "done": summary.done, "ran": summary.ran}
+        counts |= {"reused": summary.reused}
         paths = {"run": str(out), "report": str(report_paths[0]) if report_paths else None}
         errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
         outcomes = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
@@ -313,6 +319,8 @@ def _print_summary(
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now; "
         f"checks, experiments and proof took {describe_duration(summary.elapsed_s)}"
     )
+    if summary.reuse_note:
+        terminal.print_text(summary.reuse_note)
     if summary.proof_note:
         terminal.print_text(f"proof: {summary.proof_note}")
     if report:

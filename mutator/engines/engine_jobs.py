@@ -22,10 +22,13 @@ class RunMode(StrEnum):
     WARM = "warm"
     FORK = "fork"
     GOLDEN_REUSED = "golden"  # the trigger never held, so no run was needed
+    REUSED = "reused"  # an earlier run had the same inputs, so its result was copied
 
 
 # modes that need the equivalence check
-MODES_TO_PROVE = frozenset({RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN_REUSED.value})
+MODES_TO_PROVE = frozenset(
+    {RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN_REUSED.value, RunMode.REUSED.value}
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -272,7 +272,7 @@ class ForkEngine:
         self, job: Job, home: JobFolder, ended: ProcessEnding, output_destination: Path, observe: bool
     ) -> JobResult:
         home.unlock()
-        report = home.read_report(threads=list)
+        report = home.read_report(threads=list, modules=list)
         if report is not None:
             check_fork_report(job, report, is_golden=observe)
         status, detail = status_of_ending(self._limits, ended, report, job)
@@ -292,6 +292,7 @@ class ForkEngine:
             was_fault_active=home.was_fault_active(),
             log_tail=home.log_tail(),
             was_stopped_at_hazard=bool(report and report.get("stopped")),
+            third_party_modules=tuple(report["modules"]) if report else (),
             watch_report={name: report[name] for name in _OBSERVATION_KEYS} if observe and report else {},
             mode=RunMode.WARM if self._forks_before_first_step else RunMode.FORK,
         )

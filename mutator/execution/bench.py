@@ -56,12 +56,14 @@ class Bench:
         workers: int = 1,
         engine: str | None = None,
         notify: ProgressCallback = lambda progress: None,
+        reuse: bool = True,
     ) -> None:
         self.path = path.resolve()
         self.calls = BenchCalls(self.path)
         self._workspace, self._manifest = workspace, manifest
         check_requirements(manifest)
         self._requested_engine, self._engine = engine, choose_engine(engine, manifest)
+        self._is_reuse_wanted = reuse
         self._batch_check = BatchCheck(workspace, manifest, campaign)
         self._plan = GrowingPlan(workspace, manifest, campaign, canary, self.path)
         self._checks = BenchChecks(
@@ -217,6 +219,7 @@ class Bench:
             workers=self._crew.size,
             engine=self._requested_engine,
             notify=self._progress.notify,
+            reuse=self._is_reuse_wanted,
         )
         self._worker_prefix = session.new_worker_name("")
         return session
@@ -302,12 +305,13 @@ class Bench:
         sampled = equivalence_check.remaining_sampled_experiments(folder)
         experiments = [planned[s.id] for s in sampled if self._has_final_record(s.id)]
         self._prove_by_crew(experiments)
-        return equivalence_check.compare_sample(folder, folder.records())
+        return self._session.compare_sample(folder.records())
 
     def _begin_work(self) -> None:
         """Before the first run of this opening: record the software and the machine."""
         assert self._session is not None
-        if self._engine != REFERENCE:
+        reuse = self._session.reuse
+        if self._engine != REFERENCE or (reuse and reuse.searches):
             equivalence_check.mark_check_as_needed(self.path)
         if not self._has_begun:
             self._session.begin_environment(f"{self._worker_prefix}*")
@@ -357,6 +361,7 @@ class Bench:
                 golden_digests={},
                 secret=self._session.secret,
                 parent_pid=os.getpid(),
+                reuse=self._session.reuse.assignment if self._session.reuse else None,
             ),
         )
 

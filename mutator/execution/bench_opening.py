@@ -33,6 +33,7 @@ def opened_bench(
     *,
     workers: int = 1,
     engine: str | None = None,
+    reuse: bool = True,
 ) -> Iterator[Bench]:
     """Lock the run folder `out`, open the bench in it or begin one, and finish it at the end of the block.
 
@@ -45,7 +46,13 @@ def opened_bench(
         try:
             with writing_progress(out, None) as progress:
                 bench = _build_bench(
-                    workspace, out, values, workers=workers, engine=engine, notify=progress.notify
+                    workspace,
+                    out,
+                    values,
+                    workers=workers,
+                    engine=engine,
+                    reuse=reuse,
+                    notify=progress.notify,
                 )
                 try:
                     yield bench
@@ -69,6 +76,7 @@ def _build_bench(
     *,
     workers: int,
     engine: str | None,
+    reuse: bool,
     notify: ProgressCallback,
 ) -> Bench:
     file_bytes = bench_file_bytes(values)
@@ -87,6 +95,7 @@ def _build_bench(
         out,
         workers=workers,
         engine=engine,
+        reuse=reuse,
         notify=notify,
     )
 

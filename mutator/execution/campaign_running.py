@@ -10,7 +10,7 @@ from mutator.errors import MutatorWarning
 from mutator.execution.distributor_choice import Distributor, packages_of_distributor
 from mutator.execution.local_distributor import LocalDistributor
 from mutator.execution.progress_reporting import reporting_progress
-from mutator.execution.session import open_session
+from mutator.execution.session_opening import open_session
 from mutator.execution.session_summary import Summary
 from mutator.execution.stray_files import StrayFiles
 from mutator.store.plan_choices import Choices
@@ -30,6 +30,7 @@ def run_campaign(
     engine: str | None = None,
     reviewed: bool = False,
     accept_versions: bool = False,
+    reuse: bool = True,
     distributor: Distributor = LOCAL_DISTRIBUTOR,
     notify: ProgressCallback | None = None,
 ) -> Summary:
@@ -38,7 +39,8 @@ def run_campaign(
     A frozen plan in `out` is used unchanged. Omitted `choices` keep their frozen values. `engine` is a name
     in `engines.engine_kinds` (None: the fastest that pays off). With `reviewed`, only approved mutants run
     (`mutator.review.approval_gate`). Without `accept_versions`, Python and packages must not change during a
-    run. Another thread calls `notify` about twice a second.
+    run. Without `reuse`, experiments run even if the store of finished runs has their results. Another
+    thread calls `notify` about twice a second.
 
     Raises MutatorError for wrong input, choices that differ from the frozen ones, or a changed campaign file
     or target. Raises CheckFailed if an unapproved mutant would run with `reviewed`, or if a
@@ -53,6 +55,7 @@ def run_campaign(
         engine=engine,
         reviewed=reviewed,
         accept_versions=accept_versions,
+        reuse=reuse,
         notify=notify,
     ) as session:
         session.prepare(packages_of_distributor(distributor))

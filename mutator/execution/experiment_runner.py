@@ -1,20 +1,18 @@
 """Turn experiments into records: build each mutant, run it, compare it with its golden run, judge it."""
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
-from typing import TypeVar
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import path_below
-from mutator._common.file_change_detection import FileChangeDetector
 from mutator._common.hashing import digest
 from mutator.campaigns.shared_runs import group_by_run
 from mutator.engines.engine_jobs import Engine, Job, JobResult, RunMode
 from mutator.errors import BadAddition, BadOutput, InvalidMutant, MutatorError
 from mutator.execution.inactivity_check import InactivityCheck
+from mutator.execution.loaded_goldens import LoadedGoldens, changed_file_error
 from mutator.faults.fault_models import FaultModels
 from mutator.model import AfterHazard, Experiment, ObservedActivation, Record, Status
 from mutator.mutants.mutant_building import Mutant, build
@@ -27,19 +25,14 @@ from mutator.outcomes.actuator_change_and_speeds import (
 )
 from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.failure_cause import judge_failure, run_error
-from mutator.outcomes.hazard_and_metric_judgement import RunJudgement, load_judged_run, load_manifest_channels
+from mutator.outcomes.hazard_and_metric_judgement import RunJudgement, load_judged_run
 from mutator.outcomes.lost_observed_values import find_lost_value
-from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.outcomes.verdict_rules import first_events_after, outcome_of
-from mutator.preflight.check_run_problems import output_digest_of
-from mutator.store.run_folder import GoldenRun
+from mutator.store.finished_run_store import FinishedRun
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
-
-_T = TypeVar("_T")
-_MOST_GOLDENS_IN_MEMORY = 32  # golden runs in memory: enough for the current seed and the next
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,67 +54,14 @@ class RecordedExperiment:
     fallback_reason: str = ""
     fork_step: int = 0
     series: EncodedSeries | None = None
+    third_party_modules: tuple[str, ...] = ()
+
+    @property
+    def is_reused(self) -> bool:
+        return self.mode is RunMode.REUSED
 
 
-class LoadedGoldens:
-    """The channels of golden runs, loaded on request. Only the last few are kept in memory."""
-
-    def __init__(
-        self,
-        manifest: TargetManifest,
-        folder_of: Callable[[Experiment], Path],
-        *,
-        several_seeds: bool = False,
-        digests: Mapping[Path, str] | None = None,
-    ) -> None:
-        self.folder_of = folder_of  # finds the output folder of the fault-free run
-        self._manifest = manifest
-        self._several_seeds = several_seeds
-        self._digests = digests  # what `output_digest_of` must return, by folder
-        self._files_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(self._read_verified_files)
-        self._trace_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
-            lambda folder: self._load_unchanged(folder, load_manifest_channels)
-        )
-        self._sampler_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
-            lambda folder: SeriesSampler(manifest, self._trace_of_folder(folder))
-        )
-        self._judged_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
-            lambda folder: self._load_unchanged(folder, load_judged_run)[1]
-        )
-
-    def read_and_verify_files_of(self, experiment: Experiment) -> None:
-        """Read the golden run's files before they are used. MutatorError if their digest is another."""
-        self._files_of_folder(self.folder_of(experiment))
-
-    def check_unchanged(self, folder: Path) -> None:
-        """Raise MutatorError if the files of a golden run have been written to since they were read."""
-        if changed := self._files_of_folder(folder).first_changed_path():
-            raise _changed_file_error(Path(changed))
-
-    def _load_unchanged(self, folder: Path, load: Callable[[TargetManifest, Path], _T]) -> _T:
-        self._files_of_folder(folder)
-        loaded = load(self._manifest, folder)
-        self.check_unchanged(folder)
-        return loaded
-
-    def _read_verified_files(self, folder: Path) -> FileChangeDetector:
-        paths = [path for name in self._manifest.output_files if (path := path_below(folder, name)).is_file()]
-        files = FileChangeDetector({str(path): read_bounded(path) for path in paths})
-        if self._digests is not None and output_digest_of(self._manifest, folder) != self._digests[folder]:
-            raise _changed_file_error(folder)
-        return files
-
-    def golden_key_of(self, experiment: Experiment) -> str:
-        return GoldenRun.for_experiment(experiment, several_seeds=self._several_seeds).key
-
-    def trace_of(self, experiment: Experiment) -> Trace:
-        return self._trace_of_folder(self.folder_of(experiment))
-
-    def has_terminal_hazard(self, experiment: Experiment) -> bool:
-        return self._judged_of_folder(self.folder_of(experiment)).t_end is not None
-
-    def sampler_of(self, experiment: Experiment) -> SeriesSampler:
-        return self._sampler_of_folder(self.folder_of(experiment))
+FindFinishedRun = Callable[[Experiment, Mutant], FinishedRun | None]
 
 
 class ExperimentRunner:
@@ -137,6 +77,7 @@ class ExperimentRunner:
         *,
         with_series: bool = False,
         inactivity_check: InactivityCheck | None = None,
+        find_finished_run: FindFinishedRun = lambda experiment, mutant: None,
     ) -> None:
         self.inactivity_check = inactivity_check  # None: records do not say why a fault was never active
         self.manifest = manifest
@@ -145,11 +86,13 @@ class ExperimentRunner:
         self.goldens = goldens
         self.scenario_file = cache(scenario_file)
         self.with_series = with_series
+        self._find_finished_run = find_finished_run
 
     def run(self, experiments: Iterable[Experiment]) -> Iterator[RecordedExperiment]:
         """Yield each experiment with its record.
 
-        A mutant that cannot be built is not run. Experiments that share a run get the same record.
+        A mutant that cannot be built is not run, nor an experiment whose finished run is found. Experiments
+        that share a run get the same record.
         """
         shared = {same[0].id: same for same in group_by_run(self.manifest, experiments)}
         for finished in self._run_distinct([same[0] for same in shared.values()]):
@@ -165,7 +108,7 @@ class ExperimentRunner:
             self.inactivity_check.close()
 
     def _run_distinct(self, experiments: Iterable[Experiment]) -> Iterator[RecordedExperiment]:
-        refused: deque[RecordedExperiment] = deque()
+        without_job: deque[RecordedExperiment] = deque()
         started: dict[str, tuple[Experiment, Mutant]] = {}
 
         def jobs() -> Iterator[Job]:
@@ -173,17 +116,32 @@ class ExperimentRunner:
                 try:
                     built = build(self.manifest, self.models, experiment.fault, experiment.trigger)
                 except MutatorError as err:
-                    refused.append(self._finish_without_run(experiment, err))
+                    without_job.append(self._finish_without_run(experiment, err))
                     continue
                 self.goldens.read_and_verify_files_of(experiment)
+                if (run := self._find_finished_run(experiment, built)) is not None:
+                    without_job.append(self._reuse_run(experiment, built, run))
+                    continue
                 started[experiment.id] = (experiment, built)
                 yield self._build_job(experiment, built)
 
         for job, execution in self.engine.run(jobs()):
-            while refused:  # the engine has just asked for more jobs, and some had none
-                yield refused.popleft()
+            while without_job:  # the engine has just asked for more jobs, and some had none
+                yield without_job.popleft()
             yield self._finish_run(*started.pop(job.name), execution)
-        yield from refused
+        yield from without_job
+
+    def _reuse_run(self, experiment: Experiment, mutant: Mutant, run: FinishedRun) -> RecordedExperiment:
+        series = None
+        if self.with_series and run.faulty_series is not None:
+            series = self._series_beside_golden(experiment, run.faulty_series)
+        return RecordedExperiment(
+            experiment=experiment,
+            record=replace(run.record, experiment_id=experiment.id),
+            mutant=mutant,
+            mode=RunMode.REUSED,
+            series=series,
+        )
 
     def _build_job(self, experiment: Experiment, mutant: Mutant) -> Job:
         stop = experiment.after_hazard is AfterHazard.STOP
@@ -231,6 +189,7 @@ class ExperimentRunner:
             fallback_reason=execution.fallback_reason,
             fork_step=execution.fork_step,
             series=self._encode_series(experiment, record, faulty) if faulty is not None else None,
+            third_party_modules=execution.third_party_modules,
         )
 
     def _check_input_unchanged(self, experiment: Experiment, execution: JobResult) -> None:
@@ -241,16 +200,20 @@ class ExperimentRunner:
             self.goldens.check_unchanged(execution.out)
         scenario = self.scenario_file(experiment.scenario)
         if digest(read_bounded(scenario)) != experiment.scenario_digest:
-            raise _changed_file_error(scenario)
+            raise changed_file_error(scenario)
 
     def _encode_series(self, experiment: Experiment, record: Record, faulty: Trace) -> EncodedSeries | None:
         if not self.with_series:
             return None
         sampler = self.goldens.sampler_of(experiment)
+        faulty_bytes = encode_series(sampler.faulty_series(faulty, record), sampler.golden)
+        return self._series_beside_golden(experiment, faulty_bytes)
+
+    def _series_beside_golden(self, experiment: Experiment, faulty_bytes: bytes) -> EncodedSeries:
         return EncodedSeries(
             golden_key=self.goldens.golden_key_of(experiment),
-            golden_bytes=sampler.encoded_golden,
-            faulty_bytes=encode_series(sampler.faulty_series(faulty, record), sampler.golden),
+            golden_bytes=self.goldens.sampler_of(experiment).encoded_golden,
+            faulty_bytes=faulty_bytes,
         )
 
     def _injections_that_raise(self, experiment: Experiment, mutant: Mutant) -> set[str]:
@@ -347,16 +310,6 @@ class ExperimentRunner:
         activation = activation_of(execution.probe_report or {}) if status is Status.CRASHED else None
         bare = _record_of_mutant_without_outcome(experiment, status, detail, mutant, activation)
         return replace(bare, error=run_error(execution.exception))
-
-
-def _changed_file_error(path: Path) -> MutatorError:
-    return MutatorError(
-        "changed while it was in use",
-        where=path,
-        expected="files that no mutant writes to",
-        remedy="restore it (`mutator verify` names what is damaged in a run folder), then run the same "
-        "command again; `mutator run --sandbox` keeps mutants from it",
-    )
 
 
 def _describe_problem(err: MutatorError) -> str:

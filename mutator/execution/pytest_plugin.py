@@ -32,6 +32,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="resume even if Python or packages have changed since the run folder was last used",
     )
     group.addoption(
+        "--campaign-no-reuse",
+        action="store_true",
+        help="run every experiment, even if an earlier run had it, like `mutator run --no-reuse`",
+    )
+    group.addoption(
         "--campaign-sandbox",
         action="store_true",
         help="run the target's code in a sandbox, like `mutator run --sandbox`",
@@ -53,8 +58,8 @@ def pytest_configure(config: pytest.Config) -> None:
     if campaign is None:
         if out is not None:
             raise pytest.UsageError("--campaign-out without --campaign")
-        others = ("require_reviewed", "accept_versions", "campaign_sandbox", "campaign_cluster")
-        for option in (*others, "insecure_network"):
+        others = ("require_reviewed", "accept_versions", "campaign_no_reuse", "campaign_sandbox")
+        for option in (*others, "campaign_cluster", "insecure_network"):
             if config.getoption(option):
                 raise pytest.UsageError(f"--{option.replace('_', '-')} without --campaign")
         return
@@ -83,6 +88,7 @@ def pytest_configure(config: pytest.Config) -> None:
         reviewed=config.getoption("require_reviewed"),
         accept_versions=config.getoption("accept_versions"),
         sandbox=config.getoption("campaign_sandbox"),
+        reuse=not config.getoption("campaign_no_reuse"),
         distributor=work_distributor,
         packages=packages_of_distributor(work_distributor) if work_distributor else (),
     )

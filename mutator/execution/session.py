@@ -5,26 +5,22 @@
 
 import os
 import re
-import shutil
 import time
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import asdict
 from functools import cached_property
 from itertools import chain
-from pathlib import Path
 from secrets import token_bytes
 from typing import Any
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import write_below
-from mutator._common.files import is_half_written, remove_anything_at
-from mutator._common.folder_locks import lock_run_folder, wait_for_workers
-from mutator._common.interrupts import raising_keyboard_interrupts
+from mutator._common.folder_locks import wait_for_workers
 from mutator.audit.run_digests_and_seal import seals_of
 from mutator.campaigns.chunks import PendingChunk, pending_chunks_of
-from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import (
     accepted_version_differences,
@@ -46,9 +42,8 @@ from mutator.execution.finished_outcome_cache import (
     find_finished_run,
     remember_finished_run,
 )
-from mutator.execution.frozen_plan import open_or_freeze_run
+from mutator.execution.session_reuse import SessionReuse, count_reused
 from mutator.execution.session_summary import Summary
-from mutator.execution.watched_progress import writing_progress
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Outcome, Record
 from mutator.preflight import equivalence_check
@@ -63,7 +58,6 @@ from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experiment
 from mutator.store import file_digests
 from mutator.store.file_digests import FileDigest
-from mutator.store.plan_choices import Choices
 from mutator.store.preflight_results import golden_digests
 from mutator.store.records import LINE_SCHEMA_BY_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
@@ -88,6 +82,7 @@ class Session:
         workers: int = 0,
         engine: str | None = None,
         accept_versions: bool = False,
+        reuse: bool = True,
         notify: ProgressCallback = lambda progress: None,
     ) -> None:
         self.workspace = workspace
@@ -100,6 +95,12 @@ class Session:
         self.manifest = workspace.manifest(folder.head.target)
         self.engine = choose_engine(engine, self.manifest)
         self._not_forked = "" if engine else reason_not_forkable(self.manifest)
+        self.reuse = (
+            SessionReuse(workspace, self.manifest, requested_engine=engine, engine=self.engine)
+            if reuse
+            else None
+        )
+        self._worker_prefix = self.new_worker_name("")
         self.problem = ""
         self.interrupted = False
         self.secret = token_bytes(_SECRET_BYTES)
@@ -127,7 +128,7 @@ class Session:
         records = self.folder.records()
         self._finished_count_before = sum(ending.is_final for ending in endings_of(records))
         pending_chunks = pending_chunks_of(self.folder, records)
-        if pending_chunks and self.engine != REFERENCE:
+        if pending_chunks and (self.engine != REFERENCE or (self.reuse and self.reuse.searches)):
             equivalence_check.mark_check_as_needed(self.folder.path)
         self.proof = equivalence_check.remaining_sampled_experiments(self.folder)
         if pending_chunks or self.proof or not checks_and_goldens_exist(self.folder):
@@ -219,6 +220,7 @@ class Session:
             "engine": self.engine,
             "goldens": dict(self.golden_digests),
             "secret": self.secret,
+            "reuse": asdict(self.reuse.assignment) if self.reuse and self.pending else None,
             "pending": [[item.chunk_index, list(item.pending_positions)] for item in self.pending],
             "proof": [[sample.number, sample.id] for sample in self.proof],
         }
@@ -239,19 +241,22 @@ class Session:
             self._close_segments()
             results_path = table_building.ensure_tables(self.folder.path)
             self._pack_series()
-        proven = equivalence_check.compare_sample(self.folder, records)
+        proven = self.compare_sample(records)
         not_forked = "" if proven else self._not_forked
         if (
             proven
             and finished_count == self.folder.planned_experiment_count
             and (why := equivalence_check.reason_check_not_needed(self.folder)) is not None
         ):
-            proven, not_forked = None, why
+            proven, not_forked = None, self._not_forked or why
             with self._noting_full_disk():
                 equivalence_check.remove_proof(self.folder)
         if finished_count == self.folder.planned_experiment_count and (proven is None or proven.is_complete):
             with self._noting_full_disk():
                 self._close_segments(finished=True)
+        has_proof = proven.is_complete if proven else bool(not_forked) or self.engine == REFERENCE
+        if self.reuse and has_proof:
+            self.reuse.store_proved_runs(self.folder, records)
         outcomes = Counter[str]()
         for (status, outcome), count in ends.items():
             outcomes[progress_label(status, outcome)] += count
@@ -274,7 +279,17 @@ class Session:
             not_forked=not_forked,
             elapsed_s=time.monotonic() - self._start_s,
             has_reached_nothing=self._has_reached_nothing(outcomes),
+            reused=count_reused(self.folder, self._worker_prefix),
         )
+
+    def compare_sample(self, records: Mapping[str, Record]) -> equivalence_check.EquivalenceResult | None:
+        """Return the state of the equivalence check. What failed it is not stored for other runs."""
+        try:
+            return equivalence_check.compare_sample(self.folder, records)
+        except CheckFailed:
+            if self.reuse:
+                self.reuse.forget_unproved_runs(self.folder, records)
+            raise
 
     def _undo_writes_of_mutants(self) -> None:
         """Restore the digests of the run folder, and set aside lines that no worker wrote."""
@@ -336,55 +351,3 @@ class Session:
         if list_unpacked_worker_files(folder.path) and not wait_for_workers(folder.path):
             ranks = worst_first_rank_by_ok_experiment(Results(folder.path).frame())
             pack_series(folder.path, folder.head.plan_of_lines, ranks, folder.series_budget_mb)
-
-
-@contextmanager
-def open_session(
-    workspace: Workspace,
-    campaign: str | Path,
-    out: Path,
-    *,
-    workers: int,
-    choices: Choices,
-    engine: str | None = None,
-    reviewed: bool = False,
-    accept_versions: bool = False,
-    notify: ProgressCallback | None = None,
-) -> Iterator[Session]:
-    """Lock the run folder `out`, freeze the plan if needed, and yield the session.
-
-    Scratch folders are deleted before and after the session.
-    """
-    is_new = not out.exists()
-    make_run_folder(out)
-    with raising_keyboard_interrupts(), lock_run_folder(out):
-        if notify and not RunFolder.exists(out):
-            notify(Progress(stage="plan"))
-        try:
-            folder = open_or_freeze_run(workspace, campaign, out, choices, reviewed=reviewed)
-        except MutatorError:
-            if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is worth keeping
-                shutil.rmtree(out, ignore_errors=True)
-            raise
-        file_digests.add_segments_to_ledger(folder.path)
-        remove_anything_at(folder.scratch_folder)
-        # where files get their names only when they are complete
-        folders = ("plan", "report", "series", "patches")
-        candidates = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in folders))
-        for path in chain(*candidates):
-            if is_half_written(path.name) and path.is_file():
-                path.unlink()
-        try:
-            with writing_progress(folder.path, notify) as progress:
-                session = Session(
-                    workspace,
-                    folder,
-                    workers=workers,
-                    engine=engine,
-                    accept_versions=accept_versions,
-                    notify=progress.notify,
-                )
-                yield session
-                progress.problem = session.problem
-        finally:
-            remove_anything_at(folder.scratch_folder)

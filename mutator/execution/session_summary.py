@@ -31,6 +31,14 @@ class Summary:
     elapsed_s: float  #: duration of the session (s)
     #: whether, without a canary, no experiment of the whole plan has reached a hazard
     has_reached_nothing: bool = False
+    reused: int = 0  #: experiments of this session whose result was copied from an earlier run
+
+    @property
+    def reuse_note(self) -> str:
+        """How many results were copied; empty if none was."""
+        if not self.reused:
+            return ""
+        return f"{self.reused:,} of {self.ran:,} reused: earlier runs had the same experiments"
 
     @property
     def seal(self) -> str | None:

@@ -16,8 +16,9 @@ from mutator.engines.engine_jobs import EngineArguments, Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_measuring, measure_limits
 from mutator.errors import CheckFailed
-from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
+from mutator.execution.experiment_runner import ExperimentRunner, RecordedExperiment
 from mutator.execution.inactivity_check import InactivityCheck
+from mutator.execution.loaded_goldens import LoadedGoldens
 from mutator.model import Experiment, Limits, Record, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.preflight.check_run_problems import read_check_run

@@ -21,11 +21,12 @@ from mutator.engines.in_target import process_guard
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.experiment_runner import (
     ExperimentRunner,
-    LoadedGoldens,
     RecordedExperiment,
     record_without_outcome,
 )
 from mutator.execution.inactivity_check import InactivityCheck
+from mutator.execution.loaded_goldens import LoadedGoldens
+from mutator.execution.run_reuse import ReuseAssignment, RunReuse
 from mutator.execution.written_files import FileDigests
 from mutator.model import Experiment, Record, Status
 from mutator.preflight import equivalence_check
@@ -43,7 +44,8 @@ class WorkerAssignment:
 
     `worker_name` makes its file names in the run folder unique. `parent_pid` is the process that the worker
     must not outlive (None: the worker is the command itself). `golden_digests` has the digest of each golden
-    run, and `secret` authenticates files that workers share; neither is in a file.
+    run, and `secret` authenticates files that workers share; neither is in a file. Without `reuse`, the store
+    of finished runs is left out.
     """
 
     run_folder: Path
@@ -52,6 +54,7 @@ class WorkerAssignment:
     golden_digests: Mapping[str, str]
     secret: bytes
     parent_pid: int | None = None
+    reuse: ReuseAssignment | None = None
 
 
 class Worker:
@@ -66,9 +69,16 @@ class Worker:
         self._inputs, self._manifest, self._assignment = inputs, inputs.manifest, assignment
         self._scenario_files = dict(inputs.scenario_files)
         self._digest_by_golden_folder: dict[Path, str] = {}
+        self._reuse = (
+            RunReuse(assignment.reuse, self.folder, assignment.worker_name, self._golden_digest_of)
+            if assignment.reuse
+            else None
+        )
         self.add_inputs(goldens=assignment.golden_digests)
         self._runner = self._make_runner(
-            self._make_engine(assignment.engine), with_series=bool(self.folder.series_budget_mb)
+            self._make_engine(assignment.engine),
+            with_series=bool(self.folder.series_budget_mb),
+            reuse=self._reuse,
         )
         self._current_seed: int | None = None  # the seed being run
         self._prover: ExperimentRunner | None = None
@@ -110,6 +120,11 @@ class Worker:
             path_below(self.folder.path / "golden", key): golden_digest
             for key, golden_digest in (goldens or {}).items()
         }
+        if goldens and self._reuse:
+            self._reuse.note_new_goldens()
+
+    def _golden_digest_of(self, experiment: Experiment) -> str:
+        return self._digest_by_golden_folder[self.folder.golden_folder_of(experiment)]
 
     def _prune_cached_images(self, seed: int) -> None:
         """Delete images of earlier seeds, which would fill the disk."""
@@ -153,8 +168,12 @@ class Worker:
     def close(self) -> None:
         self._runner.close()
         self._writer.close()
+        if self._reuse:
+            self._reuse.close()
 
-    def _make_runner(self, engine: Engine, *, with_series: bool = False) -> ExperimentRunner:
+    def _make_runner(
+        self, engine: Engine, *, with_series: bool = False, reuse: RunReuse | None = None
+    ) -> ExperimentRunner:
         folder = self.folder
         goldens = LoadedGoldens(
             self._manifest,
@@ -171,6 +190,7 @@ class Worker:
             self._scenario_files.__getitem__,
             with_series=with_series,
             inactivity_check=InactivityCheck(self._engine_arguments()),
+            find_finished_run=reuse.find if reuse else lambda experiment, mutant: None,
         )
 
     def _make_engine(self, name: str) -> Engine:
@@ -210,6 +230,8 @@ class Worker:
         patch = None if finished.mutant is None else finished.mutant.patch_bytes
         timing = timing_of(finished, self._assignment.worker_name)
         self._writer.append(finished.record, timing, patch, finished.series)
+        if self._reuse:
+            self._reuse.note(finished)
 
 
 def timing_of(finished: RecordedExperiment, worker: str) -> dict[str, Any]:

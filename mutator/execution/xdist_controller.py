@@ -16,7 +16,8 @@ from mutator._common.resource_shortages import find_shortage
 from mutator.errors import MutatorError, PytestItemFailed
 from mutator.execution.progress_reporting import reporting_progress
 from mutator.execution.progress_text import ProgressLines
-from mutator.execution.session import Session, open_session
+from mutator.execution.session import Session
+from mutator.execution.session_opening import open_session
 from mutator.execution.session_summary import Summary
 from mutator.execution.suspended_workers import WorkerContinuer
 from mutator.execution.worker import WorkerAssignment, python_command_dying_with
@@ -61,6 +62,7 @@ def register_controller(
     reviewed: bool,
     accept_versions: bool,
     sandbox: bool,
+    reuse: bool,
     distributor: "WorkDistributor | None" = None,
     packages: Sequence[str] = (),
 ) -> None:
@@ -79,6 +81,7 @@ def register_controller(
                 reviewed=reviewed,
                 accept_versions=accept_versions,
                 sandbox=sandbox,
+                reuse=reuse,
                 distributor=distributor,
                 packages=packages,
             )
@@ -130,6 +133,7 @@ class CampaignController:
             engine=begun.engine,
             golden_digests=begun.golden_digests,
             secret=begun.secret,
+            reuse=begun.reuse.assignment if begun.reuse and begun.pending else None,
         )
         self._lazy_worker = LazyWorker(lambda: begun.inputs, assignment)
         return collect_items(session, (*begun.pending, *begun.proof), self._lazy_worker)
@@ -177,10 +181,12 @@ class StandaloneController(CampaignController):
         reviewed: bool,
         accept_versions: bool,
         sandbox: bool,
+        reuse: bool,
         distributor: "WorkDistributor | None" = None,
         packages: Sequence[str] = (),
     ) -> None:
         super().__init__()
+        self._reuse = reuse
         self._distributor = distributor
         self._packages = packages
         self._campaign = campaign
@@ -203,6 +209,7 @@ class StandaloneController(CampaignController):
                 choices=Choices(),
                 reviewed=self._reviewed,
                 accept_versions=self._accept_versions,
+                reuse=self._reuse,
                 notify=_progress_notifier(session.config),
             )
             self.campaign_session = self._open.enter_context(opened)
@@ -268,6 +275,7 @@ def _progress_notifier(config: pytest.Config) -> ProgressCallback | None:
 def _summary_lines(summary: Summary) -> list[str]:
     lines = [
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now",
+        summary.reuse_note,
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),
         summary.problem,
         *(f"{name}: {what}" for name, what in summary.harness_errors),

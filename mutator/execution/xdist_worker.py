@@ -15,6 +15,7 @@ from mutator._common.resource_shortages import find_shortage
 from mutator.campaigns.chunks import PendingChunk
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import DiskFull, MutatorError, PytestItemFailed, ResourceShortage
+from mutator.execution.run_reuse import ReuseAssignment
 from mutator.execution.suspended_workers import on_resume
 from mutator.execution.worker import Worker, WorkerAssignment, bind_to_parent
 from mutator.execution.written_files import FileDigests
@@ -130,6 +131,7 @@ class WorkerPlugin:
             golden_digests=campaign_input["goldens"],
             secret=campaign_input["secret"],
             parent_pid=campaign_input["parent"],
+            reuse=ReuseAssignment(**campaign_input["reuse"]) if campaign_input["reuse"] else None,
         )
         self._config = config
         self._registration = open_worker_lock(run)

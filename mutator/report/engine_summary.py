@@ -22,6 +22,7 @@ MOST_LISTED_REASONS = (
 _MODE_DESCRIPTIONS = {
     RunMode.FORK: "a fork of the golden run, just before the fault is first active",
     RunMode.GOLDEN_REUSED: "no run: the trigger never holds, so the golden run's result is used",
+    RunMode.REUSED: "no run: an earlier run had the same experiment, so its result was copied",
     RunMode.WARM: "a fork of the loaded program, from the start of the run",
     RunMode.REFERENCE: "a fresh interpreter (reference engine)",
     None: "no run: there is no mutant",

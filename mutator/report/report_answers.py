@@ -212,8 +212,11 @@ def _describe_unsimulated(frame: pd.DataFrame, cpu: pd.Series, timings: pd.DataF
     rest = frame["experiment_id"][~(cpu > 0)]
     golden = timings[timings["engine"] == RunMode.GOLDEN_REUSED.value]
     idle = int(rest.isin(golden["experiment_id"]).sum())
+    reused = timings[timings["engine"] == RunMode.REUSED.value]
+    copied = int(rest.isin(reused["experiment_id"]).sum())
     reasons = {
+        "the result of an earlier run with the same experiment was copied": copied,
         "the trigger never held, so the golden run's result was used": idle,
-        "the result of an experiment with an identical run was used": len(rest) - idle,
+        "the result of an experiment with an identical run was used": len(rest) - idle - copied,
     }
     return "".join(f"; for {count:,}, {words}" for words, count in reasons.items() if count)

@@ -102,6 +102,11 @@ def block_bytes(kind: int, key: str, data: bytes) -> bytes:
     return b"".join((head, check, text, data))
 
 
+def parse_block(data: bytes) -> Block | None:
+    """Return the block that `data` begins with; None if it is damaged."""
+    return _block_at(data, 0)
+
+
 def read_blocks(path: Path) -> BlockFile:
     parts = list(_blocks_or_none(read_bounded(path, MOST_EXPERIMENT_DATA_BYTES)))
     blocks = tuple(block for block in parts if block is not None)

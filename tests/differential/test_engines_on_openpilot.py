@@ -11,7 +11,8 @@ from mutator.engines.engine_choice import make_engine
 from mutator.engines.engine_jobs import EngineArguments, Job
 from mutator.engines.engine_kinds import ENGINES
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens
+from mutator.execution.experiment_runner import ExperimentRunner
+from mutator.execution.loaded_goldens import LoadedGoldens
 from mutator.model import Record
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import GoldenRun

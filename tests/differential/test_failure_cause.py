@@ -10,7 +10,8 @@ from mutator.engines.engine_choice import make_engine
 from mutator.engines.engine_jobs import Engine, EngineArguments, Job
 from mutator.engines.engine_kinds import ENGINES
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens
+from mutator.execution.experiment_runner import ExperimentRunner
+from mutator.execution.loaded_goldens import LoadedGoldens
 from mutator.model import (
     Anchor,
     AnchorKind,

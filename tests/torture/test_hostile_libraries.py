@@ -15,7 +15,7 @@ import pytest
 import mutator
 from mutator.errors import MutatorError
 from mutator.execution.cluster.bundle import Bundle, unpack_bundle
-from mutator.execution.session import open_session
+from mutator.execution.session_opening import open_session
 from mutator.serve.application import ServedSite, build_application
 from mutator.serve.served_runs import ServedRuns
 from mutator.store.plan_choices import Choices

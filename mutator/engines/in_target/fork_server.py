@@ -205,9 +205,9 @@ class ForkingProcess:
         run_once.limit_resources(job)
         os.chdir(job["out"])
         report = self.run_mutant_to_end(job)
-        report["outside"] = self.files_outside_tree + self.files_imported_elsewhere(
-            run_once.modules_imported_since(job["probe_name"])
-        )
+        imported_modules = run_once.modules_imported_since(job["probe_name"])
+        report["outside"] = self.files_outside_tree + self.files_imported_elsewhere(imported_modules)
+        report["modules"] = run_once.third_party_names(imported_modules, self.start_message["packages"])
         report["threads"] = thread_names.other_thread_names()
         Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
         if job["watch"] is None or not report["threads"]:  # a golden run with other threads is not used

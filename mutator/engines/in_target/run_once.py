@@ -282,17 +282,14 @@ def new_modules_outside_packages(modules_before: set[str], packages: Iterable[st
 
 def third_party_modules(modules_before: set[str], packages: Iterable[str]) -> list[str]:
     """Return the third-party top-level modules imported after `modules_before`, or mapped into memory."""
-    excluded = {*sys.stdlib_module_names, HarnessImportFinder.package_folder.name, *packages, *modules_before}
-    return sorted(
-        {
-            name.partition(".")[0]
-            for name in (
-                *new_modules_outside_packages(modules_before, packages),
-                *modules_mapped_into_memory(),
-            )
-        }
-        - excluded
-    )
+    names = (*new_modules_outside_packages(modules_before, packages), *modules_mapped_into_memory())
+    return third_party_names(names, [*packages, *modules_before])
+
+
+def third_party_names(names: Iterable[str], others: Iterable[str]) -> list[str]:
+    """Return the top-level names of modules, without `others`, the standard library and the harness."""
+    excluded = {*sys.stdlib_module_names, HarnessImportFinder.package_folder.name, *others}
+    return sorted({name.partition(".")[0] for name in names} - excluded)
 
 
 def modules_mapped_into_memory() -> Iterator[str]:

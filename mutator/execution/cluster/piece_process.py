@@ -32,8 +32,9 @@ from mutator.errors import DiskFull, MutatorError, ResourceShortage, WorkerGolde
 from mutator.execution.cluster.golden_cache import GoldenRunCache
 from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceKind, PieceResult
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
-from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
+from mutator.execution.experiment_runner import ExperimentRunner, RecordedExperiment
 from mutator.execution.inactivity_check import InactivityCheck
+from mutator.execution.loaded_goldens import LoadedGoldens
 from mutator.execution.worker import timing_of
 from mutator.model import Experiment
 from mutator.preflight.check_run_problems import read_check_run

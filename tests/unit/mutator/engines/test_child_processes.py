@@ -8,8 +8,9 @@ import pytest
 import mutator
 from mutator.engines.engine_choice import make_engine
 from mutator.engines.engine_jobs import EngineArguments, RunMode
-from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
+from mutator.execution.experiment_runner import ExperimentRunner, RecordedExperiment
 from mutator.execution.inactivity_check import InactivityCheck
+from mutator.execution.loaded_goldens import LoadedGoldens
 from mutator.model import Limits, Outcome
 from mutator.workspace import Workspace
 from tests.small_loop import small_loop

@@ -15,7 +15,8 @@ from mutator.engines.engine_jobs import Engine, RunMode
 from mutator.engines.fork_engine import ForkEngine
 from mutator.engines.in_target.early_stop import compile_stop_condition
 from mutator.errors import MutatorError
-from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens, RecordedExperiment
+from mutator.execution.experiment_runner import ExperimentRunner, RecordedExperiment
+from mutator.execution.loaded_goldens import LoadedGoldens
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.trace_and_record_loading import trace_until

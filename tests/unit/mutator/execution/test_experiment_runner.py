@@ -15,7 +15,8 @@ from mutator.engines.engine_jobs import Job, JobResult, RunMode
 from mutator.engines.fork_engine import ForkEngine
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
-from mutator.execution.experiment_runner import ExperimentRunner, LoadedGoldens
+from mutator.execution.experiment_runner import ExperimentRunner
+from mutator.execution.loaded_goldens import LoadedGoldens
 from mutator.model import (
     Anchor,
     AnchorKind,

@@ -10,7 +10,7 @@ import pytest
 
 import mutator
 from mutator.errors import CheckFailed
-from mutator.execution.session import open_session
+from mutator.execution.session_opening import open_session
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 

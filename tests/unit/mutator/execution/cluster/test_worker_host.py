@@ -19,7 +19,7 @@ from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceRe
 from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.cluster.worker_host import WorkerHost
-from mutator.execution.session import open_session
+from mutator.execution.session_opening import open_session
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 

@@ -1,0 +1,92 @@
+"""The golden runs that a worker compares with, loaded on request and checked against changes."""
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import TypeVar
+
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import path_below
+from mutator._common.file_change_detection import FileChangeDetector
+from mutator.errors import MutatorError
+from mutator.model import Experiment
+from mutator.outcomes.hazard_and_metric_judgement import load_judged_run, load_manifest_channels
+from mutator.outcomes.series_sampling import SeriesSampler
+from mutator.outcomes.trace_and_record_loading import Trace
+from mutator.preflight.check_run_problems import output_digest_of
+from mutator.store.run_folder import GoldenRun
+from mutator.targets.manifest import TargetManifest
+
+_T = TypeVar("_T")
+_MOST_GOLDENS_IN_MEMORY = 32  # golden runs in memory: enough for the current seed and the next
+
+
+class LoadedGoldens:
+    """The channels of golden runs, loaded on request. Only the last few are kept in memory."""
+
+    def __init__(
+        self,
+        manifest: TargetManifest,
+        folder_of: Callable[[Experiment], Path],
+        *,
+        several_seeds: bool = False,
+        digests: Mapping[Path, str] | None = None,
+    ) -> None:
+        self.folder_of = folder_of  # finds the output folder of the fault-free run
+        self._manifest = manifest
+        self._several_seeds = several_seeds
+        self._digests = digests  # what `output_digest_of` must return, by folder
+        self._files_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(self._read_verified_files)
+        self._trace_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
+            lambda folder: self._load_unchanged(folder, load_manifest_channels)
+        )
+        self._sampler_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
+            lambda folder: SeriesSampler(manifest, self._trace_of_folder(folder))
+        )
+        self._judged_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
+            lambda folder: self._load_unchanged(folder, load_judged_run)[1]
+        )
+
+    def read_and_verify_files_of(self, experiment: Experiment) -> None:
+        """Read the golden run's files before they are used. MutatorError if their digest is another."""
+        self._files_of_folder(self.folder_of(experiment))
+
+    def check_unchanged(self, folder: Path) -> None:
+        """Raise MutatorError if the files of a golden run have been written to since they were read."""
+        if changed := self._files_of_folder(folder).first_changed_path():
+            raise changed_file_error(Path(changed))
+
+    def _load_unchanged(self, folder: Path, load: Callable[[TargetManifest, Path], _T]) -> _T:
+        self._files_of_folder(folder)
+        loaded = load(self._manifest, folder)
+        self.check_unchanged(folder)
+        return loaded
+
+    def _read_verified_files(self, folder: Path) -> FileChangeDetector:
+        paths = [path for name in self._manifest.output_files if (path := path_below(folder, name)).is_file()]
+        files = FileChangeDetector({str(path): read_bounded(path) for path in paths})
+        if self._digests is not None and output_digest_of(self._manifest, folder) != self._digests[folder]:
+            raise changed_file_error(folder)
+        return files
+
+    def golden_key_of(self, experiment: Experiment) -> str:
+        return GoldenRun.for_experiment(experiment, several_seeds=self._several_seeds).key
+
+    def trace_of(self, experiment: Experiment) -> Trace:
+        return self._trace_of_folder(self.folder_of(experiment))
+
+    def has_terminal_hazard(self, experiment: Experiment) -> bool:
+        return self._judged_of_folder(self.folder_of(experiment)).t_end is not None
+
+    def sampler_of(self, experiment: Experiment) -> SeriesSampler:
+        return self._sampler_of_folder(self.folder_of(experiment))
+
+
+def changed_file_error(path: Path) -> MutatorError:
+    return MutatorError(
+        "changed while it was in use",
+        where=path,
+        expected="files that no mutant writes to",
+        remedy="restore it (`mutator verify` names what is damaged in a run folder), then run the same "
+        "command again; `mutator run --sandbox` keeps mutants from it",
+    )

@@ -1,0 +1,75 @@
+"""Opens a session: locks the run folder, freezes the plan if needed, and clears leftovers."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import chain
+from pathlib import Path
+
+from mutator._common.files import is_half_written, remove_anything_at
+from mutator._common.folder_locks import lock_run_folder
+from mutator._common.interrupts import raising_keyboard_interrupts
+from mutator.campaigns.plan_freezing import make_run_folder
+from mutator.errors import MutatorError
+from mutator.execution.frozen_plan import open_or_freeze_run
+from mutator.execution.session import Session
+from mutator.execution.watched_progress import writing_progress
+from mutator.store import file_digests
+from mutator.store.plan_choices import Choices
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_progress import Progress, ProgressCallback
+from mutator.workspace import Workspace
+
+
+@contextmanager
+def open_session(
+    workspace: Workspace,
+    campaign: str | Path,
+    out: Path,
+    *,
+    workers: int,
+    choices: Choices,
+    engine: str | None = None,
+    reviewed: bool = False,
+    accept_versions: bool = False,
+    reuse: bool = True,
+    notify: ProgressCallback | None = None,
+) -> Iterator[Session]:
+    """Lock the run folder `out`, freeze the plan if needed, and yield the session.
+
+    Scratch folders are deleted before and after the session.
+    """
+    is_new = not out.exists()
+    make_run_folder(out)
+    with raising_keyboard_interrupts(), lock_run_folder(out):
+        if notify and not RunFolder.exists(out):
+            notify(Progress(stage="plan"))
+        try:
+            folder = open_or_freeze_run(workspace, campaign, out, choices, reviewed=reviewed)
+        except MutatorError:
+            if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is worth keeping
+                shutil.rmtree(out, ignore_errors=True)
+            raise
+        file_digests.add_segments_to_ledger(folder.path)
+        remove_anything_at(folder.scratch_folder)
+        # where files get their names only when they are complete
+        folders = ("plan", "report", "series", "patches")
+        candidates = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in folders))
+        for path in chain(*candidates):
+            if is_half_written(path.name) and path.is_file():
+                path.unlink()
+        try:
+            with writing_progress(folder.path, notify) as progress:
+                session = Session(
+                    workspace,
+                    folder,
+                    workers=workers,
+                    engine=engine,
+                    accept_versions=accept_versions,
+                    reuse=reuse,
+                    notify=progress.notify,
+                )
+                yield session
+                progress.problem = session.problem
+        finally:
+            remove_anything_at(folder.scratch_folder)
