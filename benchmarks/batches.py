@@ -37,13 +37,13 @@ def choices(count: int) -> mutator.Choices:
 def ask(way: str, out: Path, count: int) -> dict[str, float]:
     """Run all experiments in one way. Return what is measured besides the CPU time."""
     if way == CAMPAIGN:
-        mutator.run("paper", out, choices=choices(count), engine="fork")
+        mutator.run("paper", out, choices=choices(count), engine="fork", reuse=False)
         return {}
     experiments = list(mutator.plan("paper", choices=choices(count)).experiments)
     if way.endswith("shuffled"):
         random.Random(1).shuffle(experiments)
     size, waiting_mb, asked_s, run_s = SIZES[way], 0.0, 0.0, 0.0
-    with mutator.open_bench(None, out, campaign="paper", seed=experiments[0].seed) as bench:
+    with mutator.open_bench(None, out, campaign="paper", seed=experiments[0].seed, reuse=False) as bench:
         for begin in range(0, count, size):
             bench.run(experiments[begin : begin + size])
             if begin % 50 == 0:

@@ -22,6 +22,7 @@ WORKERS = (1, 2)
 
 def run(campaign: str, workers: int, out: Path, more: Sequence[str]) -> dict[str, float]:
     command = [sys.executable, "-m", "mutator", "run", campaign, "--out", str(out), "-n", str(workers)]
+    command.append("--no-reuse")
     before, began = _cpu(), time.monotonic()
     subprocess.run([*command, *more], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     return {"wall_s": time.monotonic() - began, "cpu_s": _cpu() - before}

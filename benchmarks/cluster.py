@@ -73,7 +73,7 @@ def overhead(campaign: str, rounds: int) -> None:
         for number in range(rounds + 1):  # the first fills the caches
             for name in options if number % 2 == 0 else reversed(options):
                 command = [sys.executable, "-m", "mutator", "run", campaign, "--out", f"{place}/run"]
-                command += ["--no-stills", *options[name]]
+                command += ["--no-stills", "--no-reuse", *options[name]]
                 used = cpu_s(command, env)
                 shutil.rmtree(f"{place}/run")
                 if number:

@@ -55,7 +55,7 @@ def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
     series.on(SeriesWriter, "append")
     patches.on(PatchWriter, "append")
     workspace = Workspace.find(root=ROOT)
-    summary = run_campaign(workspace, campaign, out, choices=Choices(limit=count))
+    summary = run_campaign(workspace, campaign, out, choices=Choices(limit=count), reuse=False)
     folder = RunFolder.open(out)
     cpu = [float(line["cpu_s"]) for line in folder.timings().values()]
     index = TimeSeriesFolder(out).index
