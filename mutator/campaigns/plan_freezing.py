@@ -33,6 +33,7 @@ from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
 from mutator.store.plain_contents_check import check_plain_contents
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RUN_SCHEMA, Provenance, RunHead
+from mutator.store.session_progress import PROGRESS_FILE
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import TargetFacts, channel_facts, hazard_facts, metric_facts
 from mutator.workspace import Workspace
@@ -81,6 +82,8 @@ def make_run_folder(out: Path) -> None:
         foreign_names = [
             name for name in names if name not in _FILES_OF_KILLED_FREEZE and not is_half_written(name)
         ]
+        if OWNER_LOCK_FILE in names:  # of a killed bench, which tells its progress before it plans
+            foreign_names = [name for name in foreign_names if name != PROGRESS_FILE]
         if names >= {OWNER_LOCK_FILE, CAMPAIGN_FILE}:  # of a killed bench, which checks before it plans
             foreign_names = [name for name in foreign_names if name != SCRATCH_FOLDER]
         if foreign_names:

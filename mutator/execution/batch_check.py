@@ -82,6 +82,12 @@ class BatchCheck:
                     expected=f"'{expected}', as in this bench",
                     remedy="build the experiment anew, or open another bench",
                 )
+        if not 0 <= experiment.seed < 2**63:
+            raise MutatorError(
+                f"{experiment.label}: seed {experiment.seed}",
+                argument="experiments",
+                expected="seeds from 0 to 2**63 - 1",
+            )
         for change in experiment.changes:
             if change not in self._manifest.args_by_change:
                 raise MutatorError(

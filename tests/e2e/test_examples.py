@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import mutator
+from mutator.campaigns.plan import build_plan
 from mutator.engines.engine_jobs import RunMode
 from mutator.execution.campaign_running import run_campaign
 from mutator.store.run_folder import RunFolder
@@ -64,6 +65,21 @@ def test_every_experiment_ends_well(run: Path) -> None:
 def test_only_a_contact_has_a_contact_speed(run: Path) -> None:
     contacts = [(row.get("contact_speed", ""), row.get("delta_v", "")) for row in rows(run)]
     assert all(bool(speed) == bool(delta_v) for speed, delta_v in contacts)
+
+
+def test_a_bench_tells_the_same_figures(run: Path, workspace: Workspace, tmp_path: Path) -> None:
+    """Asked in batches, two of them in flight, the campaign's experiments have the same rows."""
+    planned = build_plan(workspace, "first").experiments
+    with mutator.open_bench(workspace, tmp_path / "bench", campaign="first", workers=2) as bench:
+        for begin in range(0, len(planned), 10):
+            bench.submit(planned[begin : begin + 10])
+            if begin:
+                results = bench.results()
+                assert all(next(results).experiment_id for _ in range(10))
+    by_id = [{row["experiment_id"]: row for row in rows(folder)} for folder in (run, tmp_path / "bench")]
+    for row in (row for table in by_id for row in table.values()):
+        row.pop("seed", None)  # a campaign of one seed has no such column
+    assert by_id[0] == by_id[1]
 
 
 def test_nearly_all_experiments_are_forked(run: Path) -> None:

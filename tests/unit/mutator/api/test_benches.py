@@ -234,6 +234,7 @@ def test_an_experiment_must_fit_the_bench(toycar: Workspace, tmp_path: Path) -> 
             ),
             ([_changed(good, scenario_digest="0" * 64)], "scenario_digest"),
             ([_changed(good, setting=("lonely",))], "change 'lonely'"),
+            ([_changed(good, seed=-1)], "seed -1; expected seeds from 0"),
             ([_changed(good, fault=_changed(good.fault, reading="as_coded"))], "reading 'as_coded'"),
         ):
             with pytest.raises(MutatorError, match=expected):

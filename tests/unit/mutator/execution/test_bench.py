@@ -95,7 +95,7 @@ def test_a_kill_in_the_first_checks_leaves_a_folder_to_open(toycar: Workspace, t
             bench.run(longer(bench, 5))
 
     killed(command)
-    assert (tmp_path / "b" / "work").is_dir()
+    assert (tmp_path / "b" / "work").is_dir() and (tmp_path / "b" / "progress.json").is_file()
     with opened(toycar, tmp_path / "b") as bench:
         bench.run(longer(bench, 5))
     check_whole(tmp_path / "b", toycar, 1)
