@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable
+from contextlib import suppress
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -96,6 +97,25 @@ def package_versions(names: Iterable[str] | None = None) -> dict[str, str | None
     installed = _installed_packages()
     selected = installed if names is None else names
     return {name: installed.get(name, (None,))[0] for name in sorted(selected)}
+
+
+def versions_of_fixed_packages() -> dict[str, str | None]:
+    """Return the version of each installed package, without those installed as editable, whose code can
+    change while their version stays.
+    """
+    editable = {*_editable_packages()}
+    return {name: version for name, version in package_versions().items() if name not in editable}
+
+
+@lru_cache(maxsize=1)
+def _editable_packages() -> tuple[str, ...]:
+    names = []
+    for distribution in metadata.distributions():
+        text = distribution.read_text("direct_url.json")
+        with suppress(ValueError, AttributeError):  # damaged: as without the file
+            if text and json.loads(text).get("dir_info", {}).get("editable"):
+                names.append(canonicalize_name(distribution.metadata["Name"]))
+    return tuple(names)
 
 
 def required_packages() -> frozenset[str]:

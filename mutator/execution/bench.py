@@ -197,10 +197,11 @@ class Bench:
 
     def _stop_work(self) -> None:
         """End all workers. What has finished stays."""
-        self._crew.kill()
-        if self._session is not None:
-            self._read_records()
-        self._awaited.stop(self._has_final_record)
+        with delaying_interrupts():  # after half of it, the next call would wait for ever
+            self._crew.kill()
+            if self._session is not None:
+                self._read_records()
+            self._awaited.stop(self._has_final_record)
 
     def _resume(self) -> None:
         folder = RunFolder(self.path)

@@ -20,6 +20,7 @@ from queue import SimpleQueue
 
 from mutator.errors import MutatorError
 from mutator.execution.bench_messages import AssignedExperiments, BenchWorkerStart, WorkEnding
+from mutator.execution.suspended_workers import WorkerContinuer
 from mutator.execution.worker import python_command_dying_with
 from mutator.model import Experiment, Record
 
@@ -60,12 +61,14 @@ class BenchCrew:
         self._workers: list[_CrewWorker] = []
         self._board = _Board(on_record)
         self._started_count, self._is_stopped = 0, False
+        self._continuer: WorkerContinuer | None = None  # while there are workers
 
     def hand_out(self, batch: CrewBatch) -> None:
         """Give a batch to the workers, and return at once. MutatorError once the crew was stopped."""
         if self._is_stopped:
             raise _work_error(_CLOSED)
         self._remove_dead_workers()
+        self._continuer = self._continuer or WorkerContinuer(self._living_pids)
         piece_count = self._board.add(batch, self.size)
         while len(self._workers) < min(self.size, piece_count):
             self._workers.append(self._start_worker())
@@ -107,11 +110,19 @@ class BenchCrew:
     def _await_ends(self) -> None:
         for worker in self._workers:
             worker.has_ended.wait()
+        if self._continuer is not None:
+            self._continuer.end()
+            self._continuer = None
         workers, self._workers = self._workers, []
         self._board = _Board(self._on_record)
         for worker in workers:
             if worker.written:
                 self._on_written(worker.name, worker.written)
+
+    def _living_pids(self) -> list[int]:
+        """Return the process ids of the workers; the caller's other child processes are its own affair."""
+        processes = [worker.process for worker in list(self._workers)]
+        return [process.pid for process in processes if process is not None and process.returncode is None]
 
     def _start_worker(self) -> "_CrewWorker":
         start = self._start_of(self._started_count)
@@ -225,24 +236,30 @@ class _CrewWorker:
 
     def _work(self, start: BenchWorkerStart, board: _Board) -> None:
         try:
-            try:
-                connection = self._start_process(start)
-            except (OSError, MutatorError) as err:
-                board.fail(f"worker {self.name} could not begin: {err}")
-                return
-            with connection:
-                problem = self._receive_ending(connection, board)
-                self.is_ready.set()
-                while not problem and (piece := board.take(self)) is not None:
-                    with suppress(OSError):  # of a dead worker: receiving from it gives the reason
-                        connection.send(_assignment(self, piece))
-                    problem = self._receive_ending(connection, board)
-                if problem:
-                    board.fail(problem)
-                self._end_process(connection)
+            self._start_and_deal(start, board)
+        except Exception as err:  # whatever it is, the caller waits for this thread
+            self.kill()
+            board.fail(f"worker {self.name} failed: {type(err).__name__}: {err}")
         finally:
             self.is_ready.set()
             self.has_ended.set()
+
+    def _start_and_deal(self, start: BenchWorkerStart, board: _Board) -> None:
+        try:
+            connection = self._start_process(start)
+        except (OSError, MutatorError) as err:
+            board.fail(f"worker {self.name} could not begin: {err}")
+            return
+        with connection:
+            problem = self._receive_ending(connection, board)
+            self.is_ready.set()
+            while not problem and (piece := board.take(self)) is not None:
+                with suppress(OSError):  # of a dead worker: receiving from it gives the reason
+                    connection.send(_assignment(self, piece))
+                problem = self._receive_ending(connection, board)
+            if problem:
+                board.fail(problem)
+            self._end_process(connection)
 
     def _start_process(self, start: BenchWorkerStart) -> Connection:
         """Start a process that dies with this thread."""

@@ -1,20 +1,19 @@
 """The reuse of finished runs by a worker: it searches the store before a run, and notes what a run gave."""
 
+import builtins
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from mutator._common.hashing import digest
 from mutator.campaigns import run_environment
+from mutator.engines.process_endings import KILLED, LEFT
 from mutator.execution.experiment_runner import RecordedExperiment
-from mutator.execution.finished_run_keys import run_key
+from mutator.execution.finished_run_keys import harness_digest, run_key
 from mutator.model import Experiment, Record, RunError, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.store.finished_run_store import FinishedRun, FinishedRuns, UnprovedRuns
 from mutator.store.preflight_results import packages_loaded_by_golden_runs
 from mutator.store.run_folder import RunFolder
-
-# a run with another limit of memory or disk space could go on
-_ERRORS_BY_LIMITS = ("MemoryError", "OSError")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,11 +21,13 @@ class ReuseAssignment:
     """How a worker uses the store.
 
     * `surroundings`: the digest of what all runs of its session have in common
+    * `harness`: the digest of the harness's code in it. A worker with other code leaves the store alone.
     * `searches`: whether it takes runs from the store; if not, it only notes runs
-    * `version_by_package`: all installed packages
+    * `version_by_package`: all installed packages whose version tells what their code is
     """
 
     surroundings: str
+    harness: str
     searches: bool
     version_by_package: Mapping[str, str | None]
 
@@ -41,7 +42,10 @@ class RunReuse:
         worker_name: str,
         golden_digest_of: Callable[[Experiment], str],
     ) -> None:
-        self._surroundings, self._searches = assignment.surroundings, assignment.searches
+        self._surroundings = assignment.surroundings
+        # a worker of a bench can begin long after its session, when somebody has edited the harness
+        self._is_in_use = harness_digest() == assignment.harness
+        self._searches = assignment.searches and self._is_in_use
         self._version_by_package = assignment.version_by_package
         self._with_series = bool(folder.series_budget_mb)
         self._golden_digest_of = golden_digest_of
@@ -70,12 +74,15 @@ class RunReuse:
     def note(self, finished: RecordedExperiment) -> None:
         """Note what a run gave, for the store."""
         mutant, record = finished.mutant, finished.record
-        if mutant is None or finished.is_reused or not is_storable(record):
+        if not self._is_in_use or mutant is None or finished.is_reused or not is_storable(record):
             return
+        packages = self._packages_of(finished.third_party_modules, mutant)
+        if not packages <= self._version_by_package.keys():
+            return  # it loaded code that can change
         series = finished.series.faulty_bytes if finished.series else None
         run = FinishedRun(
             record=record,
-            packages=self._versions_of(self._packages_of(finished.third_party_modules, mutant)),
+            packages=self._versions_of(packages),
             surroundings=self._surroundings,
             faulty_series=series,
         )
@@ -105,11 +112,19 @@ class RunReuse:
 
 
 def is_storable(record: Record) -> bool:
-    """Whether a record is the same with other limits: it was not cut off, and the harness did not fail."""
+    """Whether a record is the same with other limits, and inside or outside of the sandbox: it was not cut
+    off, and the harness did not fail.
+    """
     if record.status in (Status.TIMEOUT, Status.HARNESS_ERROR) or not record.tree:
         return False
-    return not _is_by_limits(record.error)
+    # native code that gets no memory can end the process
+    return not _is_by_limits(record.error) and not record.detail.startswith((KILLED, LEFT))
 
 
 def _is_by_limits(error: RunError | None) -> bool:
-    return error is not None and error.kind.endswith(_ERRORS_BY_LIMITS)
+    """Whether a run with another limit of memory or disk space, or with another sandbox, could go on."""
+    if error is None:
+        return False
+    kind = getattr(builtins, error.kind, None)
+    is_of_system = isinstance(kind, type) and issubclass(kind, OSError)
+    return is_of_system or error.kind.endswith(("MemoryError", "OSError"))

@@ -8,7 +8,7 @@ from functools import cached_property
 from mutator.campaigns import run_environment
 from mutator.engines.engine_jobs import RunMode
 from mutator.engines.engine_kinds import REFERENCE
-from mutator.execution.finished_run_keys import run_key, surroundings_digest
+from mutator.execution.finished_run_keys import harness_digest, run_key, surroundings_digest
 from mutator.execution.run_reuse import ReuseAssignment, is_storable
 from mutator.model import Experiment, Record, Status
 from mutator.store.finished_run_store import FinishedRun, FinishedRuns, UnprovedRuns, store_finished_runs
@@ -41,8 +41,9 @@ class SessionReuse:
     def assignment(self) -> ReuseAssignment:
         return ReuseAssignment(
             surroundings=surroundings_digest(self._workspace, self._manifest),
+            harness=harness_digest(),
             searches=self.searches,
-            version_by_package=run_environment.package_versions(),
+            version_by_package=run_environment.versions_of_fixed_packages(),
         )
 
     def store_proved_runs(self, folder: RunFolder, records: Mapping[str, Record]) -> None:

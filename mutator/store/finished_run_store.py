@@ -39,7 +39,16 @@ _ROW_BYTES = _KEY_BYTES + _OFFSET_BYTES + _LENGTH_BYTES  # of an index: key, and
 _MOST_RUN_BYTES, _MOST_INDEX_BYTES = 64_000_000, 1_000_000_000  # a forged file can claim any size
 _MOST_SEGMENT_BYTES = 200_000_000  # pruning deletes whole segments
 _COMPRESSION_LEVEL = 1  # series are compressed already, and a record is short
-_UNREADABLE = (OSError, MutatorError, ValueError, LookupError, TypeError, AttributeError, RecursionError)
+_UNREADABLE = (
+    OSError,
+    MutatorError,
+    ValueError,
+    ArithmeticError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    RecursionError,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,11 +126,9 @@ class FinishedRuns:
         with suppress(OSError):
             stamp = self._folder.stat().st_mtime_ns
             if stamp != self._folder_stamp:
-                names = {path.name for path in self._folder.glob(f"*{SEGMENT_SUFFIX}")}
-                unchanged = {name: self._segments[name] for name in names & self._segments.keys()}
-                new = {
-                    name: _open_segment(path_below(self._folder, name)) for name in names - unchanged.keys()
-                }
+                paths = {path.name: path for path in self._folder.glob(f"*{SEGMENT_SUFFIX}")}
+                unchanged = {name: self._segments[name] for name in paths.keys() & self._segments.keys()}
+                new = {name: _open_segment(paths[name]) for name in paths.keys() - unchanged.keys()}
                 self._segments, self._folder_stamp = unchanged | new, stamp
         yield from (segment for segment in self._segments.values() if segment is not None)
 

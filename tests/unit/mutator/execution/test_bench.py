@@ -18,6 +18,9 @@ import mutator
 from mutator import Bench, Experiment, MutatorError
 from mutator.audit.run_audit import run_audit_checks
 from mutator.campaigns import plan_growth
+from mutator.execution import suspended_workers
+from mutator.execution.bench_crew import BenchCrew
+from mutator.model import Status
 from mutator.preflight.bench_checks import BenchChecks
 from mutator.preflight.preflight_check_runner import CheckRunner
 from mutator.serve.run_states import RUNNING, state_of_run
@@ -302,6 +305,7 @@ def test_what_was_in_flight_is_pending_after_a_failure(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_interrupted: bool
 ) -> None:
     """A worker that dies and Ctrl-C end all batches in flight; what is pending can be submitted again."""
+    monkeypatch.setattr(suspended_workers, "_CHECK_INTERVAL_S", 600.0)  # it stays stopped
     with opened(toycar, tmp_path / "b") as bench:
         bench.run(longer(bench, 5))
         [worker] = bench._opened._crew._workers
@@ -319,6 +323,46 @@ def test_what_was_in_flight_is_pending_after_a_failure(
         bench.submit(bench.pending)
         assert len(list(bench.results())) == 2
     check_whole(tmp_path / "b", toycar, 3)
+
+
+def test_a_stopped_worker_goes_on(toycar: Workspace, tmp_path: Path) -> None:
+    """A mutant can stop its worker: the bench does not wait for ever, and what ran is asked for again."""
+    with opened(toycar, tmp_path / "b") as bench:
+        bench.run(longer(bench, 5))
+        [worker] = bench._opened._crew._workers
+        os.kill(worker.process.pid, signal.SIGSTOP)  # type: ignore[union-attr]
+        end = threading.Timer(60.0, worker.kill)  # of a test that fails
+        end.start()
+        [record] = bench.run(longer(bench, 40))
+        end.cancel()
+        assert (record.status, record.detail) == (
+            Status.HARNESS_ERROR,
+            "its worker was stopped while it ran",
+        )
+        assert [record.status for record in bench.run(longer(bench, 40))] == [Status.OK]
+    check_whole(tmp_path / "b", toycar, 2)
+
+
+def test_a_second_interruption_leaves_the_bench_usable(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C while the first one ends the workers comes after that, and nothing stays in flight."""
+    with opened(toycar, tmp_path / "b") as bench:
+        bench.run(longer(bench, 5))
+        crew = bench._opened._crew
+
+        def kill_interrupted() -> None:
+            os.kill(os.getpid(), signal.SIGINT)
+            BenchCrew.kill(crew)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(crew, "receive", lambda: os.kill(os.getpid(), signal.SIGINT))
+            patch.setattr(crew, "kill", kill_interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                bench.run(longer(bench, 40))
+        assert not bench._opened._awaited.running and not crew._workers
+        assert len(bench.run(longer(bench, 40))) == 1
+    check_whole(tmp_path / "b", toycar, 2)
 
 
 def test_watchers_see_how_far_an_open_bench_is(toycar: Workspace, tmp_path: Path) -> None:

@@ -5,7 +5,14 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
-from mutator.execution.bench_crew import CrewBatch, _assignment, _cut_into_pieces, _Piece, _pop_piece_for
+from mutator.execution.bench_crew import (
+    BenchCrew,
+    CrewBatch,
+    _assignment,
+    _cut_into_pieces,
+    _Piece,
+    _pop_piece_for,
+)
 from mutator.model import Experiment
 
 
@@ -53,3 +60,12 @@ def test_a_worker_is_told_only_what_is_new(experiment: Callable[..., Experiment]
     assert (sent[0].golden_digests, sent[0].scenario_files) == ({"A@1": "d"}, {"A": Path("A.yaml")})
     assert not sent[1].golden_digests and not sent[1].scenario_files
     assert sent[1].experiments == tuple(piece.runs[0])
+
+
+def test_whoever_waits_for_a_worker_hears_of_every_failure(experiment: Callable[..., Experiment]) -> None:
+    """An error that nobody expected, here of what is sent to the worker, ends the work like any other."""
+    unsendable = SimpleNamespace(assignment=SimpleNamespace(worker_name="w1"), value=lambda: None)
+    crew = BenchCrew(1, lambda number: cast(Any, unsendable), lambda name, written: None)
+    crew.hand_out(CrewBatch(runs=runs_in(experiment, "A"), golden_digests={}, scenario_files={}))
+    assert "worker w1 failed" in str(crew._board.arrived.get(timeout=60))
+    crew.close()

@@ -186,6 +186,27 @@ def test_a_run_that_loaded_a_package_needs_its_version(
     assert ran(toycar, tmp_path / "third", accept_versions=True).reused == 0
 
 
+def test_a_run_that_loaded_an_editable_package_is_not_stored(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The package's code can change while its version stays."""
+    monkeypatch.setattr(run_reuse, "packages_loaded_by_golden_runs", lambda folder: ("pytest",))
+    monkeypatch.setattr(run_environment, "_editable_packages", lambda: ("pytest",))
+    ran(toycar, tmp_path / "first")
+    assert not FinishedRuns().has_any()
+
+
+def test_a_worker_with_other_code_leaves_the_store_alone(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Somebody can edit the harness after a session has begun, and before a worker does."""
+    ran(toycar, tmp_path / "first")
+    stored = {path.name for path in finished_runs_folder().glob("*.runs")}
+    monkeypatch.setattr(run_reuse, "harness_digest", lambda: "edited")
+    assert ran(toycar, tmp_path / "second").reused == 0
+    assert {path.name for path in finished_runs_folder().glob("*.runs")} == stored
+
+
 def stored_surroundings(*arguments: object) -> str:
     (segment, *_) = FinishedRuns()._current_segments()
     (run, *_) = segment.runs_with_key(segment._row_key(0).hex())
@@ -333,6 +354,7 @@ def test_a_bench_and_a_campaign_share_runs(toycar: Workspace, tmp_path: Path) ->
         (Status.CRASHED, "MemoryError", False),
         (Status.CRASHED, "numpy._core._exceptions._ArrayMemoryError", False),
         (Status.CRASHED, "OSError", False),
+        (Status.CRASHED, "PermissionError", False),
         (Status.TIMEOUT, "", False),
         (Status.HARNESS_ERROR, "", False),
     ],
@@ -343,3 +365,12 @@ def test_runs_that_limits_cut_off_are_not_stored(
     error = RunError(kind=kind, message="", place="") if kind else None
     ended = dataclasses.replace(record(), status=status, error=error, tree="1" * 64)
     assert is_storable(ended) is expected
+
+
+@pytest.mark.parametrize("detail", ["killed by SIGABRT", "left with status 1 without a report"])
+def test_runs_that_ended_without_an_exception_are_not_stored(
+    record: Callable[..., Record], detail: str
+) -> None:
+    """Native code that gets no memory ends so, and would go on with a higher limit."""
+    ended = dataclasses.replace(record(), status=Status.CRASHED, detail=detail, tree="1" * 64)
+    assert not is_storable(ended)

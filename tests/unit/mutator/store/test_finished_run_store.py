@@ -111,7 +111,7 @@ def test_damage_is_never_believed() -> None:
     assert lost > 100
 
 
-@pytest.mark.parametrize("kind", ["folder", "pipe", "link", "empty"])
+@pytest.mark.parametrize("kind", ["folder", "pipe", "link", "empty", "name"])
 def test_what_is_no_segment_is_ignored(kind: str, tmp_path: Path) -> None:
     store_finished_runs(runs_by_key(range(2)).items())
     path = finished_runs_folder() / "x.runs"
@@ -121,6 +121,8 @@ def test_what_is_no_segment_is_ignored(kind: str, tmp_path: Path) -> None:
         os.mkfifo(path)
     elif kind == "link":
         path.symlink_to(tmp_path / "nowhere")
+    elif kind == "name":
+        (path.parent / "x\n.runs").touch()
     else:
         path.touch()
     assert {key: find(key) for key in runs_by_key(range(2))} == runs_by_key(range(2))
