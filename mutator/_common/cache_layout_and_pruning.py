@@ -187,9 +187,15 @@ def _build_entry(what: str, path: Path) -> CacheEntry:
         path=path,
         # st_blocks counts units of 512 bytes; a sparse file takes less space than its size
         size=sum(state.st_blocks * 512 for state in states),
-        # the later of both, because many systems update the time of access once a day at most
-        used=max((max(state.st_atime, state.st_mtime) for state in states), default=0.0),
+        used=max((_last_use(what, state) for state in states), default=0.0),
     )
+
+
+def _last_use(what: str, state: os.stat_result) -> float:
+    if what == FINISHED_RUNS_CACHE:  # a search reads every file, and marks the one that it uses
+        return state.st_mtime
+    # the later of both, because many systems update the time of access once a day at most
+    return max(state.st_atime, state.st_mtime)
 
 
 def _file_states(paths: Iterable[Path]) -> Iterator[os.stat_result]:
