@@ -20,7 +20,10 @@ from mutator.errors import MutatorError, UnsafePath
 from mutator.model import Limits, Status
 from mutator.targets.process_environment import FIXED_VARIABLES, INHERITED_VARIABLES
 
-KILLED, LEFT = "killed by ", "left with status "  # how details of crashes without an exception begin
+KILLED_DETAIL, EXITED_DETAIL = (
+    "killed by ",
+    "left with status ",
+)  # how details of crashes without an exception begin
 GUARD_LOST = "lost"  # no process is left to report the ending
 GUARD_PATIENCE_S = 60.0  # time for the guard's report, after a run's wall limit
 _GUARD_END_TIMEOUT_S = 10.0  # to kill what the run left behind
@@ -77,8 +80,8 @@ def status_of_ending(
     if report is not None:
         return _status_of_report(limits, report, job)
     if ending.code < 0:
-        return Status.CRASHED, f"{KILLED}{signal.Signals(-ending.code).name}"
-    return Status.CRASHED, f"{LEFT}{ending.code} without a report"
+        return Status.CRASHED, f"{KILLED_DETAIL}{signal.Signals(-ending.code).name}"
+    return Status.CRASHED, f"{EXITED_DETAIL}{ending.code} without a report"
 
 
 def _find_status_if_stopped(limits: Limits, ending: ProcessEnding) -> tuple[Status, str] | None:

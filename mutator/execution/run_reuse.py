@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mutator._common.hashing import digest
 from mutator.campaigns import run_environment
-from mutator.engines.process_endings import KILLED, LEFT
+from mutator.engines.process_endings import EXITED_DETAIL, KILLED_DETAIL
 from mutator.execution.experiment_runner import RecordedExperiment
 from mutator.execution.finished_run_keys import harness_digest, run_key
 from mutator.model import Experiment, Record, RunError, Status
@@ -118,7 +118,7 @@ def is_storable(record: Record) -> bool:
     if record.status in (Status.TIMEOUT, Status.HARNESS_ERROR) or not record.tree:
         return False
     # native code that gets no memory can end the process
-    return not _is_by_limits(record.error) and not record.detail.startswith((KILLED, LEFT))
+    return not _is_by_limits(record.error) and not record.detail.startswith((EXITED_DETAIL, KILLED_DETAIL))
 
 
 def _is_by_limits(error: RunError | None) -> bool:
