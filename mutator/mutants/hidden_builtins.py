@@ -7,7 +7,7 @@ or do something else as soon as the fault is active.
 import ast
 import builtins
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 
 from jinja2 import Environment, nodes
@@ -32,7 +32,7 @@ def check_calls_builtins(file: ParsedFile, line: int, model: FaultModel, code: s
         name for name in _called_by_templates(model.template, model.expression_template or "") if name in code
     }
     called = names & _called_names(code) if names else names
-    if called and (hidden := called.intersection(_names_bound_around(file, line))):
+    if hidden := called & hidden_builtins_at(file, line):
         name = min(hidden)
         raise MutatorError(
             f"the injected code calls Python's `{name}`, but the file has another `{name}` here",
@@ -78,34 +78,32 @@ def _always_called(parts: Sequence[nodes.Node]) -> set[str]:
     return names
 
 
-class HiddenBuiltins:
-    """Says of which built-in functions a file has other ones of the same name around a line."""
-
-    def __init__(self, file: ParsedFile) -> None:
-        self._file = file
-        everywhere = {*names_of_module(file.data), *_names_bound_in(file.syntax_tree)}
-        self._bound_somewhere = everywhere & _BUILTIN_FUNCTIONS
-
-    def hides_any_at(self, names: frozenset[str], line: int) -> bool:
-        """Whether one of `names`, in injected code at a line (from 0), would not be the built-in function."""
-        names &= self._bound_somewhere
-        return bool(names) and not names.isdisjoint(_names_bound_around(self._file, line))
+def hidden_builtins_at(file: ParsedFile, line: int) -> frozenset[str]:
+    """Return the built-in functions for which a file has others of the same name around a line (from 0)."""
+    return _hidden_in_module(file.data).union(
+        *(names for lines, names in _hidden_in_functions(file.syntax_tree) if line in lines)
+    )
 
 
-def _names_bound_around(file: ParsedFile, line: int) -> Iterator[str]:
-    """Yield the names that the module and the functions around a line bind."""
-    yield from names_of_module(file.data)
-    for node in ast.walk(file.syntax_tree):
-        match node:
-            case ast.FunctionDef() | ast.AsyncFunctionDef() if _spans_line(node, line + 1):
-                yield from (name for part in (node.args, *node.body) for name in _names_bound_in(part))
+# both are asked for each place of a file, and for each of its mutants
+@lru_cache(maxsize=16)
+def _hidden_in_module(data: bytes) -> frozenset[str]:
+    return names_of_module(data) & _BUILTIN_FUNCTIONS
 
 
-def _spans_line(node: ast.stmt, line: int) -> bool:
-    return node.lineno <= line <= (node.end_lineno or 0)
+@lru_cache(maxsize=16)
+def _hidden_in_functions(tree: ast.Module) -> tuple[tuple[range, frozenset[str]], ...]:
+    """Return the lines (from 0) of each function that binds names of built-in functions, with these names."""
+    return tuple(
+        (range(node.lineno - 1, node.end_lineno or 0), names)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and (names := _BUILTIN_FUNCTIONS & _names_bound_in_function(node))
+    )
 
 
-def _names_bound_in(part: ast.AST) -> Iterator[str]:
-    """Yield the names that a part binds, possibly in a function or class inside it, and parameters."""
-    yield from bound_names(part)
-    yield from (node.arg for node in ast.walk(part) if isinstance(node, ast.arg))
+def _names_bound_in_function(function: ast.FunctionDef | ast.AsyncFunctionDef) -> frozenset[str]:
+    """Return the names that a function binds, possibly in a function or class inside it, and parameters."""
+    parts = (function.args, *function.body)
+    parameters = (node.arg for part in parts for node in ast.walk(part) if isinstance(node, ast.arg))
+    return frozenset(parameters).union(*map(bound_names, parts))

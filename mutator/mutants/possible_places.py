@@ -10,7 +10,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind, TemplateNeed
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.changeable_expressions import NO_TEMPLATE_PARTS, Expression, template_parts
-from mutator.mutants.hidden_builtins import HiddenBuiltins, builtins_always_called
+from mutator.mutants.hidden_builtins import builtins_always_called, hidden_builtins_at
 from mutator.mutants.parsed_files_and_anchors import (
     ParsedFile,
     ResolvedAnchor,
@@ -63,7 +63,6 @@ class _PlaceLister:
     def __init__(self, file: ParsedFile, models: Sequence[FaultModel]) -> None:
         self.file = file
         self.models = models
-        self.hidden_builtins = HiddenBuiltins(file)
 
     def places_in_function(self, name: str) -> Iterator[ListedPlace]:
         functions = self.file.functions_by_name[name]
@@ -156,7 +155,7 @@ class _PlaceLister:
 
     def meets_hidden_builtin(self, template: str, line: int) -> bool:
         """Whether the template calls a built-in function that the file hides at a line (from 0)."""
-        return self.hidden_builtins.hides_any_at(builtins_always_called(template), line)
+        return not builtins_always_called(template).isdisjoint(hidden_builtins_at(self.file, line))
 
     def location_at(self, function: str, anchor: Anchor) -> FaultLocation:
         return FaultLocation(path=self.file.path, function=function, anchor=anchor)

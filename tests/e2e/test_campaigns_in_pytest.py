@@ -95,7 +95,9 @@ def test_loadfile_distributes_chunks_over_all_workers(tmp_path: Path, given: str
     registered: list[object] = []
     manager = SimpleNamespace(get_plugins=lambda: (), register=registered.append)
     config: Any = SimpleNamespace(option=SimpleNamespace(dist=given), pluginmanager=manager)
-    register_controller(config, "small", tmp_path, reviewed=False, accept_versions=False, sandbox=False)
+    register_controller(
+        config, "small", tmp_path, reviewed=False, accept_versions=False, sandbox=False, reuse=True
+    )
     assert config.option.dist == used
     assert len(registered) == 1
 
@@ -119,6 +121,7 @@ def test_collecting_50000_experiments_is_fast(toy: Workspace, tmp_path: Path) ->
         proof=(),
         engine="reference",
         golden_digests={},
+        reuse=None,
         secret=b"",
         written=WrittenFiles(),
         new_worker_name=lambda name: name,

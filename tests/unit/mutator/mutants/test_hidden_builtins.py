@@ -6,9 +6,11 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection, Value
+from mutator.mutants import hidden_builtins
 from mutator.mutants.hidden_builtins import builtins_always_called
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.parsed_files_and_anchors import parse_file
+from mutator.mutants.possible_places import places_of
 from mutator.workspace import Workspace
 
 MODELS = Workspace.find(root=Path(__file__).parents[4]).fault_models()
@@ -52,6 +54,17 @@ def test_a_variable_with_the_name_of_a_called_function_is_refused(source: str) -
 )
 def test_a_name_that_is_the_built_in_function_at_the_place_is_none(source: str) -> None:
     edit(source, "offset", OFFSET)
+
+
+def test_a_file_is_searched_once_for_all_its_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Listing the places of a file with thousands of lines costs seconds, not minutes."""
+    searched: list[object] = []
+    monkeypatch.setattr(
+        hidden_builtins, "names_of_module", lambda data: searched.append(data) or frozenset[str]()
+    )
+    source = "".join(f"def searched_{i}(a, max):\n    x = a\n    return x\n" for i in range(50))
+    places = places_of(parse_file("m.py", source.encode(), Path("root")), MODELS)
+    assert len(places) > 200 and len(searched) == 1
 
 
 def test_an_offset_without_bounds_calls_no_function() -> None:
