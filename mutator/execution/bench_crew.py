@@ -69,8 +69,9 @@ class BenchCrew:
             raise _work_error(_CLOSED)
         self._remove_dead_workers()
         self._continuer = self._continuer or WorkerContinuer(self._living_pids)
-        piece_count = self._board.add(batch, self.size)
-        while len(self._workers) < min(self.size, piece_count):
+        starting_count = sum(not worker.is_ready.is_set() for worker in self._workers)
+        new_count = self._board.add(batch, self.size) - starting_count
+        for _ in range(min(new_count, self.size - len(self._workers))):
             self._workers.append(self._start_worker())
 
     def receive(self) -> Record:
@@ -165,12 +166,12 @@ class _Board:
         self._changed = threading.Condition()
 
     def add(self, batch: CrewBatch, worker_count: int) -> int:
-        """Add a batch; return the number of waiting pieces."""
+        """Add a batch; return how many waiting pieces are too many for the idle workers."""
         pieces = [_Piece(runs, batch) for runs in _cut_into_pieces(batch.runs, worker_count)]
         with self._changed:
             self._waiting_batches.append(pieces)
             self._changed.notify_all()
-            return sum(map(len, self._waiting_batches))
+            return sum(map(len, self._waiting_batches)) - len(self._idle_workers)
 
     def take(self, worker: "_CrewWorker") -> _Piece | None:
         """Wait for a piece of the oldest batch; None if the worker has nothing more to do."""

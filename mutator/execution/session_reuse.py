@@ -2,10 +2,10 @@
 proof.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 
-from mutator.campaigns import run_environment
+from mutator.campaigns import run_environment, shared_runs
 from mutator.engines.engine_jobs import RunMode
 from mutator.engines.engine_kinds import REFERENCE
 from mutator.execution.finished_run_keys import harness_digest, run_key, surroundings_digest
@@ -64,9 +64,17 @@ class SessionReuse:
             record = records.get(name)
             is_wrong = record not in (None, proof_record) and proof_record.status is not Status.HARNESS_ERROR
             if record and is_wrong and timings.get(name, {}).get("engine") == RunMode.REUSED.value:
-                golden_digest = _golden_digest_of(folder, planned[name], golden_digest_by_key)
-                surroundings = self.assignment.surroundings
-                FinishedRuns().forget(run_key(surroundings, planned[name], record.tree, golden_digest))
+                for experiment in self._experiments_sharing_run_with(planned[name], planned.values()):
+                    golden_digest = _golden_digest_of(folder, experiment, golden_digest_by_key)
+                    surroundings = self.assignment.surroundings
+                    FinishedRuns().forget(run_key(surroundings, experiment, record.tree, golden_digest))
+
+    def _experiments_sharing_run_with(
+        self, experiment: Experiment, planned: Iterable[Experiment]
+    ) -> list[Experiment]:
+        """Return the experiments of the same run: any of them can have searched the store for all."""
+        key = shared_runs.run_key(self._manifest, experiment)
+        return [other for other in planned if shared_runs.run_key(self._manifest, other) == key]
 
 
 def count_reused(folder: RunFolder, worker_prefix: str) -> int:

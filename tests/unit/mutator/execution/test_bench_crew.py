@@ -9,6 +9,7 @@ from mutator.execution.bench_crew import (
     BenchCrew,
     CrewBatch,
     _assignment,
+    _Board,
     _cut_into_pieces,
     _Piece,
     _pop_piece_for,
@@ -69,3 +70,14 @@ def test_whoever_waits_for_a_worker_hears_of_every_failure(experiment: Callable[
     crew.hand_out(CrewBatch(runs=runs_in(experiment, "A"), golden_digests={}, scenario_files={}))
     assert "worker w1 failed" in str(crew._board.arrived.get(timeout=60))
     crew.close()
+
+
+def test_work_beyond_the_idle_workers_needs_new_ones(experiment: Callable[..., Experiment]) -> None:
+    """A worker that is busy takes nothing that is added, so a second small batch gets a second worker."""
+    board = _Board(lambda record: None)
+    batch = CrewBatch(runs=runs_in(experiment, "A"), golden_digests={}, scenario_files={})
+    board._idle_workers.append(worker())
+    assert board.add(batch, 2) == 0
+    board._idle_workers.clear()
+    board._waiting_batches.clear()  # the worker has taken the piece
+    assert board.add(batch, 2) == 1
