@@ -172,7 +172,7 @@ class Bench:
         batch = self._batch_check.check(experiments)
         experiment_by_id = {experiment.id: experiment for experiment in batch}
         self._plan_new([e for name, e in experiment_by_id.items() if name not in self._plan.ids], reason)
-        self._obtain_records(list(experiment_by_id.values()))
+        self._hand_out_missing(list(experiment_by_id.values()))
         return batch
 
     def _next_result(self) -> str | None:
@@ -285,10 +285,8 @@ class Bench:
         self._session.note_growth(RunFolder(self.path))
         self._progress.note_planned(self.experiment_count)
 
-    def _obtain_records(self, experiments: Sequence[Experiment]) -> None:
-        """Let each planned experiment without a record get one. This is the one place where records come
-        from.
-        """
+    def _hand_out_missing(self, experiments: Sequence[Experiment]) -> None:
+        """Give the crew the planned experiments that have no record and do not run yet."""
         missing = [
             experiment
             for experiment in experiments

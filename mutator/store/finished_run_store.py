@@ -48,6 +48,7 @@ _UNREADABLE = (
     TypeError,
     AttributeError,
     RecursionError,
+    zlib.error,
 )
 
 
@@ -164,7 +165,7 @@ class _Segment:
                     block = parse_block(file.read(min(length, _MOST_RUN_BYTES)))
                 if block is not None and (block.kind, block.key) == (_RUN_BLOCK, key):
                     yield FinishedRun.from_bytes(block.data)
-            except (*_UNREADABLE, zlib.error):
+            except _UNREADABLE:
                 continue  # damaged, or pruned meanwhile
 
     def mark_as_used(self) -> None:
@@ -265,7 +266,7 @@ class UnprovedRuns:
                 try:
                     for block in intact_blocks(path):
                         yield block.key, FinishedRun.from_bytes(block.data)
-                except (*_UNREADABLE, zlib.error):
+                except _UNREADABLE:
                     continue
 
     def delete(self) -> None:

@@ -284,6 +284,13 @@ def _write_overlays(folder: Path, detector: str, results: list[DetectionResult])
             path.write_bytes(cv2.imencode(".png", draw_overlay(finding))[1])
 
 
+def positive_number(text: str) -> int:
+    """Return a count that a command line gives; ArgumentTypeError if it is none."""
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of 1 or more")
+    return int(text)
+
+
 def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="selfdrive.visiond_lab.evaluate_on_real_frames",

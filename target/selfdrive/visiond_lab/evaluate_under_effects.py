@@ -31,6 +31,7 @@ from selfdrive.visiond_lab.evaluate_on_real_frames import (
     build_lane_detector,
     detect_lines,
     load_labelled_frames,
+    positive_number,
 )
 
 SEED_COUNT = 20  # drawings of each effect and level
@@ -155,7 +156,9 @@ def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--effect", action="append", choices=names, help="only these effects; can be given several times"
     )
-    parser.add_argument("--seeds", type=int, default=SEED_COUNT, help="pictures of each frame and level")
+    parser.add_argument(
+        "--seeds", type=positive_number, default=SEED_COUNT, help="pictures of each frame and level"
+    )
     parser.add_argument("--csv", type=Path, metavar="FILE", help="write the counts here")
     parser.add_argument("--strips", type=Path, metavar="DIR", help="write pictures of all levels instead")
     return parser.parse_args(arguments)

@@ -35,6 +35,7 @@ from selfdrive.visiond_lab.evaluate_on_real_frames import (
     PAPER,
     ROBUST,
     load_labelled_frames,
+    positive_number,
 )
 from selfdrive.visiond_lab.judged_frames import (
     MIN_SEEN_SHARE,
@@ -42,8 +43,8 @@ from selfdrive.visiond_lab.judged_frames import (
     JudgedFrame,
     affect_frame,
     judged_real_frame,
+    measure_seen_shares_behind_effect,
     render_frames,
-    seen_shares_behind,
 )
 
 MIN_CONFIDENT = 0.5  # probability of a line that a detector is confident of
@@ -82,13 +83,13 @@ def judge(
     """Judge each frame clean, and with `seeds` drawings of the levels of the effects whose turn it is."""
     for number, frame in enumerate(frames):
         built = {name: BUILDERS[name](frame.model) for name in detectors}
-        clean_shares = frame.seen_shares(frame.picture, frame.without_lines)
+        clean_shares = frame.measure_seen_shares(frame.picture, frame.without_lines)
         yield from _judge_picture(built, frame, frame.picture, clean_shares, (CLEAN, 0))
         for kind in kinds[number % turns :: turns]:
             for level, k in product(judged_levels(kind), range(seeds)):
                 amount, seed = AMOUNTS_BY_EFFECT[kind][level - 1], 1 + number * seeds + k
                 picture = affect_frame(frame, kind, amount, seed)
-                shares = seen_shares_behind(frame, kind, amount, seed)
+                shares = measure_seen_shares_behind_effect(frame, kind, amount, seed)
                 yield from _judge_picture(built, frame, picture, shares, (kind.__name__, level))
 
 
@@ -196,7 +197,7 @@ def _print(verdicts: Sequence[Verdicts], lines: int) -> None:
         )
     for name in sorted({v.detector for v in verdicts}):
         of_detector = [v for v in verdicts if v.detector == name and v.seen_count]
-        wrong = max(v.wrong_count / v.seen_count for v in of_detector)
+        wrong = max((v.wrong_count / v.seen_count for v in of_detector), default=0.0)
         gain = largest_gain(of_detector)
         print(f"{name}: at most {wrong:.1%} wrong; against the order of levels by {gain:.1%}")
 
@@ -227,11 +228,11 @@ def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
         description="Judge the lines that detectors find behind image effects.",
     )
     parser.add_argument("--frames", type=Path, nargs=2, metavar=("FRAMES", "TRUTH"), help="judge real frames")
-    parser.add_argument("--roads", type=int, default=JUDGED_ROADS, help="rendered roads to judge")
+    parser.add_argument("--roads", type=positive_number, default=JUDGED_ROADS, help="rendered roads to judge")
     names = [kind.__name__ for kind in AMOUNTS_BY_EFFECT]
     parser.add_argument("--effect", action="append", choices=names, help="only these; can be repeated")
     parser.add_argument("--detector", action="append", choices=list(BUILDERS), help="only these")
-    parser.add_argument("--seeds", type=int, help="drawings of each effect and level")
+    parser.add_argument("--seeds", type=positive_number, help="drawings of each effect and level")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="write the counts here")
     return parser.parse_args(arguments)
 

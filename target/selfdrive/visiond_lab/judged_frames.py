@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.sim.effects.effect import Effect, Moment
+from selfdrive.sim.effects.effect import Effect
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.detector import RoadLine
 from selfdrive.visiond_lab.evaluate_on_real_frames import (
@@ -20,6 +20,7 @@ from selfdrive.visiond_lab.evaluate_on_real_frames import (
     UDACITY_MODEL,
     LabelledFrame,
 )
+from selfdrive.visiond_lab.evaluate_under_effects import EFFECT_MOMENT
 from selfdrive.visiond_lab.random_looks import random_camera, random_look
 
 NEAR, FAR = 4.9, 30.0  # m ahead, where a line's pixels are counted
@@ -31,7 +32,6 @@ ROAD_PERIODS = 4  # of 12.2 m
 POSE_SIGMAS = 0.3, 0.01  # m, rad: usual offsets and headings of the car
 COMMON_CAMERA_SHARE = 0.5  # of roads that the default camera and that of the real frames see
 HALF_MARK_WIDTH = 0.22  # m: pixels so close to a real line are replaced
-EFFECT_MOMENT = Moment(2.0, 50.0, 26.82)  # any time and place, at 60 mph
 SIDES = 0, 1  # left, right
 
 
@@ -56,8 +56,10 @@ class JudgedFrame:
         a, b = self.model.line_in_picture(line.y, line.slope)
         return abs(a * self.row + b - self.columns[side]) <= self.tolerance
 
-    def seen_shares(self, affected: np.ndarray, affected_without_lines: np.ndarray) -> list[float]:
-        """Share of each line's pixels that are seen behind an effect; NaN for a line that is not judged."""
+    def measure_seen_shares(self, affected: np.ndarray, affected_without_lines: np.ndarray) -> list[float]:
+        """Return the share of each line's pixels that are seen behind an effect; NaN for a line that is not
+        judged.
+        """
         difference = np.abs(affected[self._rows].astype(np.int16) - affected_without_lines[self._rows])
         is_seen = difference >= SEEN_LEVELS
         return [
@@ -84,9 +86,14 @@ def affect_frame(frame: JudgedFrame, kind: type[Effect], amount: float, seed: in
     return np.asarray(kind(amount, seed, frame.model).apply(frame.picture, EFFECT_MOMENT))
 
 
-def seen_shares_behind(frame: JudgedFrame, kind: type[Effect], amount: float, seed: int) -> list[float]:
+def measure_seen_shares_behind_effect(
+    frame: JudgedFrame, kind: type[Effect], amount: float, seed: int
+) -> list[float]:
+    """Return the share of each line's pixels that are seen behind an effect."""
     bare = replace(frame, picture=frame.without_lines)
-    return frame.seen_shares(affect_frame(frame, kind, amount, seed), affect_frame(bare, kind, amount, seed))
+    return frame.measure_seen_shares(
+        affect_frame(frame, kind, amount, seed), affect_frame(bare, kind, amount, seed)
+    )
 
 
 def render_frames(

@@ -13,7 +13,12 @@ from selfdrive.visiond_lab.judge_detectors import (
     largest_gain,
     wilson_interval,
 )
-from selfdrive.visiond_lab.judged_frames import JudgedFrame, affect_frame, render_frames, seen_shares_behind
+from selfdrive.visiond_lab.judged_frames import (
+    JudgedFrame,
+    affect_frame,
+    measure_seen_shares_behind_effect,
+    render_frames,
+)
 
 
 @pytest.fixture(scope="module")
@@ -30,8 +35,8 @@ def test_equal_seeds_give_equal_roads(frames):
 def test_only_the_lanes_lines_are_missing_from_the_frame_without_lines(frames):
     """All of a clean line's pixels are seen; nothing is seen of a line that both frames lack."""
     for frame in frames:
-        assert frame.seen_shares(frame.picture, frame.without_lines) == [1.0, 1.0]
-        assert frame.seen_shares(frame.without_lines, frame.without_lines) == [0.0, 0.0]
+        assert frame.measure_seen_shares(frame.picture, frame.without_lines) == [1.0, 1.0]
+        assert frame.measure_seen_shares(frame.without_lines, frame.without_lines) == [0.0, 0.0]
 
 
 def test_a_line_is_right_within_the_tolerance(frames):
@@ -46,8 +51,8 @@ def test_a_line_is_right_within_the_tolerance(frames):
 def test_a_line_behind_white_or_haze_is_seen_less(frames):
     """A gain of ten makes road and paint equally white."""
     frame = frames[0]
-    assert max(seen_shares_behind(frame, Contrast, 10.0, 1)) == 0.0
-    assert min(seen_shares_behind(frame, PaperFog, 1, 1)) > 0.9
+    assert max(measure_seen_shares_behind_effect(frame, Contrast, 10.0, 1)) == 0.0
+    assert min(measure_seen_shares_behind_effect(frame, PaperFog, 1, 1)) > 0.9
     assert affect_frame(frame, Contrast, 10.0, 1).shape == frame.picture.shape
 
 
@@ -103,3 +108,11 @@ def test_the_command_prints_and_writes_the_counts(tmp_path, capsys):
 def test_a_folder_without_frames_is_refused(tmp_path, capsys):
     assert judge_detectors.main(["--frames", str(tmp_path), str(tmp_path / "none.json")]) == 2
     assert "none.json" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--roads", "--seeds"])
+@pytest.mark.parametrize("value", ["0", "-1", "1.5", "many"])
+def test_a_count_below_one_is_refused(option, value, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        judge_detectors.main([f"{option}={value}"])
+    assert f"argument {option}: '{value}' is not a whole number of 1 or more" in capsys.readouterr().err
