@@ -13,11 +13,15 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.core import TyperGroup
+from typer.main import get_command
 
+from mutator.cli.app import app
 from mutator.reference.generated_files import SCHEMAS_FOLDER
 from mutator.reference.json_schemas import yaml_formats
 from mutator.workspace import Workspace
@@ -279,3 +283,21 @@ def test_the_readme_has_both_command_lines() -> None:
         (True, False),
         (False, True),
     ]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_commands_that_a_page_only_names_have_all_that_they_need(page: Path) -> None:
+    """A command of a `sh` block has every option that it requires, and no other."""
+    program = get_command(app)
+    assert isinstance(program, TyperGroup)
+    for _, kind, block in FENCE.findall(page.read_text(encoding="utf-8")):
+        for line in block.replace("\\\n", " ").splitlines() if kind == "sh" else ():
+            if line.startswith("mutator ") and "$" not in line:  # the shell gives variables their values
+                words = takewhile(
+                    lambda word: word not in {"|", ">", "&&"}, shlex.split(line, comments=True)[1:]
+                )
+                with program.make_context("mutator", list(words)) as context:
+                    subcommand, command, rest = program.resolve_command(
+                        context, [*context._protected_args, *context.args]
+                    )
+                    assert command is not None and command.make_context(subcommand, rest, parent=context)
