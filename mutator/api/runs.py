@@ -224,12 +224,14 @@ class Run(RunFigures):
         failures: Sequence[str] = (),
         only: str | None = None,
         table: ExportedTable | str = ExportedTable.RESULTS,
+        base: str | Path | None = None,
     ) -> Path:
         """Export the run for other tools, and return the path; default: in exports/ of the run folder.
 
         `format` is a `Format`, or the name of one that another package adds.
         `failures` are the endings that JUnit shows as failures. `only`, for MCAP, is a filter over the
-        columns of the results. `table` is the table for CSV and Parquet. An MCAP export is a folder of files.
+        columns of the results. `table` is the table for CSV and Parquet. `base`, for SARIF and code quality,
+        is an earlier run folder, whose hazards are left out. An MCAP export is a folder of files.
         """
         if table not in (table_names := [choice.value for choice in ExportedTable]):
             raise MutatorError(f"'{table}'", argument="table", expected=f"one of {', '.join(table_names)}")
@@ -238,7 +240,12 @@ class Run(RunFigures):
         if exporter.uses_library:
             workspace = self._workspace_if_any()
         out_path = None if out is None else Path(out)
-        parts = ExportSelection(failures=failures, only=only, table=ExportedTable(table))
+        parts = ExportSelection(
+            failures=failures,
+            only=only,
+            table=ExportedTable(table),
+            base=None if base is None else Path(base),
+        )
         return export(self.path, str(format), out_path, workspace=workspace, selection=parts)
 
     def check_equivalence(self) -> None:

@@ -20,6 +20,7 @@ def register(app: typer.Typer) -> None:
 EXAMPLES = """\b
 Examples:
   mutator export runs/first --format mutation-elements   for viewers of mutation testing reports
+  mutator export runs/change --format sarif --base runs/main
   mutator export runs/first --format junit --out junit.xml
   mutator export runs/first --format junit --failures hazard,crashed
   mutator export runs/first --format parquet --out first.parquet
@@ -65,14 +66,23 @@ def export(
         ),
     ] = None,
     table: Annotated[ExportTable, typer.Option(help="CSV and Parquet: which table.")] = ExportTable.RESULTS,
+    base: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="RUN",
+            help="SARIF and code quality: leave out the hazards of this earlier run.",
+            autocompletion=shell_completion.complete_runs,
+        ),
+    ] = None,
     as_json: Json = False,
     *,
     workspace_options: WorkspaceOptions,
 ) -> None:
-    """Export a run: mutation report, JUnit, CSV, Parquet, MCAP.
+    """Export a run: mutation report, SARIF, code quality, JUnit, CSV, Parquet, MCAP.
 
-    MCAP writes one file for each experiment, with events, units, and separate topics for the golden and the
-    faulty run.
+    SARIF (for code scanning) and code quality (for GitLab) list hazards at the places of their faults. MCAP
+    writes one file for each experiment, with events, units, and separate topics for the golden and the faulty
+    run.
     """
     terminal = Terminal(as_json)
     exporter = find_export(format)
@@ -82,7 +92,7 @@ def export(
     endings = [name.strip() for name in failures.split(",")] if failures else []
     with terminal.show_spinner("writing"):
         out_path = mutator.load_run(run, workspace=workspace).export(
-            format, out, failures=endings, only=only, table=table
+            format, out, failures=endings, only=only, table=table, base=base
         )
     if as_json:
         terminal.print_json({"format": format, "file": str(out_path)})

@@ -1,4 +1,4 @@
-"""Write runs for other tools: mutation testing viewers, CI servers, spreadsheets, data frames.
+"""Write runs for other tools: mutation testing viewers, code scanning, CI servers, spreadsheets, data frames.
 
 A format is an `Export`: in a module of `formats/`, or from another package (entry points of the group
 `mutator.exports`).
@@ -49,12 +49,13 @@ class ExportTable(StrEnum):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportSelection:
     """The part of a run to write: the outcomes that are reported as failures, a filter over the columns of
-    the results, the table.
+    the results, the table, and an earlier run folder whose hazards are left out.
     """
 
     failures: Sequence[str] = ()
     only: str | None = None
     table: ExportTable = ExportTable.RESULTS
+    base: Path | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +82,7 @@ class Export:
     about: str
     file: str
     write: Callable[[ExportRequest], bytes | None]
-    options: frozenset[str] = frozenset()  # the fields of `Parts` that it reads
+    options: frozenset[str] = frozenset()  # the fields of `ExportSelection` that it reads
     needs_library: bool = False  # fails without the library and the target
     uses_library: bool = False  # writes more if they are there
 
@@ -105,6 +106,7 @@ def check_options(name: str, export: Export, selection: ExportSelection) -> None
         "failures": bool(selection.failures),
         "only": selection.only is not None,
         "table": selection.table is not ExportTable.RESULTS,
+        "base": selection.base is not None,
     }
     for option, is_chosen in chosen.items():
         if is_chosen and option not in export.options:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from mutator.campaigns.fault_positions import numbered_lines
 from mutator.errors import MutatorError
 from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Outcome, Status
 from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
@@ -133,8 +134,9 @@ class SourceLines:
 
 
 def _line_of(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
-    location = fault.injections[0].location
-    return location.path, parsed_file(manifest.tree, location.path).line_span(location)[0] + 1
+    first = fault.injections[0]
+    file = parsed_file(manifest.tree, first.location.path)
+    return file.path, numbered_lines(file, first)[0]
 
 
 def _line_marks(

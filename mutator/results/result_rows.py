@@ -61,6 +61,12 @@ class ResultRow:
         return self.status not in UNUSABLE_STATUSES
 
     @property
+    def summary(self) -> str:
+        """What happened, in words: the sentence; if there is none, the hazards, the detail or the ending."""
+        hazards = ", ".join(f"{name} at {time:.2f} s" for name, time in self.hazards)
+        return self.sentence or hazards or self.detail or self.ending
+
+    @property
     def fault(self) -> str:
         return fault_label(f"{self.kind}/{self.variant}", self.value, self.unit)
 

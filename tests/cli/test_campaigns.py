@@ -219,7 +219,10 @@ def test_clean_deletes_everything_that_commands_wrote_into_a_run(cli: Cli, run: 
         ["show", name, "--run", copy, "--plot"],
         ["rerun", name, "--run", copy, "--trace"],
         ["show", name, "--run", copy, "--still", "2.0", "--video", copy / "plots" / f"{name}.mp4"],
-        *(["export", copy, "--format", f] for f in ("mutation-elements", "junit", "csv", "parquet")),
+        *(
+            ["export", copy, "--format", f]
+            for f in ("mutation-elements", "junit", "csv", "parquet", "sarif", "codequality")
+        ),
         ["compare", other, copy],
     ):
         assert cli(*words).code == 0, words

@@ -42,7 +42,7 @@ VERBS: dict[str, Callable[[Sent], tuple[object, ...]]] = {
     ),
     **{
         f"export {kind}": lambda sent, kind=kind: ("export", sent.run, "--format", kind)  # type: ignore[misc]
-        for kind in ("csv", "parquet", "junit", "mutation-elements", "mcap")
+        for kind in ("csv", "parquet", "junit", "mutation-elements", "mcap", "sarif", "codequality")
     },
     "rerun": lambda sent: ("rerun", sent.experiment, "--run", sent.run),
     "rerun and keep": lambda sent: ("rerun", sent.experiment, "--run", sent.run, "--trace"),

@@ -12,8 +12,10 @@ from typing import Any
 
 from mutator._common.message_text import counted
 from mutator._common.version import VERSION
+from mutator.campaigns.fault_positions import numbered_lines
 from mutator.execution import single_run
 from mutator.exports import Export, ExportRequest
+from mutator.exports.code_findings import rule_name_of
 from mutator.faults.fault_models import FaultModels, SnippetKind
 from mutator.model import OPERATOR_FAULTS_MODULE, Experiment, Fault, Injection, Outcome, Record, Status
 from mutator.mutants.changeable_expressions import parenthesized_if_splittable
@@ -75,13 +77,13 @@ def _mutant_as_json(
     experiments: Sequence[Experiment],
     records: Mapping[str, Record],
 ) -> dict[str, Any]:
-    first, *others = fault.injections
+    others = fault.injections[1:]
     also = [f"{i.location.path}:{_line_number(manifest, i)}" for i in others]
     description = ", aims at ".join(filter(None, (fault.label, fault.aim)))
     description += f"; also at {', '.join(also)}" if also else ""
     return {
         "id": fault.id,
-        "mutatorName": fault.fault_type if fault.module == OPERATOR_FAULTS_MODULE else first.model,
+        "mutatorName": rule_name_of(fault),
         "description": description,
         **_replacement_of(manifest, models, fault),
         **mutant_status_as_json(experiments, records),
@@ -89,7 +91,7 @@ def _mutant_as_json(
 
 
 def _line_number(manifest: TargetManifest, injection: Injection) -> int:
-    return parsed_file(manifest.tree, injection.location.path).line_span(injection.location)[0] + 1
+    return numbered_lines(parsed_file(manifest.tree, injection.location.path), injection)[0]
 
 
 def _replacement_of(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict[str, Any]:

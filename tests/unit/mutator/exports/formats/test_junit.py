@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, MutatorWarning
 from mutator.exports import ExportSelection, Format
 from mutator.exports.run_export import export
 from mutator.model import Experiment, Outcome, Status
+from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 BECAME: dict[str, dict[str, Any] | None] = {
@@ -93,3 +94,31 @@ def test_csv_and_parquet_exports_are_copies_of_the_runs_tables(run: Path, tmp_pa
     for format, name in ((Format.CSV, "results.csv"), (Format.PARQUET, "results.parquet")):
         file = export(run, format, tmp_path / "new" / name)
         assert file.read_bytes() == (run / name).read_bytes()
+
+
+def test_cases_have_the_place_of_their_fault_if_the_target_is_there(
+    toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
+    (tmp_path / ".git").mkdir()
+    folder = write_run(toycar, tmp_path / "run", became)
+    assert cases(export(folder, Format.JUNIT))["lane"][0].get("file") is None
+    for case in cases(export(folder, Format.JUNIT, workspace=toycar))["lane"]:
+        lines = (tmp_path / str(case.get("file"))).read_text().splitlines()
+        assert lines[int(str(case.get("line"))) - 1].strip().startswith("offset = ")
+    (toycar.library.parent / "tree" / "toycar" / "driver.py").write_text("x = 1\n")
+    with pytest.warns(MutatorWarning, match="JUnit without files and lines: .* has changed since"):
+        assert cases(export(folder, Format.JUNIT, workspace=toycar))["lane"][0].get("file") is None
+
+
+def test_times_are_those_of_the_runs_and_add_up(
+    toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = write_run(toycar, tmp_path / "run", became)
+    ids = list(RunFolder.open(folder).experiment_ids())
+    monkeypatch.setattr(RunFolder, "timings", lambda run: {name: {"wall_s": 0.25} for name in ids[:4]})
+    root = ET.parse(export(folder, Format.JUNIT)).getroot()
+    assert (
+        sorted(str(case.get("time")) for case in root.iter("testcase") if case.get("time")) == ["0.250"] * 4
+    )
+    assert root.get("time") == "1.000"
+    assert sum(float(str(suite.get("time"))) for suite in root.findall("testsuite")) == 1.0
