@@ -166,7 +166,7 @@ def intake() -> None:
             written=WrittenFiles(),
             engine="fork",
             accept_versions=True,
-            new_worker_name=lambda name: f"0001-{name}",
+            worker_prefix="0001-",
             note_machine=lambda machine: None,
             problem="",
             interrupted=False,

@@ -1,11 +1,12 @@
 """Chunks: the experiments that one pytest item runs."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
 from mutator.model import Experiment, Record
 from mutator.store import plan_file
+from mutator.store.plan_lines import parse_experiment
 from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 
@@ -57,3 +58,13 @@ def pending_chunks_of(folder: RunFolder, records: Mapping[str, Record]) -> tuple
         if pending_positions and (shard is None or shard.has_chunk(index)):
             pending_chunks.append(PendingChunk(index, pending_positions))
     return tuple(pending_chunks)
+
+
+def golden_key_by_chunk(folder: RunFolder, pending: Iterable[PendingChunk]) -> dict[int, str]:
+    """Return the key of the golden run that the experiments of each chunk share, by chunk index."""
+    faults = plan_file.load_faults(folder.path)
+    keys: dict[int, str] = {}
+    for index in (work.chunk_index for work in pending):
+        [line, *_] = plan_file.read_chunk_lines(folder.path, folder.head.chunks[index])
+        keys[index] = folder.golden_run_of(parse_experiment(line, faults)).key
+    return keys

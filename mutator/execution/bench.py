@@ -4,7 +4,6 @@ Its workers stay between batches, with their fork servers and golden runs. Its p
 the order in which batches are asked for. Several batches can be in flight.
 """
 
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +11,6 @@ from pathlib import Path
 from mutator._common.interrupts import delaying_interrupts
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.plan_growth import APPENDED_FILES, GrowingPlan
-from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
 from mutator.engines.engine_choice import choose_engine
 from mutator.engines.engine_kinds import REFERENCE
@@ -22,11 +20,10 @@ from mutator.execution.awaited_records import AwaitedRecords
 from mutator.execution.batch_check import BatchCheck, check_reason
 from mutator.execution.bench_calls import BenchCalls
 from mutator.execution.bench_crew import BenchCrew, CrewBatch
-from mutator.execution.bench_messages import BenchWorkerStart
 from mutator.execution.bench_progress import BenchProgress
 from mutator.execution.session import Session
 from mutator.execution.session_summary import Summary
-from mutator.execution.worker import WorkerAssignment
+from mutator.execution.worker import WorkerStart
 from mutator.model import AfterHazard, Experiment, Record, Status
 from mutator.preflight import equivalence_check
 from mutator.preflight.bench_checks import BenchChecks
@@ -73,7 +70,7 @@ class Bench:
         self._new_records: dict[str, Record] = {}
         self._awaited = AwaitedRecords()
         self._session: Session | None = None
-        self._worker_prefix, self._has_begun = "", False
+        self._has_begun = False
         self._is_plan_half_written = self._has_crew_old_limits = False
         self.summary: Summary | None = None  # known once the bench is closed
         self._progress = BenchProgress(notify)
@@ -214,7 +211,7 @@ class Bench:
         self._progress.note_planned(self.experiment_count)
 
     def _open_session(self, folder: RunFolder) -> Session:
-        session = Session(
+        return Session(
             self._workspace,
             folder,
             workers=self._crew.size,
@@ -222,8 +219,6 @@ class Bench:
             notify=self._progress.notify,
             reuse=self._is_reuse_wanted,
         )
-        self._worker_prefix = session.new_worker_name("")
-        return session
 
     def _read_records(self) -> None:
         self._stored_records, self._new_records = RunFolder(self.path).records(), {}
@@ -313,7 +308,7 @@ class Bench:
         if self._engine != REFERENCE or (reuse and reuse.searches):
             equivalence_check.mark_check_as_needed(self.path)
         if not self._has_begun:
-            self._session.begin_environment(f"{self._worker_prefix}*")
+            self._session.begin_environment(f"{self._session.worker_prefix}*")
             self._has_begun = True
 
     def _prove_by_crew(self, experiments: Sequence[Experiment]) -> None:
@@ -346,23 +341,9 @@ class Bench:
         self._crew.hand_out(batch)
         self._awaited.running |= {experiment.id for experiment in experiments}
 
-    def _start_of_worker(self, number: int) -> BenchWorkerStart:
+    def _start_of_worker(self, number: int) -> WorkerStart:
         assert self._session is not None
-        name = f"{self._worker_prefix}w{number}"
-        self._session.written.note_worker_began(name)
-        inputs = RunInputs.from_workspace(self._workspace, self._manifest, self._session.folder.scenarios)
-        return BenchWorkerStart(
-            inputs=inputs.to_bytes(),
-            assignment=WorkerAssignment(
-                run_folder=self.path,
-                worker_name=name,
-                engine=self._engine,
-                golden_digests={},
-                secret=self._session.secret,
-                parent_pid=os.getpid(),
-                reuse=self._session.reuse.assignment if self._session.reuse else None,
-            ),
-        )
+        return self._session.start_of_worker(f"w{number}")
 
     def _note_written(self, worker: str, written: Mapping[str, str]) -> None:
         assert self._session is not None

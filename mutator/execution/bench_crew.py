@@ -4,11 +4,7 @@ Each worker has a thread here, which starts its process, deals to it, and receiv
 go on while the caller of the bench does something else.
 """
 
-import os
-import pickle
-import socket
 import subprocess
-import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -19,14 +15,14 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from mutator.errors import MutatorError
-from mutator.execution.bench_messages import AssignedExperiments, BenchWorkerStart, WorkEnding
+from mutator.execution.bench_messages import AssignedExperiments, WorkEnding
+from mutator.execution.pieces import cut_into_pieces, take_piece_for
 from mutator.execution.suspended_workers import WorkerContinuer
-from mutator.execution.worker import python_command_dying_with
+from mutator.execution.worker import WorkerStart
+from mutator.execution.worker_processes import start_worker_process
 from mutator.model import Experiment, Record
 
 _WORKER_MODULE = "mutator.execution.bench_worker"
-_PIECES_PER_WORKER = 4  # of a batch: more even the load, fewer share more work
-_MOST_RUNS_PER_PIECE = 20
 _END_PATIENCE_S = 30.0  # for a worker to close its files
 
 Run = Sequence[Experiment]  # experiments that share a run
@@ -52,7 +48,7 @@ class BenchCrew:
     def __init__(
         self,
         size: int,
-        start_of: Callable[[int], BenchWorkerStart],
+        start_of: Callable[[int], WorkerStart],
         on_written: Callable[[str, Mapping[str, str]], None],
         on_record: Callable[[Record], None] = lambda record: None,
     ) -> None:
@@ -167,7 +163,7 @@ class _Board:
 
     def add(self, batch: CrewBatch, worker_count: int) -> int:
         """Add a batch; return how many waiting pieces are too many for the idle workers."""
-        pieces = [_Piece(runs, batch) for runs in _cut_into_pieces(batch.runs, worker_count)]
+        pieces = [_Piece(runs, batch) for runs in cut_into_pieces(batch.runs, _golden_key_of, worker_count)]
         with self._changed:
             self._waiting_batches.append(pieces)
             self._changed.notify_all()
@@ -184,7 +180,8 @@ class _Board:
                 return None
             self._idle_workers.remove(worker)
             pieces = self._waiting_batches[0]
-            piece = _pop_piece_for(worker, pieces)
+            piece = take_piece_for(worker.golden_key, pieces, lambda piece: _golden_key_of(piece.runs[0]))
+            worker.golden_key = _golden_key_of(piece.runs[0])
             if not pieces:
                 self._waiting_batches.popleft()
             return piece
@@ -219,7 +216,7 @@ class _CrewWorker:
     Linux ends a process with the thread that started it, and the caller's thread can be short-lived.
     """
 
-    def __init__(self, start: BenchWorkerStart, board: _Board) -> None:
+    def __init__(self, start: WorkerStart, board: _Board) -> None:
         self.name = start.assignment.worker_name
         self.process: subprocess.Popen[bytes] | None = None
         self.is_ready, self.has_ended = threading.Event(), threading.Event()
@@ -235,7 +232,7 @@ class _CrewWorker:
             if self.process is not None:
                 self.process.kill()
 
-    def _work(self, start: BenchWorkerStart, board: _Board) -> None:
+    def _work(self, start: WorkerStart, board: _Board) -> None:
         try:
             self._start_and_deal(start, board)
         except Exception as err:  # whatever it is, the caller waits for this thread
@@ -245,7 +242,7 @@ class _CrewWorker:
             self.is_ready.set()
             self.has_ended.set()
 
-    def _start_and_deal(self, start: BenchWorkerStart, board: _Board) -> None:
+    def _start_and_deal(self, start: WorkerStart, board: _Board) -> None:
         try:
             connection = self._start_process(start)
         except (OSError, MutatorError) as err:
@@ -262,34 +259,14 @@ class _CrewWorker:
                 board.fail(problem)
             self._end_process(connection)
 
-    def _start_process(self, start: BenchWorkerStart) -> Connection:
+    def _start_process(self, start: WorkerStart) -> Connection:
         """Start a process that dies with this thread."""
-        here, there = socket.socketpair()
-        try:
-            with tempfile.TemporaryFile() as file:  # nameless, so no run can change it
-                file.write(pickle.dumps(start))
-                file.seek(0)
-                descriptors = [there.fileno(), file.fileno()]
-                with self._lock:
-                    if self._is_killed:
-                        raise MutatorError(_CLOSED)
-                    self.process = subprocess.Popen(
-                        [
-                            *python_command_dying_with(os.getpid()),
-                            "-m",
-                            _WORKER_MODULE,
-                            *map(str, descriptors),
-                        ],
-                        pass_fds=descriptors,
-                        stdin=subprocess.DEVNULL,
-                        start_new_session=True,  # Ctrl-C is for the command only
-                    )
-        except BaseException:
-            here.close()
-            raise
-        finally:
-            there.close()
-        return Connection(here.detach())
+        data = start.to_bytes()
+        with self._lock:
+            if self._is_killed:
+                raise MutatorError(_CLOSED)
+            self.process, connection = start_worker_process(_WORKER_MODULE, data)
+        return connection
 
     def _receive_ending(self, connection: Connection, board: _Board) -> str:
         """Pass records on until the end of the work; return why it failed, empty if it did not."""
@@ -328,27 +305,6 @@ def _receive(worker: _CrewWorker, connection: Connection) -> Record | WorkEnding
 
 def _golden_key_of(run: Run) -> tuple[object, ...]:
     return run[0].scenario, run[0].changes, run[0].seed
-
-
-def _cut_into_pieces(runs: Sequence[Run], worker_count: int) -> list[list[Run]]:
-    """Cut runs, which are in order, into pieces with one golden run each."""
-    most_runs = max(1, min(_MOST_RUNS_PER_PIECE, -(-len(runs) // (worker_count * _PIECES_PER_WORKER))))
-    pieces: list[list[Run]] = []
-    for run in runs:
-        last = pieces[-1] if pieces else []
-        if last and len(last) < most_runs and _golden_key_of(last[0]) == _golden_key_of(run):
-            last.append(run)
-        else:
-            pieces.append([run])
-    return pieces
-
-
-def _pop_piece_for(worker: _CrewWorker, pieces: list[_Piece]) -> _Piece:
-    """Return the next piece with the golden run that the worker has in memory, or else the next one."""
-    matching = (i for i, piece in enumerate(pieces) if _golden_key_of(piece.runs[0]) == worker.golden_key)
-    piece = pieces.pop(next(matching, 0))
-    worker.golden_key = _golden_key_of(piece.runs[0])
-    return piece
 
 
 def _assignment(worker: _CrewWorker, piece: _Piece) -> AssignedExperiments:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator.execution.worker import WorkerAssignment
 from mutator.execution.written_files import FileDigests
 from mutator.model import Experiment
 
@@ -27,11 +26,3 @@ class WorkEnding:
 
     problem: str = ""
     written: FileDigests = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BenchWorkerStart:
-    """What a worker needs to begin. `inputs` is packed by `RunInputs.to_bytes`."""
-
-    inputs: bytes
-    assignment: WorkerAssignment

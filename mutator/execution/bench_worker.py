@@ -5,22 +5,16 @@ connection FD, it sends a `WorkEnding` when it is ready, and receives assignment
 sends records, then a `WorkEnding`.
 """
 
-import os
-import pickle
 import signal
 import sys
-import traceback
 from contextlib import suppress
 from multiprocessing.connection import Connection
 
 from mutator._common.files import raising_disk_full
-from mutator._common.folder_locks import open_worker_lock
-from mutator._common.resource_shortages import find_shortage
-from mutator.campaigns.run_inputs import RunInputs
-from mutator.errors import MutatorError
-from mutator.execution.bench_messages import AssignedExperiments, BenchWorkerStart, WorkEnding
-from mutator.execution.suspended_workers import on_resume
-from mutator.execution.worker import Worker, bind_to_parent
+from mutator.execution.bench_messages import AssignedExperiments, WorkEnding
+from mutator.execution.worker import Worker, WorkerOfProcess, WorkerStart
+from mutator.execution.worker_problems import describe_problem
+from mutator.execution.worker_processes import opened_by_parent
 
 
 def _run_assigned(connection: Connection, worker: Worker, assigned: AssignedExperiments) -> WorkEnding:
@@ -31,48 +25,31 @@ def _run_assigned(connection: Connection, worker: Worker, assigned: AssignedExpe
             for record in run(assigned.experiments):
                 connection.send(record)
     except Exception as err:
-        return _ending_of_error(err)
+        return WorkEnding(problem=describe_problem(err))
     return WorkEnding()
 
 
-def _ending_of_error(err: Exception) -> WorkEnding:
-    reported_error = err if isinstance(err, MutatorError) else find_shortage(err)
-    if reported_error:
-        return WorkEnding(problem=str(reported_error))
-    return WorkEnding(problem="".join(traceback.format_exception(err)).rstrip())
-
-
-def _serve(connection: Connection, start: BenchWorkerStart) -> None:
-    registration = open_worker_lock(start.assignment.run_folder)
+def _serve(connection: Connection, process: WorkerOfProcess) -> None:
     try:
-        worker = Worker(RunInputs.from_bytes(start.inputs), start.assignment)
+        worker = process.ensure_worker()
     except Exception as err:
-        connection.send(_ending_of_error(err))
+        connection.send(WorkEnding(problem=describe_problem(err)))
         return
-
-    def note_suspension() -> None:
-        worker.was_suspended = True
-
-    on_resume(note_suspension)
     connection.send(WorkEnding())
     try:
         while (assigned := connection.recv()) is not None:
             connection.send(_run_assigned(connection, worker, assigned))
     finally:
-        worker.close()
-        os.close(registration)
-    connection.send(WorkEnding(written=dict(worker.file_digests)))
+        written = process.close()
+    connection.send(WorkEnding(written=written))
 
 
 def main() -> int:
-    connection = Connection(int(sys.argv[1]))
-    with os.fdopen(int(sys.argv[2]), "rb") as file:
-        start: BenchWorkerStart = pickle.load(file)
-    assert start.assignment.parent_pid is not None
-    bind_to_parent(start.assignment.parent_pid)
+    connection, data = opened_by_parent(sys.argv[1:])
+    process = WorkerOfProcess(WorkerStart.from_bytes(data))
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     with suppress(EOFError, BrokenPipeError):
-        _serve(connection, start)
+        _serve(connection, process)
     return 0
 
 

@@ -10,11 +10,8 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
-from functools import cached_property
 from itertools import chain
 from secrets import token_bytes
-from typing import Any
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import write_below
@@ -44,6 +41,7 @@ from mutator.execution.finished_outcome_cache import (
 )
 from mutator.execution.session_reuse import SessionReuse, count_reused
 from mutator.execution.session_summary import Summary
+from mutator.execution.worker import WorkerAssignment, WorkerStart
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Outcome, Record
 from mutator.preflight import equivalence_check
@@ -100,7 +98,7 @@ class Session:
             if reuse
             else None
         )
-        self._worker_prefix = self.new_worker_name("")
+        self.worker_prefix = self._new_worker_prefix()  # of the names of this session's workers
         self.problem = ""
         self.interrupted = False
         self.secret = token_bytes(_SECRET_BYTES)
@@ -140,7 +138,7 @@ class Session:
             self.folder = begin_session_environment(
                 self.folder,
                 self.workspace,
-                records_glob=self.new_worker_name("*"),
+                records_glob=f"{self.worker_prefix}*",
                 packages=packages,
                 accept_versions=self.accept_versions,
             )
@@ -199,31 +197,35 @@ class Session:
                 remedy="it is restored: ask again",
             )
 
-    def new_worker_name(self, name: str) -> str:
-        """Return a name for a worker's files that no session used before."""
+    def _new_worker_prefix(self) -> str:
+        """Return a prefix that the worker names of no earlier session had."""
         files = chain.from_iterable(
             (self.folder.path / kind).glob("*.jsonl") for kind in LINE_SCHEMA_BY_FOLDER
         )
         used_numbers = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
-        return f"{max(used_numbers, default=0) + 1:04d}-{name}"
+        return f"{max(used_numbers, default=0) + 1:04d}-"
 
-    @cached_property
+    @property
     def inputs(self) -> RunInputs:
         return RunInputs.from_workspace(self.workspace, self.manifest, self.folder.scenarios)
 
-    def xdist_worker_input(self) -> dict[str, Any]:
-        return {
-            "parent": os.getpid(),
-            "run": str(self.folder.path),
-            "session": self.new_worker_name(""),
-            "inputs": self.inputs.to_bytes(),
-            "engine": self.engine,
-            "goldens": dict(self.golden_digests),
-            "secret": self.secret,
-            "reuse": asdict(self.reuse.assignment) if self.reuse and self.pending else None,
-            "pending": [[item.chunk_index, list(item.pending_positions)] for item in self.pending],
-            "proof": [[sample.number, sample.id] for sample in self.proof],
-        }
+    def worker_assignment(self, name: str, *, parent_pid: int | None = None) -> WorkerAssignment:
+        """Return the role of this session's worker `name`; `parent_pid` is None for this process."""
+        return WorkerAssignment(
+            run_folder=self.folder.path,
+            worker_name=f"{self.worker_prefix}{name}",
+            engine=self.engine,
+            golden_digests=dict(self.golden_digests),
+            secret=self.secret,
+            parent_pid=parent_pid,
+            reuse=self.reuse.assignment if self.reuse else None,
+        )
+
+    def start_of_worker(self, name: str) -> WorkerStart:
+        """Return what a process needs to begin as a worker, whose files are believed from now on."""
+        assignment = self.worker_assignment(name, parent_pid=os.getpid())
+        self.written.note_worker_began(assignment.worker_name)
+        return WorkerStart(inputs=self.inputs.to_bytes(), assignment=assignment)
 
     def finish(self) -> Summary:
         self.notify(Progress(stage="tables"))
@@ -279,7 +281,7 @@ class Session:
             not_forked=not_forked,
             elapsed_s=time.monotonic() - self._start_s,
             has_reached_nothing=self._has_reached_nothing(outcomes),
-            reused=count_reused(self.folder, self._worker_prefix),
+            reused=count_reused(self.folder, self.worker_prefix),
         )
 
     def compare_sample(self, records: Mapping[str, Record]) -> equivalence_check.EquivalenceResult | None:

@@ -1,32 +1,26 @@
 """The process that runs chunks: an xdist worker, or the command itself."""
 
-import signal
+import os
+import pickle
 import socket
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from mutator._common import cache_layout_and_pruning
 from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
+from mutator._common.folder_locks import open_worker_lock
 from mutator.campaigns.chunks import PendingChunk
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
-from mutator.engines.engine_choice import make_engine
-from mutator.engines.engine_jobs import MODES_TO_PROVE, Engine, EngineArguments
-from mutator.engines.in_target import process_guard
-from mutator.engines.reference_engine import ReferenceEngine
-from mutator.execution.experiment_runner import (
-    ExperimentRunner,
-    RecordedExperiment,
-    record_without_outcome,
-)
-from mutator.execution.inactivity_check import InactivityCheck
-from mutator.execution.loaded_goldens import LoadedGoldens
+from mutator.engines.engine_jobs import MODES_TO_PROVE, EngineArguments
+from mutator.execution.experiment_runner import RecordedExperiment, record_without_outcome
 from mutator.execution.run_reuse import ReuseAssignment, RunReuse
+from mutator.execution.suspended_workers import on_resume
+from mutator.execution.worker_processes import bind_to_parent
+from mutator.execution.worker_runners import WorkerRunners
 from mutator.execution.written_files import FileDigests
 from mutator.model import Experiment, Record, Status
 from mutator.preflight import equivalence_check
@@ -57,6 +51,24 @@ class WorkerAssignment:
     reuse: ReuseAssignment | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkerStart:
+    """What a process needs to begin as a worker. `inputs` is packed by `RunInputs.to_bytes`."""
+
+    inputs: bytes
+    assignment: WorkerAssignment
+
+    def to_bytes(self) -> bytes:
+        return pickle.dumps(self)
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> "WorkerStart":
+        """Return what `to_bytes` packed. The data must come from the process that started this one."""
+        start = pickle.loads(data)
+        assert isinstance(start, cls)
+        return start
+
+
 class Worker:
     """Runs chunks of a run folder and appends their results. Reads the plan chunk by chunk."""
 
@@ -66,7 +78,7 @@ class Worker:
         check_sources(self.folder.path, self.folder.head.sources, inputs.digest_by_source())
         with raising_disk_full(self.folder.scratch_folder):
             self.folder.scratch_folder.mkdir(exist_ok=True)
-        self._inputs, self._manifest, self._assignment = inputs, inputs.manifest, assignment
+        self._assignment = assignment
         self._scenario_files = dict(inputs.scenario_files)
         self._digest_by_golden_folder: dict[Path, str] = {}
         self._reuse = (
@@ -75,13 +87,23 @@ class Worker:
             else None
         )
         self.add_inputs(goldens=assignment.golden_digests)
-        self._runner = self._make_runner(
-            self._make_engine(assignment.engine),
+        self._runners = WorkerRunners(
+            EngineArguments(
+                manifest=inputs.manifest,
+                models=inputs.fault_models,
+                work_folder=self.folder.scratch_folder,
+                limits=self.folder.limits,
+                parent_pid=assignment.parent_pid,
+                secret=assignment.secret,
+            ),
+            assignment.engine,
+            golden_folder_of=self.folder.golden_folder_of,
+            digest_by_golden_folder=self._digest_by_golden_folder,
+            has_seeded_goldens=self.folder.has_seeded_goldens,
+            scenario_file=self._scenario_files.__getitem__,
             with_series=bool(self.folder.series_budget_mb),
-            reuse=self._reuse,
+            find_finished_run=self._reuse.find if self._reuse else lambda experiment, mutant: None,
         )
-        self._current_seed: int | None = None  # the seed being run
-        self._prover: ExperimentRunner | None = None
         self._needs_proof: bool | None = None  # None: not known yet
         self._planned_experiments: Mapping[str, Experiment] = {}
         self._faults = plan_file.load_faults(self.folder.path)
@@ -103,8 +125,7 @@ class Worker:
 
     def run_experiments(self, experiments: Sequence[Experiment]) -> Iterator[Record]:
         """Run experiments of the plan, at least one; store what each gave, and yield its record."""
-        self._prune_cached_images(experiments[0].seed)
-        for ended in self._runner.run(experiments):
+        for ended in self._runners.run(experiments):
             finished = self._without_outcome_if_suspended(ended)
             self._store_finished(finished)
             if finished.mode in MODES_TO_PROVE:
@@ -126,18 +147,11 @@ class Worker:
     def _golden_digest_of(self, experiment: Experiment) -> str:
         return self._digest_by_golden_folder[self.folder.golden_folder_of(experiment)]
 
-    def _prune_cached_images(self, seed: int) -> None:
-        """Delete images of earlier seeds, which would fill the disk."""
-        if self.folder.has_seeded_goldens and seed != self._current_seed:
-            cache_layout_and_pruning.prune_target_cache(self._manifest.cache_name)
-        self._current_seed = seed
-
     def prove(self, sample: SampledExperiment) -> list[tuple[str, str]]:
         """Run an experiment of the proof's sample on the reference engine; return harness errors as `run`
         does.
 
-        The run uses no data of other runs, because the proof must also detect errors in such data. If no
-        experiment was forked, nothing is run.
+        If no experiment was forked, nothing is run.
         """
         if self._needs_proof is None:
             self._needs_proof = equivalence_check.reason_check_not_needed(self.folder) is None
@@ -153,9 +167,7 @@ class Worker:
 
     def prove_experiments(self, experiments: Sequence[Experiment]) -> Iterator[Record]:
         """Run experiments on the reference engine for the proof, and yield their records."""
-        if self._prover is None:
-            self._prover = self._make_runner(self._make_independent_engine())
-        for ended in self._prover.run(experiments):
+        for ended in self._runners.prove(experiments):
             finished = self._without_outcome_if_suspended(ended)
             self._writer.append_proof(finished.record)
             yield finished.record
@@ -166,56 +178,10 @@ class Worker:
         return self._writer.sha256_by_segment
 
     def close(self) -> None:
-        self._runner.close()
+        self._runners.close()
         self._writer.close()
         if self._reuse:
             self._reuse.close()
-
-    def _make_runner(
-        self, engine: Engine, *, with_series: bool = False, reuse: RunReuse | None = None
-    ) -> ExperimentRunner:
-        folder = self.folder
-        goldens = LoadedGoldens(
-            self._manifest,
-            folder.golden_folder_of,
-            several_seeds=folder.has_seeded_goldens,
-            digests=self._digest_by_golden_folder,
-        )
-        inputs = self._inputs
-        return ExperimentRunner(
-            self._manifest,
-            inputs.fault_models,
-            engine,
-            goldens,
-            self._scenario_files.__getitem__,
-            with_series=with_series,
-            inactivity_check=InactivityCheck(self._engine_arguments()),
-            find_finished_run=reuse.find if reuse else lambda experiment, mutant: None,
-        )
-
-    def _make_engine(self, name: str) -> Engine:
-        return make_engine(name, self._engine_arguments())
-
-    def _engine_arguments(self) -> EngineArguments:
-        folder = self.folder
-        return EngineArguments(
-            manifest=self._manifest,
-            models=self._inputs.fault_models,
-            work_folder=folder.scratch_folder,
-            limits=folder.limits,
-            parent_pid=self._assignment.parent_pid,
-            secret=self._assignment.secret,
-        )
-
-    def _make_independent_engine(self) -> Engine:
-        folder = self.folder
-        return ReferenceEngine(
-            self._manifest,
-            folder.scratch_folder,
-            folder.limits,
-            self._assignment.parent_pid,
-            independent=True,
-        )
 
     def _without_outcome_if_suspended(self, finished: RecordedExperiment) -> RecordedExperiment:
         """Return the experiment; one that ran when this worker was stopped has no outcome."""
@@ -247,16 +213,36 @@ def timing_of(finished: RecordedExperiment, worker: str) -> dict[str, Any]:
     }
 
 
-def python_command_dying_with(parent_pid: int) -> list[str]:
-    """Return the beginning of a Python command line whose process dies with its parent, even while starting.
+class WorkerOfProcess:
+    """The worker of a process that a command has started. It is made when its first work comes.
 
-    It imports nothing from its working folder.
+    The process is registered in the run folder, and dies with the command.
     """
-    # without site-packages, which the guard does not need and which take time to find
-    return [sys.executable, "-I", "-S", process_guard.__file__, str(parent_pid), sys.executable, "-P"]
 
+    def __init__(self, start: WorkerStart) -> None:
+        assert start.assignment.parent_pid is not None
+        bind_to_parent(start.assignment.parent_pid)
+        self._start = start
+        self._registration = open_worker_lock(start.assignment.run_folder)
+        self._worker: Worker | None = None
+        on_resume(self._note_suspension)
 
-def bind_to_parent(parent_pid: int) -> None:
-    """End this process when `parent_pid` ends, and ignore Ctrl-C, which the parent handles."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    process_guard.die_with_parent(parent_pid)
+    def ensure_worker(self) -> Worker:
+        if self._worker is None:
+            self._worker = Worker(RunInputs.from_bytes(self._start.inputs), self._start.assignment)
+        return self._worker
+
+    def close(self) -> dict[str, str]:
+        """Close the worker's files; return their digests."""
+        worker, self._worker = self._worker, None
+        try:
+            if worker is None:
+                return {}
+            worker.close()
+            return dict(worker.file_digests)
+        finally:
+            os.close(self._registration)
+
+    def _note_suspension(self) -> None:
+        if self._worker is not None:
+            self._worker.was_suspended = True

@@ -13,21 +13,24 @@ import pytest
 
 from mutator._common.folder_locks import living_worker_pids
 from mutator._common.resource_shortages import find_shortage
+from mutator.campaigns.chunks import golden_key_by_chunk
 from mutator.errors import MutatorError, PytestItemFailed
+from mutator.execution.piece_scheduling import PieceScheduling, is_scheduler_chosen
 from mutator.execution.progress_reporting import reporting_progress
 from mutator.execution.progress_text import ProgressLines
 from mutator.execution.session import Session
 from mutator.execution.session_opening import open_session
 from mutator.execution.session_summary import Summary
 from mutator.execution.suspended_workers import WorkerContinuer
-from mutator.execution.worker import WorkerAssignment, python_command_dying_with
+from mutator.execution.worker import Worker
+from mutator.execution.worker_processes import python_command_dying_with
 from mutator.execution.xdist_worker import (
     INPUT_KEY,
     PROBLEM_KEY,
     WRITTEN_KEY,
     CampaignItem,
-    LazyWorker,
     collect_items,
+    node_id_of,
 )
 from mutator.store.plan_choices import Choices
 from mutator.store.run_progress import ProgressCallback
@@ -68,10 +71,10 @@ def register_controller(
 ) -> None:
     """Register the plugin of the process that is no worker.
 
-    Workers take items one by one, even if the user's configuration groups tests, for example by file. With a
-    `distributor`, pytest itself distributes nothing; `packages` are what it comes from.
+    The items of a campaign are dealt to all workers, even if the user's configuration groups tests by file.
+    With a `distributor`, pytest itself distributes nothing; `packages` are what it comes from.
     """
-    if getattr(config.option, "dist", "no") != "no":
+    if getattr(config.option, "dist", "no") != "no" and not is_scheduler_chosen(config):
         config.option.dist = "load"
     if not any(isinstance(plugin, CampaignController) for plugin in config.pluginmanager.get_plugins()):
         config.pluginmanager.register(
@@ -93,7 +96,7 @@ class CampaignController:
 
     def __init__(self, campaign_session: Session | None = None) -> None:
         self.campaign_session = campaign_session
-        self._lazy_worker: LazyWorker | None = None
+        self._worker: Worker | None = None  # of this process
         self._worker_continuer: WorkerContinuer | None = None
 
     @pytest.hookimpl(optionalhook=True)
@@ -106,37 +109,48 @@ class CampaignController:
     @pytest.hookimpl(optionalhook=True)
     def pytest_configure_node(self, node: Any) -> None:
         assert self.campaign_session is not None
-        worker_input = node.workerinput[INPUT_KEY] = self.campaign_session.xdist_worker_input()
-        self.campaign_session.written.note_worker_began(worker_input["session"] + node.gateway.id)
+        begun = self.campaign_session
+        start = begun.start_of_worker(node.gateway.id)
+        node.workerinput[INPUT_KEY] = {
+            "start": start.to_bytes(),
+            "pending": [[item.chunk_index, list(item.pending_positions)] for item in begun.pending],
+            "proof": [[sample.number, sample.id] for sample in begun.proof],
+        }
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_xdist_make_scheduler(self, config: pytest.Config, log: Any) -> PieceScheduling | None:
+        if is_scheduler_chosen(config):
+            return None
+        assert self.campaign_session is not None
+        folder, pending = self.campaign_session.folder, self.campaign_session.pending
+        keys = golden_key_by_chunk(folder, pending)
+        golden_key_by_node_id = {node_id_of(work): keys[work.chunk_index] for work in pending}
+        return PieceScheduling(config, log, golden_key_by_node_id.get)
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any, error: object | None) -> None:
         if error:
             self._note_problem(f"worker {node.gateway.id} died: {error}")
         assert self.campaign_session is not None
-        output, campaign_input = getattr(node, "workeroutput", {}), node.workerinput[INPUT_KEY]
+        output = getattr(node, "workeroutput", {})
         self._note_problem(output.get(PROBLEM_KEY, ""))
         if WRITTEN_KEY in output:
-            self.campaign_session.written.add_report(
-                output[WRITTEN_KEY], campaign_input["session"] + node.gateway.id
-            )
+            session = self.campaign_session
+            session.written.add_report(output[WRITTEN_KEY], session.worker_prefix + node.gateway.id)
 
     def pytest_collection(self, session: pytest.Session) -> bool | None:
         if session.config.pluginmanager.hasplugin("dsession"):
             return None  # xdist's hook collects nothing in this process
         assert self.campaign_session is not None
         begun = self.campaign_session
-        name = begun.new_worker_name("main")
-        assignment = WorkerAssignment(
-            run_folder=begun.folder.path,
-            worker_name=name,
-            engine=begun.engine,
-            golden_digests=begun.golden_digests,
-            secret=begun.secret,
-            reuse=begun.reuse.assignment if begun.reuse and begun.pending else None,
-        )
-        self._lazy_worker = LazyWorker(lambda: begun.inputs, assignment)
-        return collect_items(session, (*begun.pending, *begun.proof), self._lazy_worker)
+        return collect_items(session, (*begun.pending, *begun.proof), self._ensure_worker)
+
+    def _ensure_worker(self) -> Worker:
+        begun = self.campaign_session
+        assert begun is not None
+        if self._worker is None:
+            self._worker = Worker(begun.inputs, begun.worker_assignment("main"))
+        return self._worker
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         self._note_problem(str(dict(report.user_properties).get(PROBLEM_KEY, "")))
@@ -155,8 +169,10 @@ class CampaignController:
 
     @pytest.hookimpl(trylast=True)  # after xdist has ended its workers
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        if self._lazy_worker is not None and self.campaign_session is not None:
-            self.campaign_session.written.add_report(self._lazy_worker.close())
+        if self._worker is not None and self.campaign_session is not None:
+            self._worker.close()
+            self.campaign_session.written.add_report(self._worker.file_digests)
+            self._worker = None
         if self._worker_continuer is not None:
             self._worker_continuer.end()
 

@@ -94,7 +94,8 @@ def test_loadfile_distributes_chunks_over_all_workers(tmp_path: Path, given: str
     """All chunks belong to one file."""
     registered: list[object] = []
     manager = SimpleNamespace(get_plugins=lambda: (), register=registered.append)
-    config: Any = SimpleNamespace(option=SimpleNamespace(dist=given), pluginmanager=manager)
+    options = SimpleNamespace(dist=given)
+    config: Any = SimpleNamespace(option=options, known_args_namespace=options, pluginmanager=manager)
     register_controller(
         config, "small", tmp_path, reviewed=False, accept_versions=False, sandbox=False, reuse=True
     )
@@ -124,7 +125,6 @@ def test_collecting_50000_experiments_is_fast(toy: Workspace, tmp_path: Path) ->
         reuse=None,
         secret=b"",
         written=WrittenFiles(),
-        new_worker_name=lambda name: name,
         problem="",
         interrupted=False,
     )

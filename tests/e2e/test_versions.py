@@ -19,7 +19,7 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
-from mutator.execution.worker import Worker, WorkerAssignment
+from mutator.execution.worker import Worker
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.store.session_progress import PROGRESS_FILE
@@ -35,15 +35,7 @@ class OnePiece:
     """A distributor that stops after one piece of work."""
 
     def run(self, session: Session) -> None:
-        name = session.new_worker_name("mine")
-        assignment = WorkerAssignment(
-            run_folder=session.folder.path,
-            worker_name=name,
-            engine=session.engine,
-            golden_digests=session.golden_digests,
-            secret=session.secret,
-        )
-        worker = Worker(session.inputs, assignment)
+        worker = Worker(session.inputs, session.worker_assignment("mine"))
         worker.run(session.pending[0])
         worker.close()
         session.written.add_report(worker.file_digests)

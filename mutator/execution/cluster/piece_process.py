@@ -10,32 +10,29 @@ import os
 import signal
 import sys
 import time
-import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from mutator._common import cache_layout_and_pruning
 from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator._common.hashing import canonical_json
-from mutator._common.resource_shortages import find_shortage
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import group_by_run
 from mutator.engines import sandbox
-from mutator.engines.engine_choice import make_engine
 from mutator.engines.engine_jobs import MODES_TO_PROVE, EngineArguments, Job
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.errors import DiskFull, MutatorError, ResourceShortage, WorkerGoldenRunsDiffer
+from mutator.errors import DiskFull, ResourceShortage, WorkerGoldenRunsDiffer
 from mutator.execution.cluster.golden_cache import GoldenRunCache
 from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceKind, PieceResult
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
-from mutator.execution.experiment_runner import ExperimentRunner, RecordedExperiment
-from mutator.execution.inactivity_check import InactivityCheck
-from mutator.execution.loaded_goldens import LoadedGoldens
+from mutator.execution.experiment_runner import RecordedExperiment
 from mutator.execution.worker import timing_of
+from mutator.execution.worker_problems import describe_problem, reported_error
+from mutator.execution.worker_processes import opened_by_parent
+from mutator.execution.worker_runners import WorkerRunners
 from mutator.model import Experiment
 from mutator.preflight.check_run_problems import read_check_run
 from mutator.store.checksummed_blocks import block_bytes
@@ -61,7 +58,7 @@ class PieceRunner:
         self._goldens_folder = self._work_folder / "golden"
         self._golden_cache = GoldenRunCache(bundle, inputs.manifest)
         self._matching_goldens: set[str] = set()  # golden runs that equal the campaign's
-        self._runners_by_kind: dict[PieceKind, ExperimentRunner] = {}
+        self._runners: WorkerRunners | None = None  # made for the first piece
 
     def run_piece(self, piece: Piece, report_finished: Callable[[str], None]) -> PieceResult:
         """Run a piece. Calls `report_finished` with the id of each finished experiment.
@@ -74,54 +71,44 @@ class PieceRunner:
         for same in group_by_run(self._manifest, experiments):
             if (key := self._golden_of(same[0]).key) not in self._matching_goldens:
                 self._ensure_golden(key)
-        runner = self._runner_of_kind(piece.kind)
+        runners, is_proof = self._ensure_runners(), piece.kind is PieceKind.PROVE
         finished: list[RecordedExperiment] = []
-        for ended in runner.run(experiments):
+        for ended in runners.prove(experiments) if is_proof else runners.run(experiments):
             finished.append(ended)
             report_finished(ended.experiment.id)
-        result = _build_result(finished, self._worker_name, is_proof=piece.kind is PieceKind.PROVE)
+        result = _build_result(finished, self._worker_name, is_proof=is_proof)
         return replace(result, number=piece.number, seconds=time.monotonic() - began)
 
     def close(self) -> None:
-        for runner in self._runners_by_kind.values():
-            runner.close()
+        if self._runners is not None:
+            self._runners.close()
 
-    def _runner_of_kind(self, kind: PieceKind) -> ExperimentRunner:
-        if kind not in self._runners_by_kind:
-            bundle = self._bundle
-            arguments = EngineArguments(
+    def _ensure_runners(self) -> WorkerRunners:
+        self._runners = self._runners or self._make_runners()
+        return self._runners
+
+    def _make_runners(self) -> WorkerRunners:
+        bundle = self._bundle
+        return WorkerRunners(
+            EngineArguments(
                 manifest=self._manifest,
                 models=self._models,
                 work_folder=self._work_folder,
                 limits=bundle.limits,
                 parent_pid=self._parent_pid,
-            )
-            if kind is PieceKind.PROVE:
-                engine = ReferenceEngine(
-                    self._manifest, self._work_folder, bundle.limits, self._parent_pid, independent=True
-                )
-            else:
-                engine = make_engine(bundle.meta["engine"], arguments)  # type: ignore[assignment]
-            goldens = LoadedGoldens(
-                self._manifest,
-                lambda experiment: path_below(self._goldens_folder, self._golden_of(experiment).key),
-                several_seeds=bundle.meta["several_seeds"],
-                digests={
-                    path_below(self._goldens_folder, key): golden_digest
-                    for key, (_, golden_digest) in bundle.golden_and_digest_by_key.items()
-                },
-            )
-            with_series = kind is PieceKind.RUN and bundle.meta["series"]
-            self._runners_by_kind[kind] = ExperimentRunner(
-                self._manifest,
-                self._models,
-                engine,
-                goldens,
-                bundle.scenario_path,
-                with_series=with_series,
-                inactivity_check=InactivityCheck(arguments),
-            )
-        return self._runners_by_kind[kind]
+            ),
+            bundle.meta["engine"],
+            golden_folder_of=lambda experiment: path_below(
+                self._goldens_folder, self._golden_of(experiment).key
+            ),
+            digest_by_golden_folder={
+                path_below(self._goldens_folder, key): golden_digest
+                for key, (_, golden_digest) in bundle.golden_and_digest_by_key.items()
+            },
+            has_seeded_goldens=bundle.meta["several_seeds"],
+            scenario_file=bundle.scenario_path,
+            with_series=bundle.meta["series"],
+        )
 
     def _ensure_golden(self, key: str) -> None:
         """Make a golden run or copy it from the cache; WorkerGoldenRunsDiffer if it differs from the
@@ -153,8 +140,6 @@ class PieceRunner:
                 )
                 raise WorkerGoldenRunsDiffer(f"golden run {golden.key} {problem}")
             execution.out.rename(destination)
-            if golden.seed is not None:  # the images of a hundred seeds would fill the disk
-                cache_layout_and_pruning.prune_target_cache(self._manifest.cache_name)
 
     def _golden_of(self, experiment: Experiment) -> GoldenRun:
         return GoldenRun.for_experiment(experiment, several_seeds=self._bundle.meta["several_seeds"])
@@ -189,13 +174,11 @@ def _run_catching_errors(
     except WorkerGoldenRunsDiffer as err:
         return PieceResult(number=piece.number, ending=PieceEnding.GOLDEN_DIFFERS, reason=str(err))
     except Exception as err:
-        reported_error = err if isinstance(err, MutatorError) else find_shortage(err)
-        lacks_resources = isinstance(reported_error, DiskFull | ResourceShortage)
-        text = str(reported_error) if reported_error else "".join(traceback.format_exception(err)).rstrip()
+        lacks_resources = isinstance(reported_error(err), DiskFull | ResourceShortage)
         return PieceResult(
             number=piece.number,
             ending=PieceEnding.WORKER_UNFIT if lacks_resources else PieceEnding.HARNESS_FAILED,
-            reason=text,
+            reason=describe_problem(err),
         )
 
 
@@ -213,20 +196,22 @@ def _refuse_first_piece(connection: Connection, err: Exception) -> None:
     """Answer the first piece with the reason why this process cannot run anything."""
     with suppress(EOFError):
         piece = Piece.from_bytes(connection.recv_bytes())
-        text = str(err if isinstance(err, MutatorError) else find_shortage(err) or repr(err))
+        text = str(reported_error(err) or repr(err))
         connection.send(
             PieceResult(number=piece.number, ending=PieceEnding.WORKER_UNFIT, reason=text).to_bytes()
         )
 
 
 def main() -> int:
-    connection, bundle, name = Connection(int(sys.argv[1])), UnpackedBundle(Path(sys.argv[3])), sys.argv[4]
+    (connection, data), bundle, name = (
+        opened_by_parent(sys.argv[1:]),
+        UnpackedBundle(Path(sys.argv[3])),
+        sys.argv[4],
+    )
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the host handles these signals
     try:
         with raising_disk_full(bundle.folder):
-            with os.fdopen(int(sys.argv[2]), "rb") as file:
-                inputs = RunInputs.from_bytes(file.read())
-            runner = PieceRunner(bundle, inputs, name, os.getppid())
+            runner = PieceRunner(bundle, RunInputs.from_bytes(data), name, os.getppid())
     except Exception as err:
         _refuse_first_piece(connection, err)
         return 1

@@ -4,11 +4,9 @@ One thread attends a host for the whole run and starts the processes. When that 
 the processes, and the host's folder is deleted. Other threads pass pieces to the host.
 """
 
-import os
 import queue
 import shutil
 import signal
-import socket
 import subprocess
 import tempfile
 import threading
@@ -25,7 +23,7 @@ from mutator.errors import MutatorError, PieceNoLongerNeeded
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceResult
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
-from mutator.execution.worker import python_command_dying_with
+from mutator.execution.worker_processes import start_worker_process
 
 _CHECK_INTERVAL_S = 0.25  # between two checks that the work is still wanted
 _LEAVE_TIMEOUT_S = 5.0  # to kill the processes and delete the folder
@@ -188,29 +186,7 @@ class WorkerHost:
         self._packed_inputs = (
             self._packed_inputs or bundle.load_run_inputs(UnpackedBundle(self.folder)).to_bytes()
         )
-        host_socket, process_socket = socket.socketpair()
-        try:
-            with tempfile.TemporaryFile(dir=self.folder) as file:  # nameless, so no run can change it
-                file.write(self._packed_inputs)
-                file.seek(0)
-                descriptors = [process_socket.fileno(), file.fileno()]
-                words = [
-                    "-m",
-                    _PIECE_PROCESS_MODULE,
-                    *map(str, descriptors),
-                    str(self.folder),
-                    self.worker_name,
-                ]
-                process = subprocess.Popen(
-                    [*python_command_dying_with(os.getpid()), *words],
-                    pass_fds=descriptors,
-                    cwd=self.folder,
-                    stdin=subprocess.DEVNULL,
-                    start_new_session=True,  # signals from the worker's terminal are for the worker only
-                )
-        except BaseException:
-            host_socket.close()
-            raise
-        finally:
-            process_socket.close()
-        return _PieceProcess(process, Connection(host_socket.detach()))
+        arguments = [str(self.folder), self.worker_name]
+        return _PieceProcess(
+            *start_worker_process(_PIECE_PROCESS_MODULE, self._packed_inputs, arguments, folder=self.folder)
+        )

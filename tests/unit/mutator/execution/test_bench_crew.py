@@ -10,10 +10,10 @@ from mutator.execution.bench_crew import (
     CrewBatch,
     _assignment,
     _Board,
-    _cut_into_pieces,
+    _golden_key_of,
     _Piece,
-    _pop_piece_for,
 )
+from mutator.execution.pieces import cut_into_pieces
 from mutator.model import Experiment
 
 
@@ -24,34 +24,11 @@ def runs_in(experiment: Callable[..., Experiment], *scenarios: str) -> list[list
 def pieces_in(experiment: Callable[..., Experiment], *scenarios: str) -> list[_Piece]:
     runs = runs_in(experiment, *scenarios)
     batch = CrewBatch(runs=runs, golden_digests={"A@1": "d"}, scenario_files={"A": Path("A.yaml")})
-    return [_Piece(piece, batch) for piece in _cut_into_pieces(runs, 2)]
+    return [_Piece(piece, batch) for piece in cut_into_pieces(runs, _golden_key_of, 2)]
 
 
 def worker() -> Any:
     return cast(Any, SimpleNamespace(golden_key=(), sent_goldens=set(), sent_scenarios=set()))
-
-
-def test_a_piece_has_one_golden_run(experiment: Callable[..., Experiment]) -> None:
-    """Pieces are small enough for all workers, and none mixes golden runs."""
-    pieces = _cut_into_pieces(runs_in(experiment, *"A" * 10, *"B" * 3), 1)
-    assert [[run[0].scenario for run in piece] for piece in pieces] == [
-        ["A"] * 4,
-        ["A"] * 4,
-        ["A"] * 2,
-        ["B"] * 3,
-    ]
-    assert [len(piece) for piece in _cut_into_pieces(runs_in(experiment, *"A" * 4), 2)] == [1, 1, 1, 1]
-
-
-def test_a_worker_goes_on_with_the_golden_run_that_it_has(experiment: Callable[..., Experiment]) -> None:
-    """A fork server that waits in a golden run is used further, if anything is left for it."""
-    pieces = pieces_in(experiment, *"AABB")
-    first, second = worker(), worker()
-    dealt = [_pop_piece_for(who, pieces).runs[0][0].scenario for who in (first, second, second, first)]
-    assert dealt == ["A", "A", "B", "B"]
-    pieces = pieces_in(experiment, *"AABB")
-    first.golden_key = ("B", pieces[-1].runs[0][0].changes, 7)
-    assert _pop_piece_for(first, pieces).runs[0][0].scenario == "B"
 
 
 def test_a_worker_is_told_only_what_is_new(experiment: Callable[..., Experiment]) -> None:

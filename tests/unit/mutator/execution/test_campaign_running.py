@@ -9,7 +9,7 @@ import pytest
 
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
-from mutator.execution.worker import Worker, WorkerAssignment
+from mutator.execution.worker import Worker
 from mutator.store.session_progress import PROGRESS_FILE, read_session_progress
 from mutator.workspace import Workspace
 
@@ -29,19 +29,9 @@ sys.stdout.buffer.write(pickle.dumps((worker.file_digests, set(sys.modules))))
 """
 
 
-def assignment_of(session: Session) -> WorkerAssignment:
-    return WorkerAssignment(
-        run_folder=session.folder.path,
-        worker_name=session.new_worker_name("mine"),
-        engine=session.engine,
-        golden_digests=session.golden_digests,
-        secret=session.secret,
-    )
-
-
 class InOrder:
     def run(self, session: Session) -> None:
-        worker = Worker(session.inputs, assignment_of(session))
+        worker = Worker(session.inputs, session.worker_assignment("mine"))
         for piece in session.pending:
             worker.run(piece)
         for sample in session.proof:
@@ -57,7 +47,7 @@ class Elsewhere:
         self.loaded: set[str] = set()
 
     def run(self, session: Session) -> None:
-        work = (session.inputs.to_bytes(), assignment_of(session), session.pending, session.proof)
+        work = (session.inputs.to_bytes(), session.worker_assignment("mine"), session.pending, session.proof)
         command = [sys.executable, "-c", WORKER]
         done = subprocess.run(command, input=pickle.dumps(work), stdout=subprocess.PIPE, check=True)
         written, self.loaded = pickle.loads(done.stdout)

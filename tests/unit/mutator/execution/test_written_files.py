@@ -62,7 +62,10 @@ def test_lines_of_workers_count_if_the_command_is_interrupted(run: Path) -> None
     """pytest then does not wait for the workers' reports."""
     write(run)
     written = WrittenFiles()
-    begun = SimpleNamespace(written=written, xdist_worker_input=lambda: {"session": "0001-"})
+    start = SimpleNamespace(to_bytes=lambda: b"")
+    begun = SimpleNamespace(
+        pending=(), proof=(), start_of_worker=lambda name: written.note_worker_began(f"0001-{name}") or start
+    )
     node = SimpleNamespace(workerinput={}, gateway=SimpleNamespace(id="gw0"))
     CampaignController(cast("Any", begun)).pytest_configure_node(node)
     assert written.set_unreported_aside(run) == []

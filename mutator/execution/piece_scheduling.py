@@ -1,0 +1,98 @@
+"""How pytest-xdist deals a campaign's items: in pieces, each with one golden run.
+
+A worker goes on with the golden run that it has in memory, so its engine can go on where it is.
+"""
+
+from collections.abc import Callable, Hashable, Sequence
+from itertools import cycle
+from typing import Any
+
+import pytest
+from xdist.scheduler import LoadScheduling
+
+from mutator.execution.pieces import cut_into_pieces, take_piece_for
+
+# A user's choice, which is followed. The other ones keep the items of a file together, or repeat all items.
+_CHOICES = ("load", "loadgroup", "worksteal")
+_LEAST_PENDING = 2  # a worker begins an item when it knows the next one
+
+
+def is_scheduler_chosen(config: pytest.Config) -> bool:
+    """Whether the user has named a `--dist` that suits a campaign."""
+    return getattr(config.known_args_namespace, "dist", "no") in _CHOICES
+
+
+class PieceScheduling(LoadScheduling):  # type: ignore[misc]  # xdist has no types
+    """Deals pieces of items. `golden_key_of` returns what items of a piece have in common, by node id."""
+
+    collection: list[str] | None
+
+    def __init__(self, config: pytest.Config, log: Any, golden_key_of: Callable[[str], Hashable]) -> None:
+        super().__init__(config, log)
+        self._golden_key_of = golden_key_of
+        self._pieces: list[list[int]] = []
+        self._golden_key_by_worker: dict[Any, Hashable] = {}
+
+    def schedule(self) -> None:
+        """Deal the first pieces, in turn, or, to workers that came later, the next ones."""
+        is_first = self.collection is None
+        if is_first and not self._check_nodes_have_same_collection():
+            return
+        if is_first:
+            self.collection = next(iter(self.node2collection.values()))
+            self._put_back(range(len(self.collection)))
+        for node in cycle(self.nodes):
+            if not self.pending or all(map(self._has_enough, self.nodes)):
+                break
+            if not self._has_enough(node):
+                self._send_piece(node)
+        if self.collection and not self.pending:
+            for node in self.nodes:
+                node.shutdown()
+
+    def check_schedule(self, node: Any, duration: float = 0) -> None:
+        """Deal the next pieces to a worker that is about to wait for them."""
+        if node.shutting_down:
+            return
+        while self.pending and not self._has_enough(node):
+            self._send_piece(node)
+        if not self.pending:
+            node.shutdown()
+
+    def mark_test_pending(self, item: str) -> None:
+        """Deal an item again."""
+        assert self.collection is not None
+        self._put_back([self.collection.index(item)])
+        for node in self.nodes:
+            self.check_schedule(node)
+
+    def remove_node(self, node: Any) -> str | None:
+        """Forget a worker; return the item that it ran when it died, and deal the others again."""
+        indices: list[int] = self.node2pending.pop(node)
+        if not indices:
+            return None
+        assert self.collection is not None
+        self._put_back(indices[1:])
+        for other in self.nodes:
+            self.check_schedule(other)
+        return self.collection[indices[0]]
+
+    def _has_enough(self, node: Any) -> bool:
+        return len(self.node2pending[node]) >= _LEAST_PENDING or node.shutting_down
+
+    def _put_back(self, indices: Sequence[int]) -> None:
+        self._pieces += cut_into_pieces(indices, self._key_of_index, len(self.nodes) or 1)
+        self.pending.extend(indices)
+
+    def _key_of_index(self, index: int) -> Hashable:
+        assert self.collection is not None
+        return self._golden_key_of(self.collection[index])
+
+    def _send_piece(self, node: Any) -> None:
+        golden_key = self._golden_key_by_worker.get(node)
+        piece = take_piece_for(golden_key, self._pieces, lambda piece: self._key_of_index(piece[0]))
+        self._golden_key_by_worker[node] = self._key_of_index(piece[-1])
+        sent = set(piece)
+        self.pending[:] = [index for index in self.pending if index not in sent]
+        self.node2pending[node].extend(piece)
+        node.send_runtest_some(piece)
