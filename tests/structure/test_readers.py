@@ -12,7 +12,7 @@ ALLOWED = {
     "_common/shipped_files.py: read_text": "installed with the harness",
     "campaigns/run_environment.py: read_text": "the kernel's file",
     "execution/suspended_workers.py: read_text": "the kernel's file",
-    "execution/cluster/piece_process.py: read": "a file of its parent",
+    "execution/worker_processes.py: read": "a file of its parent",
     "glue.py: read_text": "runs in the target's process",
     "results/table_reader.py: read": "checks the number of cells before",
     "review/image_effect_pictures.py: read_bytes": "installed with the harness",
