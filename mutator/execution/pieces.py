@@ -23,8 +23,8 @@ def cut_into_pieces(
         if last and len(last) < most and golden_key_of(last[0]) == golden_key_of(part):
             last.append(part)
         else:
-            left = len(work) - position
-            most = max(1, min(_MOST_IN_PIECE, -(-left // (worker_count * _PIECES_PER_WORKER))))
+            remaining = len(work) - position
+            most = max(1, min(_MOST_IN_PIECE, -(-remaining // (worker_count * _PIECES_PER_WORKER))))
             pieces.append([part])
     return pieces
 
