@@ -13,6 +13,7 @@ from mutator._common.confined_files import (
     write_below,
 )
 from mutator._common.files import json_bytes, parse_json_object
+from mutator._common.folder_locks import OWNER_LOCK_FILE
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
@@ -41,6 +42,7 @@ _TOP_NAMES_NOT_READ = {
     DAMAGED_FOLDER,
     SCRATCH_FOLDER,
     "workers",
+    OWNER_LOCK_FILE,  # has the number of the last process
     PROGRESS_FILE,
     *SIGNATURE_FILES,
 }

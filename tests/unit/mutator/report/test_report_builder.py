@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from mutator._common.files import write_json
+from mutator._common.folder_locks import OWNER_LOCK_FILE
 from mutator.errors import MutatorError, UnsafePath
 from mutator.figures.figure_style import with_page_theme
 from mutator.report import report_builder
@@ -175,6 +176,8 @@ def drawn_again(run: Path, workspace: Workspace | None) -> bool:
 
 def test_an_up_to_date_report_is_not_written_again(run: Path) -> None:
     assert drawn_again(run, None)
+    assert not drawn_again(run, None)
+    (run / OWNER_LOCK_FILE).write_text("4711")  # as each process that opens the run leaves it
     assert not drawn_again(run, None)
     (run / "plots" / ("2" * 16 + ".svg")).touch()
     assert drawn_again(run, None)
