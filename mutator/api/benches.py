@@ -20,7 +20,7 @@ from mutator.api.target_and_fault_selection import (
 )
 from mutator.campaigns.campaign_files import load_campaign
 from mutator.engines.engine_choice import check_engine_is_offered
-from mutator.errors import EXIT_CHECK_FAILED, IncompleteRun, MutatorError, MutatorWarning
+from mutator.errors import EXIT_CHECK_FAILED, IncompleteRun, MutatorWarning
 from mutator.execution import bench as bench_in_folder
 from mutator.execution.bench_opening import opened_bench
 from mutator.execution.session_summary import Summary
@@ -61,16 +61,13 @@ def open_bench(
     IncompleteRun warning is issued if experiments have no result.
     """
     check_whole_number("seed", seed)
+    check_whole_number("workers", workers, least=1)
     check_engine_is_offered(engine)
-    check_whole_number("workers", workers)
-    if workers < 1:
-        raise MutatorError(f"{workers}", argument="workers", expected="a whole number, at least 1")
     opened_workspace = open_workspace(workspace)
-    shared = _values_of_campaign(opened_workspace, campaign)
-    selected_target = SelectedTarget.of(opened_workspace, target or shared.pop("target", None))
-    values = {
-        **shared,
-        **{name: value for name, value in (("canary", canary), ("limits", limits)) if value is not None},
+    values = _values_of_campaign(opened_workspace, campaign)
+    selected_target = SelectedTarget.of(opened_workspace, target or values.pop("target", None))
+    values |= {name: value for name, value in (("canary", canary), ("limits", limits)) if value is not None}
+    values |= {
         "target": selected_target.manifest.name,
         "reading": _checked_reading(opened_workspace, reading),
         "seed": seed,

@@ -1,7 +1,8 @@
 """`campaign.yaml` of a bench: what was fixed when it was opened. Its experiments come in batches."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -52,6 +53,22 @@ def _json(key: str, value: Any) -> str:
     except (TypeError, ValueError) as err:
         raise MutatorError(
             f"{value!r} ({err})", argument=key, expected="plain numbers, text, lists and mappings"
+        ) from None
+
+
+@contextmanager
+def naming_arguments(path: Path, values: Mapping[str, Any]) -> Iterator[None]:
+    """Make errors that point at a line of the bench's file name the argument in this line: whoever opened the
+    bench did not write the file.
+    """
+    try:
+        yield
+    except MutatorError as error:
+        if error.where != str(path) or error.line is None:
+            raise
+        key_by_line = dict(enumerate(("schema", *values), start=1))
+        raise MutatorError(
+            error.got, argument=key_by_line[error.line], expected=error.expected, remedy=error.remedy
         ) from None
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import remove_anything_at, remove_folder, write_atomic
 from mutator._common.folder_locks import lock_run_folder
-from mutator.campaigns.bench_files import bench_file_bytes, load_bench_file
+from mutator.campaigns.bench_files import bench_file_bytes, load_bench_file, naming_arguments
 from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.plan_growth import APPENDED_FILES
@@ -84,14 +84,16 @@ def _build_bench(
         _check_existing(workspace, out, file_bytes)
     else:
         write_atomic(out / CAMPAIGN_FILE, file_bytes)
-    campaign = load_bench_file(out / CAMPAIGN_FILE)
-    manifest = workspace.manifest(campaign.target)
-    expansion = CampaignExpansion(workspace, campaign, manifest, campaign.seed, campaign.reading or "")
+    with naming_arguments(out / CAMPAIGN_FILE, values):
+        campaign = load_bench_file(out / CAMPAIGN_FILE)
+        manifest = workspace.manifest(campaign.target)
+        expansion = CampaignExpansion(workspace, campaign, manifest, campaign.seed, campaign.reading or "")
+        canary = expansion.build_canary()
     return Bench(
         workspace,
         manifest,
         campaign,
-        expansion.build_canary(),
+        canary,
         out,
         workers=workers,
         engine=engine,

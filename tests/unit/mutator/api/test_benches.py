@@ -192,14 +192,15 @@ def test_a_failed_golden_run_leaves_no_plan(toycar: Workspace, tmp_path: Path) -
     [
         ({"seed": 9}, "this bench was opened with other arguments"),
         ({"canary": None, "limits": {"steps": 150}}, "this bench was opened with other arguments"),
-        ({"workers": 0}, "a whole number, at least 1"),
+        ({"workers": 0}, "workers: 0; expected a positive number"),
         ({"after_hazard": "never"}, "after_hazard: 'never'; expected `go_on` or `stop`"),
         ({"limits": {"steps": np.int64(200)}}, "limits: .*int64.*expected plain numbers"),
         ({"limits": {"steps": math.nan}}, "limits: .*nan.*expected plain numbers"),
-        ({"limits": {"stairs": 1}}, "campaign.yaml:.*stairs"),
+        ({"limits": {"stairs": 1}}, "^limits: unknown key 'stairs'"),
+        ({"limits": {"steps": -1}}, "^limits: .*-1"),
         (
             {"canary": {"spec": "sensor/lane/none", "scenario": "A", "hazard": "H3", "at_s": 1}},
-            "sensor/lane/none",
+            "^canary: .*sensor/lane/none",
         ),
         ({"reading": "as_told"}, "as_told"),
     ],
@@ -207,7 +208,7 @@ def test_a_failed_golden_run_leaves_no_plan(toycar: Workspace, tmp_path: Path) -
 def test_wrong_arguments_are_refused(
     toycar: Workspace, tmp_path: Path, change: dict[str, Any], expected: str
 ) -> None:
-    """A mistake, or arguments other than the first time, end in an error that says so, and make no folder."""
+    """A mistake, or other arguments than the first time, end in an error that names them and in no folder."""
     if "other" in expected:
         with opened(toycar, tmp_path / "b") as bench:
             bench.run(shifted(bench, 5))
