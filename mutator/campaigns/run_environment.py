@@ -145,6 +145,11 @@ def packages_of_modules(modules: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted({canonicalize_name(name) for name in names} & _installed_packages().keys()))
 
 
+def modules_without_package(modules: Iterable[str]) -> tuple[str, ...]:
+    """Return the top-level modules that no package provides. No version tells what their code is."""
+    return tuple(sorted(module for module in modules if not packages_of_modules([module])))
+
+
 @lru_cache(maxsize=1)
 def _packages_by_module() -> dict[str, list[str]]:
     """Return the packages of each top-level module; cached, because it reads every package's file list."""

@@ -1,7 +1,7 @@
 """What decides the record of a run, as a key: two runs with the same key have the same result.
 
 The key has neither the experiment's id, which contains how its trigger was chosen, nor limits, which only cut
-runs off.
+runs off. It has the scenario's name beside its digest: an error of the target can contain it.
 """
 
 import platform
@@ -77,6 +77,7 @@ def run_key(surroundings: str, experiment: Experiment, tree_digest: str, golden_
             experiment.fault.injections,
             experiment.fault.hold,
             experiment.trigger_as_json,
+            experiment.scenario,
             experiment.scenario_digest,
             experiment.changes,
             experiment.seed,

@@ -1,7 +1,8 @@
 """The reuse of finished runs by a worker: it searches the store before a run, and notes what a run gave."""
 
 import builtins
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from mutator._common.hashing import digest
@@ -12,8 +13,14 @@ from mutator.execution.finished_run_keys import harness_digest, run_key
 from mutator.model import Experiment, Record, RunError, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.store.finished_run_store import FinishedRun, FinishedRuns, UnprovedRuns
-from mutator.store.preflight_results import packages_loaded_by_golden_runs
+from mutator.store.preflight_results import (
+    packages_loaded_by_golden_runs,
+    unpackaged_modules_of_golden_runs,
+)
 from mutator.store.run_folder import RunFolder
+
+# not in the middle of a word, as in `km/h`; often the path of the scenario's file
+_ABSOLUTE_PATH_PATTERN = re.compile(r"(?<![\w/.])/\w")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +58,7 @@ class RunReuse:
         self._golden_digest_of = golden_digest_of
         self._run_path = folder.path
         self._golden_packages: tuple[str, ...] | None = None  # not read yet
+        self._is_golden_unpackaged: bool | None = None
         self._stored = FinishedRuns()
         self._unproved = UnprovedRuns(folder.path, folder.head.plan_of_lines, worker_name)
 
@@ -76,8 +84,9 @@ class RunReuse:
         mutant, record = finished.mutant, finished.record
         if not self._is_in_use or mutant is None or finished.is_reused or not is_storable(record):
             return
-        packages = self._packages_of(finished.third_party_modules, mutant)
-        if not packages <= self._version_by_package.keys():
+        modules = _modules_outside(mutant, finished.third_party_modules)
+        packages = self._packages_of(modules)
+        if self._has_unpackaged(modules) or not packages <= self._version_by_package.keys():
             return  # it loaded code that can change
         series = finished.series.faulty_bytes if finished.series else None
         run = FinishedRun(
@@ -90,7 +99,7 @@ class RunReuse:
 
     def note_new_goldens(self) -> None:
         """Note that the run folder has more golden runs, which can have loaded more packages."""
-        self._golden_packages = None
+        self._golden_packages = self._is_golden_unpackaged = None
 
     def close(self) -> None:
         self._unproved.close()
@@ -102,20 +111,31 @@ class RunReuse:
     def _versions_of(self, packages: Iterable[str]) -> dict[str, str | None]:
         return {name: self._version_by_package.get(name) for name in packages}
 
-    def _packages_of(self, third_party_modules: Iterable[str], mutant: Mutant) -> set[str]:
+    def _packages_of(self, modules: Collection[str]) -> set[str]:
         """Return the packages of these modules, which a run loaded, and of its golden run."""
         if self._golden_packages is None:
             self._golden_packages = packages_loaded_by_golden_runs(RunFolder(self._run_path))
-        own_names = {path.partition("/")[0].removesuffix(".py") for path in mutant.files}
-        modules = {*third_party_modules} - own_names
         return {*self._golden_packages, *(run_environment.packages_of_modules(modules) if modules else ())}
+
+    def _has_unpackaged(self, modules: Collection[str]) -> bool:
+        """Whether no package provides one of these modules, or one that a golden run loaded."""
+        if self._is_golden_unpackaged is None:
+            self._is_golden_unpackaged = bool(unpackaged_modules_of_golden_runs(RunFolder(self._run_path)))
+        return self._is_golden_unpackaged or bool(run_environment.modules_without_package(modules))
+
+
+def _modules_outside(mutant: Mutant, modules: Iterable[str]) -> set[str]:
+    return {*modules} - {path.partition("/")[0].removesuffix(".py") for path in mutant.files}
 
 
 def is_storable(record: Record) -> bool:
-    """Whether a record is the same with other limits, and inside or outside of the sandbox: it was not cut
-    off, and the harness did not fail.
+    """Whether a record is the same with other limits, with or without the sandbox, and in another folder: it
+    was not cut off, the harness did not fail, and no text in it names an absolute path.
     """
     if record.status in (Status.TIMEOUT, Status.HARNESS_ERROR) or not record.tree:
+        return False
+    texts = (record.detail, record.error.message if record.error else "")
+    if any(map(_ABSOLUTE_PATH_PATTERN.search, texts)):
         return False
     # native code that gets no memory can end the process
     return not _is_by_limits(record.error) and not record.detail.startswith((EXITED_DETAIL, KILLED_DETAIL))

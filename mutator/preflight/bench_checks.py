@@ -26,13 +26,16 @@ from mutator.preflight.preflight_checks import (
     build_check_result,
     golden_run_results,
     loaded_packages,
+    unpackaged_modules,
 )
 from mutator.store import file_digests
 from mutator.store.checks_file import (
     CHECKED_GOLDENS_KEY,
     CHECKS_FILE,
     CHECKS_SCHEMA,
+    UNPACKAGED_MODULES_KEY,
     measured_limits_as_json,
+    unpackaged_modules_as_json,
 )
 from mutator.store.file_digests import FileDigest
 from mutator.store.preflight_results import CheckResult
@@ -54,15 +57,20 @@ class CheckedGolden:
     packages: tuple[str, ...]
     results: tuple[CheckResult, ...]
     canary: CheckResult | None = None
+    modules_without_package: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
-        return {**asdict(self), "packages": list(self.packages), "results": list(map(asdict, self.results))}
+        values = asdict(self)
+        unpackaged = unpackaged_modules_as_json(values.pop("modules_without_package"))
+        lists = {"packages": list(self.packages), "results": list(map(asdict, self.results))}
+        return values | lists | unpackaged
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> "CheckedGolden":
         results = tuple(CheckResult(**result) for result in values["results"])
         canary = CheckResult(**values["canary"]) if values["canary"] else None
-        return cls(**{**values, "packages": tuple(values["packages"]), "results": results, "canary": canary})
+        lists = {name: tuple(values.get(name, ())) for name in ("packages", UNPACKAGED_MODULES_KEY)}
+        return cls(**{**values, **lists, "results": results, "canary": canary})
 
 
 @dataclass
@@ -158,6 +166,7 @@ class BenchChecks:
                 trace_digest=digest([first.trace_digest, first.alerts]),
                 cpu_s=first.cpu_s,
                 packages=tuple(loaded_packages(self.manifest, [first])),
+                modules_without_package=unpackaged_modules(self.manifest, [first]),
                 results=tuple(golden_run_results(runs, golden_run)),
                 canary=canary if golden_run == canary_golden else None,
             )
@@ -232,6 +241,9 @@ class BenchChecks:
                 for golden_run, golden in zip(golden_runs, checked, strict=True)
             },
             "packages": sorted({name for golden in checked for name in golden.packages}),
+            **unpackaged_modules_as_json(
+                name for golden in checked for name in golden.modules_without_package
+            ),
             "run_cpu_s": sum(cpu_s) / len(cpu_s),
             CHECKED_GOLDENS_KEY: {
                 golden_run.key: golden.as_json()

@@ -37,7 +37,13 @@ from mutator.preflight.preflight_check_runner import (
     OnProgress,
 )
 from mutator.store import file_digests, plan_file
-from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA, MEASURED_LIMITS_KEY, measured_limits_as_json
+from mutator.store.checks_file import (
+    CHECKS_FILE,
+    CHECKS_SCHEMA,
+    MEASURED_LIMITS_KEY,
+    measured_limits_as_json,
+    unpackaged_modules_as_json,
+)
 from mutator.store.file_digests import FileDigest
 from mutator.store.preflight_results import CheckResult
 from mutator.store.run_folder import GoldenRun, RunFolder
@@ -183,6 +189,7 @@ class _PreflightChecks:
             "results": [asdict(result) for result in results],
             "goldens": goldens,
             "packages": loaded_packages(self.manifest, golden_runs),
+            **unpackaged_modules_as_json(unpackaged_modules(self.manifest, golden_runs)),
             "run_cpu_s": sum(run.cpu_s for run in golden_runs) / len(golden_runs),
             **measured_limits_as_json(check_runner.measure_limits(golden_runs)),
         }
@@ -293,9 +300,17 @@ def anchor_result(problem: str, variant_count: int) -> CheckResult:
 
 def loaded_packages(manifest: TargetManifest, golden_runs: Iterable[CheckRun]) -> list[str]:
     """Return the packages that golden runs loaded, without the target and the standard library."""
+    return list(run_environment.packages_of_modules(_third_party_modules(manifest, golden_runs)))
+
+
+def unpackaged_modules(manifest: TargetManifest, golden_runs: Iterable[CheckRun]) -> tuple[str, ...]:
+    """Return the modules that golden runs loaded from outside the target and that no package provides."""
+    return run_environment.modules_without_package(_third_party_modules(manifest, golden_runs))
+
+
+def _third_party_modules(manifest: TargetManifest, golden_runs: Iterable[CheckRun]) -> set[str]:
     loaded = {module for run in golden_runs for module in run.third_party_modules}
-    target_modules = {path.split("/")[0].removesuffix(".py") for path in manifest.tree.files}
-    return list(run_environment.packages_of_modules(loaded - target_modules))
+    return loaded - {path.split("/")[0].removesuffix(".py") for path in manifest.tree.files}
 
 
 def _limits_that_checks_depend_on(campaign: Campaign) -> dict[str, Any] | Limits:

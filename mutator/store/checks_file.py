@@ -1,5 +1,6 @@
-"""`checks.json`: its name and schema, and the limits that the checks measured."""
+"""`checks.json`: its name and schema, and what it has only if a run needs it."""
 
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,6 +13,7 @@ CHECKS_SCHEMA = "checks/1"
 CHECKS_FILE = "checks.json"
 CHECKED_GOLDENS_KEY = "checked"  # of a bench: what each golden run's checks gave, with its CPU time
 MEASURED_LIMITS_KEY = "measured_limits"
+UNPACKAGED_MODULES_KEY = "modules_without_package"
 
 
 def limits_of_run(run: Path, campaign_limits: Limits) -> Limits:
@@ -41,3 +43,11 @@ def measured_limits_as_json(limits: Limits) -> dict[str, dict[str, int]]:
     if not isinstance(limits, MeasuredLimits):
         return {}
     return {MEASURED_LIMITS_KEY: {name: getattr(limits, name) for name in sorted(LIMITS_THAT_ARE_MEASURED)}}
+
+
+def unpackaged_modules_as_json(modules: Iterable[str]) -> dict[str, list[str]]:
+    """Return what checks.json stores of modules that golden runs loaded and no package provides: nothing, if
+    there are none.
+    """
+    names = sorted({*modules})
+    return {UNPACKAGED_MODULES_KEY: names} if names else {}

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from mutator._common.files import read_json
-from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA
+from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA, UNPACKAGED_MODULES_KEY
 from mutator.store.run_folder import RunFolder
 
 
@@ -26,6 +26,12 @@ def check_results(folder: RunFolder) -> tuple[CheckResult, ...]:
 def packages_loaded_by_golden_runs(folder: RunFolder) -> tuple[str, ...]:
     path = folder.path / CHECKS_FILE
     return tuple(read_json(path, CHECKS_SCHEMA).get("packages", ())) if path.is_file() else ()
+
+
+def unpackaged_modules_of_golden_runs(folder: RunFolder) -> tuple[str, ...]:
+    """Return the modules that golden runs loaded and no package provides."""
+    path = folder.path / CHECKS_FILE
+    return tuple(read_json(path, CHECKS_SCHEMA).get(UNPACKAGED_MODULES_KEY, ())) if path.is_file() else ()
 
 
 def golden_digests(folder: RunFolder) -> dict[str, str]:

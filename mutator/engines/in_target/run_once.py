@@ -287,9 +287,23 @@ def third_party_modules(modules_before: set[str], packages: Iterable[str]) -> li
 
 
 def third_party_names(names: Iterable[str], others: Iterable[str]) -> list[str]:
-    """Return the top-level names of modules, without `others`, the standard library and the harness."""
+    """Return the top-level names of modules, without `others`, the standard library, the harness and what
+    code made at run time.
+    """
     excluded = {*sys.stdlib_module_names, HarnessImportFinder.package_folder.name, *others}
-    return sorted({name.partition(".")[0] for name in names} - excluded)
+    return sorted(filter(is_from_third_party, {name.partition(".")[0] for name in names} - excluded))
+
+
+def is_from_third_party(name: str) -> bool:
+    """Return whether a module has a file or folder outside that of the standard library, which also has
+    modules that `sys.stdlib_module_names` lacks. Of a library that was only mapped into memory, True.
+    """
+    if name not in sys.modules:
+        return True
+    module, places = sys.modules[name], []
+    with suppress(Exception):  # a target can put any object there
+        places = [getattr(module, "__file__", None), *getattr(module, "__path__", ())]
+    return any(isinstance(place, str) and Path(place).parent != Path(os.__file__).parent for place in places)
 
 
 def modules_mapped_into_memory() -> Iterator[str]:

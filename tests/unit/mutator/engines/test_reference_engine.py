@@ -339,6 +339,15 @@ def test_the_report_lists_only_packages_that_the_run_imports(run: Run) -> None:
     assert run(entry("import json, iniconfig.exceptions, toycar.world")).third_party_modules == ("iniconfig",)
 
 
+def test_the_report_leaves_out_modules_of_python_and_those_without_a_file(run: Run) -> None:
+    """Numpy's extensions make some, and Python's configuration has another name on each system."""
+    code = (
+        "import numpy.random, sys, sysconfig, types\nsysconfig.get_config_vars()\nsys.modules['made'] = types"
+    )
+    code += ".ModuleType('made'); sys.modules['strange'] = 1"
+    assert run(entry(code)).third_party_modules == ("numpy",)
+
+
 def test_the_report_lists_packages_with_loaded_shared_libraries(run: Run) -> None:
     """The versions of these packages affect results, although the run does not import them."""
     code = (

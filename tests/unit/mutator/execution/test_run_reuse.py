@@ -21,7 +21,7 @@ from mutator.execution.finished_run_keys import harness_digest, surroundings_dig
 from mutator.execution.run_reuse import is_storable
 from mutator.execution.session_summary import Summary
 from mutator.execution.worker import Worker
-from mutator.model import Record, RunError, Status
+from mutator.model import Experiment, Record, RunError, Status
 from mutator.store import plan_file
 from mutator.store.checksummed_blocks import block_bytes, read_blocks
 from mutator.store.finished_run_store import FinishedRun, FinishedRuns
@@ -160,6 +160,28 @@ def test_the_harness_is_part_of_the_key_but_for_what_shows_results(
     harness_digest.cache_clear()
 
 
+def test_runs_of_edited_code_are_not_reused_but_those_before_an_unrelated_package_are(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is reused after an edit of the rules of verdicts or of the records; everything is after another
+    package was installed."""
+    copy = tmp_path / "mutator"
+    shutil.copytree(Path(mutator.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(finished_run_keys, "_HARNESS_FOLDER", copy)
+    installed = run_environment._installed_packages()
+    reused = [ran(toycar, tmp_path / "first").reused]
+    for name in ("outcomes/verdict_rules.py", "model.py"):
+        (copy / name).write_text((copy / name).read_text() + "\n")
+        harness_digest.cache_clear()
+        reused.append(ran(toycar, tmp_path / f"after {Path(name).stem}").reused)
+    monkeypatch.setattr(
+        run_environment, "_installed_packages", lambda: {**installed, "unrelated": ("1.0", [])}
+    )
+    reused.append(ran(toycar, tmp_path / "after a package", accept_versions=True).reused)
+    harness_digest.cache_clear()
+    assert reused == [0, 0, 0, 12]
+
+
 def test_an_unrelated_package_changes_no_key(toycar: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
     """But another version of one that the harness requires does."""
     manifest, installed = toycar.manifest("toycar"), run_environment._installed_packages()
@@ -194,6 +216,27 @@ def test_a_run_that_loaded_an_editable_package_is_not_stored(
     monkeypatch.setattr(run_environment, "_editable_packages", lambda: ("pytest",))
     ran(toycar, tmp_path / "first")
     assert not FinishedRuns().has_any()
+
+
+@pytest.mark.parametrize("is_in_golden", [True, False])
+def test_a_run_that_loaded_a_module_of_no_package_is_not_stored(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_in_golden: bool
+) -> None:
+    """No version tells what such a file contains, whether golden runs load it or only a mutant does."""
+    if is_in_golden:
+        monkeypatch.setattr(run_reuse, "unpackaged_modules_of_golden_runs", lambda folder: ("loose",))
+    else:
+        monkeypatch.setattr(run_reuse, "_modules_outside", lambda mutant, modules: {"numpy", "loose"})
+    ran(toycar, tmp_path / "first")
+    assert not FinishedRuns().has_any()
+
+
+def test_the_name_of_a_scenario_is_part_of_the_key(experiment: Callable[..., Experiment]) -> None:
+    """An error of the target can contain it, and then stands in the record."""
+    asked = experiment()
+    renamed = dataclasses.replace(asked, scenario=f"{asked.scenario}_again")
+    keys = {finished_run_keys.run_key("", each, "", "") for each in (asked, asked, renamed)}
+    assert len(keys) == 2
 
 
 def test_a_worker_with_other_code_leaves_the_store_alone(
@@ -364,6 +407,23 @@ def test_runs_that_limits_cut_off_are_not_stored(
 ) -> None:
     error = RunError(kind=kind, message="", place="") if kind else None
     ended = dataclasses.replace(record(), status=status, error=error, tree="1" * 64)
+    assert is_storable(ended) is expected
+
+
+@pytest.mark.parametrize(
+    ("message", "expected"),
+    [
+        ("/home/me/scenarios/A.yaml: no lead", False),
+        ("no file '/tmp/x'", False),
+        ("80 km/h, 1 / 2 of them", True),
+    ],
+)
+def test_errors_that_name_a_path_are_not_stored(
+    record: Callable[..., Record], message: str, expected: bool
+) -> None:
+    """In another clone, the same error names another path."""
+    error = RunError(kind="ValueError", message=message, place="")
+    ended = dataclasses.replace(record(), status=Status.CRASHED, error=error, tree="1" * 64)
     assert is_storable(ended) is expected
 
 

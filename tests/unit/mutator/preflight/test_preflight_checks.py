@@ -1,5 +1,6 @@
 """The checks before a campaign."""
 
+import dataclasses
 import json
 import re
 import shutil
@@ -13,11 +14,18 @@ from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Limits, MeasuredLimits
+from mutator.preflight.bench_checks import CheckedGolden
 from mutator.preflight.canary_check import CanaryVerdict, run_until_hazard
 from mutator.preflight.check_run_problems import CheckRun
-from mutator.preflight.preflight_checks import run_checks
-from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA
+from mutator.preflight.preflight_checks import run_checks, unpackaged_modules
+from mutator.store.checks_file import (
+    CHECKS_FILE,
+    CHECKS_SCHEMA,
+    UNPACKAGED_MODULES_KEY,
+    unpackaged_modules_as_json,
+)
 from mutator.store.checksummed_lines import LineWriter
+from mutator.store.preflight_results import unpackaged_modules_of_golden_runs
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress
@@ -247,3 +255,20 @@ def test_a_golden_run_that_loses_an_observed_value_fails_its_check(toycar: Works
     text = "golden A: truth: d_rel is NaN at 1.05 s, and stays so to the end of the drive"
     with pytest.raises(CheckFailed, match=text):
         run_checks(toycar, frozen(toycar, tmp_path))
+
+
+def test_modules_of_golden_runs_that_no_package_provides_are_stored(
+    toycar: Workspace, tmp_path: Path
+) -> None:
+    """They decide what may be reused. Without them, checks.json has no such key, nor a bench's golden run."""
+    loaded = [CheckRun(problem="", third_party_modules=("numpy", "loose", "toycar"))]
+    modules = unpackaged_modules(toycar.manifest("toycar"), loaded)
+    assert modules == ("loose",)
+    assert unpackaged_modules_as_json(()) == {}
+    checks = {"schema": CHECKS_SCHEMA, **unpackaged_modules_as_json(modules)}
+    (tmp_path / CHECKS_FILE).write_text(json.dumps(checks))
+    assert unpackaged_modules_of_golden_runs(RunFolder(tmp_path)) == ("loose",)
+    golden = CheckedGolden(output_digest="", trace_digest="", cpu_s=0.0, packages=(), results=())
+    assert UNPACKAGED_MODULES_KEY not in golden.as_json()
+    golden = dataclasses.replace(golden, modules_without_package=modules)
+    assert CheckedGolden.from_json(golden.as_json()) == golden
