@@ -72,6 +72,16 @@ def test_run_prints_the_table_and_the_path_of_the_report(finished: tuple[Path, A
     assert "experiments " in said.stderr  # progress goes to stderr
 
 
+def test_run_takes_results_from_earlier_runs_unless_it_is_told_not_to(cli: Cli, root: Path) -> None:
+    """It says how many results it took. With `--no-reuse` it runs everything, and the seal is the same."""
+    words = ("run", "small", "-n", "0", "--out")
+    first = cli(*words, "first", "--json").json
+    assert "12 of 12 reused: earlier runs had the same experiments" in cli(*words, "second").out
+    second, third = cli(*words, "second", "--json").json, cli(*words, "third", "--no-reuse", "--json").json
+    assert (first["reused"], third["reused"], third["ran"]) == (0, 0, 12)
+    assert first["seal"] == second["seal"] == third["seal"]
+
+
 def test_running_a_finished_run_changes_nothing(cli: Cli, run: Path) -> None:
     before = results(run)
     answer = cli("run", "toy", "--out", run, *CHOSEN, "-n", "0")

@@ -1,7 +1,10 @@
-"""A bench that is killed again and again gives the same seal as one that is left alone."""
+"""A bench that is killed again and again gives the same seal as one that is left alone, and the page *Ask in
+batches* keeps its word.
+"""
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -13,6 +16,8 @@ import mutator
 from mutator.store.records import load_records
 from mutator.workspace import Workspace
 
+_CLONE = Path(__file__).parents[2]
+_PAGE = _CLONE / "docs" / "how-to" / "ask-in-batches.md"
 _KILLS = 8
 _ASK = """
 import sys
@@ -66,3 +71,21 @@ def test_kills_inside_and_between_batches_change_nothing(
     assert second.seal == first.seal is not None
     assert dict(load_records(out)) == dict(load_records(tmp_path / "alone"))
     assert second.verify().differences == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "folder", "batch_count"), [(0, "search", 8), (1, "slopes", 6)])
+def test_the_code_of_the_page_runs_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, folder: str, batch_count: int
+) -> None:
+    """Each block of Python leaves a sealed run folder with a result of each experiment and its batches."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MUTATOR_ROOT", str(_CLONE))
+    blocks = re.findall(
+        r"^```python\n(.*?)^```$", _PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL
+    )
+    assert len(blocks) == 2
+    exec(compile(blocks[number], str(_PAGE), "exec"), {})
+    run = mutator.load_run(tmp_path / "runs" / folder, workspace=Workspace.find(root=_CLONE))
+    assert run.seal and len(run.records) == run.folder.head.experiments
+    assert len((run.folder.path / "plan" / "batches.jsonl").read_text().splitlines()) == batch_count
