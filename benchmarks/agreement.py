@@ -9,7 +9,8 @@ from pathlib import Path
 
 from mutator.paper.fault_type_rank_agreement import GUIDED, measure_agreement
 from mutator.paper.published_numbers import load_published_numbers
-from mutator.statistics.results_frame import load_usable_results
+from mutator.results.table_reader import Results
+from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.tallies import Tally, tally_by_fault_type
 
 REFERENCES = Path(__file__).resolve().parents[1] / "fault_library/references"
@@ -20,7 +21,7 @@ def main() -> None:
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="a run folder")
     options = parser.parse_args()
     published = load_published_numbers(REFERENCES)
-    frames = [load_usable_results(run / "results.csv") for run in options.runs]
+    frames = [prepare_results(Results.up_to_date(run).frame()) for run in options.runs]
     tallies = [tally_by_fault_type(frame) for frame in frames]
     width = max(12, *(len(run.name) for run in options.runs))
     print(
