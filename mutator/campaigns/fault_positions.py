@@ -7,7 +7,7 @@ from mutator.errors import MutatorError
 from mutator.model import Fault, Injection
 from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.store.run_folder import RunFolder
-from mutator.targets.source_tree import SourceTree
+from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 
@@ -34,7 +34,7 @@ class SourcePosition:
 class FaultPositions:
     """The positions of faults in a target's files."""
 
-    tree: SourceTree
+    manifest: TargetManifest
 
     @classmethod
     def of_run(cls, folder: RunFolder, workspace: Workspace) -> "FaultPositions":
@@ -47,14 +47,14 @@ class FaultPositions:
                 expected="the source that the run had, because lines must match",
                 remedy="restore it, or name its folder with `target`",
             )
-        return cls(manifest.tree)
+        return cls(manifest)
 
     def of_fault(self, fault: Fault) -> tuple[SourcePosition, ...]:
         """Return the position of each injection, in the order of the spec."""
         return tuple(map(self._of_injection, fault.injections))
 
     def _of_injection(self, injection: Injection) -> SourcePosition:
-        file = parsed_file(self.tree, injection.location.path)
+        file = parsed_file(self.manifest.tree, injection.location.path)
         first_line, last_line = numbered_lines(file, injection)
         path = path_in_repository(file.full_path)
         return SourcePosition(path=path, first_line=first_line, last_line=last_line)

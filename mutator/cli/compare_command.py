@@ -1,5 +1,6 @@
 """`compare`: compare two runs of the same faults, with a gate on changes for the worse."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,7 +9,9 @@ import typer
 import mutator
 from mutator._common.message_text import counted, spelling_suggestion
 from mutator.cli import shell_completion
-from mutator.cli.shared_options import Json, Only, Wide
+from mutator.cli.github_step import GitHub, GitHubStep, showing_errors
+from mutator.cli.merge_report_clean_commands import workspace_if_any
+from mutator.cli.shared_options import Json, Only, Wide, WorkspaceOptions, with_workspace_options
 from mutator.cli.terminal_output import Terminal, short_path
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 
@@ -34,12 +37,16 @@ Examples:
   mutator compare runs/main runs/change \\
     --fail-on new-hazard,new-silent-hazard,other-hazard,new-crash,harness-error,unmatched
   mutator compare runs/main runs/change --fail-on severity:S2
+  mutator compare runs/main runs/change --fail-on new-hazard --github
 
 With --fail-on, the exit code is 1 if such a change is found; each is printed. Otherwise it is 3 if
 experiments lack a result in either run, because the comparison is then incomplete.
+
+With --github and without --fail-on, changes for the worse are shown as warnings.
 """
 
 
+@with_workspace_options
 def compare(
     run_a: Annotated[
         Path,
@@ -71,8 +78,11 @@ def compare(
             autocompletion=shell_completion.complete_gates,
         ),
     ] = None,
+    github: GitHub = False,
     wide: Wide = False,
     as_json: Json = False,
+    *,
+    workspace_options: WorkspaceOptions,
 ) -> None:
     """Compare two runs, experiment by experiment.
 
@@ -82,10 +92,13 @@ def compare(
     """
     terminal = Terminal(as_json, wide)
     gates = _parse_gates(fail_on or [])
-    with terminal.show_spinner("comparing"):
-        run_comparison = mutator.compare(run_a, run_b, only=only)
+    step = GitHubStep.of_environment() if github else None
+    workspace = workspace_if_any(workspace_options)
+    with showing_errors(step), terminal.show_spinner("comparing"):
+        runs = [mutator.load_run(run, workspace=workspace) for run in (run_a, run_b)]
+        run_comparison = mutator.compare(*runs, only=only)
         files = run_comparison.write(out)
-    comparison, failing = run_comparison.comparison, run_comparison.findings(gates)
+        comparison, failing = run_comparison.comparison, run_comparison.findings(gates)
     if as_json:
         terminal.print_json(
             _comparison_as_json(run_comparison, failing)
@@ -94,6 +107,10 @@ def compare(
     else:
         _print_comparison(terminal, run_comparison)
         terminal.print_text(f"comparison: {short_path(files.markdown)} and {short_path(files.page)}")
+    if step:
+        from mutator.api.github_output import comparison_on_github
+
+        step.show(comparison_on_github(run_comparison, gates, workspace, os.environ), to_stderr=as_json)
     _fail_on_findings(terminal, comparison, gates, failing)
 
 
@@ -165,14 +182,14 @@ def _fail_on_findings(
     gates: "list[mutator.Gate]",
     failing: "tuple[GateFinding, ...]",
 ) -> None:
-    gates_by_experiment: dict[tuple[str, str, str], list[str]] = {}  # an experiment can fail several gates
-    for finding in failing:
-        experiment = (finding.description, finding.experiment_id, finding.sentence)
-        gates_by_experiment.setdefault(experiment, []).append(finding.gate.value)
-    length = terminal.id_length(experiment_id for _, experiment_id, _ in gates_by_experiment)
+    from mutator.comparison.gate_failures import failing_experiments
+
+    experiments = failing_experiments(comparison, failing)  # one can fail several gates
+    length = terminal.id_length(each.experiment.id for each in experiments)
     lines = [
-        f"{', '.join(kinds)}: {description} [{experiment_id[:length]}]{sentence and f': {sentence}'}"
-        for (description, experiment_id, sentence), kinds in gates_by_experiment.items()
+        f"{each.gates_text}: {each.description} [{each.experiment.id[:length]}]"
+        f"{each.sentence and f': {each.sentence}'}"
+        for each in experiments
     ]
     for line in lines[:MOST_LISTED_FINDINGS]:
         terminal.print_error(line)

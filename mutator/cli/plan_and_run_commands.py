@@ -1,5 +1,6 @@
 """`plan` and `run`: plan and run campaigns."""
 
+import os
 import shlex
 import sys
 import warnings
@@ -13,6 +14,7 @@ import mutator
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.message_text import counted, describe_seeds
 from mutator.cli import shell_completion
+from mutator.cli.github_step import GitHub, GitHubStep, showing_errors
 from mutator.cli.merge_report_clean_commands import print_outcome_counts
 from mutator.cli.shared_options import (
     AcceptVersions,
@@ -233,6 +235,7 @@ def run(
             "Takes about two minutes."
         ),
     ] = True,
+    github: GitHub = False,
     wide: Wide = False,
     as_json: Json = False,
     *,
@@ -242,6 +245,7 @@ def run(
     from mutator.cli.progress_display import campaign_progress
 
     terminal = Terminal(as_json, wide)
+    step = GitHubStep.of_environment() if github else None
     workspace = workspace_options.workspace()
     choices = mutator.Choices(
         seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard
@@ -249,7 +253,7 @@ def run(
     choices = replace(choices, series_mb=series_mb)
     workers = usable_cores() if workers is None else workers
     try:
-        with campaign_progress(terminal) as notify, warnings.catch_warnings():
+        with showing_errors(step), campaign_progress(terminal) as notify, warnings.catch_warnings():
             warnings.simplefilter("ignore", mutator.IncompleteRun)  # `_print_summary` reports it
             finished_run = mutator.run(
                 campaign,
@@ -273,6 +277,11 @@ def run(
         raise typer.Abort(f"interrupted; finished experiments are kept; resume: {resume_command()}") from None
     assert finished_run.summary is not None  # `mutator.run` always sets it
     _print_summary(terminal, out, finished_run, finished_run.summary, report)
+    if step and report:
+        from mutator.api.github_output import run_on_github
+
+        output = run_on_github(finished_run, finished_run.summary, workspace, os.environ)
+        step.show(output, to_stderr=as_json)
     if finished_run.summary.exit_code:
         raise typer.Exit(finished_run.summary.exit_code)
 

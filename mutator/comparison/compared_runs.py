@@ -11,6 +11,7 @@ from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import frame_of_experiments
+from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.hazard_severity import SeverityScale
@@ -31,14 +32,15 @@ class ExperimentKey(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedRun:
-    """One run: its folder, its planned experiments, and their rows and metrics by id. Metrics without a value
-    are left out.
+    """One run: its folder, its planned experiments, and their rows, metrics and ranks (0: the worst) by id.
+    Metrics without a value are left out.
     """
 
     folder: RunFolder
     experiments: tuple[Experiment, ...]
     row_by_id: dict[str, ResultRow]
     metrics_by_id: dict[str, dict[str, float]] = field(default_factory=dict)
+    rank_by_id: dict[str, int] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -68,14 +70,14 @@ def load_compared_run(run: Path, only: str | None = None) -> ComparedRun:
         experiments = tuple(matching_items(experiments, only, PLAN_COLUMN_NAMES, plan_row))
     faults = {e.fault.id: e.fault for e in experiments}
     sentences = ExperimentSentences.of_run(folder.head)
+    frame = frame_of_experiments(folder, experiments)
+    ranks = worst_first_ranks(frame).tolist()
     return ComparedRun(
         folder=folder,
         experiments=experiments,
-        row_by_id={
-            row.experiment_id: row
-            for row in rows_of(frame_of_experiments(folder, experiments), faults, sentences)
-        },
+        row_by_id={row.experiment_id: row for row in rows_of(frame, faults, sentences)},
         metrics_by_id={e.id: _metrics_of(records[e.id]) for e in experiments if e.id in records},
+        rank_by_id=dict(zip(frame["experiment_id"].tolist(), ranks, strict=True)),
     )
 
 

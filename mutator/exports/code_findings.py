@@ -1,7 +1,7 @@
 """The hazards of a run as findings in the user's source, for code scanning and code quality tools."""
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -13,12 +13,8 @@ from mutator.errors import MutatorWarning
 from mutator.exports import ExportRequest
 from mutator.model import Experiment, Fault
 from mutator.operators.operator_lookup import operator_name_of
-from mutator.results.experiment_sentence import ExperimentSentences
-from mutator.results.outcome_counting import first_hazard_times
-from mutator.results.result_rows import ResultRow, rows_of
-from mutator.results.table_reader import Results
-from mutator.results.worst_first_ranking import worst_first_ranks
-from mutator.store import plan_file
+from mutator.results.hazards_worst_first import hazardous_experiments
+from mutator.results.result_rows import ResultRow
 from mutator.store.run_folder import RunFolder
 
 NEW_HAZARD_GATES = (Gate.NEW_HAZARD, Gate.NEW_SILENT_HAZARD, Gate.OTHER_HAZARD)
@@ -76,7 +72,7 @@ def hazard_findings(request: ExportRequest) -> list[CodeFinding]:
     folder, base = request.folder, request.selection.base
     positions = FaultPositions.of_run(folder, request.workspace)
     new_ids = None if base is None else new_hazard_ids(base, folder)
-    findings = list(_findings_of_run(folder, positions, plan_file.load_faults(folder.path)))
+    findings = list(_findings_of_run(folder, positions))
     if new_ids is not None:
         findings = [finding for finding in findings if finding.experiment.id in new_ids]
     inside = [finding for finding in findings if finding.positions[0].is_in_repository]
@@ -98,18 +94,9 @@ def new_hazard_ids(base: Path, folder: RunFolder) -> frozenset[str]:
     return frozenset(ids | {experiment.id for experiment in comparison.matching.only_b})
 
 
-def _findings_of_run(
-    folder: RunFolder, positions: FaultPositions, faults: Mapping[str, Fault]
-) -> Iterator[CodeFinding]:
-    frame = Results.up_to_date(folder.path).frame()
-    hazardous = frame[first_hazard_times(frame).notna().any(axis=1)]
-    ranked = hazardous.iloc[worst_first_ranks(hazardous).argsort()]
-    rows = rows_of(ranked, faults, ExperimentSentences.of_run(folder.head))
-    ids = {row.experiment_id for row in rows}
-    experiments = {e.id: e for e in plan_file.iterate_experiments(folder.path) if e.id in ids}
+def _findings_of_run(folder: RunFolder, positions: FaultPositions) -> Iterator[CodeFinding]:
     positions_by_fault: dict[str, tuple[SourcePosition, ...]] = {}
-    for row in rows:
-        experiment = experiments[row.experiment_id]
+    for experiment, row in hazardous_experiments(folder):
         fault = experiment.fault
         if fault.id not in positions_by_fault:
             positions_by_fault[fault.id] = positions.of_fault(fault)

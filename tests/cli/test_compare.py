@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import mutator
+from mutator.comparison.gate_failures import RECOMMENDED_GATES
 from mutator.model import Experiment, Outcome, Status
 from mutator.workspace import Workspace
 
@@ -103,6 +104,7 @@ def test_the_recommended_gate_fails_for_a_hazard_beside_another(
     pages = ("how-to/gate-a-change-in-ci.md", "tutorial/tour-controller-developer.md", "reference/cli.md")
     pattern = re.compile(r"--fail-on (new-hazard,\S+)")
     [gate] = {kinds for page in pages for kinds in pattern.findall((docs / page).read_text())}
+    assert gate.split(",") == [each.value for each in RECOMMENDED_GATES]
 
     def run(name: str, *hazards: tuple[str, float]) -> Path:
         fields = {"outcome": Outcome.HAZARD, "hazards": hazards, "alerts": (("fcw", 2.5),)}

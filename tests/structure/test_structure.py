@@ -194,6 +194,7 @@ def test_a_violation_fails_the_lint(name: str, tmp_path: Path) -> None:
 
 # modules that the command line may import for options, help texts and presentation
 SHOWN_BY_THE_COMMAND_LINE = {
+    "mutator.comparison.gate_failures",
     "mutator.config.yaml_files",
     "mutator.engines.engine_kinds",
     "mutator.execution.progress_text",
