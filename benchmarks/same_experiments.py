@@ -33,7 +33,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition(":")[0] + ".")
     parser.add_argument("run", type=Path, metavar="RUN", help="a run folder of a campaign")
     parser.add_argument("out", type=Path, metavar="OUT", help="the new run folder")
-    parser.add_argument("changes", nargs="*", metavar="CHANGE", help="a change that the manifest names")
+    parser.add_argument("changes", nargs="+", metavar="CHANGE", help="a change that the manifest names")
     parser.add_argument("--only", default="", metavar="EXPR", help="only experiments that match")
     parser.add_argument("-n", "--workers", type=int, default=1)
     parser.add_argument("--no-proof", action="store_true", help="leave out the equivalence check")
