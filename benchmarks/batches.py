@@ -143,11 +143,8 @@ def main() -> int:
             for way in taken if number % 2 == 0 else reversed(taken):
                 began = time.monotonic()
                 taken[way].append(measure(way, Path(folder), options.experiments))
-                cpu_s = taken[way][-1]["cpu_s"]
-                print(
-                    f"round {number + 1}, {way}: {cpu_s:.1f} s CPU, {time.monotonic() - began:.1f} s",
-                    flush=True,
-                )
+                measured = ", ".join(f"{name} {value:.2f}" for name, value in taken[way][-1].items())
+                print(f"round {number + 1}, {way}: {measured}; {time.monotonic() - began:.0f} s", flush=True)
     return show(taken, options)
 
 
