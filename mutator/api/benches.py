@@ -23,6 +23,7 @@ from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.errors import EXIT_CHECK_FAILED, IncompleteRun, MutatorWarning
 from mutator.execution import bench as bench_in_folder
 from mutator.execution.bench_opening import opened_bench
+from mutator.execution.distributor_choice import Distributor, choose_distributor
 from mutator.execution.session_summary import Summary
 from mutator.model import AfterHazard, Experiment, Fault, Record
 from mutator.preflight.equivalence_check import EquivalenceResult
@@ -45,6 +46,8 @@ def open_bench(
     workers: int = 1,
     engine: str | None = None,
     reuse: bool = True,
+    cluster: str | None = None,
+    insecure_network: bool = False,
 ) -> "Iterator[Bench]":
     """Open a bench in the run folder `out`, for a `with` block: it answers list after list of experiments.
 
@@ -56,6 +59,8 @@ def open_bench(
       Without a canary, results begin with a note.
     * `reading`, `after_hazard`: what all experiments have. `seed` decides what the proof draws.
     * `workers`: number of processes. `engine` and `reuse`: as for `run`.
+    * `cluster`, `insecure_network`: as for `run`. What was asked for is dealt to the cluster once a record is
+      waited for, and a connection lasts until all of it is done; `workers` are for the checks.
 
     MutatorError for an invalid argument, and if `out` holds another run or is in use. After the block, an
     IncompleteRun warning is issued if experiments have no result.
@@ -74,7 +79,13 @@ def open_bench(
         "after_hazard": checked_after_hazard(after_hazard).value,
     }
     with opened_bench(
-        opened_workspace, Path(out), values, workers=workers, engine=engine, reuse=reuse
+        opened_workspace,
+        Path(out),
+        values,
+        workers=workers,
+        engine=engine,
+        reuse=reuse,
+        distributor=_distributor_of_cluster(cluster, insecure_network=insecure_network),
     ) as opened:
         yield Bench(opened, selected_target, values["reading"])
     _warn_of_end(opened.summary)
@@ -166,6 +177,12 @@ class Bench:
     def load(self) -> Run:
         """Return the run folder as it is now; call it again after the next batch."""
         return Run(RunFolder.open(self.path), self._selected_target.workspace)
+
+
+def _distributor_of_cluster(cluster: str | None, *, insecure_network: bool) -> Distributor | None:
+    """Return what deals to the cluster; None without one, as the bench's own workers then do the work."""
+    distributor = choose_distributor(cluster, insecure=insecure_network)
+    return distributor if cluster is not None else None
 
 
 def _warn_of_end(summary: Summary | None) -> None:

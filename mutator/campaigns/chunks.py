@@ -1,6 +1,6 @@
 """Chunks: the experiments that one pytest item runs."""
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice
 
@@ -58,6 +58,16 @@ def pending_chunks_of(folder: RunFolder, records: Mapping[str, Record]) -> tuple
         if pending_positions and (shard is None or shard.has_chunk(index)):
             pending_chunks.append(PendingChunk(index, pending_positions))
     return tuple(pending_chunks)
+
+
+def chunks_with(folder: RunFolder, experiment_ids: Set[str]) -> tuple[PendingChunk, ...]:
+    """Return the chunks that have some of these experiments, with their positions."""
+    names = plan_file.experiment_ids(folder.path)
+    parts = (
+        PendingChunk(index, tuple(i for i in range(count) if next(names) in experiment_ids))
+        for index, (_, _, count) in enumerate(folder.head.chunks)
+    )
+    return tuple(part for part in parts if part.pending_positions)
 
 
 def golden_key_by_chunk(folder: RunFolder, pending: Iterable[PendingChunk]) -> dict[int, str]:

@@ -7,6 +7,7 @@ the order in which batches are asked for. Several batches can be in flight.
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mutator._common.interrupts import delaying_interrupts
 from mutator.campaigns.campaign_files import Campaign
@@ -21,6 +22,7 @@ from mutator.execution.batch_check import BatchCheck, check_reason
 from mutator.execution.bench_calls import BenchCalls
 from mutator.execution.bench_crew import BenchCrew, CrewBatch
 from mutator.execution.bench_progress import BenchProgress
+from mutator.execution.distributed_crew import DistributedCrew
 from mutator.execution.session import Session
 from mutator.execution.session_summary import Summary
 from mutator.execution.worker import WorkerStart
@@ -38,6 +40,9 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
 
+if TYPE_CHECKING:
+    from mutator.execution.distributor_choice import Distributor
+
 
 class Bench:
     """An open bench. The caller owns the run folder, whose `campaign.yaml` is the file of `campaign`."""
@@ -54,13 +59,14 @@ class Bench:
         engine: str | None = None,
         notify: ProgressCallback = lambda progress: None,
         reuse: bool = True,
+        distributor: "Distributor | None" = None,
     ) -> None:
         self.path = path.resolve()
         self.calls = BenchCalls(self.path)
         self._workspace, self._manifest = workspace, manifest
         check_requirements(manifest)
         self._requested_engine, self._engine = engine, choose_engine(engine, manifest)
-        self._is_reuse_wanted = reuse
+        self._is_reuse_wanted = reuse and distributor is None
         self._batch_check = BatchCheck(workspace, manifest, campaign)
         self._plan = GrowingPlan(workspace, manifest, campaign, canary, self.path)
         self._checks = BenchChecks(
@@ -74,7 +80,11 @@ class Bench:
         self._is_plan_half_written = self._has_crew_old_limits = False
         self.summary: Summary | None = None  # known once the bench is closed
         self._progress = BenchProgress(notify)
-        self._crew = BenchCrew(workers, self._start_of_worker, self._note_written, self._progress.note_record)
+        self._crew: BenchCrew | DistributedCrew = (
+            DistributedCrew(distributor, workers, self._begun_session, self._progress.note_record)
+            if distributor
+            else BenchCrew(workers, self._start_of_worker, self._note_written, self._progress.note_record)
+        )
         if RunFolder.exists(self.path):
             self._resume()
 
@@ -344,6 +354,10 @@ class Bench:
     def _start_of_worker(self, number: int) -> WorkerStart:
         assert self._session is not None
         return self._session.start_of_worker(f"w{number}")
+
+    def _begun_session(self) -> Session:
+        assert self._session is not None
+        return self._session
 
     def _note_written(self, worker: str, written: Mapping[str, str]) -> None:
         assert self._session is not None

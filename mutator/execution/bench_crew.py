@@ -62,7 +62,7 @@ class BenchCrew:
     def hand_out(self, batch: CrewBatch) -> None:
         """Give a batch to the workers, and return at once. MutatorError once the crew was stopped."""
         if self._is_stopped:
-            raise _work_error(_CLOSED)
+            raise crew_error(_CLOSED)
         self._remove_dead_workers()
         self._continuer = self._continuer or WorkerContinuer(self._living_pids)
         starting_count = sum(not worker.is_ready.is_set() for worker in self._workers)
@@ -78,7 +78,7 @@ class BenchCrew:
         if isinstance(message, Record):
             return message
         self.close()
-        raise _work_error(message)
+        raise crew_error(message)
 
     def wait_until_ready(self) -> None:
         """Wait until no worker is starting, which reads the run folder."""
@@ -284,7 +284,7 @@ class _CrewWorker:
         self.process.wait()
 
 
-def _work_error(problem: str) -> MutatorError:
+def crew_error(problem: str) -> MutatorError:
     return MutatorError(
         problem,
         expected="workers that finish what they are given",

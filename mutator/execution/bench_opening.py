@@ -16,6 +16,7 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import accepted_version_differences, check_sources, check_version
 from mutator.errors import MutatorError
 from mutator.execution.bench import Bench
+from mutator.execution.distributor_choice import Distributor
 from mutator.execution.watched_progress import writing_progress
 from mutator.store import file_digests
 from mutator.store.appended_files import undo_unfinished_growth
@@ -34,11 +35,12 @@ def opened_bench(
     workers: int = 1,
     engine: str | None = None,
     reuse: bool = True,
+    distributor: Distributor | None = None,
 ) -> Iterator[Bench]:
     """Lock the run folder `out`, open the bench in it or begin one, and finish it at the end of the block.
 
-    `values` are those of `bench_files.BenchModel`. An error in the block leaves the run unfinished: it can be
-    opened again.
+    `values` are those of `bench_files.BenchModel`; `distributor` deals to a cluster, if not None. An error in
+    the block leaves the run unfinished: it can be opened again.
     """
     is_new = not out.exists()
     make_run_folder(out)
@@ -52,6 +54,7 @@ def opened_bench(
                     workers=workers,
                     engine=engine,
                     reuse=reuse,
+                    distributor=distributor,
                     notify=progress.notify,
                 )
                 try:
@@ -77,6 +80,7 @@ def _build_bench(
     workers: int,
     engine: str | None,
     reuse: bool,
+    distributor: Distributor | None,
     notify: ProgressCallback,
 ) -> Bench:
     file_bytes = bench_file_bytes(values)
@@ -98,6 +102,7 @@ def _build_bench(
         workers=workers,
         engine=engine,
         reuse=reuse,
+        distributor=distributor,
         notify=notify,
     )
 

@@ -205,6 +205,13 @@ class Session:
         used_numbers = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
         return f"{max(used_numbers, default=0) + 1:04d}-"
 
+    def unused_worker_name(self, name: str) -> str:
+        """Return a name like `0001-cluster`, or `0001-cluster2`, that no worker of this session has had."""
+        kinds = LINE_SCHEMA_BY_FOLDER
+        used = {path.stem for kind in kinds for path in (self.folder.path / kind).glob("*.jsonl")}
+        names = (f"{self.worker_prefix}{name}{number}" for number in ("", *range(2, len(used) + 3)))
+        return next(unused for unused in names if unused not in used)
+
     @property
     def inputs(self) -> RunInputs:
         return RunInputs.from_workspace(self.workspace, self.manifest, self.folder.scenarios)

@@ -74,6 +74,32 @@ def test_kills_inside_and_between_batches_change_nothing(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("kept_checks")
+def test_a_cluster_gives_the_same_seal(toycar: Workspace, tmp_path: Path) -> None:
+    """The workers of `local:2` do the work of two batches, in two openings and after a kill."""
+    pytest.importorskip("distributed")
+    script = tmp_path / "ask.py"  # Dask's workers import the script
+    call = 'campaign="small", workers=workers'
+    assert call in _ASK
+    text = _ASK.replace(call, f'{call}, reuse=False, cluster="local:2"')
+    head, _, rest = text.partition("library, out")
+    body = "".join(f"    {line}\n" for line in f"library, out{rest}".splitlines())
+    script.write_text(f"{head}if __name__ == '__main__':\n{body}")
+    words = [sys.executable, str(script), str(toycar.library.parent), str(tmp_path / "cluster"), "1", "12"]
+    with subprocess.Popen(words, start_new_session=True) as process:
+        try:
+            process.wait(6.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+    assert subprocess.run(words, check=False).returncode == 0
+    assert ask(toycar, tmp_path / "alone", 1, 100).wait(600) == 0
+    first, second = (mutator.load_run(tmp_path / name, workspace=toycar) for name in ("alone", "cluster"))
+    assert second.seal == first.seal is not None
+    assert second.verify().differences == ()
+    assert any("cluster" in path.name for path in (tmp_path / "cluster" / "records").iterdir())
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "folder", "batch_count"), [(0, "search", 8), (1, "slopes", 6)])
 def test_the_code_of_the_page_runs_as_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, folder: str, batch_count: int

@@ -70,7 +70,7 @@ class WorkDispatcher:
         folder = session.folder
         self._bundle = Bundle.pack_for_run(session.workspace, folder, session.engine)
         self._queue = PieceQueue(folder, session.pending, session.proof)
-        self._intake = ResultIntake(folder, session.manifest, f"{session.worker_prefix}cluster")
+        self._intake = ResultIntake(folder, session.manifest, session.unused_worker_name("cluster"))
         self._roster = WorkerRoster(folder.session_environments[-1], accept=session.accept_versions)
         self._run_id = f"mutator-{uuid.uuid4().hex}"
         self._workers_by_key: dict[str, _PresentWorker] = {}

@@ -140,7 +140,7 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
         proof=(),
         engine="fork",
         accept_versions=True,
-        worker_prefix="0001-",
+        unused_worker_name=lambda name: f"0001-{name}",
         written=WrittenFiles(),
         note_machine=lambda machine: None,
         problem="",
