@@ -41,6 +41,7 @@ DETECTION_FILES = (
     "visiond/voting.py",
     "visiond/*.[ch]",
     "visiond/*_net.npz",
+    "visiond/paper_confidence.json",
 )
 _NUMBERS_OF_LINES = 9  # for three lines
 

@@ -12,10 +12,10 @@ from selfdrive.messages import CameraView
 from selfdrive.visiond import compiled_windows
 from selfdrive.visiond.compiled_sums_check import has_identical_sums
 from selfdrive.visiond.compiled_windows import MarkWindowFinder
-from selfdrive.visiond.detector import LaneLines, RoadLine
+from selfdrive.visiond.edge_lines import FittedLine
 from selfdrive.visiond.hog import WINDOW_STRIDE
 from selfdrive.visiond.mark_edges import steepness_limits
-from selfdrive.visiond.paper_detector import CLUSTER_REACH, MIN_LOG_ODDS, PaperDetector, complete_lane
+from selfdrive.visiond.paper_detector import CLUSTER_REACH, MIN_LOG_ODDS, PaperDetector
 from selfdrive.visiond.road_region import RoadRegion
 
 C_SOURCE = Path(__file__).with_name("mark_lines.c")
@@ -41,7 +41,7 @@ class _PaperStructure(ctypes.Structure):
         ("all", _PointsStructure),
         ("own", _PointsStructure),
         ("count", ctypes.c_int64),
-        ("lines", ctypes.c_double * 4 * 2),
+        ("lines", ctypes.c_double * 8 * 2),  # whether there is one, and a FittedLine
     )
 
 
@@ -88,21 +88,22 @@ class CompiledPaperDetector(PaperDetector):
         for function, count in ((self._take_gradients, 2), (self._take_edges, 1), (self._take_lines, 1)):
             function.argtypes, function.restype = [ctypes.c_void_p] * count, None
 
-    def detect(self, view: CameraView) -> LaneLines:
+    def fit_lines(self, view: CameraView) -> tuple[FittedLine | None, FittedLine | None]:
         part = np.ascontiguousarray(view.picture[self._region.part])
         if part.dtype != np.uint8 or part.shape != self._region.shape:  # a fault can cause this
-            return super().detect(view)
+            return super().fit_lines(view)
         address, sums = part.ctypes.data, self._arrays["sums"]
         self._take_gradients(self._at, address)
         if sums.max() >= FLOATS_EXACT_BELOW:
-            return super().detect(view)
+            return super().fit_lines(view)
         mean = (sums * np.float32(1.0 / WINDOW_STRIDE**2)).astype(np.float32)
         self._arrays["limits"][...] = steepness_limits(mean)
         self._take_edges(self._at)
         if not self._windows.clear_windows_without_mark(address, self._looked_at):
-            return super().detect(view)
+            return super().fit_lines(view)
         self._take_lines(self._at)
-        return complete_lane(*(RoadLine(*line[1:]) if line[0] else None for line in self._paper.lines))
+        left, right = (FittedLine(*line[1:]) if line[0] else None for line in self._paper.lines)
+        return left, right
 
 
 def _build_arrays(region: RoadRegion, scale: np.ndarray) -> dict[str, np.ndarray]:

@@ -1,13 +1,13 @@
 """Fits straight lines to clusters of edges and selects those that bound the lane."""
 
-from math import sqrt
+from math import log, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from selfdrive.common.array_math import dot
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.visiond.detector import RoadLine
+from selfdrive.visiond.detector import LANE_WIDTH
 from selfdrive.visiond.road_region import RoadRegion
 
 MIN_LINE_PIXELS = 24  # in a cluster, or a line, that is used
@@ -19,9 +19,54 @@ MOST_TRIED_CLUSTERS = 8  # clusters examined on each side, from the nearest
 FIT_ROUND_REACHES = 0.3, 0.2  # m; distance of edges that belong to a line, in each round of fitting
 MIN_SHARE_OF_EITHER_EDGE = 0.12  # smallest share of a mark's edges that lead into the paint, and out of it
 MARK_WIDTH_RANGE = 0.03, 0.45  # m between both kinds of edges, for one or two strips of paint
+MIN_MEAN_SQUARE = 1e-4  # m^2, added to a mean square distance before its logarithm is taken
 MOST_PAINT_EDGE_SPREAD = 0.05  # m, standard deviation of the edges on one side of a strip of paint
-CERTAIN_PIXELS = 80.0  # edge pixels of a line with full certainty
-HALF_CERTAIN_SPREAD = 0.25  # m: root mean square distance of a line's edges at which its probability is half
+
+
+class FittedLine(NamedTuple):
+    """A line through edges: `y` (m, left positive) at the car, then y + slope * x.
+
+    Of its edges: `pixels` is their number, `row_spread` the standard deviation of their rows, `mean_square`
+    that of their distances (m^2), `balance` the share of the rarer kind of edge, `width` the distance (m)
+    from the edges that lead into the paint to those that lead out of it.
+    """
+
+    y: float
+    slope: float
+    pixels: float
+    row_spread: float
+    mean_square: float
+    balance: float
+    width: float
+
+
+EVIDENCE_NAMES = (
+    *("log of pixels", "log of row spread", "log of mean square", "balance", "width", "squared width"),
+    *("squared slope", "squared offset", "other line", "log of other pixels", "squared lane width"),
+)
+
+
+def line_evidence(line: FittedLine, side: float, other: FittedLine | None) -> tuple[float, ...]:
+    """The evidence, in the order of EVIDENCE_NAMES, for a line on a `side` of the car (1 left, -1 right).
+
+    Offset and lane width are relative to the usual ones, `NEAREST_LINE_DISTANCE` ahead.
+    """
+    away = side * (line.y + NEAREST_LINE_DISTANCE * line.slope)
+    about_other = (0.0, 0.0, 0.0)
+    if other:
+        lane = away - side * (other.y + NEAREST_LINE_DISTANCE * other.slope)
+        about_other = (1.0, log(other.pixels / MIN_LINE_PIXELS), (lane - LANE_WIDTH) ** 2)
+    return (
+        log(line.pixels / MIN_LINE_PIXELS),
+        log(line.row_spread),
+        log(line.mean_square + MIN_MEAN_SQUARE),
+        line.balance,
+        line.width,
+        line.width**2,
+        line.slope**2,
+        (away - 0.5 * LANE_WIDTH) ** 2,
+        *about_other,
+    )
 
 
 class EdgePoints(NamedTuple):
@@ -50,7 +95,7 @@ class EdgeLines:
 
     def nearest_lines(
         self, at: np.ndarray, rising: np.ndarray, labels: np.ndarray
-    ) -> tuple[RoadLine | None, RoadLine | None]:
+    ) -> tuple[FittedLine | None, FittedLine | None]:
         """The lines next to the car, left and right, among the edges at the pixels `at` (row-major).
 
         `rising` says for each edge whether the picture gets brighter to the right; `labels` are its clusters.
@@ -84,35 +129,42 @@ class EdgeLines:
             self.scale.take(row),
         )
 
-    def _nearest_line(self, clusters: list[list[float]], points: EdgePoints) -> RoadLine | None:
-        best, first, most_pixels, best_distance = None, 0.0, 0, 0.0
+    def _nearest_line(self, clusters: list[list[float]], points: EdgePoints) -> FittedLine | None:
+        best, first, most_pixels, best_distance = None, 0.0, 0.0, 0.0
         for distance, a, b in clusters:
             if best is not None and (
                 distance > first + RIVAL_LINES_DISTANCE or distance < best_distance + FIT_ROUND_REACHES[0]
             ):
                 continue
-            line, pixels = self._fit_mark(a, b, points)
-            if line is not None and pixels > most_pixels:
+            line = self._fit_mark(a, b, points)
+            if line is not None and line.pixels > most_pixels:
                 first = first if best else distance
-                best, most_pixels, best_distance = line, pixels, distance
+                best, most_pixels, best_distance = line, line.pixels, distance
         return best
 
-    def _fit_mark(self, a: float, b: float, points: EdgePoints) -> tuple[RoadLine | None, int]:
-        """The line through all edges near column = a * row + b, and their number; (None, 0) if not a mark."""
+    def _fit_mark(self, a: float, b: float, points: EdgePoints) -> FittedLine | None:
+        """The line through all edges near column = a * row + b; None if they are not a mark."""
         near = points
         for reach in FIT_ROUND_REACHES:
             away = np.abs(_distances_from_line(near, a, b))
             near = near.take((away <= reach).nonzero()[0])
             if near.row.size < MIN_LINE_PIXELS:
-                return None, 0
+                return None
             spread, a, b = _fit_line(near.row, near.column)
         y, slope = self._model.line_on_road(a, b)
         away = _distances_from_line(near, a, b)
         if spread < MIN_ROW_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, near.rising):
-            return None, 0
-        doubt = dot(away, away) / away.size / HALF_CERTAIN_SPREAD**2
-        prob = min(1.0, near.row.size / CERTAIN_PIXELS) / (1.0 + doubt)
-        return RoadLine(y=y, slope=slope, prob=prob), near.row.size
+            return None
+        brighter, darker = away[near.rising], away[~near.rising]
+        return FittedLine(
+            y=y,
+            slope=slope,
+            pixels=float(away.size),
+            row_spread=spread,
+            mean_square=dot(away, away) / away.size,
+            balance=min(brighter.size, darker.size) / away.size,
+            width=_mean_distance(brighter, darker),
+        )
 
 
 def _distances_from_line(points: EdgePoints, a: float, b: float) -> np.ndarray:
@@ -148,8 +200,11 @@ def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
 
 
 def _is_strip_of_paint(brighter: np.ndarray, darker: np.ndarray) -> bool:
-    width = float(darker.sum()) / darker.size - float(brighter.sum()) / brighter.size
-    return MARK_WIDTH_RANGE[0] <= width <= MARK_WIDTH_RANGE[1]
+    return MARK_WIDTH_RANGE[0] <= _mean_distance(brighter, darker) <= MARK_WIDTH_RANGE[1]
+
+
+def _mean_distance(brighter: np.ndarray, darker: np.ndarray) -> float:
+    return float(darker.sum()) / darker.size - float(brighter.sum()) / brighter.size
 
 
 def _fit_line(row: np.ndarray, column: np.ndarray) -> tuple[float, float, float]:

@@ -12,8 +12,7 @@
 enum { STRIDE = 16, EPS = 4, SQUARE = 2 * EPS + 1, MIN_SAMPLES = 8, NEED = 2, MIN_PIXELS = 24, TRIES = 8 };
 enum { NONE = INT32_MAX };
 static const double MIN_SPREAD = 3.0, MAX_SLOPE = 0.15, BESIDE = 8.0, CROWD = 0.8, REACHES[] = {0.3, 0.2};
-static const double LEAST_SHARE = 0.12, THINNEST = 0.03, WIDEST = 0.45, SHARP = 0.05, SURE_PIXELS = 80.0;
-static const double SURE_SPREAD = 0.25;
+static const double LEAST_SHARE = 0.12, THINNEST = 0.03, WIDEST = 0.45, SHARP = 0.05;
 
 /* Edge pixels on the road: position in the picture, m per pixel, whether it gets brighter to the right. */
 typedef struct {
@@ -41,7 +40,7 @@ typedef struct {
     double *room;           /* 5 per pixel */
     Points all, own;
     int64_t count;          /* edges */
-    double lines[2][4];     /* left and right: 1 if there is one, y, slope, probability */
+    double lines[2][8];     /* left and right: 1 if there is one, then FittedLine */
 } Paper;
 
 /* The Sobel operator, and tile sums of its squares. The picture is mirrored at its border. */
@@ -291,9 +290,14 @@ static double deviation(const double *values, long count, double *room)
     return sqrt(sum_of(room, count) / (double)count);
 }
 
+static double mean_distance(const double *brighter, long up, const double *darker, long down)
+{
+    return sum_of(darker, down) / (double)down - sum_of(brighter, up) / (double)up;
+}
+
 static int is_paint(const double *brighter, long up, const double *darker, long down)
 {
-    double width = sum_of(darker, down) / (double)down - sum_of(brighter, up) / (double)up;
+    double width = mean_distance(brighter, up, darker, down);
     return THINNEST <= width && width <= WIDEST;
 }
 
@@ -303,8 +307,9 @@ static int is_sharp_paint(const double *brighter, long up, const double *darker,
            deviation(darker, down, room) <= SHARP && is_paint(brighter, up, darker, down);
 }
 
-/* See _is_mark; `room` has space for four times as many values. */
-static int is_mark(const double *away, const uint8_t *rising, long count, double *room)
+/* See _is_mark; `room` has space for four times as many values. `kinds` becomes the share of the rarer kind of edge,
+ * and the distance between both. */
+static int is_mark(const double *away, const uint8_t *rising, long count, double *room, double *kinds)
 {
     double *brighter = room, *darker = room + count, *some = room + 2 * count, *more = room + 3 * count;
     long up = 0, down = 0, kept = 0;
@@ -315,6 +320,8 @@ static int is_mark(const double *away, const uint8_t *rising, long count, double
     double least = LEAST_SHARE * (double)count;
     if ((double)(up < down ? up : down) < least)
         return 0;
+    kinds[0] = (double)(up < down ? up : down) / (double)count;
+    kinds[1] = mean_distance(brighter, up, darker, down);
     if (is_paint(brighter, up, darker, down))
         return 1;
     double middle = median(brighter, up, more);
@@ -333,7 +340,7 @@ static int is_mark(const double *away, const uint8_t *rising, long count, double
     return is_sharp_paint(some, kept, darker, down, least, more);
 }
 
-/* The line through all edges near column = a * row + b: 1, y, slope, probability. Returns their number, or 0. */
+/* The line through all edges near column = a * row + b: 1, then FittedLine. Returns the number of edges, or 0. */
 static long line_about(Paper *p, double a, double b, long all, double *line)
 {
     const Points *from = &p->all;
@@ -368,11 +375,10 @@ static long line_about(Paper *p, double a, double b, long all, double *line)
         double off = own->column[i] - a * own->row[i];
         away[i] = (off - b) * own->scale[i];
     }
-    if (spread < MIN_SPREAD || fabs(slope) > MAX_SLOPE || !is_mark(away, own->rising, count, room))
+    if (spread < MIN_SPREAD || fabs(slope) > MAX_SLOPE || !is_mark(away, own->rising, count, room, line + 6))
         return 0;
-    double doubt = dot(away, away, count, room) / (double)count / (SURE_SPREAD * SURE_SPREAD);
-    double sure = (double)count / SURE_PIXELS;
-    line[0] = 1.0, line[1] = y, line[2] = slope, line[3] = (sure < 1.0 ? sure : 1.0) / (1.0 + doubt);
+    line[0] = 1.0, line[1] = y, line[2] = slope, line[3] = (double)count, line[4] = spread;
+    line[5] = dot(away, away, count, room) / (double)count;
     return count;
 }
 
@@ -431,7 +437,7 @@ INLINE void lines(Paper *p, int32_t found)
 {
     long count = points_of(p, found);
     for (int side = 0; side < 2; side++) {
-        double near[TRIES][3], first = 0.0, where = 0.0, *best = p->lines[side], line[4];
+        double near[TRIES][3], first = 0.0, where = 0.0, *best = p->lines[side], line[8];
         int tries = nearest_on(p, side ? -1.0 : 1.0, found, near);
         long most = 0;
         memset(best, 0, sizeof p->lines[side]);

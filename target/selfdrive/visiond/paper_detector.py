@@ -10,9 +10,10 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.visiond.dbscan import dbscan
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
-from selfdrive.visiond.edge_lines import EdgeLines
+from selfdrive.visiond.edge_lines import EdgeLines, FittedLine, line_evidence
 from selfdrive.visiond.hog import WINDOW_FEATURES, Hog, detection_windows
 from selfdrive.visiond.lane_net import PAPER_NET, LaneNet
+from selfdrive.visiond.line_confidence import MIN_CONFIDENT, PAPER_CONFIDENCE, LineConfidence
 from selfdrive.visiond.mark_edges import find_steep_edges, tile_numbers, tiles_with_mark, windows_on_tiles
 from selfdrive.visiond.road_region import RoadRegion
 
@@ -34,18 +35,23 @@ class PaperDetector:
         self._region = RoadRegion(model)
         self._hog = Hog(*self._region.shape)
         self._net = LaneNet.load(PAPER_NET)
+        self._confidence = LineConfidence.load(PAPER_CONFIDENCE)
         self._tile = tile_numbers(*self._region.shape)
         self._lines = EdgeLines(model, self._region)
 
     def detect(self, view: CameraView) -> LaneLines:
         """Return the lines in `view.picture`; a line not seen has prob 0 and the expected position."""
+        return complete_lane(*self.fit_lines(view), self._confidence)
+
+    def fit_lines(self, view: CameraView) -> tuple[FittedLine | None, FittedLine | None]:
+        """The left and the right line in `view.picture`, None for a line not seen."""
         part = np.ascontiguousarray(view.picture[self._region.part])
         at, rising = find_steep_edges(part)
         tile = self._tile.take(at)
         inside = tiles_with_mark(self._windows_with_mark(part, tile), MIN_MARKED_WINDOWS).take(tile)
         at, rising = at[inside], rising[inside]
         labels = dbscan(at, part.shape, CLUSTER_REACH, MIN_CLUSTER_EDGES)
-        return complete_lane(*self._lines.nearest_lines(at, rising, labels))
+        return self._lines.nearest_lines(at, rising, labels)
 
     def _windows_with_mark(self, part: np.ndarray, tile: np.ndarray) -> np.ndarray:
         candidates = self._region.windows
@@ -60,7 +66,17 @@ class PaperDetector:
         return marked
 
 
-def complete_lane(left: RoadLine | None, right: RoadLine | None) -> LaneLines:
-    left = left or RoadLine(y=0.5 * LANE_WIDTH, prob=0.0)
-    right = right or RoadLine(y=-0.5 * LANE_WIDTH, prob=0.0)
-    return LaneLines(left=left, right=right, path=path_between(left, right))
+def complete_lane(left: FittedLine | None, right: FittedLine | None, confidence: LineConfidence) -> LaneLines:
+    """The lines with their probabilities, and the path, which is led only by lines that are likely right."""
+    lines = _road_line(left, 1.0, right, confidence), _road_line(right, -1.0, left, confidence)
+    leading = (line if line.prob >= MIN_CONFIDENT else line._replace(prob=0.0) for line in lines)
+    return LaneLines(*lines, path=path_between(*leading))
+
+
+def _road_line(
+    line: FittedLine | None, side: float, other: FittedLine | None, confidence: LineConfidence
+) -> RoadLine:
+    if line is None:
+        return RoadLine(y=side * 0.5 * LANE_WIDTH, prob=0.0)
+    prob = confidence.probability(line_evidence(line, side, other))
+    return RoadLine(y=line.y, slope=line.slope, prob=prob)

@@ -30,6 +30,7 @@ from selfdrive.sim.remembering_detector import DetectorWithState
 from selfdrive.visiond.compiled_paper import build_paper_detector
 from selfdrive.visiond.compiled_robust import build_robust_detector
 from selfdrive.visiond.detector import LaneLines
+from selfdrive.visiond.line_confidence import MIN_CONFIDENT
 from selfdrive.visiond_lab.evaluate_on_real_frames import (
     EXIT_INVALID_INPUT,
     PAPER,
@@ -47,7 +48,6 @@ from selfdrive.visiond_lab.judged_frames import (
     render_frames,
 )
 
-MIN_CONFIDENT = 0.5  # probability of a line that a detector is confident of
 JUDGED_ROADS, JUDGED_SEED = 500, (47, 1)  # training uses other seeds
 REAL_FRAME_SEEDS = 10  # drawings of each effect and level
 ROAD_TURNS = 3  # an effect is judged on every third road

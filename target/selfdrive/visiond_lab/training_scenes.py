@@ -9,6 +9,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.lead_picture import draw_car
 from selfdrive.sim.road_look import LinePaint, RoadLook
 from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.visiond_lab.random_effects import random_effect, random_moment
 from selfdrive.visiond_lab.random_looks import random_camera, random_look
 from selfdrive.visiond_lab.real_picture_features import (
     RandomVergesAndBands,
@@ -29,7 +30,9 @@ class TrainingView:
     paint: np.ndarray
 
 
-def generate_views(scenes: int, rng: np.random.Generator) -> Iterator[TrainingView]:
+def generate_views(
+    scenes: int, rng: np.random.Generator, *, with_effects: bool = True
+) -> Iterator[TrainingView]:
     for _ in range(scenes):
         look, model, seed = random_look(rng), random_camera(rng), int(rng.integers(2**31))
         road = RoadRenderer(model, look, seed, periods=DASH_PERIODS_PER_SCENE)
@@ -41,7 +44,11 @@ def generate_views(scenes: int, rng: np.random.Generator) -> Iterator[TrainingVi
             paint = np.where(hidden, np.uint8(0), marks.render_grey(*pose))
             picture, paint = ground.apply(road.render_grey(*pose), paint, offset=pose[1], heading=pose[2])
             picture, paint = bend_road_in_images(model, (picture, paint), rng)
-            yield TrainingView(model=model, picture=degrade_like_bad_camera(picture, rng), paint=paint)
+            picture = degrade_like_bad_camera(picture, rng)
+            effect = random_effect(model, rng) if with_effects else None
+            if effect:
+                picture = np.asarray(effect.apply(picture, random_moment(rng)))
+            yield TrainingView(model=model, picture=picture, paint=paint)
 
 
 def _pixels_behind_cars(look: RoadLook, model: CameraModel) -> np.ndarray:

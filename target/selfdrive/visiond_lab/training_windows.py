@@ -1,5 +1,7 @@
 """Labelled detection windows from training scenes."""
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 
@@ -14,14 +16,16 @@ MOST_PAINT_WITHOUT_MARK = 2.0  # pixels
 SURROUNDINGS_KERNEL = np.ones((7, 7), np.uint8)  # neighbourhood for comparison with paint
 
 
-def draw_labelled_windows(scenes: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def draw_labelled_windows(
+    scenes: int, rng: np.random.Generator, *, with_effects: bool = True
+) -> tuple[np.ndarray, np.ndarray]:
     """Return features (windows x 1764, float32) and labels (bool), about half with a mark."""
     features = np.empty((2 * MOST_WINDOWS_PER_LABEL * VIEWS_PER_SCENE * scenes, WINDOW_FEATURES), np.float32)
     labels = np.empty(len(features), bool)
-    used = 0
-    for view in generate_views(scenes, rng):
+    used, hog_of_shape = 0, lru_cache(maxsize=1)(Hog)  # the views of a scene have one shape
+    for view in generate_views(scenes, rng, with_effects=with_effects):
         region = RoadRegion(view.model)
-        features_by_window = detection_windows(Hog(*region.shape).blocks(view.picture[region.part]))
+        features_by_window = detection_windows(hog_of_shape(*region.shape).blocks(view.picture[region.part]))
         for label, weight in zip((True, False), _sampling_weights(view, region), strict=True):
             chosen = _draw_windows(weight * region.windows, rng)
             features[used : used + len(chosen)] = features_by_window[chosen[:, 0], chosen[:, 1]].reshape(

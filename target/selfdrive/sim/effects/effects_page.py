@@ -63,15 +63,17 @@ strongest. Lines show what the detectors find: **broad red** for `paper`, **narr
   Clean pictures have {clean.false_edges:.1%}.
 * Covered: share of the lane's inside, 5 to 30 m ahead, where drops, flakes, blobs or blotches change an even
   grey by at least 8 levels.
-* Found: share of pictures in which a detector finds both lines, each within 0.3 m of the truth 10 m ahead. If
-  `as_coded` finds nothing, it repeats its last result, which happens to be correct here. Its high shares at
-  the strongest levels therefore mean that it sees nothing.
+* Found: share of pictures in which a detector finds both lines, each within 0.3 m of the truth 10 m ahead,
+  including lines from which it abstains (probability below 0.5). If `as_coded` finds nothing, it repeats its
+  last result, which happens to be correct here. Its high shares at the strongest levels therefore mean that
+  it sees nothing.
 * Missed on real frames: number of pictures in which a detector misses a line. The six frames show highways
   (from Udacity's first project on lane finding, MIT licence). Random effects are applied with 20 seeds. The
   detectors have no memory of earlier pictures. The counts are not independent, because they come from only
   six roads. The repository contains [the counts](image-effects/real-frames.csv), but not the frames. For your
   own frames, `python -m selfdrive.visiond_lab.evaluate_under_effects FRAMES TRUTH` counts the misses and,
-  with `--strips`, shows all levels. The detectors were tuned only for rain and snow on rendered roads.
+  with `--strips`, shows all levels. No real frame was used in training or tuning: on rendered roads, `paper`
+  was trained behind all effects, and `robust` was tuned for rain and snow.
 
 ## What a level of the paper's effects represents
 

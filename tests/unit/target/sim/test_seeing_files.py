@@ -79,7 +79,7 @@ def memory() -> Path:
 
 
 def test_the_manifest_lists_every_file_that_affects_detection() -> None:
-    """A mutant of a file that the memory's key covers is run from the disk.
+    """A mutant's tree has all files that the memory's key covers; a mutant of one is run from the disk.
 
     The key does not cover visiond and the camera, so their faults can be forked.
     """
@@ -91,6 +91,7 @@ def test_the_manifest_lists_every_file_that_affects_detection() -> None:
         for p in package.glob(glob)
     }
     assert len(seeing) > 30
+    assert [path for path in sorted(seeing) if not matches_any_glob(path, manifest.file_globs)] == []
     assert [
         path
         for path in sorted(seeing)
