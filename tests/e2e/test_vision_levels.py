@@ -31,14 +31,12 @@ def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
 
 
 def test_lane_departures_of_each_effect_and_detector(workspace: Workspace, tmp_path: Path) -> None:
-    """Rain, snow and contrast mislead the published detector; fog, brightness and blur hardly do. The other
-    detector is more robust."""
+    """Only strong contrast makes the car leave its lane: the published detector abstains from lines that other
+    effects mislead, and the other detector is robust."""
     paper = departures(workspace, tmp_path / "paper", "paper")
     robust = departures(workspace, tmp_path / "robust", "robust")
-    assert all(paper[name] > 0 for name in ("rain", "snow", "contrast"))
-    assert sum(paper[name] for name in ("fog", "brightness", "blur")) <= 2
-    assert robust.total() < paper.total() / 2
-    assert robust["rain"] + robust["snow"] + robust["occlusion"] == 0
+    assert paper.keys() | robust.keys() == {"contrast"}
+    assert 0 < paper.total() <= 2 and robust.total() <= 2
 
 
 def test_the_frame_cache_changes_no_byte(
