@@ -145,7 +145,7 @@ def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_fault_in_a_detector_does_not_depend_on_earlier_runs(drive: Drive) -> None:
-    place = ("selfdrive/visiond/paper_detector.py", "PaperDetector._marked", "score")
+    place = ("selfdrive/visiond/paper_detector.py", "PaperDetector._windows_with_mark", "score")
     early, late = (drive(place, time_s, independent=True) for time_s in (0.3, 0.7))
     assert early[0] != late[0] and '"count": 14' in early[1] and '"count": 6' in late[1]
     assert [drive(place, time_s) for time_s in (0.3, 0.3, 0.7)] == [early, early, late]
@@ -157,7 +157,7 @@ def test_a_fault_in_a_detector_does_not_depend_on_earlier_runs(drive: Drive) -> 
     not any(compile_helpers.COMPILED_FOLDER.glob("mark_windows-*")), reason="nothing is compiled"
 )
 def test_a_fault_in_code_with_a_compiled_version_is_activated(drive: Drive) -> None:
-    place = ("selfdrive/visiond/hog.py", "Hog._votes", "votes")
+    place = ("selfdrive/visiond/hog.py", "Hog._vote_by_cell", "votes")
     acted = drive(place, 0.3)
     assert '"count": 14' in acted[1] and acted == drive(place, 0.3, independent=True)
 
