@@ -31,8 +31,8 @@ def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
 
 
 def test_lane_departures_of_each_effect_and_detector(workspace: Workspace, tmp_path: Path) -> None:
-    """Only strong contrast makes the car leave its lane: the published detector abstains from lines that other
-    effects mislead, and the other detector is robust."""
+    """Only strong contrast makes the car leave its lane: the published detector abstains from the lines that
+    other effects displace, and the other detector is robust."""
     paper = departures(workspace, tmp_path / "paper", "paper")
     robust = departures(workspace, tmp_path / "robust", "robust")
     assert paper.keys() | robust.keys() == {"contrast"}
