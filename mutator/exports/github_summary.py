@@ -121,9 +121,10 @@ def _worst_experiments(
     parts = ["### The worst"] if worst else []
     for each in worst:
         place = f"{repository.link(each.position)}: " if each.position else ""
+        ending = each.description.removeprefix(f"{each.experiment.label}: ")
         parts += [
             f"#### {escaped_markdown_line(each.experiment.label)}",
-            f"{place}{escaped_markdown_line(f'{each.title}. {each.description}')} "
+            f"{place}{escaped_markdown_line(f'{each.title}: {ending}')} "
             f"(`{each.experiment.id[:SHORT_ID_LENGTH]}`)",
             escaped_markdown_line(each.sentence),
             charts.chart(each),

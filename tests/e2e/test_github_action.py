@@ -1,0 +1,269 @@
+"""The action for GitHub: its steps run as a runner runs them, on pull requests of a scripted repository."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from mutator.comparison.gate_failures import RECOMMENDED_GATES
+
+CLONE = Path(__file__).parents[2]
+ACTION: dict[str, Any] = yaml.safe_load((CLONE / "action.yml").read_text())
+STEPS: list[dict[str, Any]] = ACTION["runs"]["steps"]
+EXPRESSION = re.compile(r"\$\{\{ (.*?) \}\}")
+PAGE = CLONE / "docs" / "how-to" / "show-hazards-in-a-pull-request.md"
+# stands for Python, whose pip would need the network
+FAKE_PYTHON = """\
+#!/bin/sh
+if [ "$1 $2" != "-m venv" ]; then exec "{python}" "$@"; fi
+mkdir -p "$3/bin"
+printf '#!/bin/sh\\necho "$@" >>"$0.log"\\n' >"$3/bin/pip"
+printf '#!/bin/sh\\nPYTHONPATH="{clone}" exec "{python}" "$@"\\n' >"$3/bin/python"
+printf '#!/bin/sh\\nPYTHONPATH="{clone}" exec "{python}" -m mutator "$@"\\n' >"$3/bin/mutator"
+chmod +x "$3"/bin/*
+"""
+
+
+def test_the_default_gate_is_the_recommended_one() -> None:
+    kinds = ACTION["inputs"]["fail-on"]["default"].split(",")
+    assert kinds == [gate.value for gate in RECOMMENDED_GATES]
+
+
+def test_no_script_contains_an_expression() -> None:
+    """A branch's name in a script would be run as a command."""
+    for step in STEPS:
+        assert "${{" not in step.get("run", "")
+        assert ("run" in step) == (step.get("shell") == "bash")
+        assert "run" in step or re.fullmatch(r"[\w/-]+@v\d+", step["uses"])
+
+
+def test_expressions_name_inputs_and_outputs_that_exist() -> None:
+    outputs = {
+        step["id"]: set(re.findall(r'echo "([\w-]+)=', step.get("run", ""))) for step in STEPS if "id" in step
+    }
+    of_actions = {"python": {"python-version"}, "environment": {"cache-hit"}, "base-run": {"cache-hit"}}
+    text = yaml.safe_dump(ACTION, width=10_000)
+    named = re.findall(r"steps\.([\w-]+)\.outputs\.([\w-]+)", text)
+    assert named
+    for step, output in named:
+        assert output in outputs[step] | of_actions.get(step, set())
+    assert set(re.findall(r"inputs\.([\w-]+)", text)) == set(ACTION["inputs"])
+
+
+def test_the_page_explains_every_input() -> None:
+    rows = re.findall(r"^\| `([\w-]+)` \|", PAGE.read_text(), re.MULTILINE)
+    assert [name for name in rows if name in ACTION["inputs"]] == list(ACTION["inputs"])
+
+
+@dataclass
+class Runner:
+    """Runs the steps of the action that have a script, in the environment that a runner gives them."""
+
+    temp: Path
+    workspace: Path
+    context: dict[str, str]
+    environment: dict[str, str] = field(default_factory=dict)
+    log: str = ""
+    skipped: list[str] = field(default_factory=list)
+
+    def run(self, inputs: Mapping[str, str]) -> int:
+        """Run all steps as for a job without cached files; return the exit code of the first that failed."""
+        for name, declared in ACTION["inputs"].items():
+            self.context[f"inputs.{name}"] = inputs.get(name, declared.get("default", ""))
+        code = 0
+        for step in STEPS:
+            if "run" not in step:
+                continue
+            if not self.should_run(step.get("if", "success()"), code):
+                self.skipped.append(step["name"])
+                continue
+            failed = self.run_step(step)
+            if "id" in step:
+                self.context[f"steps.{step['id']}.outcome"] = "failure" if failed else "success"
+            code = code or failed
+        return code
+
+    def should_run(self, condition: str, code: int) -> bool:
+        parts = condition.split(" && ")
+        if "always()" not in parts and code:
+            return False
+        for part in parts:
+            if part not in ("always()", "success()"):
+                left, sign, right = part.split(" ")
+                if (self.context.get(left, "") == right.strip("'")) != (sign == "=="):
+                    return False
+        return True
+
+    def run_step(self, step: Mapping[str, Any]) -> int:
+        files = {}
+        for name in ("OUTPUT", "ENV", "PATH"):
+            files[name] = self.temp / f"{name}.txt"
+            files[name].write_text("")
+        script = self.temp / "script.sh"
+        script.write_text(step["run"])
+        given = {name: self.evaluated(value) for name, value in step.get("env", {}).items()}
+        done = subprocess.run(
+            ["bash", "--noprofile", "--norc", "-eo", "pipefail", str(script)],
+            cwd=self.workspace,
+            env=self.environment | given | {f"GITHUB_{name}": str(path) for name, path in files.items()},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+        )
+        self.log += done.stdout
+        for line in files["OUTPUT"].read_text().splitlines():
+            name, _, value = line.partition("=")
+            self.context[f"steps.{step['id']}.outputs.{name}"] = value
+        self.environment |= dict(line.split("=", 1) for line in files["ENV"].read_text().splitlines())
+        paths = files["PATH"].read_text().split()
+        self.environment["PATH"] = os.pathsep.join([*paths, self.environment["PATH"]])
+        return done.returncode
+
+    def evaluated(self, text: str) -> str:
+        def value(match: re.Match[str]) -> str:
+            return next(filter(None, (self.context.get(name, "") for name in match[1].split(" || "))), "")
+
+        return EXPRESSION.sub(value, text)
+
+    def annotations(self, kind: str) -> list[str]:
+        return [line for line in self.log.splitlines() if line.startswith(f"::{kind}")]
+
+
+def git(folder: Path, *words: str) -> str:
+    identity = ("-c", "user.name=a", "-c", "user.email=a@b.c", "-c", "init.defaultBranch=main")
+    done = subprocess.run(["git", *identity, *words], cwd=folder, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    """A repository with the toy car, its library and the templates, and what a runner checks out of it."""
+    origin, toy = tmp_path / "origin", CLONE / "tests" / "toy"
+    ignored = shutil.ignore_patterns("__pycache__", "hostile")
+    shutil.copytree(toy / "fault_library", origin / "fault_library", ignore=ignored)
+    shutil.copytree(toy / "tree", origin / "tree", ignore=ignored)
+    shutil.copytree(CLONE / "templates", origin / "templates", ignore=ignored)
+    git(origin, "init", "--quiet")
+    git(origin, "add", ".")
+    git(origin, "commit", "--quiet", "-m", "toy car")
+    git(tmp_path, "clone", "--quiet", "--depth=1", origin.as_uri(), "work")
+    return tmp_path / "work"
+
+
+@pytest.fixture
+def runner(repository: Path, tmp_path: Path) -> Runner:
+    temp = tmp_path / "temp"
+    (temp / "bin").mkdir(parents=True)
+    python = temp / "bin" / "python"
+    python.write_text(FAKE_PYTHON.format(python=sys.executable, clone=CLONE))
+    python.chmod(0o755)
+    environment = {
+        "PATH": os.pathsep.join([str(temp / "bin"), os.environ["PATH"]]),
+        "HOME": str(tmp_path / "home"),
+        "CI": "true",
+        "GITHUB_ACTIONS": "true",
+        "GITHUB_WORKSPACE": str(repository),
+        "GITHUB_STEP_SUMMARY": str(temp / "summary.md"),
+        "RUNNER_TEMP": str(temp),
+        "RUNNER_OS": "Linux",
+    }
+    context = {
+        "github.action_path": str(CLONE),
+        "github.base_ref": "main",
+        "runner.temp": str(temp),
+        "steps.python.outputs.python-version": "3.12.1",
+    }
+    return Runner(temp=temp, workspace=repository, context=context, environment=environment)
+
+
+def change(repository: Path, path: str, old: str, new: str) -> None:
+    file = repository / path
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+    git(repository, "commit", "--quiet", "--all", "-m", "change")
+
+
+@pytest.mark.slow
+def test_a_change_with_new_hazards_fails_with_annotations_summary_and_sarif(
+    runner: Runner, repository: Path
+) -> None:
+    change(repository, "tree/toycar/driver.py", "-0.6 * offset", "-0.6 * (offset + 0.3)")
+    (repository / "packages.txt").write_text("numpy\n")
+    assert runner.run({"campaign": "toy", "workers": "0", "requirements": "packages.txt"}) == 1, runner.log
+    errors = runner.annotations("error")
+    assert errors
+    assert all(line.startswith("::error file=tree/toycar/sensing.py,line=") for line in errors)
+    summary = (runner.temp / "summary.md").read_text()
+    assert summary.startswith("## base against new\n\n**The gate fails for ")
+    assert "Files of the target changed: toycar/driver.py." in summary
+    assert "```mermaid" in summary
+    runs = runner.temp / "mutator-runs" / "toy"
+    assert runner.context["steps.files.outputs.sarif"] == str(runs / "hazards.sarif")
+    assert '"uri": "tree/toycar/sensing.py"' in (runs / "hazards.sarif").read_text()
+    assert (runs / "new" / "exports" / "new-report.html").is_file()
+    assert (runs / "comparison" / "index.html").is_file()
+    assert 'file="tree/toycar/' in (runs / "junit.xml").read_text()
+    installed = (runner.temp / "mutator-environment" / "bin" / "pip.log").read_text()
+    assert f"--constraint {CLONE}/constraints.txt {CLONE}\n" in installed
+    assert "--requirement packages.txt" in installed
+    assert runner.skipped == ["Say that SARIF is left out"]
+    assert any((runner.temp / "mutator-store").iterdir())
+
+
+@pytest.mark.slow
+def test_a_refactoring_from_a_fork_passes_and_says_that_sarif_is_left_out(
+    runner: Runner, repository: Path
+) -> None:
+    """The second job, which has the store of the first, runs no experiment again."""
+    change(
+        repository,
+        "tree/toycar/driver.py",
+        "gap, closing, offset = reading",
+        "(gap, closing, offset) = reading",
+    )
+    runner.context["github.event.pull_request.head.repo.fork"] = "true"
+    inputs = {"campaign": "fault_library/campaigns/small.yaml", "workers": "0", "base": "main"}
+    assert runner.run(inputs) == 0, runner.log
+    assert runner.annotations("error") == []
+    assert runner.annotations("notice") == [
+        "::notice::SARIF is not uploaded to code scanning, because the token of a fork can only read. "
+        "It is in the artifact."
+    ]
+    summary = (runner.temp / "summary.md").read_text()
+    assert "**The gate passes: no experiment fails `new-hazard`" in summary
+    assert "SARIF is not uploaded" in summary
+    shutil.rmtree(runner.temp / "mutator-runs")
+    runner.log = ""
+    assert runner.run(inputs) == 0, runner.log
+    assert len(re.findall(r"^(\d+) of \1 reused", runner.log, re.MULTILINE)) == 2
+
+
+@pytest.mark.slow
+def test_a_campaign_that_cannot_start_is_an_error_in_the_summary(runner: Runner, repository: Path) -> None:
+    """With this change, the car leaves its lane without any fault."""
+    change(repository, "tree/toycar/driver.py", "-0.6 * offset", "0.6 * (offset + 1)")
+    assert runner.run({"campaign": "small", "workers": "0"}) == 1, runner.log
+    [error] = runner.annotations("error")
+    assert error.startswith("::error title=The campaign did not finish::error: ")
+    assert "without any fault" in error
+    summary = (runner.temp / "summary.md").read_text()
+    assert summary.startswith("## small did not finish on this version\n\n    error: ")
+    assert runner.skipped[:2] == ["Fetch the base", "Run the campaign on the base"]
+
+
+@pytest.mark.slow
+def test_a_base_that_does_not_exist_is_an_error(runner: Runner) -> None:
+    assert runner.run({"campaign": "small", "workers": "0", "base": "nowhere"}) == 2
+    assert runner.annotations("error") == [
+        "::error::cannot fetch 'nowhere' to compare with: correct the input 'base'"
+    ]
