@@ -9,6 +9,7 @@
       pages/<digest>/      reports that the server built
       finished/<name>.runs  records and series of finished runs
       finished/<digest>/   finished runs of a run folder whose proof is still to come
+      campaigns/<name>/    run folders of campaigns under pytest, without --campaign-out
       targets/<name>/      files that a target keeps for its runs (`{cache}` in its manifest)
 
 Results never depend on the cache. Each entry is found by a digest of its inputs and checked before use. An
@@ -31,20 +32,21 @@ EXECUTED_LINES_CACHE, IMAGE_EFFECTS_CACHE, REPORTS_CACHE, TARGET_CACHES = (
     "pages",
     "targets",
 )
-FINISHED_RUNS_CACHE = "finished"
+FINISHED_RUNS_CACHE, CAMPAIGN_RUNS_CACHE = "finished", "campaigns"
 _MOST_FOLDER_NAME_LENGTH = 200  # file systems allow 255 bytes
 MOST_TARGET_CACHE_BYTES = 4_000_000_000  # size limit for one target, enforced between seeds
 MOST_CACHED_REPORTS_BYTES = 500_000_000  # size limit for all reports that the server built
 MOST_FINISHED_RUNS_BYTES = 4_000_000_000  # size limit for the store of finished runs
+MOST_CAMPAIGN_RUNS_BYTES = 4_000_000_000  # size limit for run folders of campaigns under pytest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CacheEntry:
     """A cached item that is kept or deleted as a whole.
 
-    `what` is the part of the cache: `checks`, `goldens`, `runs`, `lines`, `pictures`, `pages`, `finished` or,
-    for example, `target openpilot`. `size` is the size on disk in bytes, `used` the time of the last use in
-    seconds since the epoch.
+    `what` is the part of the cache: `checks`, `goldens`, `runs`, `lines`, `pictures`, `pages`, `finished`,
+    `campaigns` or, for example, `target openpilot`. `size` is the size on disk in bytes, `used` the time of
+    the last use in seconds since the epoch.
     """
 
     what: str
@@ -99,6 +101,10 @@ def finished_runs_folder() -> Path:
     return caches_folder() / FINISHED_RUNS_CACHE
 
 
+def campaign_runs_folder() -> Path:
+    return caches_folder() / CAMPAIGN_RUNS_CACHE
+
+
 def target_cache_folder(name: str) -> Path:
     """Return the folder that all runs of a target share."""
     quoted = quote(name, safe="").replace(".", "%2E")
@@ -118,6 +124,7 @@ def list_entries() -> list[CacheEntry]:
     listed += [_build_entry(IMAGE_EFFECTS_CACHE, path) for path in _paths_in(cached_image_effects_folder())]
     listed += [_build_entry(REPORTS_CACHE, path) for path in _paths_in(cached_reports_folder())]
     listed += [_build_entry(FINISHED_RUNS_CACHE, path) for path in _paths_in(finished_runs_folder())]
+    listed += [_build_entry(CAMPAIGN_RUNS_CACHE, path) for path in _paths_in(campaign_runs_folder())]
     for target in _paths_in(caches_folder() / TARGET_CACHES):
         listed += [_build_entry(f"target {target.name}", path) for path in _files_below(target)]
     return sorted(listed, key=lambda entry: (entry.what, entry.path))
@@ -157,6 +164,16 @@ def prune_finished_runs() -> list[CacheEntry]:
     return _prune_entries(
         [_build_entry(FINISHED_RUNS_CACHE, path) for path in _paths_in(finished_runs_folder())],
         MOST_FINISHED_RUNS_BYTES,
+    )
+
+
+def prune_campaign_runs() -> list[CacheEntry]:
+    """Delete the least recently used run folders of campaigns under pytest until at most
+    MOST_CAMPAIGN_RUNS_BYTES remain; return them.
+    """
+    return _prune_entries(
+        [_build_entry(CAMPAIGN_RUNS_CACHE, path) for path in _paths_in(campaign_runs_folder())],
+        MOST_CAMPAIGN_RUNS_BYTES,
     )
 
 

@@ -1,18 +1,20 @@
 """Campaign files: the faults, scenarios, triggers and limits of a campaign."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import checked_name_not_path
+from mutator._common.message_text import describe_choices
 from mutator.campaigns.campaign_model import CampaignModel, Canary, SelectionModel
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
     ListedTrigger,
     with_trigger_list_under_key,
 )
+from mutator.campaigns.expectations import Expectation
 from mutator.campaigns.installed_studies import CheckableStudy, load_installed_study
 from mutator.campaigns.operator_selection import MutantActivity, OperatorSelection
 from mutator.config.yaml_files import load_yaml_model
@@ -21,6 +23,7 @@ from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_m
 from mutator.errors import MutatorError
 from mutator.faults.library_readings import SpecReadings
 from mutator.model import AfterHazard, Limits, Method
+from mutator.targets.hazard_severity import SeverityScale
 
 SCHEMA = "campaign/1"
 _SPEC_SUFFIXES = (".yaml", ".yml")
@@ -68,6 +71,7 @@ class Campaign:
     chunk_size: int
     after_hazard: AfterHazard
     yaml_source: YamlSource
+    expectation: Expectation | None = None  # what results may be under pytest; None: anything
     is_bench: bool = False  # what a bench fixed when it was opened; its experiments come in batches
 
     @property
@@ -155,6 +159,7 @@ def load_campaign(path: Path) -> Campaign:
         chunk_size=model.chunk,
         after_hazard=model.after_hazard,
         yaml_source=source,
+        expectation=model.expect,
     )
 
 
@@ -203,6 +208,29 @@ def load_campaign_study(campaign: Campaign) -> CheckableStudy | None:
         raise campaign.yaml_source.error(
             ("study",), error.got, expected=error.expected, remedy=error.remedy
         ) from error
+
+
+def check_expectation(campaign: Campaign, hazards: Collection[str], scale: SeverityScale | None) -> None:
+    """Raise MutatorError if the campaign expects a hazard, or a class of severity, that there is not."""
+    expectation = campaign.expectation
+    if expectation is None:
+        return
+    for i, name in enumerate(expectation.hazards or ()):
+        if name not in hazards:
+            raise campaign.error(
+                ("expect", "hazards", i),
+                f"hazard '{name}'",
+                expected=describe_choices(hazards),
+                remedy="name a hazard of the target's manifest",
+            )
+    classes = [name for name, _, _ in scale.classes] if scale else []
+    if expectation.severity is not None and expectation.severity not in classes:
+        raise campaign.error(
+            ("expect", "severity"),
+            f"severity '{expectation.severity}'",
+            expected=describe_choices(classes) if classes else "a target whose manifest has a `severity`",
+            remedy="name a class of the target's severity scale",
+        )
 
 
 def check_readings(campaign: Campaign, readings: SpecReadings) -> None:

@@ -14,6 +14,7 @@ from mutator.campaigns.campaign_triggers import (
     schema_with_readings,
     to_value_by_reading,
 )
+from mutator.campaigns.expectations import Expectation
 from mutator.campaigns.operator_selection import MutantActivity
 from mutator.config.yaml_files import StrictModel, YamlRecord
 from mutator.model import AfterHazard, Limits, Method
@@ -183,6 +184,11 @@ class CampaignModel(StrictModel, title="The file"):
         description="`stop` ends each faulty run at its first [terminal "
         "hazard](../explanation/verdicts.md#the-end-of-the-drive). This saves time, but later "
         "hazards and alerts are not observed.",
+    )
+    expect: YamlRecord[Expectation] | None = Field(
+        None,
+        description="What results may be. Under pytest, an experiment with another hazard is a test that "
+        "fails, and so is the build; records, tables and seal stay the same.",
     )
     limits: YamlRecord[Limits] = Field(Limits(), description="The resources that one run is allowed to use.")
     chunk: int = Field(

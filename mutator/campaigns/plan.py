@@ -14,7 +14,7 @@ from mutator._common.message_text import counted, describe_seeds
 from mutator._common.table_rendering import TextTable
 from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.campaigns.campaign_expansion import CampaignExpansion
-from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign
+from mutator.campaigns.campaign_files import Campaign, check_expectation, check_readings, load_campaign
 from mutator.campaigns.chunks import chunk_lengths_of_runs
 from mutator.campaigns.neutral_faults import NeutralFaultWarner
 from mutator.campaigns.plan_tally import FaultTypeAndMethod, PlanPart, PlanTally, plan_digest
@@ -160,6 +160,7 @@ class SeedBySeedPlan:
         if self.choices.reading is not None:
             readings.check_name(self.choices.reading)
         self._workspace, self._manifest = workspace, workspace.manifest(self.campaign.target)
+        check_expectation(self.campaign, self._manifest.hazard_names, workspace.scale_of(self._manifest))
         if self.campaign.after_hazard is AfterHazard.STOP:
             stop_function_source(self._manifest)  # raises before any run starts
         self._expansion = CampaignExpansion(

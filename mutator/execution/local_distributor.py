@@ -9,7 +9,8 @@ from importlib import metadata
 import pytest
 
 from mutator.execution.session import Session
-from mutator.execution.xdist_controller import CampaignController
+from mutator.execution.xdist_controller import CampaignController, PreparedRun
+from mutator.store.run_head import CAMPAIGN_FILE
 
 _PLUGIN_MODULE = "mutator.execution.pytest_plugin"
 
@@ -18,18 +19,19 @@ class LocalDistributor:
     """The distributor of `mutator run`: `session.workers` processes, or only this process if 0."""
 
     def run(self, session: Session) -> None:
-        """Run the pending chunks as pytest items, ignoring the user's pytest configuration."""
+        """Run the pending experiments as pytest items, ignoring the user's pytest configuration."""
         installed = any(entry.name == "mutator" for entry in metadata.entry_points(group="pytest11"))
         folder = session.folder.path
         arguments = [
-            *("--campaign", str(folder / "campaign.yaml"), "--campaign-out", str(folder)),
             *("--disable-plugin-autoload", "-p", "xdist", "-p", "mutator" if installed else _PLUGIN_MODULE),
             *("-p", "no:cacheprovider", "-p", "no:tmpdir", "--noconftest", "--assert=plain"),
             *("-c", os.devnull, "--rootdir", str(folder), "-s", "-n", str(session.workers)),
         ]
         output = _SilentReporter()
         with _without_environment_variables("PYTEST_ADDOPTS", "PYTEST_PLUGINS"):
-            code = pytest.main(arguments, plugins=[CampaignController(session), output])
+            sources = {os.path.realpath(folder / CAMPAIGN_FILE): PreparedRun(session)}
+            controller = CampaignController(sources, is_alone=True)
+            code = pytest.main(arguments, plugins=[controller, output])
         if code in (pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR) and not session.problem:
             # the error is at the end of what pytest prints
             session.problem = output.text.getvalue().strip()[-2000:] or f"pytest ended with {code!r}"

@@ -1,11 +1,25 @@
-"""The pytest plugin that runs campaigns: `pytest --campaign FILE --campaign-out DIR -n 2`.
+"""The pytest plugin that collects campaigns: `pytest fault_library/campaigns/quickstart.yaml -n 2`.
 
 Every pytest session in the environment loads this plugin, so it imports the harness only for a campaign.
 """
 
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from mutator.execution.requested_campaigns import WORKER_INPUT_KEY, find_requested_campaigns
+
+_CAMPAIGN_OPTIONS = (
+    "campaign_out",
+    "require_reviewed",
+    "accept_versions",
+    "campaign_no_reuse",
+    "campaign_sandbox",
+    "campaign_cluster",
+    "insecure_network",
+    "hazard_fails",
+)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -19,7 +33,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--campaign-out",
         metavar="DIR",
         type=Path,
-        help="the run folder; an interrupted run resumes there",
+        help="the run folder; an interrupted run resumes there (default: one below the cache; after an edit "
+        "of library or target, another one)",
+    )
+    group.addoption(
+        "--hazard-fails",
+        action="store_true",
+        help="fail an experiment that reaches a hazard, whatever the campaign expects",
     )
     group.addoption(
         "--require-reviewed",
@@ -54,41 +74,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    campaign, out = config.getoption("campaign"), config.getoption("campaign_out")
-    if campaign is None:
-        if out is not None:
-            raise pytest.UsageError("--campaign-out without --campaign")
-        others = ("require_reviewed", "accept_versions", "campaign_no_reuse", "campaign_sandbox")
-        for option in (*others, "campaign_cluster", "insecure_network"):
+    worker_input: dict[str, Any] | None = getattr(config, "workerinput", None)
+    if worker_input is not None:
+        if WORKER_INPUT_KEY in worker_input:
+            from mutator.execution.xdist_worker import WorkerPlugin
+
+            config.pluginmanager.register(WorkerPlugin(config, worker_input))
+        return
+    requested = find_requested_campaigns(config)
+    if requested.is_empty:
+        for option in _CAMPAIGN_OPTIONS:
             if config.getoption(option):
-                raise pytest.UsageError(f"--{option.replace('_', '-')} without --campaign")
+                name = f"--{option.replace('_', '-')}"
+                raise pytest.UsageError(f"{name} without a campaign (--campaign, or a campaign's file)")
         return
-    if out is None:
-        raise pytest.UsageError("--campaign needs --campaign-out DIR, the folder for its results")
-    if hasattr(config, "workerinput"):
-        from mutator.execution.xdist_worker import WorkerPlugin
+    from mutator.execution.session_campaigns import register_campaigns
 
-        config.pluginmanager.register(WorkerPlugin(config, config.workerinput))
-        return
-    from mutator.errors import MutatorError
-    from mutator.execution.distributor_choice import choose_distributor, packages_of_distributor
-    from mutator.execution.xdist_controller import register_controller
-
-    cluster, insecure = config.getoption("campaign_cluster"), config.getoption("insecure_network")
-    if cluster and getattr(config.option, "numprocesses", None):
-        raise pytest.UsageError("--campaign-cluster with -n: leave out -n (the cluster has its own workers)")
-    try:
-        work_distributor = choose_distributor(cluster, insecure=insecure) if cluster or insecure else None
-    except MutatorError as err:
-        raise pytest.UsageError(str(err)) from None
-    register_controller(
-        config,
-        campaign,
-        out,
-        reviewed=config.getoption("require_reviewed"),
-        accept_versions=config.getoption("accept_versions"),
-        sandbox=config.getoption("campaign_sandbox"),
-        reuse=not config.getoption("campaign_no_reuse"),
-        distributor=work_distributor,
-        packages=packages_of_distributor(work_distributor) if work_distributor else (),
-    )
+    register_campaigns(config, requested)

@@ -229,12 +229,13 @@ class Session:
         )
 
     def start_of_worker(self, name: str) -> WorkerStart:
-        """Return what a process needs to begin as a worker, whose files are believed from now on."""
+        """Return what another process needs to begin as a worker, whose files are believed from now on."""
         assignment = self.worker_assignment(name, parent_pid=os.getpid())
         self.written.note_worker_began(assignment.worker_name)
         return WorkerStart(inputs=self.inputs.to_bytes(), assignment=assignment)
 
-    def finish(self) -> Summary:
+    def finish(self, *, tables_of_part: bool = True) -> Summary:
+        """End the session; return what it reports. Without `tables_of_part`, a part has no tables."""
         self.notify(Progress(stage="tables"))
         if self._earlier_outcome:
             return self._finish_finished_run(self._earlier_outcome)
@@ -248,8 +249,9 @@ class Session:
         results_path = None
         with self._noting_full_disk():
             self._close_segments()
-            results_path = table_building.ensure_tables(self.folder.path)
-            self._pack_series()
+            if tables_of_part or finished_count == self.folder.planned_experiment_count:
+                results_path = table_building.ensure_tables(self.folder.path)
+                self._pack_series()
         proven = self.compare_sample(records)
         not_forked = "" if proven else self._not_forked
         if (

@@ -1,4 +1,4 @@
-"""The process that runs chunks: an xdist worker, or the command itself."""
+"""A process that runs experiments: an xdist worker, a worker of a bench, or the command itself."""
 
 import os
 import pickle
@@ -12,10 +12,10 @@ from typing import Any
 from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator._common.folder_locks import open_worker_lock
-from mutator.campaigns.chunks import PendingChunk
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
-from mutator.engines.engine_jobs import MODES_TO_PROVE, EngineArguments
+from mutator.campaigns.shared_runs import run_key
+from mutator.engines.engine_jobs import EngineArguments
 from mutator.execution.experiment_runner import RecordedExperiment, record_without_outcome
 from mutator.execution.run_reuse import ReuseAssignment, RunReuse
 from mutator.execution.suspended_workers import on_resume
@@ -23,10 +23,6 @@ from mutator.execution.worker_processes import bind_to_parent
 from mutator.execution.worker_runners import WorkerRunners
 from mutator.execution.written_files import FileDigests
 from mutator.model import Experiment, Record, Status
-from mutator.preflight import equivalence_check
-from mutator.preflight.equivalence_check import SampledExperiment
-from mutator.store import plan_file
-from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter
 from mutator.store.timings import ending_text
@@ -70,7 +66,7 @@ class WorkerStart:
 
 
 class Worker:
-    """Runs chunks of a run folder and appends their results. Reads the plan chunk by chunk."""
+    """Runs experiments of a run folder and appends their results."""
 
     def __init__(self, inputs: RunInputs, assignment: WorkerAssignment) -> None:
         self.was_suspended = False  # a signal handler sets it
@@ -78,7 +74,7 @@ class Worker:
         check_sources(self.folder.path, self.folder.head.sources, inputs.digest_by_source())
         with raising_disk_full(self.folder.scratch_folder):
             self.folder.scratch_folder.mkdir(exist_ok=True)
-        self._assignment = assignment
+        self._manifest, self._assignment = inputs.manifest, assignment
         self._scenario_files = dict(inputs.scenario_files)
         self._digest_by_golden_folder: dict[Path, str] = {}
         self._reuse = (
@@ -104,33 +100,40 @@ class Worker:
             with_series=bool(self.folder.series_budget_mb),
             find_finished_run=self._reuse.find if self._reuse else lambda experiment, mutant: None,
         )
-        self._needs_proof: bool | None = None  # None: not known yet
-        self._planned_experiments: Mapping[str, Experiment] = {}
-        self._faults = plan_file.load_faults(self.folder.path)
+        self._last_finished: RecordedExperiment | None = None
         self._writer = RunWriter(
             self.folder, assignment.worker_name
         )  # last: nothing is written if the rest fails
 
-    def run(self, pending: PendingChunk) -> list[tuple[str, str]]:
-        """Run the rest of a chunk; return (experiment id, detail) of each harness error."""
-        experiments = plan_file.load_chunk(
-            self.folder.path, self.folder.head.chunks[pending.chunk_index], self._faults
-        )
-        pending_experiments = [experiments[place] for place in pending.pending_positions]
-        return [
-            (record.experiment_id, record.detail)
-            for record in self.run_experiments(pending_experiments)
-            if record.status is Status.HARNESS_ERROR
-        ]
-
     def run_experiments(self, experiments: Sequence[Experiment]) -> Iterator[Record]:
         """Run experiments of the plan, at least one; store what each gave, and yield its record."""
-        for ended in self._runners.run(experiments):
+        return (finished.record for finished in self.run_and_store(experiments))
+
+    def run_and_store(self, experiments: Sequence[Experiment]) -> Iterator[RecordedExperiment]:
+        """Like `run_experiments`, but yield all that each gave.
+
+        An experiment that shares its run with the one before is not run, even if they come one by one.
+        """
+        experiments = list(experiments)
+        while experiments and (shared := self._shared_result(experiments[0])) is not None:
+            del experiments[0]
+            self._store_finished(shared)
+            yield shared
+        for ended in self._runners.run(experiments) if experiments else ():
             finished = self._without_outcome_if_suspended(ended)
             self._store_finished(finished)
-            if finished.mode in MODES_TO_PROVE:
-                self._needs_proof = True
-            yield finished.record
+            self._last_finished = finished
+            yield finished
+
+    def _shared_result(self, experiment: Experiment) -> RecordedExperiment | None:
+        """Return what an experiment gives that shares its run with the last one."""
+        last = self._last_finished
+        if last is None or last.record.status is Status.HARNESS_ERROR:
+            return None
+        if run_key(self._manifest, last.experiment) != run_key(self._manifest, experiment):
+            return None
+        record = replace(last.record, experiment_id=experiment.id)
+        return replace(last, experiment=experiment, record=record, cpu_s=0.0, wall_s=0.0)
 
     def add_inputs(
         self, *, goldens: Mapping[str, str] | None = None, scenario_files: Mapping[str, Path] | None = None
@@ -146,24 +149,6 @@ class Worker:
 
     def _golden_digest_of(self, experiment: Experiment) -> str:
         return self._digest_by_golden_folder[self.folder.golden_folder_of(experiment)]
-
-    def prove(self, sample: SampledExperiment) -> list[tuple[str, str]]:
-        """Run an experiment of the proof's sample on the reference engine; return harness errors as `run`
-        does.
-
-        If no experiment was forked, nothing is run.
-        """
-        if self._needs_proof is None:
-            self._needs_proof = equivalence_check.reason_check_not_needed(self.folder) is None
-        if not self._needs_proof:
-            return []
-        if not self._planned_experiments:
-            self._planned_experiments = PlannedExperiments(self.folder.path)
-        return [
-            (record.experiment_id, record.detail)
-            for record in self.prove_experiments([self._planned_experiments[sample.id]])
-            if record.status is Status.HARNESS_ERROR
-        ]
 
     def prove_experiments(self, experiments: Sequence[Experiment]) -> Iterator[Record]:
         """Run experiments on the reference engine for the proof, and yield their records."""

@@ -1,11 +1,14 @@
-"""Campaigns as pytest sessions: the controller, whose xdist workers have `xdist_worker`."""
+"""Campaigns in a pytest session: the plugin of the process that is no xdist worker.
+
+It runs the items itself or, with pytest-xdist, deals them to workers (`xdist_worker`). In a user's session,
+it also opens the run folders, and prints the summaries.
+"""
 
 import os
+import pickle
 import shlex
 import signal
-import sys
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -13,91 +16,66 @@ import pytest
 
 from mutator._common.folder_locks import living_worker_pids
 from mutator._common.resource_shortages import find_shortage
-from mutator.campaigns.chunks import golden_key_by_chunk
-from mutator.errors import MutatorError, PytestItemFailed
+from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError, PytestItemFailed
+from mutator.execution.campaign_items import (
+    PROBLEM_KEY,
+    CampaignFile,
+    CampaignItem,
+    ItemSource,
+    collect_alone,
+    source_of,
+)
+from mutator.execution.campaign_runs import CampaignRun
+from mutator.execution.item_running import ItemRunner, ItemsStart
+from mutator.execution.listed_items import ItemListing
 from mutator.execution.piece_scheduling import PieceScheduling, is_scheduler_chosen
 from mutator.execution.progress_reporting import reporting_progress
-from mutator.execution.progress_text import ProgressLines
+from mutator.execution.requested_campaigns import WORKER_INPUT_KEY
 from mutator.execution.session import Session
-from mutator.execution.session_opening import open_session
+from mutator.execution.session_items import SessionItems
 from mutator.execution.session_summary import Summary
 from mutator.execution.suspended_workers import WorkerContinuer
-from mutator.execution.worker import Worker
 from mutator.execution.worker_processes import python_command_dying_with
-from mutator.execution.xdist_worker import (
-    INPUT_KEY,
-    PROBLEM_KEY,
-    WRITTEN_KEY,
-    CampaignItem,
-    collect_items,
-    node_id_of,
-)
-from mutator.store.plan_choices import Choices
-from mutator.store.run_progress import ProgressCallback
-from mutator.workspace import Workspace
+from mutator.execution.xdist_worker import START_COMMAND, WRITTEN_KEY
 
 
 class WorkDistributor(Protocol):
     def run(self, session: Session) -> None: ...
 
 
-class DistributedItem(CampaignItem):
-    """All of a session's work, done by a cluster."""
+class PreparedRun(ItemSource):
+    """The campaign of a session that another command has prepared, and will finish."""
 
-    def __init__(self, *, campaign_session: Session, distributor: WorkDistributor, **keywords: Any) -> None:
-        super().__init__(**keywords)
-        self._campaign_session, self._distributor = campaign_session, distributor
+    def __init__(self, session: Session) -> None:
+        super().__init__()
+        self.session: Session | None = session
+        self._items = SessionItems(session=session)
+        self._listing = self._items.list_work()
 
-    def runtest(self) -> None:
-        with reporting_progress(self._campaign_session):
-            self._distributor.run(self._campaign_session)
-        if self._campaign_session.interrupted:
-            raise KeyboardInterrupt
-        if self._campaign_session.problem:
-            raise PytestItemFailed(self._campaign_session.problem)
+    @property
+    def listing(self) -> ItemListing:
+        return self._listing
 
+    def start_for_worker(self, name: str) -> ItemsStart:
+        return self._items.start_for(self._items.session.start_of_worker(name))
 
-def register_controller(
-    config: pytest.Config,
-    campaign: str,
-    out: Path,
-    *,
-    reviewed: bool,
-    accept_versions: bool,
-    sandbox: bool,
-    reuse: bool,
-    distributor: "WorkDistributor | None" = None,
-    packages: Sequence[str] = (),
-) -> None:
-    """Register the plugin of the process that is no worker.
+    def _begin(self) -> ItemRunner:
+        return self._items.start_here()
 
-    The items of a campaign are dealt to all workers, even if the user's configuration groups tests by file.
-    With a `distributor`, pytest itself distributes nothing; `packages` are what it comes from.
-    """
-    if getattr(config.option, "dist", "no") != "no" and not is_scheduler_chosen(config):
-        config.option.dist = "load"
-    if not any(isinstance(plugin, CampaignController) for plugin in config.pluginmanager.get_plugins()):
-        config.pluginmanager.register(
-            StandaloneController(
-                campaign,
-                out,
-                reviewed=reviewed,
-                accept_versions=accept_versions,
-                sandbox=sandbox,
-                reuse=reuse,
-                distributor=distributor,
-                packages=packages,
-            )
-        )
+    def close(self, *, is_stopped: bool) -> None:
+        self._items.close(self._runner, is_stopped=is_stopped)
 
 
 class CampaignController:
-    """Plugin of the controller: distributes chunks or, without xdist, runs them itself."""
+    """Deals the items of campaigns, by real path of their files. If `is_alone`, the session has no others."""
 
-    def __init__(self, campaign_session: Session | None = None) -> None:
-        self.campaign_session = campaign_session
-        self._worker: Worker | None = None  # of this process
+    def __init__(self, sources: Mapping[str, PreparedRun | CampaignRun], *, is_alone: bool = False) -> None:
+        self._sources, self._is_alone = sources, is_alone
         self._worker_continuer: WorkerContinuer | None = None
+        self._node_ids: list[str] = []  # what xdist's workers have selected
+        self._begun_nodes: set[Any] = set()
+        self._golden_key_by_name: dict[str, str] = {}
+        self._is_interrupted = False
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_xdist_setupnodes(self, specs: Sequence[Any]) -> None:
@@ -108,195 +86,228 @@ class CampaignController:
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_configure_node(self, node: Any) -> None:
-        assert self.campaign_session is not None
-        begun = self.campaign_session
-        start = begun.start_of_worker(node.gateway.id)
-        node.workerinput[INPUT_KEY] = {
-            "start": start.to_bytes(),
-            "pending": [[item.chunk_index, list(item.pending_positions)] for item in begun.pending],
-            "proof": [[sample.number, sample.id] for sample in begun.proof],
+        if not self._golden_key_by_name:
+            items = [item for source in self._sources.values() for item in source.listing.items]
+            self._golden_key_by_name = {item.name: item.golden_key for item in items}
+        listings = {path: pickle.dumps(source.listing) for path, source in self._sources.items()}
+        node.workerinput[WORKER_INPUT_KEY] = {
+            "parent": os.getpid(),
+            "listings": listings,
+            "alone": self._is_alone,
         }
 
-    @pytest.hookimpl(optionalhook=True)
-    def pytest_xdist_make_scheduler(self, config: pytest.Config, log: Any) -> PieceScheduling | None:
-        if is_scheduler_chosen(config):
-            return None
-        assert self.campaign_session is not None
-        folder, pending = self.campaign_session.folder, self.campaign_session.pending
-        keys = golden_key_by_chunk(folder, pending)
-        golden_key_by_node_id = {node_id_of(work): keys[work.chunk_index] for work in pending}
-        return PieceScheduling(config, log, golden_key_by_node_id.get)
+    @pytest.hookimpl(optionalhook=True, wrapper=True)
+    def pytest_xdist_make_scheduler(self, config: pytest.Config, log: Any) -> Any:
+        scheduler = yield
+        if not is_scheduler_chosen(config) and self._has_only_campaigns(config):
+            scheduler = PieceScheduling(config, log, self._golden_key_of)
+        _call_before(scheduler, "add_node_collection", self._note_collection)
+        _call_before(scheduler, "schedule", lambda: self._begin_workers(config, scheduler.nodes))
+        return scheduler
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any, error: object | None) -> None:
-        if error:
-            self._note_problem(f"worker {node.gateway.id} died: {error}")
-        assert self.campaign_session is not None
         output = getattr(node, "workeroutput", {})
-        self._note_problem(output.get(PROBLEM_KEY, ""))
-        if WRITTEN_KEY in output:
-            session = self.campaign_session
-            session.written.add_report(output[WRITTEN_KEY], session.worker_prefix + node.gateway.id)
+        for path, source in self._sources.items():
+            if source.session is None:
+                continue
+            if error:
+                _note_problem(source.session, f"worker {node.gateway.id} died: {error}")
+            _note_problem(source.session, output.get(PROBLEM_KEY, ""))
+            if (written := output.get(WRITTEN_KEY, {}).get(path)) is not None:
+                name = f"{source.session.worker_prefix}{node.gateway.id}"
+                source.session.written.add_report(written, name)
 
     def pytest_collection(self, session: pytest.Session) -> bool | None:
-        if session.config.pluginmanager.hasplugin("dsession"):
+        if session.config.pluginmanager.hasplugin("dsession") or not self._is_alone:
             return None  # xdist's hook collects nothing in this process
-        assert self.campaign_session is not None
-        begun = self.campaign_session
-        return collect_items(session, (*begun.pending, *begun.proof), self._ensure_worker)
+        [(path, source)] = self._sources.items()
+        return collect_alone(session, Path(path), source)
 
-    def _ensure_worker(self) -> Worker:
-        begun = self.campaign_session
-        assert begun is not None
-        if self._worker is None:
-            self._worker = Worker(begun.inputs, begun.worker_assignment("main"))
-        return self._worker
+    def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> CampaignFile | None:
+        source = source_of(file_path, self._sources)
+        return CampaignFile.from_parent(parent, path=file_path, source=source) if source else None
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        self._note_problem(str(dict(report.user_properties).get(PROBLEM_KEY, "")))
+        if problem := dict(report.user_properties).get(PROBLEM_KEY):
+            for session in self._sessions():
+                _note_problem(session, str(problem))
 
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
-        if self.campaign_session is None:
-            return
         if type(excinfo.value) is KeyboardInterrupt:  # pytest's own exceptions mean a regular stop
-            self.campaign_session.interrupted = True
-        # workers ignore Ctrl-C, and xdist would wait for their chunks
-        for pid in living_worker_pids(self.campaign_session.folder.path):
-            os.kill(pid, signal.SIGTERM)
+            self._is_interrupted = True
+        for session in self._sessions():
+            session.interrupted |= self._is_interrupted
+            # workers ignore Ctrl-C, and xdist would wait for their items
+            for pid in living_worker_pids(session.folder.path):
+                os.kill(pid, signal.SIGTERM)
 
     def pytest_internalerror(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
-        self._note_problem(str(find_shortage(excinfo.value) or ""))
+        for session in self._sessions():
+            _note_problem(session, str(find_shortage(excinfo.value) or ""))
 
     @pytest.hookimpl(trylast=True)  # after xdist has ended its workers
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        if self._worker is not None and self.campaign_session is not None:
-            self._worker.close()
-            self.campaign_session.written.add_report(self._worker.file_digests)
-            self._worker = None
+        for source in self._sources.values():
+            if isinstance(source, PreparedRun):
+                source.close(is_stopped=self._is_interrupted or _is_stopped(session))
         if self._worker_continuer is not None:
             self._worker_continuer.end()
 
-    def _note_problem(self, problem: str) -> None:
-        if (
-            self.campaign_session
-            and problem
-            and not self.campaign_session.problem
-            and not self.campaign_session.interrupted
-        ):
-            self.campaign_session.problem = problem
+    def _sessions(self) -> Iterable[Session]:
+        return [source.session for source in self._sources.values() if source.session is not None]
+
+    def _has_only_campaigns(self, config: pytest.Config) -> bool:
+        """Whether a scheduler that a user's configuration names for other tests can be replaced."""
+        names = {os.path.realpath(argument.partition("::")[0]) for argument in config.args}
+        return self._is_alone or names <= self._sources.keys() or config.option.dist == "load"
+
+    def _golden_key_of(self, node_id: str) -> str | None:
+        """Return the golden run of an item; None for a test."""
+        return self._golden_key_by_name.get(node_id.partition("::")[2])
+
+    def _note_collection(self, node: Any, collection: Sequence[str]) -> None:
+        self._node_ids = list(collection)
+
+    def _begin_workers(self, config: pytest.Config, nodes: Iterable[Any]) -> None:
+        """Send workers what they need, before their first item."""
+        selected = {
+            os.path.realpath(config.rootpath / name)
+            for name in {node_id.partition("::")[0] for node_id in self._node_ids}
+        }
+        for node in nodes:
+            if node in self._begun_nodes:
+                continue
+            self._begun_nodes.add(node)
+            starts = {
+                path: source.start_for_worker(node.gateway.id).to_bytes()
+                for path, source in self._sources.items()
+                if path in selected
+            }
+            node.sendcommand(START_COMMAND, starts=starts)
 
 
 class StandaloneController(CampaignController):
-    """Controller for a user's pytest command: also plans, checks, and prints the summary."""
+    """The controller of a user's session: it ends what has begun, and prints the summaries."""
 
-    def __init__(
-        self,
-        campaign: str,
-        out: Path,
-        *,
-        reviewed: bool,
-        accept_versions: bool,
-        sandbox: bool,
-        reuse: bool,
-        distributor: "WorkDistributor | None" = None,
-        packages: Sequence[str] = (),
-    ) -> None:
-        super().__init__()
-        self._reuse = reuse
-        self._distributor = distributor
-        self._packages = packages
-        self._campaign = campaign
-        self._reviewed = reviewed
-        self._accept_versions = accept_versions
-        self._sandbox = sandbox
-        self._out = out
-        self._open = ExitStack()
+    def __init__(self, runs: Mapping[str, CampaignRun]) -> None:
+        super().__init__(runs)
+        self._runs = runs
         self._closing_lines: list[str] = []
-
-    @pytest.hookimpl(tryfirst=True)
-    def pytest_sessionstart(self, session: pytest.Session) -> None:
-        workers = getattr(session.config.option, "numprocesses", None) or 0
-        try:
-            opened = open_session(
-                Workspace.find(sandbox=self._sandbox),
-                self._campaign,
-                self._out,
-                workers=workers,
-                choices=Choices(),
-                reviewed=self._reviewed,
-                accept_versions=self._accept_versions,
-                reuse=self._reuse,
-                notify=_progress_notifier(session.config),
-            )
-            self.campaign_session = self._open.enter_context(opened)
-            self.campaign_session.prepare(self._packages)
-        except MutatorError as err:
-            self._open.close()
-            self.campaign_session = None
-            print(err, file=sys.stderr)  # pytest would print the reason twice
-            pytest.exit("no campaign was run", returncode=err.exit_code)
-
-    def pytest_collection(self, session: pytest.Session) -> bool | None:
-        if self._distributor is None or self.campaign_session is None:
-            return super().pytest_collection(session)
-        session.items = []
-        if self.campaign_session.pending or self.campaign_session.proof:
-            item = DistributedItem.from_parent(
-                session,
-                name="cluster",
-                nodeid="campaign::cluster",
-                campaign_session=self.campaign_session,
-                distributor=self._distributor,
-            )
-            session.items.append(item)
-        session.testscollected = len(session.items)
-        session.config.hook.pytest_collection_finish(session=session)
-        return True
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        if self.campaign_session is None:
-            return
-        try:
-            super().pytest_sessionfinish(session)
-            summary = self.campaign_session.finish()
-            self._closing_lines = _summary_lines(summary)
-            if not summary.interrupted:
-                session.exitstatus = summary.exit_code
-        except MutatorError as err:
-            self._closing_lines = [str(err)]
-            session.exitstatus = err.exit_code
-        finally:
-            self._open.close()
+        super().pytest_sessionfinish(session)
+        is_stopped = self._is_interrupted or _is_stopped(session)
+        for run in self._runs.values():
+            try:
+                summary = run.finish(is_stopped=is_stopped)
+            except MutatorError as err:
+                self._closing_lines.append(str(err))
+                session.exitstatus = err.exit_code
+                continue
+            if summary is not None:
+                self._closing_lines += _summary_lines(run, summary)
+                session.exitstatus = _exit_status(session, summary)
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         if self._closing_lines:
-            terminalreporter.section("campaign")
+            terminalreporter.section("campaigns" if len(self._runs) > 1 else "campaign")
         for line in self._closing_lines:
             terminalreporter.write_line(line)
 
 
-def _progress_notifier(config: pytest.Config) -> ProgressCallback | None:
-    reporter = config.pluginmanager.get_plugin("terminalreporter")
-    if reporter is None or config.get_verbosity() < 0:
-        return None
+class ClusterItem(CampaignItem):
+    """All of a campaign's work, done by a cluster."""
 
-    def write(line: str) -> None:
-        reporter.ensure_newline()
-        reporter.write_line(line)
+    def __init__(self, *, run: CampaignRun, distributor: WorkDistributor, **keywords: Any) -> None:
+        super().__init__(**keywords)
+        self._run, self._distributor = run, distributor
 
-    return ProgressLines(write)
+    def runtest(self) -> None:
+        self._run.begin()
+        session = self._run.session
+        assert session is not None
+        if not (session.pending or session.proof):
+            return
+        with reporting_progress(session):
+            self._distributor.run(session)
+        if session.interrupted:
+            raise KeyboardInterrupt
+        if session.problem:
+            raise PytestItemFailed(session.problem)
 
 
-def _summary_lines(summary: Summary) -> list[str]:
+class ClusterFile(pytest.File):
+    """The file of a campaign that a cluster runs."""
+
+    def __init__(self, *, run: CampaignRun, distributor: WorkDistributor, **keywords: Any) -> None:
+        super().__init__(**keywords)
+        self._run, self._distributor = run, distributor
+
+    def collect(self) -> Iterable[ClusterItem]:
+        yield ClusterItem.from_parent(self, name="cluster", run=self._run, distributor=self._distributor)
+
+
+class ClusterController(StandaloneController):
+    """The controller of a session whose campaigns run on a cluster."""
+
+    def __init__(self, runs: Mapping[str, CampaignRun], distributor: WorkDistributor) -> None:
+        super().__init__(runs)
+        self._distributor = distributor
+
+    def pytest_collect_file(  # type: ignore[override]
+        self, file_path: Path, parent: pytest.Collector
+    ) -> ClusterFile | None:
+        run = self._runs.get(os.path.realpath(file_path))
+        if run is None:
+            return None
+        return ClusterFile.from_parent(parent, path=file_path, run=run, distributor=self._distributor)
+
+
+def _is_stopped(session: pytest.Session) -> bool:
+    return bool(session.shouldstop or session.shouldfail)
+
+
+def _note_problem(session: Session, problem: str) -> None:
+    if problem and not session.problem and not session.interrupted:
+        session.problem = problem
+
+
+def _call_before(scheduler: Any, name: str, before: Callable[..., None]) -> None:
+    """Let a method of one object call something first. Schedulers of other packages have no hook for it."""
+    method = getattr(scheduler, name)
+
+    def call(*arguments: Any, **keywords: Any) -> Any:
+        before(*arguments, **keywords)
+        return method(*arguments, **keywords)
+
+    setattr(scheduler, name, call)
+
+
+def _exit_status(session: pytest.Session, summary: Summary) -> int:
+    """Return the exit status of a session: pytest's, unless the campaign has a worse one."""
+    status = int(session.exitstatus)
+    if summary.interrupted:
+        return status
+    if summary.harness_errors or summary.problem:
+        return EXIT_HARNESS_ERRORS
+    is_whole = summary.done == summary.planned
+    return summary.exit_code if is_whole and not status else status
+
+
+def _summary_lines(run: CampaignRun, summary: Summary) -> list[str]:
+    missing = summary.planned - summary.done
     lines = [
-        f"{summary.done} of {summary.planned} experiments done, {summary.ran} now",
+        f"{run.path.stem}: {summary.done} of {summary.planned} experiments done, {summary.ran} now",
         summary.reuse_note,
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),
         summary.problem,
         *(f"{name}: {what}" for name, what in summary.harness_errors),
-        f"proof: {summary.proof_note}" if summary.proof_note else "",
-        f"results: {summary.results}" if summary.results else "",
+        f"proof: {summary.proof_note}" if summary.proof_note and not missing else "",
+        f"results: {summary.results}" if summary.results else f"run folder: {run.out}",
         *(f"{name}: {value}" for name, value in summary.seals.digest_by_name().items()),
     ]
+    if missing and not summary.problem:
+        lines.append(f"results.csv and the seal come when the other {missing} have a result")
     return [line for line in lines if line]

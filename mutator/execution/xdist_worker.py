@@ -1,120 +1,106 @@
-"""A campaign's work as pytest items, and the plugin of xdist workers, which imports no reader of YAML."""
+"""The plugin of xdist workers, which imports no reader of YAML.
 
-from collections.abc import Callable, Sequence
+The controller lists the items before a worker begins, and sends what it needs to run them once the checks
+have passed.
+"""
+
+import pickle
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from mutator._common.files import raising_disk_full
-from mutator.campaigns.chunks import PendingChunk
-from mutator.errors import DiskFull, MutatorError, PytestItemFailed, ResourceShortage
-from mutator.execution.worker import Worker, WorkerOfProcess, WorkerStart
-from mutator.execution.worker_problems import describe_problem, reported_error
-from mutator.preflight.equivalence_check import SampledExperiment
+from mutator.errors import MutatorError, PytestItemFailed
+from mutator.execution.campaign_items import PROBLEM_KEY, CampaignFile, ItemSource, collect_alone, source_of
+from mutator.execution.item_running import ItemRunner, ItemsStart
+from mutator.execution.listed_items import ItemListing
+from mutator.execution.requested_campaigns import WORKER_INPUT_KEY
+from mutator.execution.worker import WorkerOfProcess
+from mutator.execution.worker_processes import bind_to_parent
+from mutator.store.run_folder import RunFolder
 
-INPUT_KEY = "mutator_campaign"
-PROBLEM_KEY = "mutator_problem"
 WRITTEN_KEY = "mutator_written"
+START_COMMAND = "mutator_start"
 
 
-class CampaignItem(pytest.Item):
-    """An item that does part of a campaign's work. It fails only for harness errors."""
+class WorkerSource(ItemSource):
+    """A campaign in an xdist worker."""
 
-    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        if isinstance(excinfo.value, PytestItemFailed | MutatorError):
-            return str(excinfo.value)
-        return super().repr_failure(excinfo, style)
+    def __init__(self, listing: ItemListing) -> None:
+        super().__init__()
+        self._listing = listing
+        self.start = ItemsStart(problem="the controller has not sent what is needed to begin")
+        self._process: WorkerOfProcess | None = None
 
-    def reportinfo(self) -> tuple[Path, None, str]:
-        return self.config.rootpath, None, self.name
+    @property
+    def listing(self) -> ItemListing:
+        return self._listing
 
+    def _begin(self) -> ItemRunner:
+        if self.start.worker is None:
+            raise PytestItemFailed(self.start.problem)
+        self._process = WorkerOfProcess(self.start.worker)
+        folder = RunFolder.open(self.start.worker.assignment.run_folder)
+        return ItemRunner(folder, self.start, self._process.ensure_worker)
 
-class WorkItem(CampaignItem):
-    """One chunk of the plan, or one experiment of the proof. A hazard is a result, not a failure."""
-
-    def __init__(
-        self,
-        *,
-        work: PendingChunk | SampledExperiment,
-        ensure_worker: Callable[[], Worker],
-        **keywords: Any,
-    ) -> None:
-        super().__init__(**keywords)
-        self.work = work
-        self.ensure_worker = ensure_worker
-
-    def runtest(self) -> None:
-        try:
-            with raising_disk_full(self.config.rootpath):
-                worker, work = self.ensure_worker(), self.work
-                errors = worker.run(work) if isinstance(work, PendingChunk) else worker.prove(work)
-        except Exception as err:
-            error = reported_error(err)
-            problem = str(error) if error else _describe_defect(err, self.name)
-            self.user_properties.append((PROBLEM_KEY, problem))
-            if isinstance(error, DiskFull | ResourceShortage):
-                self.session.shouldstop = problem
-            raise
-        if errors:
-            raise PytestItemFailed("\n".join(f"{name}: {detail}" for name, detail in errors))
-
-
-def _describe_defect(err: Exception, item_name: str) -> str:
-    request = f"{item_name} failed because of a defect in mutator; please report it with these lines:"
-    return f"{request}\n{describe_problem(err)}"
-
-
-def item_name_of(work: PendingChunk | SampledExperiment) -> str:
-    if isinstance(work, PendingChunk):
-        return f"chunk-{work.chunk_index:05d}"
-    return f"proof-{work.number:05d}"
-
-
-def node_id_of(work: PendingChunk | SampledExperiment) -> str:
-    return f"campaign::{item_name_of(work)}"
-
-
-def collect_items(
-    session: pytest.Session,
-    work_parts: Sequence[PendingChunk | SampledExperiment],
-    ensure_worker: Callable[[], Worker],
-) -> bool:
-    """Make the session's items: chunks, then experiments of the proof.
-
-    The proof has the smallest items and comes last, so that the workers finish at about the same time.
-    """
-    session.items = []
-    for work in work_parts:
-        name = item_name_of(work)
-        session.items.append(
-            WorkItem.from_parent(
-                session, name=name, nodeid=node_id_of(work), work=work, ensure_worker=ensure_worker
-            )
-        )
-    session.testscollected = len(session.items)
-    session.config.hook.pytest_collection_finish(session=session)
-    return True
+    def close(self, *, is_stopped: bool) -> dict[str, str]:
+        """Do what remains of the proof, and close the worker's files; return their digests."""
+        if self._process is None:
+            return {}
+        if self._runner is not None and not is_stopped:
+            self._runner.prove_rest()
+        return self._process.close()
 
 
 class WorkerPlugin:
-    """Plugin of an xdist worker: collects the pending work, and runs the items that it receives."""
+    """Collects the items that the controller has listed, and runs those that it receives."""
 
     def __init__(self, config: pytest.Config, worker_input: dict[str, Any]) -> None:
-        campaign_input = worker_input[INPUT_KEY]
+        campaigns = worker_input[WORKER_INPUT_KEY]
+        bind_to_parent(campaigns["parent"])
         self._config = config
-        self._pending_work: list[PendingChunk | SampledExperiment] = [
-            *(PendingChunk(chunk, tuple(places)) for chunk, places in campaign_input["pending"]),
-            *(SampledExperiment(number, name) for number, name in campaign_input["proof"]),
-        ]
-        self._process = WorkerOfProcess(WorkerStart.from_bytes(campaign_input["start"]))
+        self._sources = {
+            path: WorkerSource(pickle.loads(listing)) for path, listing in campaigns["listings"].items()
+        }
+        self._is_alone = campaigns["alone"]
 
-    def pytest_collection(self, session: pytest.Session) -> bool:
-        return collect_items(session, self._pending_work, self._process.ensure_worker)
+    @pytest.hookimpl(trylast=True)
+    def pytest_sessionstart(self) -> None:
+        _receive_starts(self._config, self._sources)
 
-    def pytest_sessionfinish(self) -> None:
+    def pytest_collection(self, session: pytest.Session) -> bool | None:
+        if not self._is_alone:
+            return None
+        [(path, source)] = self._sources.items()
+        return collect_alone(session, Path(path), source)
+
+    def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> CampaignFile | None:
+        source = source_of(file_path, self._sources)
+        return CampaignFile.from_parent(parent, path=file_path, source=source) if source else None
+
+    def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
         output = self._config.workeroutput  # type: ignore[attr-defined]
-        try:
-            output[WRITTEN_KEY] = self._process.close()
-        except MutatorError as err:
-            output[PROBLEM_KEY] = str(err)
+        is_interrupted = exitstatus == pytest.ExitCode.INTERRUPTED
+        is_stopped = is_interrupted or bool(session.shouldstop or session.shouldfail)
+        written = output[WRITTEN_KEY] = {}
+        for path, source in self._sources.items():
+            try:
+                written[path] = source.close(is_stopped=is_stopped)
+            except MutatorError as err:
+                output[PROBLEM_KEY] = str(err)
+
+
+def _receive_starts(config: pytest.Config, sources: dict[str, WorkerSource]) -> None:
+    """Let the worker understand a further command, which comes before the items to run."""
+    manager = config.pluginmanager
+    interactor: Any = next(p for p in manager.get_plugins() if type(p).__name__ == "WorkerInteractor")
+    handle_command = interactor.handle_command
+
+    def handle(command: Any) -> None:
+        if isinstance(command, tuple) and command[0] == START_COMMAND:
+            for path, start in command[1]["starts"].items():
+                sources[path].start = ItemsStart.from_bytes(start)
+        else:
+            handle_command(command)
+
+    interactor.handle_command = handle

@@ -199,13 +199,13 @@ def reason_check_not_needed(folder: RunFolder) -> str | None:
         if name not in finished_ids:  # not run yet; any timing is from an earlier session
             return None
         timing = timings.get(name, {})
-        if _was_forked(timing):
+        if was_forked(timing):
             return None
         reasons[str(timing.get("why", ""))] += 1
     return next((why for why, _ in reasons.most_common() if why), "the reference engine ran them all")
 
 
-def _was_forked(timing: Mapping[str, object]) -> bool:
+def was_forked(timing: Mapping[str, object]) -> bool:
     """Whether an experiment's result needs a proof. Without a timing, nobody knows, so it does."""
     return timing.get("engine", "unknown") not in (RunMode.REFERENCE.value, None)
 
@@ -285,7 +285,7 @@ def _note_on_small_sample(folder: RunFolder, chosen_ids: Collection[str]) -> str
     if folder.head.experiments >= SMALL_PLAN_SIZE:
         return ""
     sample_ids, timings = sample_ids_in_folder(folder), folder.timings()
-    forked_ids = {name for name in folder.planned_positions() if _was_forked(timings.get(name, {}))}
+    forked_ids = {name for name in folder.planned_positions() if was_forked(timings.get(name, {}))}
     proven_ids = forked_ids.intersection(sample_ids)
     notes = []
     if count := len(sample_ids) - len(proven_ids):

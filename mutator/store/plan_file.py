@@ -162,6 +162,7 @@ class ExperimentsReadOnAccess(Sequence[Experiment]):
     def __init__(self, run: Path, chunks: Sequence[Chunk]) -> None:
         self._run, self._chunks = run, chunks
         self._ends = list(accumulate(count for _, _, count in chunks))
+        self._loaded_number, self._loaded = -1, tuple[Experiment, ...]()  # the chunk that was read last
 
     def __len__(self) -> int:
         return self._ends[-1] if self._ends else 0
@@ -178,8 +179,10 @@ class ExperimentsReadOnAccess(Sequence[Experiment]):
             return [self[i] for i in range(len(self))[place]]
         at = range(len(self))[place]
         number = bisect_right(self._ends, at)
-        chunk = self._chunks[number]
-        return load_chunk(self._run, chunk, self._faults)[at - self._ends[number] + chunk[2]]
+        if number != self._loaded_number:  # most are read one after another
+            self._loaded = load_chunk(self._run, self._chunks[number], self._faults)
+            self._loaded_number = number
+        return self._loaded[at - self._ends[number] + len(self._loaded)]
 
     @cached_property
     def _faults(self) -> dict[str, Fault]:

@@ -5,22 +5,22 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 import mutator
-from mutator.campaigns.chunks import PendingChunk
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
+from mutator.execution.experiment_runner import RecordedExperiment
 from mutator.execution.session_summary import Summary
 from mutator.execution.single_run import rerun_experiment, run_single
 from mutator.execution.worker import Worker
-from mutator.model import Status
+from mutator.model import Experiment, Status
 from mutator.store import plan_file
 from mutator.store.packed_patches import PatchFolder
 from mutator.store.plan_choices import Choices
@@ -210,18 +210,18 @@ def test_experiments_with_harness_errors_are_rerun(
 def test_a_defect_in_a_worker_is_reported(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run, seen = Worker.run, []
+    run, seen = Worker.run_and_store, []
 
-    def broken(self: Worker, pending: PendingChunk) -> list[tuple[str, str]]:
-        seen.append(pending)
+    def broken(self: Worker, experiments: Sequence[Experiment]) -> Iterator[RecordedExperiment]:
+        seen.append(experiments[0].id)
         if len(seen) == 2:
             raise ZeroDivisionError("seven")
-        return run(self, pending)
+        return run(self, experiments)
 
-    monkeypatch.setattr(Worker, "run", broken)
+    monkeypatch.setattr(Worker, "run_and_store", broken)
     summary = run_campaign(toy, "small", tmp_path / "run")
-    assert (summary.exit_code, summary.done) == (3, 12 - len(seen[1].pending_positions))
-    assert "chunk-00001 failed because of a defect in mutator" in summary.problem
+    assert (summary.exit_code, summary.done) == (3, 11)
+    assert f"{seen[1][:8]} failed because of a defect in mutator" in summary.problem
     assert "ZeroDivisionError: seven" in summary.problem
 
 
@@ -287,6 +287,7 @@ FULL_DISK = """
 import os, sys, threading, time
 from pathlib import Path
 from mutator.execution.campaign_running import run_campaign
+from mutator.execution.experiment_runner import RecordedExperiment
 from mutator.workspace import Workspace
 out, workers = Path(sys.argv[2]) / "run", int(sys.argv[3])
 toy = Workspace.find(root=Path(sys.argv[1]))

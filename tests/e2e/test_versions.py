@@ -19,7 +19,7 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
-from mutator.execution.worker import Worker
+from mutator.execution.session_items import SessionItems
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.store.session_progress import PROGRESS_FILE
@@ -35,10 +35,10 @@ class OnePiece:
     """A distributor that stops after one piece of work."""
 
     def run(self, session: Session) -> None:
-        worker = Worker(session.inputs, session.worker_assignment("mine"))
-        worker.run(session.pending[0])
-        worker.close()
-        session.written.add_report(worker.file_digests)
+        items = SessionItems(session=session)
+        runner = items.start_here()
+        runner.run(items.list_work().items[0])
+        items.close(runner, is_stopped=True)
         session.problem = "interrupted"
 
 

@@ -9,35 +9,33 @@ import pytest
 
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
-from mutator.execution.worker import Worker
+from mutator.execution.session_items import SessionItems
 from mutator.store.session_progress import PROGRESS_FILE, read_session_progress
 from mutator.workspace import Workspace
 
 WORKER = """
 import pickle, sys
 from mutator.campaigns.run_inputs import RunInputs
+from mutator.execution.item_running import ItemRunner, ItemsStart
 from mutator.execution.worker import Worker
 
-inputs, assignment, pending, proof = pickle.load(sys.stdin.buffer)
+inputs, assignment, start, listed = pickle.load(sys.stdin.buffer)
 worker = Worker(RunInputs.from_bytes(inputs), assignment)
-for piece in pending:
-    worker.run(piece)
-for sample in proof:
-    worker.prove(sample)
-worker.close()
-sys.stdout.buffer.write(pickle.dumps((worker.file_digests, set(sys.modules))))
+runner = ItemRunner(worker.folder, ItemsStart.from_bytes(start), lambda: worker)
+for item in listed:
+    assert runner.run(item) == []
+runner.prove_rest()
+sys.stdout.buffer.write(pickle.dumps((runner.close(), set(sys.modules))))
 """
 
 
 class InOrder:
     def run(self, session: Session) -> None:
-        worker = Worker(session.inputs, session.worker_assignment("mine"))
-        for piece in session.pending:
-            worker.run(piece)
-        for sample in session.proof:
-            worker.prove(sample)
-        worker.close()
-        session.written.add_report(worker.file_digests)
+        items = SessionItems(session=session)
+        runner = items.start_here()
+        for item in items.list_work().items:
+            assert runner.run(item) == []
+        items.close(runner, is_stopped=False)
 
 
 class Elsewhere:
@@ -47,7 +45,9 @@ class Elsewhere:
         self.loaded: set[str] = set()
 
     def run(self, session: Session) -> None:
-        work = (session.inputs.to_bytes(), session.worker_assignment("mine"), session.pending, session.proof)
+        items, assignment = SessionItems(session=session), session.worker_assignment("mine")
+        start, listed = items.start_for(None).to_bytes(), items.list_work().items
+        work = (session.inputs.to_bytes(), assignment, start, listed)
         command = [sys.executable, "-c", WORKER]
         done = subprocess.run(command, input=pickle.dumps(work), stdout=subprocess.PIPE, check=True)
         written, self.loaded = pickle.loads(done.stdout)

@@ -1,0 +1,131 @@
+"""A campaign's file and its experiments as pytest collects them. Collecting runs nothing."""
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator._common.files import raising_disk_full
+from mutator.errors import DiskFull, MutatorError, PytestItemFailed, ResourceShortage
+from mutator.execution.item_running import ItemRunner
+from mutator.execution.listed_items import ItemListing, ListedItem
+from mutator.execution.worker_problems import describe_problem, reported_error
+
+PROBLEM_KEY = "mutator_problem"
+_COMMON_MARKER = "mutator"
+
+
+class ItemSource(ABC):
+    """A campaign, as the items of its file need it in this process."""
+
+    def __init__(self) -> None:
+        self._runner: ItemRunner | None = None
+        self._has_failed = False
+
+    @property
+    @abstractmethod
+    def listing(self) -> ItemListing: ...
+
+    @abstractmethod
+    def _begin(self) -> ItemRunner:
+        """Return the runner of this process, once the checks have passed."""
+
+    def ensure_runner(self) -> ItemRunner:
+        """Return the runner of this process; the first call may run the checks before the campaign.
+
+        If they fail, the first item fails with the reason, and the others are skipped.
+        """
+        if self._has_failed:
+            pytest.skip("the campaign could not begin: see its first item")
+        if self._runner is None:
+            self._has_failed = True
+            self._runner = self._begin()
+            self._has_failed = False
+        return self._runner
+
+
+class CampaignItem(pytest.Item):
+    """An item that does work of a campaign. It fails for harness errors, and for results if a user asks."""
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        if isinstance(excinfo.value, PytestItemFailed | MutatorError):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        return self.path, None, self.name
+
+
+class ExperimentItem(CampaignItem):
+    """One experiment, or the experiments of a chunk of a large plan."""
+
+    def __init__(self, *, listed: ListedItem, source: ItemSource, **keywords: Any) -> None:
+        super().__init__(**keywords)
+        self.listed, self._source = listed, source
+        for name in (_COMMON_MARKER, *listed.markers):
+            self.add_marker(_marker(name))
+        self.extra_keyword_matches.update(listed.keywords)
+
+    def runtest(self) -> None:
+        try:
+            with raising_disk_full(self.config.rootpath):
+                problems = self._source.ensure_runner().run(self.listed)
+        except Exception as err:
+            error = reported_error(err)
+            problem = str(error) if error else _describe_defect(err, self.name)
+            self.user_properties.append((PROBLEM_KEY, problem))
+            if isinstance(error, DiskFull | ResourceShortage):
+                self.session.shouldstop = problem
+            raise
+        if problems:
+            raise PytestItemFailed("\n".join(problems))
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        file, line = self.listed.place
+        # pytest writes the dots of a test's own name as `::`
+        title = f"{self.path.stem}: {self.name}"
+        return Path(file) if file else self.path, None if line is None else line - 1, title
+
+
+class CampaignFile(pytest.File):
+    """A campaign's file."""
+
+    def __init__(self, *, source: ItemSource, **keywords: Any) -> None:
+        super().__init__(**keywords)
+        self._source = source
+
+    def collect(self) -> Iterator[ExperimentItem]:
+        listing = self._source.listing
+        if listing.problem:
+            raise self.CollectError(listing.problem)
+        for listed in listing.items:
+            yield ExperimentItem.from_parent(self, name=listed.name, listed=listed, source=self._source)
+
+
+def collect_alone(session: pytest.Session, path: Path, source: ItemSource) -> bool:
+    """Make the items of one campaign the session's only ones, without looking for tests."""
+    file = CampaignFile.from_parent(session, path=path, source=source)
+    session.items = list(file.collect())
+    session.testscollected = len(session.items)
+    session.config.hook.pytest_collection_finish(session=session)
+    return True
+
+
+def source_of(path: Path, sources: Mapping[str, ItemSource]) -> ItemSource | None:
+    """Return the campaign in a file; `sources` are by real path."""
+    return sources.get(os.path.realpath(path))
+
+
+@lru_cache
+def _marker(name: str) -> pytest.MarkDecorator:
+    """Return a marker that needs no registration, because libraries name it."""
+    return pytest.MarkDecorator(pytest.Mark(name, (), {}, _ispytest=True), _ispytest=True)
+
+
+def _describe_defect(err: Exception, item_name: str) -> str:
+    request = f"{item_name} failed because of a defect in mutator; please report it with these lines:"
+    return f"{request}\n{describe_problem(err)}"

@@ -1,0 +1,187 @@
+"""A campaign in a user's pytest session: its items, and its run folder from the first item to the results."""
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from mutator._common.cache_layout_and_pruning import campaign_runs_folder, prune_campaign_runs
+from mutator._common.confined_files import path_below
+from mutator._common.hashing import content_id
+from mutator.campaigns import run_environment
+from mutator.campaigns.campaign_files import load_campaign
+from mutator.campaigns.expectations import NO_HAZARD, Expectation
+from mutator.campaigns.plan import Plan, build_plan
+from mutator.campaigns.plan_freezing import make_run_folder
+from mutator.campaigns.run_inputs import RunInputs
+from mutator.errors import MutatorError
+from mutator.execution.campaign_items import ItemSource
+from mutator.execution.finished_run_keys import harness_digest
+from mutator.execution.item_running import ItemRunner, ItemsStart
+from mutator.execution.listed_items import ItemListing, list_experiments
+from mutator.execution.session import Session
+from mutator.execution.session_items import SessionItems
+from mutator.execution.session_opening import open_session
+from mutator.execution.session_summary import Summary
+from mutator.execution.spec_places import SpecPlaces
+from mutator.store import plan_file
+from mutator.store.plan_choices import Choices
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_progress import ProgressCallback
+from mutator.workspace import Workspace
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CampaignOptions:
+    """The options of a pytest command for its campaigns."""
+
+    reviewed: bool = False
+    accept_versions: bool = False
+    reuse: bool = True
+    hazard_fails: bool = False
+    workers: int = 0
+    packages: tuple[str, ...] = ()  # of a distributor of another package
+
+
+class CampaignRun(ItemSource):
+    """A campaign in the process that is no worker. `out` is its run folder; None: below the cache."""
+
+    def __init__(
+        self,
+        path: Path,
+        workspace: Workspace,
+        options: CampaignOptions,
+        *,
+        out: Path | None = None,
+        notify: ProgressCallback | None = None,
+    ) -> None:
+        super().__init__()
+        self.path, self.out = path, out
+        self._workspace, self._options, self._notify = workspace, options, notify
+        self._items: SessionItems | None = None
+        self._open = ExitStack()
+
+    @property
+    def session(self) -> Session | None:
+        """The session, once it has begun."""
+        return self._items.session if self._items else None
+
+    @cached_property
+    def listing(self) -> ItemListing:
+        """All experiments of the plan, frozen or to be frozen."""
+        try:
+            return self._list_experiments()
+        except MutatorError as err:
+            return ItemListing(problem=str(err))
+
+    def begin(self) -> None:
+        """Open the run folder and run the checks, unless it was done; MutatorError if they fail."""
+        if self._items is not None:
+            return
+        if self.out is None:
+            self.out = self._default_run_folder()
+            make_run_folder(self.out)
+        options = self._options
+        try:
+            session = self._open.enter_context(
+                open_session(
+                    self._workspace,
+                    self.path,
+                    self.out,
+                    workers=options.workers,
+                    choices=Choices(),
+                    reviewed=options.reviewed,
+                    accept_versions=options.accept_versions,
+                    reuse=options.reuse,
+                    notify=self._notify,
+                )
+            )
+            self._check_plan(session.folder)
+            session.prepare(options.packages)
+        except BaseException:
+            self._open.close()
+            raise
+        self._items = SessionItems(session=session, expectation=self._expectation)
+
+    def start_for_worker(self, name: str) -> ItemsStart:
+        """Return what an xdist worker needs, or why it can run nothing."""
+        try:
+            self.begin()
+        except MutatorError as err:
+            return ItemsStart(problem=str(err))
+        assert self._items is not None
+        return self._items.start_for(self._items.session.start_of_worker(name))
+
+    def _begin(self) -> ItemRunner:
+        self.begin()
+        assert self._items is not None
+        return self._items.start_here()
+
+    def finish(self, *, is_stopped: bool) -> Summary | None:
+        """End what has begun; return its summary, None if nothing has begun. If `is_stopped`, run no more.
+
+        A part of a campaign has no tables and no seal: these come when all experiments have a result.
+        """
+        if self._items is None:
+            return None
+        session = self._items.session
+        try:
+            self._items.close(self._runner, is_stopped=is_stopped)
+            return session.finish(tables_of_part=False)
+        finally:
+            self._open.close()
+            if campaign_runs_folder() in session.folder.path.parents:
+                prune_campaign_runs()
+
+    @cached_property
+    def _plan(self) -> Plan:
+        return build_plan(self._workspace, self.path)
+
+    @property
+    def _frozen_run(self) -> RunFolder | None:
+        return RunFolder.open(self.out) if self.out is not None and RunFolder.exists(self.out) else None
+
+    def _list_experiments(self) -> ItemListing:
+        folder, places = self._frozen_run, SpecPlaces(self._workspace, load_campaign(self.path))
+        if folder is not None:
+            positions = folder.planned_positions()
+            planned = enumerate(plan_file.iterate_experiments(folder.path))
+            experiments = [(position, e) for position, e in planned if e.id in positions]
+            several, digest = folder.has_seeded_goldens, folder.head.plan
+        else:
+            if self.out is not None:
+                make_run_folder(self.out)
+            if places.has_operators:
+                raise MutatorError(
+                    "its mutants depend on golden runs, and collecting tests runs nothing",
+                    where=self.path,
+                    remedy=f"plan it first: mutator plan {self.path} --out DIR, then give --campaign-out=DIR",
+                )
+            plan = self._plan
+            experiments = list(enumerate(plan.experiments))
+            several, digest = len(plan.seeds) > 1, plan.digest
+        items = list_experiments(experiments, several_seeds=several, place_of=places.place_of)
+        return ItemListing(plan=digest, items=items)
+
+    def _check_plan(self, folder: RunFolder) -> None:
+        """Raise MutatorError if the plan is not the one that was collected."""
+        if self.listing.plan != folder.head.plan:
+            raise MutatorError(
+                "the library was changed after the experiments were collected",
+                where=self.path,
+                remedy="run the same command again",
+            )
+
+    @property
+    def _expectation(self) -> Expectation | None:
+        return NO_HAZARD if self._options.hazard_fails else load_campaign(self.path).expectation
+
+    def _default_run_folder(self) -> Path:
+        """Return a folder below the cache for this plan of these sources: an edit of any begins a new run."""
+        plan = self._plan
+        manifest = self._workspace.manifest(plan.campaign.target)
+        inputs = RunInputs.from_workspace(self._workspace, manifest, {g.scenario for g in plan.goldens()})
+        versions = [run_environment.python_version(), run_environment.versions_of_fixed_packages()]
+        sources = [inputs.digest_by_source(), harness_digest(), versions, self._workspace.sandbox]
+        key = content_id([plan.digest, plan.campaign.file_bytes.decode(), *sources])
+        return path_below(campaign_runs_folder(), f"{plan.campaign.name}-{key}")

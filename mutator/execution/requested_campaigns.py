@@ -1,0 +1,103 @@
+"""Which campaigns a pytest command asks for: by option, by file, or by the project's settings.
+
+Every pytest session imports this, so it imports nothing of the harness.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+WORKER_INPUT_KEY = "mutator_campaigns"  # what an xdist worker gets
+_SETTINGS_FILE, _SETTINGS_TABLE = "pyproject.toml", "mutator"
+_KEYS = ("library", "target", "campaigns")
+_YAML_SUFFIXES = (".yaml", ".yml")
+_CAMPAIGN_HEAD = b"schema: campaign/"
+_MOST_HEAD_BYTES = 4096  # comments can come first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RequestedCampaigns:
+    """What a command asks for. `name` is a campaign's name in the library; `library` and `target` are those
+    of the project's settings.
+    """
+
+    name: str = ""
+    files: tuple[Path, ...] = ()
+    library: Path | None = None
+    target: Path | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        return not (self.name or self.files)
+
+
+def find_requested_campaigns(config: pytest.Config) -> RequestedCampaigns:
+    """Return the campaigns of `--campaign`, of the arguments, and of the project where they are collected.
+
+    Adds the project's campaigns to what pytest looks at, if the command names no place.
+    """
+    settings = _project_settings(config.rootpath)
+    library, target = (settings.get(key) for key in ("library", "target"))
+    name = config.getoption("campaign")
+    if name is not None:
+        is_file = name.endswith(_YAML_SUFFIXES)
+        named_files = (Path(name),) if is_file else ()
+        return RequestedCampaigns(
+            name="" if is_file else name, files=named_files, library=library, target=target
+        )
+    arguments = [Path(config.invocation_params.dir, text.partition("::")[0]) for text in config.args]
+    files = [path for path in arguments if path.suffix in _YAML_SUFFIXES and _is_campaign(path)]
+    for path in settings.get("campaigns", ()):
+        if any(path == place or place in path.parents for place in arguments):
+            files.append(path)
+        elif config.args_source is not pytest.Config.ArgsSource.ARGS:
+            files.append(path)
+            config.args.append(str(path))
+    return RequestedCampaigns(files=tuple(dict.fromkeys(files)), library=library, target=target)
+
+
+def _is_campaign(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            head = file.read(_MOST_HEAD_BYTES)
+    except OSError:
+        return False
+    return any(line.startswith(_CAMPAIGN_HEAD) for line in head.splitlines())
+
+
+def _project_settings(root: Path) -> dict[str, Any]:
+    """Return `[tool.mutator]` of the project, with paths; UsageError for a mistake in it."""
+    path = root / _SETTINGS_FILE
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return {}
+    if f"[tool.{_SETTINGS_TABLE}" not in text:
+        return {}
+    try:
+        table = tomllib.loads(text)["tool"][_SETTINGS_TABLE]
+    except (tomllib.TOMLDecodeError, LookupError, TypeError) as err:
+        raise pytest.UsageError(f"{path}: [tool.{_SETTINGS_TABLE}]: {err}") from None
+    settings: dict[str, Any] = {}
+    for key, value in table.items():
+        is_list = key == "campaigns"
+        values = value if is_list else [value]
+        if key not in _KEYS or not isinstance(values, list) or not all(isinstance(v, str) for v in values):
+            kind = "a list of files" if is_list else f"one of {', '.join(_KEYS)}, with the path of a folder"
+            raise pytest.UsageError(f"{path}: [tool.{_SETTINGS_TABLE}]: {key} = {value!r}: expected {kind}")
+        settings[key] = _files(path, values) if is_list else root / value
+    return settings
+
+
+def _files(path: Path, patterns: list[str]) -> list[Path]:
+    """Return the files that these patterns match, relative to the folder of the settings."""
+    files: list[Path] = []
+    for pattern in patterns:
+        matches = sorted(path.parent.glob(pattern))
+        if not matches:
+            raise pytest.UsageError(f"{path}: [tool.{_SETTINGS_TABLE}]: campaigns: no file {pattern}")
+        files += matches
+    return files

@@ -1,0 +1,91 @@
+"""Makes the campaigns of a user's pytest session, and registers their controller."""
+
+import os
+from contextlib import nullcontext
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.execution.campaign_runs import CampaignOptions, CampaignRun
+from mutator.execution.distributor_choice import Distributor, choose_distributor, packages_of_distributor
+from mutator.execution.progress_text import ProgressLines
+from mutator.execution.requested_campaigns import RequestedCampaigns
+from mutator.execution.xdist_controller import ClusterController, StandaloneController
+from mutator.store.run_progress import ProgressCallback
+from mutator.workspace import Workspace
+
+_LIBRARY_PARTS = ("campaigns", "targets")  # folders of a library
+
+
+def register_campaigns(config: pytest.Config, requested: RequestedCampaigns) -> None:
+    """Register the controller of the session's campaigns; UsageError for a mistake in the command."""
+    try:
+        distributor = _cluster_distributor(config)
+        runs = _campaign_runs(config, requested, distributor)
+    except MutatorError as err:
+        raise pytest.UsageError(str(err)) from None
+    if config.getoption("campaign") is not None:
+        config.args[:] = [str(run.path) for run in runs.values()]
+    controller = ClusterController(runs, distributor) if distributor else StandaloneController(runs)
+    config.pluginmanager.register(controller)
+    config.addinivalue_line("markers", "mutator: an experiment of a fault injection campaign")
+
+
+def _cluster_distributor(config: pytest.Config) -> Distributor | None:
+    cluster, is_insecure = config.getoption("campaign_cluster"), config.getoption("insecure_network")
+    if cluster and getattr(config.option, "numprocesses", None):
+        raise pytest.UsageError("--campaign-cluster with -n: leave out -n (the cluster has its own workers)")
+    return choose_distributor(cluster, insecure=is_insecure) if cluster or is_insecure else None
+
+
+def _campaign_runs(
+    config: pytest.Config, requested: RequestedCampaigns, distributor: Distributor | None
+) -> dict[str, CampaignRun]:
+    workspace = _workspace(requested, sandbox=config.getoption("campaign_sandbox"))
+    files = [workspace.campaign(requested.name)] if requested.name else list(requested.files)
+    out = config.getoption("campaign_out")
+    if out is not None and len(files) > 1:
+        raise pytest.UsageError(
+            f"--campaign-out {out} with {len(files)} campaigns: leave it out, or name one"
+        )
+    options = CampaignOptions(
+        reviewed=config.getoption("require_reviewed"),
+        accept_versions=config.getoption("accept_versions"),
+        reuse=not config.getoption("campaign_no_reuse"),
+        hazard_fails=config.getoption("hazard_fails"),
+        workers=getattr(config.option, "numprocesses", None) or 0,
+        packages=packages_of_distributor(distributor) if distributor else (),
+    )
+    notify = _progress_notifier(config)
+    return {
+        os.path.realpath(file): CampaignRun(
+            workspace.campaign(file).resolve(), workspace, options, out=out, notify=notify
+        )
+        for file in files
+    }
+
+
+def _workspace(requested: RequestedCampaigns, *, sandbox: bool) -> Workspace:
+    library = requested.library
+    if library is None and requested.files:
+        folder = requested.files[0].resolve().parent
+        if all((folder.parent / part).is_dir() for part in _LIBRARY_PARTS) and folder.name == "campaigns":
+            library = folder.parent
+    return Workspace.find(library=library, target=requested.target, sandbox=sandbox)
+
+
+def _progress_notifier(config: pytest.Config) -> ProgressCallback | None:
+    """Return what writes the stages before and after the items, in a session that is not quiet."""
+    if config.get_verbosity() < 0:
+        return None
+
+    def write(line: str) -> None:
+        reporter = config.pluginmanager.get_plugin("terminalreporter")
+        capture = config.pluginmanager.get_plugin("capturemanager")
+        if reporter is not None:
+            # the checks run within the first item, whose output pytest captures
+            with capture.global_and_fixture_disabled() if capture else nullcontext():
+                reporter.ensure_newline()
+                reporter.write_line(line)
+
+    return ProgressLines(write)
