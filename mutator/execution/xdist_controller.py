@@ -207,7 +207,8 @@ class StandaloneController(CampaignController):
                 session.exitstatus = err.exit_code
                 continue
             if summary is not None:
-                self._closing_lines += _summary_lines(run, summary)
+                title = f"{run.path.stem}: " if len(self._runs) > 1 else ""
+                self._closing_lines += _summary_lines(run, summary, title)
                 session.exitstatus = _exit_status(session, summary)
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
@@ -296,10 +297,10 @@ def _exit_status(session: pytest.Session, summary: Summary) -> int:
     return summary.exit_code if is_whole and not status else status
 
 
-def _summary_lines(run: CampaignRun, summary: Summary) -> list[str]:
+def _summary_lines(run: CampaignRun, summary: Summary, title: str) -> list[str]:
     missing = summary.planned - summary.done
     lines = [
-        f"{run.path.stem}: {summary.done} of {summary.planned} experiments done, {summary.ran} now",
+        f"{title}{summary.done} of {summary.planned} experiments done, {summary.ran} now",
         summary.reuse_note,
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),
         summary.problem,

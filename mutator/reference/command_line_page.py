@@ -97,8 +97,8 @@ def _pytest_section() -> Iterator[str]:
     pytest_plugin.pytest_addoption(parser)
     yield "## pytest\n"
     yield (
-        "`pytest --campaign FILE --campaign-out DIR -n 2` runs a campaign like `mutator run`, without "
-        "its table.\n"
+        "`pytest CAMPAIGN.yaml -n 2` runs a campaign like `mutator run`, with a test for each experiment "
+        "([how](../how-to/run-in-pytest.md)).\n"
     )
     rows = [
         (f"`{' '.join(option.names())} {option.attrs()['metavar']}`", str(option.attrs()["help"]))

@@ -62,7 +62,7 @@ def run_folders(project: Path) -> list[Path]:
 
 def counts(printed: str) -> tuple[int, int]:
     """Return how many experiments are done, and how many ran now."""
-    [(done, now)] = re.findall(r"small: (\d+) of 12 experiments done, (\d+) now", printed)
+    [(done, now)] = re.findall(r"(\d+) of 12 experiments done, (\d+) now", printed)
     return int(done), int(now)
 
 

@@ -42,6 +42,7 @@ def test_the_page_lists_every_cache() -> None:
         cache_layout_and_pruning.GOLDENS_CACHE,
         cache_layout_and_pruning.EXECUTED_LINES_CACHE,
         cache_layout_and_pruning.FINISHED_RUNS_CACHE,
+        cache_layout_and_pruning.CAMPAIGN_RUNS_CACHE,
         cache_layout_and_pruning.REPORTS_CACHE,
         cache_layout_and_pruning.IMAGE_EFFECTS_CACHE,
         cache_layout_and_pruning.VERIFIED_RUNS_CACHE,

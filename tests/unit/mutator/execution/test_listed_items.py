@@ -1,0 +1,79 @@
+"""How experiments are named and marked as tests."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from mutator.campaigns.plan import build_plan
+from mutator.execution import listed_items
+from mutator.execution.listed_items import list_experiments
+from mutator.execution.spec_places import SpecPlaces
+from mutator.model import Experiment, Method
+from mutator.workspace import Workspace
+
+PLACE = ("radar.yaml", 7)
+
+
+def names_of(*experiments: Experiment) -> list[str]:
+    items = list_experiments(list(enumerate(experiments)), several_seeds=False, place_of=lambda fault: PLACE)
+    return [item.name for item in items]
+
+
+def test_a_name_says_fault_type_value_scenario_and_trigger(experiment: Callable[..., Experiment]) -> None:
+    one = experiment(value=40.0)
+    assert names_of(one) == [f"radar/chaff-40.0m-S1-C1-{one.id[:8]}"]
+
+
+@pytest.mark.parametrize(
+    ("trigger", "shown"),
+    [("guided/C1", "C1"), ("at 3.5 s", "at3.5s"), ("d_rel <= 4 [m] :: é", "d_rel_4_m"), ("", None)],
+)
+def test_a_name_has_only_characters_that_a_node_id_can_have(
+    experiment: Callable[..., Experiment], trigger: str, shown: str | None
+) -> None:
+    """pytest takes `::` and brackets apart, and terminals and CI systems expect ASCII."""
+    [name] = names_of(experiment(value=1, trigger=trigger))
+    assert re.fullmatch(r"[A-Za-z0-9.+_/-]+", name)
+    assert name.split("-")[3:-1] == ([shown] if shown else [])
+
+
+def test_ids_that_begin_alike_are_written_in_full(
+    experiment: Callable[..., Experiment], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(listed_items, "_ID_LENGTH", 0)
+    experiments = [experiment(value=number) for number in range(3)]
+    names = names_of(*experiments)
+    assert [name.rpartition("-")[2] for name in names] == [one.id for one in experiments]
+    assert names_of(experiments[0])[0].endswith("-")
+
+
+def test_markers_are_module_fault_type_scenario_method_and_context(
+    experiment: Callable[..., Experiment],
+) -> None:
+    """A random trigger has no context, and no marker has characters that `-m` does not know."""
+    guided, drawn = experiment(), experiment(method=Method.RANDOM, trigger="random/C1")
+    odd = replace(guided, scenario="a scenario")
+    items = list_experiments(
+        list(enumerate((guided, drawn, odd))), several_seeds=False, place_of=lambda fault: PLACE
+    )
+    assert [item.markers for item in items] == [
+        ("radar", "chaff", "S1", "guided", "C1"),
+        ("radar", "chaff", "S1", "random"),
+        ("radar", "chaff", "guided", "C1"),
+    ]
+
+
+def test_every_experiment_of_a_plan_has_a_name_of_its_own_and_a_place(toycar: Workspace) -> None:
+    """The place is the variant's line in its spec."""
+    plan = build_plan(toycar, "toy")
+    places = SpecPlaces(toycar, plan.campaign)
+    items = list_experiments(list(enumerate(plan.experiments)), several_seeds=False, place_of=places.place_of)
+    assert len({item.name for item in items}) == len(plan.experiments) == 24
+    for item, one in zip(items, plan.experiments, strict=True):
+        file, line = item.place
+        assert line is not None
+        text = (toycar.library / "faults" / f"{one.fault.module}/{one.fault.fault_type}.yaml").read_text()
+        assert file.endswith(f"{one.fault.fault_type}.yaml")
+        assert text.splitlines()[line - 1].strip().startswith(f"{one.fault.spec.rpartition('/')[2]}:")
