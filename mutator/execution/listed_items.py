@@ -6,13 +6,13 @@ Workers import this, so it reads no YAML.
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 from mutator.campaigns.chunks import PendingChunk, golden_key_by_chunk
 from mutator.model import Experiment, Fault, Method
 from mutator.store import plan_file
 from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_head import CAMPAIGN_FILE
 
 MOST_SINGLE_ITEMS = 20_000  # pytest keeps each item in memory; of larger plans, chunks are items
 _ID_LENGTH = 8  # characters of an id in a name; more where two agree
@@ -109,7 +109,7 @@ def list_selected(
 
 def place_in_run_folder(folder: RunFolder) -> PlaceFinder:
     """Return a finder for a plan whose library is not looked at."""
-    place = (str(folder.path / Path("campaign.yaml")), None)
+    place = (str(folder.path / CAMPAIGN_FILE), None)
     return lambda fault: place
 
 

@@ -32,12 +32,13 @@ PYTHONS = "CPython 3.11.7, here CPython 3.12.1"
 
 
 class OnePiece:
-    """A distributor that stops after one piece of work."""
+    """A distributor that stops after two items."""
 
     def run(self, session: Session) -> None:
         items = SessionItems(session=session)
         runner = items.start_here()
-        runner.run(items.list_work().items[0])
+        for item in items.list_work().items[:2]:
+            runner.run(item)
         items.close(runner, is_stopped=True)
         session.problem = "interrupted"
 

@@ -35,6 +35,10 @@ ALLOWED = {  # joins of names that no file contains
     "campaigns/git_clone.py: folder / excluded": "printed by git, and only read",
     "campaigns/git_clone.py: folder / within": "names from os.scandir",
     "execution/cluster/piece_process.py: bundle.folder / f'work-{os.getpid()}'": "a process id",
+    "execution/requested_campaigns.py: Path(config.invocation_params.dir, text.partition('::')[0])": (
+        "what a user wrote in a command"
+    ),
+    "execution/requested_campaigns.py: root / value": "of the user's own pyproject.toml",
     "faults/import_checks.py: root / path": "only shown",
     "mutants/parsed_files_and_anchors.py: root / path": "only shown",
     "mutants/modules_importing_constants.py: tree.root / path": "only shown",

@@ -11,6 +11,7 @@ ALLOWED = {
     "_common/shipped_files.py: read_bytes": "installed with the harness, or unpacked from that",
     "_common/shipped_files.py: read_text": "installed with the harness",
     "campaigns/run_environment.py: read_text": "the kernel's file",
+    "execution/requested_campaigns.py: read_text": "the user's own pyproject.toml, which pytest reads, too",
     "execution/suspended_workers.py: read_text": "the kernel's file",
     "execution/worker_processes.py: read": "a file of its parent",
     "glue.py: read_text": "runs in the target's process",

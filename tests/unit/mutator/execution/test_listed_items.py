@@ -1,14 +1,19 @@
 """How experiments are named and marked as tests."""
 
+import os
 import re
+import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from mutator.campaigns.plan import build_plan
 from mutator.execution import listed_items
-from mutator.execution.listed_items import list_experiments
+from mutator.execution.campaign_items import CampaignFile, ItemSource
+from mutator.execution.item_running import ItemRunner
+from mutator.execution.listed_items import ItemListing, list_experiments
 from mutator.execution.spec_places import SpecPlaces
 from mutator.model import Experiment, Method
 from mutator.workspace import Workspace
@@ -77,3 +82,38 @@ def test_every_experiment_of_a_plan_has_a_name_of_its_own_and_a_place(toycar: Wo
         text = (toycar.library / "faults" / f"{one.fault.module}/{one.fault.fault_type}.yaml").read_text()
         assert file.endswith(f"{one.fault.fault_type}.yaml")
         assert text.splitlines()[line - 1].strip().startswith(f"{one.fault.spec.rpartition('/')[2]}:")
+
+
+def test_collecting_5000_experiments_costs_at_most_two_seconds(
+    experiment: Callable[..., Experiment], tmp_path: Path
+) -> None:
+    """Of CPU time, with all that pytest does. Neither plan nor target nor library is opened."""
+    (tmp_path / "many.yaml").write_text("")
+    experiments = [experiment(value=number) for number in range(5000)]
+    counted: list[int] = []
+
+    class Many(ItemSource):
+        @property
+        def listing(self) -> ItemListing:
+            numbered = list(enumerate(experiments))
+            place = lambda fault: PLACE  # noqa: E731
+            return ItemListing(items=list_experiments(numbered, several_seeds=False, place_of=place))
+
+        def _begin(self) -> ItemRunner:
+            raise AssertionError("collecting runs nothing")
+
+    class Collecting:
+        def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> CampaignFile:
+            return CampaignFile.from_parent(parent, path=file_path, source=Many())
+
+        def pytest_collection_finish(self, session: pytest.Session) -> None:
+            counted.append(len(session.items))
+
+    alone = ["-c", os.devnull, "--rootdir", str(tmp_path), "--disable-plugin-autoload", "--noconftest"]
+    began = time.process_time()
+    pytest.main(
+        [*alone, "-p", "no:cacheprovider", "--collect-only", "-qq", str(tmp_path / "many.yaml")],
+        plugins=[Collecting()],
+    )
+    assert counted == [5000]
+    assert time.process_time() - began < 2.0

@@ -58,14 +58,26 @@ def test_lines_of_a_worker_count_until_it_reports_others(run: Path) -> None:
     assert written.set_unreported_aside(run) == [NAME]
 
 
+class Node:
+    """A worker of xdist, as the controller knows it."""
+
+    gateway = SimpleNamespace(id="gw0")
+
+    def sendcommand(self, name: str, **values: object) -> None:
+        pass
+
+
 def test_lines_of_workers_count_if_the_command_is_interrupted(run: Path) -> None:
     """pytest then does not wait for the workers' reports."""
     write(run)
     written = WrittenFiles()
     start = SimpleNamespace(to_bytes=lambda: b"")
     begun = SimpleNamespace(
-        pending=(), proof=(), start_of_worker=lambda name: written.note_worker_began(f"0001-{name}") or start
+        listing=None,
+        start_for_worker=lambda name: written.note_worker_began(f"0001-{name}") or start,
     )
-    node = SimpleNamespace(workerinput={}, gateway=SimpleNamespace(id="gw0"))
-    CampaignController(cast("Any", begun)).pytest_configure_node(node)
+    node = Node()
+    controller = CampaignController({str(run / "small.yaml"): cast("Any", begun)})
+    controller._note_collection(node, ["small.yaml::sensor/lane-1"])
+    controller._begin_workers(cast("Any", SimpleNamespace(rootpath=run)), [node])
     assert written.set_unreported_aside(run) == []
