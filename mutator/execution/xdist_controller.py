@@ -92,6 +92,7 @@ class CampaignController:
         listings = {path: pickle.dumps(source.listing) for path, source in self._sources.items()}
         node.workerinput[WORKER_INPUT_KEY] = {
             "parent": os.getpid(),
+            "places": list(node.config.args),  # where to collect: not only what the command names
             "listings": listings,
             "alone": self._is_alone,
         }

@@ -63,6 +63,7 @@ class WorkerPlugin:
             path: WorkerSource(pickle.loads(listing)) for path, listing in campaigns["listings"].items()
         }
         self._is_alone = campaigns["alone"]
+        config.args[:] = campaigns["places"]
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionstart(self) -> None:
