@@ -106,12 +106,19 @@ class CampaignFile(pytest.File):
             yield ExperimentItem.from_parent(self, name=listed.name, listed=listed, source=self._source)
 
 
-def collect_alone(session: pytest.Session, path: Path, source: ItemSource) -> bool:
-    """Make the items of one campaign the session's only ones, without looking for tests."""
-    file = CampaignFile.from_parent(session, path=path, source=source)
-    session.items = list(file.collect())
+def collect_alone(session: pytest.Session, file: pytest.File) -> bool:
+    """Make the items of one file the session's only ones. Unlike pytest, load no code from the folders above
+    the file, which can be somebody else's library.
+    """
+    hook = session.config.hook
+    report = hook.pytest_make_collect_report(collector=file)
+    session.items = list(report.result) if report.passed else []
+    for item in session.items:
+        hook.pytest_itemcollected(item=item)
+    hook.pytest_collectreport(report=report)
+    hook.pytest_collection_modifyitems(session=session, config=session.config, items=session.items)
+    hook.pytest_collection_finish(session=session)
     session.testscollected = len(session.items)
-    session.config.hook.pytest_collection_finish(session=session)
     return True
 
 

@@ -59,6 +59,7 @@ class CampaignRun(ItemSource):
         self.path, self.out = path, out
         self._workspace, self._options, self._notify = workspace, options, notify
         self._items: SessionItems | None = None
+        self.failure: MutatorError | None = None  # why it could not begin
         self._open = ExitStack()
 
     @property
@@ -76,8 +77,14 @@ class CampaignRun(ItemSource):
 
     def begin(self) -> None:
         """Open the run folder and run the checks, unless it was done; MutatorError if they fail."""
-        if self._items is not None:
-            return
+        if self._items is None:
+            try:
+                self._open_and_check()
+            except MutatorError as err:
+                self.failure = err
+                raise
+
+    def _open_and_check(self) -> None:
         if self.out is None:
             self.out = self._default_run_folder()
             make_run_folder(self.out)

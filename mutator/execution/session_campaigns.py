@@ -24,9 +24,12 @@ def register_campaigns(config: pytest.Config, requested: RequestedCampaigns) -> 
         runs = _campaign_runs(config, requested, distributor)
     except MutatorError as err:
         raise pytest.UsageError(str(err)) from None
-    if config.getoption("campaign") is not None:
-        config.args[:] = [str(run.path) for run in runs.values()]
-    controller = ClusterController(runs, distributor) if distributor else StandaloneController(runs)
+    is_alone = config.getoption("campaign") is not None
+    controller = (
+        ClusterController(runs, distributor, is_alone=is_alone)
+        if distributor
+        else StandaloneController(runs, is_alone=is_alone)
+    )
     config.pluginmanager.register(controller)
     config.addinivalue_line("markers", "mutator: an experiment of a fault injection campaign")
 

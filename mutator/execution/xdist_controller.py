@@ -67,7 +67,9 @@ class PreparedRun(ItemSource):
 
 
 class CampaignController:
-    """Deals the items of campaigns, by real path of their files. If `is_alone`, the session has no others."""
+    """Deals the items of campaigns, by real path of their files. If `is_alone`, there is one campaign, and
+    nothing else.
+    """
 
     def __init__(self, sources: Mapping[str, PreparedRun | CampaignRun], *, is_alone: bool = False) -> None:
         self._sources, self._is_alone = sources, is_alone
@@ -122,10 +124,12 @@ class CampaignController:
     def pytest_collection(self, session: pytest.Session) -> bool | None:
         if session.config.pluginmanager.hasplugin("dsession") or not self._is_alone:
             return None  # xdist's hook collects nothing in this process
-        [(path, source)] = self._sources.items()
-        return collect_alone(session, Path(path), source)
+        [path] = self._sources
+        file = self.pytest_collect_file(Path(path), session)
+        assert file is not None
+        return collect_alone(session, file)
 
-    def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> CampaignFile | None:
+    def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> pytest.File | None:
         source = source_of(file_path, self._sources)
         return CampaignFile.from_parent(parent, path=file_path, source=source) if source else None
 
@@ -191,8 +195,8 @@ class CampaignController:
 class StandaloneController(CampaignController):
     """The controller of a user's session: it ends what has begun, and prints the summaries."""
 
-    def __init__(self, runs: Mapping[str, CampaignRun]) -> None:
-        super().__init__(runs)
+    def __init__(self, runs: Mapping[str, CampaignRun], *, is_alone: bool) -> None:
+        super().__init__(runs, is_alone=is_alone)
         self._runs = runs
         self._closing_lines: list[str] = []
 
@@ -207,6 +211,8 @@ class StandaloneController(CampaignController):
                 self._closing_lines.append(str(err))
                 session.exitstatus = err.exit_code
                 continue
+            if run.failure is not None:
+                session.exitstatus = run.failure.exit_code
             if summary is not None:
                 title = f"{run.path.stem}: " if len(self._runs) > 1 else ""
                 self._closing_lines += _summary_lines(run, summary, title)
@@ -254,13 +260,13 @@ class ClusterFile(pytest.File):
 class ClusterController(StandaloneController):
     """The controller of a session whose campaigns run on a cluster."""
 
-    def __init__(self, runs: Mapping[str, CampaignRun], distributor: WorkDistributor) -> None:
-        super().__init__(runs)
+    def __init__(
+        self, runs: Mapping[str, CampaignRun], distributor: WorkDistributor, *, is_alone: bool
+    ) -> None:
+        super().__init__(runs, is_alone=is_alone)
         self._distributor = distributor
 
-    def pytest_collect_file(  # type: ignore[override]
-        self, file_path: Path, parent: pytest.Collector
-    ) -> ClusterFile | None:
+    def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> pytest.File | None:
         run = self._runs.get(os.path.realpath(file_path))
         if run is None:
             return None

@@ -73,7 +73,7 @@ class WorkerPlugin:
         if not self._is_alone:
             return None
         [(path, source)] = self._sources.items()
-        return collect_alone(session, Path(path), source)
+        return collect_alone(session, CampaignFile.from_parent(session, path=Path(path), source=source))
 
     def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> CampaignFile | None:
         source = source_of(file_path, self._sources)

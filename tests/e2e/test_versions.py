@@ -154,7 +154,7 @@ def test_pytest_refuses_and_accepts_versions_like_the_command(
     words = [*plain, "--disable-plugin-autoload", "-p", "mutator"]
     words += ["--campaign", "small", "--campaign-out", str(half)]
     assert pytest.main(words) == 2
-    assert PYTHONS in capfd.readouterr().err
+    assert PYTHONS in capfd.readouterr().out
     assert pytest.main([*words, "--accept-versions"]) == 0
     assert len(RunFolder.open(half).session_environments) == 2
 
