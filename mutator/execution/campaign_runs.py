@@ -77,6 +77,8 @@ class CampaignRun(ItemSource):
 
     def begin(self) -> None:
         """Open the run folder and run the checks, unless it was done; MutatorError if they fail."""
+        if self.failure is not None:
+            raise self.failure
         if self._items is None:
             try:
                 self._open_and_check()
@@ -156,8 +158,8 @@ class CampaignRun(ItemSource):
             experiments = [(position, e) for position, e in planned if e.id in positions]
             several, digest = folder.has_seeded_goldens, folder.head.plan
         else:
-            if self.out is not None:
-                make_run_folder(self.out)
+            if self.out is not None and self.out.exists():
+                make_run_folder(self.out)  # raises for a folder with anything else
             if places.has_operators:
                 raise MutatorError(
                     "its mutants depend on golden runs, and collecting tests runs nothing",
