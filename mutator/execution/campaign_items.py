@@ -106,6 +106,11 @@ class CampaignFile(pytest.File):
             yield ExperimentItem.from_parent(self, name=listed.name, listed=listed, source=self._source)
 
 
+def node_id_of_file(session: pytest.Session, path: Path) -> str:
+    """Return the node id of a file, which can be outside of the folder of pytest's settings."""
+    return Path(os.path.relpath(path, session.config.rootpath)).as_posix()
+
+
 def collect_alone(session: pytest.Session, file: pytest.File) -> bool:
     """Make the items of one file the session's only ones. Unlike pytest, load no code from the folders above
     the file, which can be somebody else's library.

@@ -23,6 +23,7 @@ from mutator.execution.campaign_items import (
     CampaignItem,
     ItemSource,
     collect_alone,
+    node_id_of_file,
     source_of,
 )
 from mutator.execution.campaign_runs import CampaignRun
@@ -125,13 +126,17 @@ class CampaignController:
         if session.config.pluginmanager.hasplugin("dsession") or not self._is_alone:
             return None  # xdist's hook collects nothing in this process
         [path] = self._sources
-        file = self.pytest_collect_file(Path(path), session)
-        assert file is not None
+        file = self._make_file(Path(path), session, nodeid=node_id_of_file(session, Path(path)))
         return collect_alone(session, file)
 
     def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> pytest.File | None:
-        source = source_of(file_path, self._sources)
-        return CampaignFile.from_parent(parent, path=file_path, source=source) if source else None
+        is_campaign = source_of(file_path, self._sources) is not None
+        return self._make_file(file_path, parent) if is_campaign else None
+
+    def _make_file(self, path: Path, parent: pytest.Collector, **more: Any) -> pytest.File:
+        source = source_of(path, self._sources)
+        assert source is not None
+        return CampaignFile.from_parent(parent, path=path, source=source, **more)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if problem := dict(report.user_properties).get(PROBLEM_KEY):
@@ -169,17 +174,27 @@ class CampaignController:
 
     def _golden_key_of(self, node_id: str) -> str | None:
         """Return the golden run of an item; None for a test."""
-        return self._golden_key_by_name.get(node_id.partition("::")[2])
+        return self._golden_key_by_name.get(node_id.rpartition("::")[2])
 
     def _note_collection(self, node: Any, collection: Sequence[str]) -> None:
         self._node_ids = list(collection)
 
+    def _selected_files(self, root: Path) -> set[str]:
+        """Return the files of which an item is selected."""
+        files = {os.path.realpath(root / name) for name in {i.partition("::")[0] for i in self._node_ids}}
+        if not files.isdisjoint(self._sources):
+            return files
+        # outside of the folder of pytest's settings, a node id has no path
+        names = {node_id.rpartition("::")[2] for node_id in self._node_ids}
+        return {
+            path
+            for path, source in self._sources.items()
+            if not names.isdisjoint(item.name for item in source.listing.items)
+        }
+
     def _begin_workers(self, config: pytest.Config, nodes: Iterable[Any]) -> None:
         """Send workers what they need, before their first item."""
-        selected = {
-            os.path.realpath(config.rootpath / name)
-            for name in {node_id.partition("::")[0] for node_id in self._node_ids}
-        }
+        selected = self._selected_files(config.rootpath)
         for node in nodes:
             if node in self._begun_nodes:
                 continue
@@ -266,11 +281,9 @@ class ClusterController(StandaloneController):
         super().__init__(runs, is_alone=is_alone)
         self._distributor = distributor
 
-    def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> pytest.File | None:
-        run = self._runs.get(os.path.realpath(file_path))
-        if run is None:
-            return None
-        return ClusterFile.from_parent(parent, path=file_path, run=run, distributor=self._distributor)
+    def _make_file(self, path: Path, parent: pytest.Collector, **more: Any) -> pytest.File:
+        run = self._runs[os.path.realpath(path)]
+        return ClusterFile.from_parent(parent, path=path, run=run, distributor=self._distributor, **more)
 
 
 def _is_stopped(session: pytest.Session) -> bool:

@@ -11,7 +11,14 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError, PytestItemFailed
-from mutator.execution.campaign_items import PROBLEM_KEY, CampaignFile, ItemSource, collect_alone, source_of
+from mutator.execution.campaign_items import (
+    PROBLEM_KEY,
+    CampaignFile,
+    ItemSource,
+    collect_alone,
+    node_id_of_file,
+    source_of,
+)
 from mutator.execution.item_running import ItemRunner, ItemsStart
 from mutator.execution.listed_items import ItemListing
 from mutator.execution.requested_campaigns import WORKER_INPUT_KEY
@@ -73,7 +80,9 @@ class WorkerPlugin:
         if not self._is_alone:
             return None
         [(path, source)] = self._sources.items()
-        return collect_alone(session, CampaignFile.from_parent(session, path=Path(path), source=source))
+        node_id = node_id_of_file(session, Path(path))
+        file = CampaignFile.from_parent(session, path=Path(path), source=source, nodeid=node_id)
+        return collect_alone(session, file)
 
     def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> CampaignFile | None:
         source = source_of(file_path, self._sources)

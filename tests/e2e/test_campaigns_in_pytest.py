@@ -215,6 +215,11 @@ def test_items_of_a_frozen_plan(project: Path, in_pytest: Pytest, tmp_path: Path
     code, printed = in_pytest("--campaign", "small", f"--campaign-out={tmp_path / 'run'}", "-n", "2")
     assert code == 0, printed
     assert "2 passed" in printed  # and none of the project's tests
+    outside = ["-c", os.devnull, "--rootdir", tmp_path, f"--campaign-out={tmp_path / 'run'}"]
+    for words in ((), ("-n", "1")):
+        code, printed = in_pytest("--campaign", "small", *outside, *words)
+        assert code == 0, printed
+        assert "2 passed" in printed
     assert "2 of 2 experiments done" in printed
 
 
