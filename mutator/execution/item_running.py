@@ -9,6 +9,7 @@ from mutator.campaigns.expectations import Expectation
 from mutator.engines.engine_jobs import MODES_TO_PROVE
 from mutator.execution.experiment_runner import RecordedExperiment
 from mutator.execution.listed_items import ListedItem
+from mutator.execution.unexpected_results import describe_unexpected_result
 from mutator.execution.worker import Worker, WorkerStart
 from mutator.execution.written_files import FileDigests
 from mutator.model import Experiment, Record, Status
@@ -129,9 +130,6 @@ class ItemRunner:
         problem = self._expectation.problem_with(record, folder.severity_scale) if self._expectation else ""
         if not problem:
             return []
-        # late: it reads YAML, and few experiments need it
-        from mutator.execution.unexpected_results import describe_unexpected_result
-
         if finished is not None and finished.mutant is not None:
             patch = finished.mutant.patch_bytes
         else:

@@ -3,7 +3,6 @@
 import shlex
 
 from mutator.model import Experiment, Record
-from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.finished_experiments_and_columns import FinishedExperiment
 from mutator.results.table_columns import result_columns_of, row_of
@@ -16,7 +15,7 @@ def describe_unexpected_result(
     folder: RunFolder, experiment: Experiment, record: Record, patch: bytes, problem: str
 ) -> str:
     """Return the experiment's sentence, what is not allowed, the injected change, and how to replay it."""
-    finished = FinishedExperiment(experiment, record, folder.severity_scale, fault_paths_of(folder))
+    finished = FinishedExperiment(experiment, record, folder.severity_scale)
     row = row_of(result_columns_of(folder.head), finished)
     sentence = ExperimentSentences.of_run(folder.head).sentence(row, experiment.fault)
     words = ["mutator", "show", experiment.id[:_SHOWN_ID_LENGTH], "--run", str(folder.path), "--drive"]

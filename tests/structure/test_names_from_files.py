@@ -39,6 +39,7 @@ ALLOWED = {  # joins of names that no file contains
         "what a user wrote in a command"
     ),
     "execution/requested_campaigns.py: root / value": "of the user's own pyproject.toml",
+    "execution/xdist_controller.py: root / name": "of an item that pytest has collected",
     "faults/import_checks.py: root / path": "only shown",
     "mutants/parsed_files_and_anchors.py: root / path": "only shown",
     "mutants/modules_importing_constants.py: tree.root / path": "only shown",
