@@ -11,6 +11,8 @@ from mutator._common.library_and_run_folder_search import run_folders_newest_fir
 from mutator.api.experiment_results import ExperimentResult
 from mutator.api.mutants import build_selected
 from mutator.api.target_and_fault_selection import SelectedTarget
+from mutator.campaigns.expectations import Expectation
+from mutator.campaigns.regression_files import save_regression
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Record
 from mutator.outcomes.fault_paths import FaultPath, FaultPathFinder, fault_paths_of
@@ -148,6 +150,23 @@ class StoredExperiment(ExperimentResult):
     def is_drawn(self) -> bool:
         """Whether the run folder has the plot and an undamaged series."""
         return self.record is not None and self.plot_file.exists() and self.has_series
+
+    def save_regression(self, file: str | Path) -> None:
+        """Add the experiment to a file of saved experiments, which pytest collects.
+
+        It is then expected to reach no other hazard than in this run. MutatorError if it has no result, and
+        for a file of another target or with the experiment in it.
+        """
+        if self.record is None:
+            raise self.not_run_error()
+        hazards = list(dict.fromkeys(name for name, _ in self.record.hazards))
+        save_regression(
+            Path(file),
+            self.run.folder.head.target,
+            self.experiment,
+            Expectation(hazards=hazards),
+            self.sentence,
+        )
 
     def not_run_error(self) -> MutatorError:
         """Return the error for an experiment that has not run."""

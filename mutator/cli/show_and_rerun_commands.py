@@ -44,6 +44,7 @@ Examples:
   mutator show 3f9a --video 3f9a.mp4         rerun and film the golden and the faulty run
   mutator show 3f9a --still 14.5             one frame of the film, for the report
   mutator show 3f9a --still 14.5=early.png --still 20=late.png
+  mutator show 3f9a --save regressions/radar.yaml   a test of plain pytest from now on
 """
 
 
@@ -89,6 +90,13 @@ def show(
         bool,
         typer.Option("--patch", help="Print only the whole patch, including the probe."),
     ] = False,
+    save: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Save the experiment for pytest: from then on, it must reach no other hazard.",
+        ),
+    ] = None,
     wide: Wide = False,
     as_json: Json = False,
     *,
@@ -113,6 +121,8 @@ def show(
     if patch_alone:
         terminal.print_diff(patch)
         return
+    if save is not None:
+        stored.save_regression(save)
     plot_path, film_paths = stored.plot_file if stored.is_drawn else None, list[Path]()
     if drive or plot or video or still:  # only this loads an engine
         run_experiment = experiment_printing.find_run_experiment(workspace, run, experiment)

@@ -118,6 +118,16 @@ class Bench:
             self._receive_records({experiment.id for experiment in batch})
             return [self._records_by_id(experiment.id) for experiment in batch]
 
+    def plan(self, experiments: Iterable[Experiment], reason: str = "") -> Session:
+        """Check and plan a batch as `run` does, for others who run it; return their session."""
+        with self._calling():
+            batch = self._check_batch(experiments, reason)
+            self._plan_new([e for e in batch if e.id not in self._plan.ids], reason)
+            assert self._session is not None
+            self._begin_work()
+            self._session.find_work()
+            return self._session
+
     def submit(self, experiments: Iterable[Experiment], reason: str = "") -> None:
         """Plan a batch as `run` does, and return while it runs: `results` gives its records."""
         with self._calling():
@@ -175,12 +185,15 @@ class Bench:
 
     def _begin_batch(self, experiments: Iterable[Experiment], reason: str) -> list[Experiment]:
         """Check, plan and hand out a batch; return its experiments."""
-        check_reason(reason)
-        batch = self._batch_check.check(experiments)
+        batch = self._check_batch(experiments, reason)
         experiment_by_id = {experiment.id: experiment for experiment in batch}
         self._plan_new([e for name, e in experiment_by_id.items() if name not in self._plan.ids], reason)
         self._hand_out_missing(list(experiment_by_id.values()))
         return batch
+
+    def _check_batch(self, experiments: Iterable[Experiment], reason: str) -> list[Experiment]:
+        check_reason(reason)
+        return self._batch_check.check(experiments)
 
     def _next_result(self) -> str | None:
         with self._calling():

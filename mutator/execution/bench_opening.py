@@ -42,12 +42,35 @@ def opened_bench(
     `values` are those of `bench_files.BenchModel`; `distributor` deals to a cluster, if not None. An error in
     the block leaves the run unfinished: it can be opened again.
     """
+    with owned_bench(
+        workspace, out, values, workers=workers, engine=engine, reuse=reuse, distributor=distributor
+    ) as bench:
+        try:
+            yield bench
+            bench.finish()
+        except BaseException:
+            bench.abandon()
+            raise
+
+
+@contextmanager
+def owned_bench(
+    workspace: Workspace,
+    out: Path,
+    values: Mapping[str, Any],
+    *,
+    workers: int = 1,
+    engine: str | None = None,
+    reuse: bool = True,
+    distributor: Distributor | None = None,
+) -> Iterator[Bench]:
+    """Like `opened_bench`, for a caller that finishes what the bench has planned."""
     is_new = not out.exists()
     make_run_folder(out)
     with lock_run_folder(out):
         try:
             with writing_progress(out, None) as progress:
-                bench = _build_bench(
+                yield _build_bench(
                     workspace,
                     out,
                     values,
@@ -57,12 +80,6 @@ def opened_bench(
                     distributor=distributor,
                     notify=progress.notify,
                 )
-                try:
-                    yield bench
-                    bench.finish()
-                except BaseException:
-                    bench.abandon()
-                    raise
         finally:
             remove_anything_at(out / "work")
             if RunFolder.exists(out):

@@ -1,5 +1,7 @@
 """A campaign in a user's pytest session: its items, and its run folder from the first item to the results."""
 
+from abc import abstractmethod
+from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
@@ -43,8 +45,12 @@ class CampaignOptions:
     packages: tuple[str, ...] = ()  # of a distributor of another package
 
 
-class CampaignRun(ItemSource):
-    """A campaign in the process that is no worker. `out` is its run folder; None: below the cache."""
+class FileRun(ItemSource):
+    """The experiments of a file in the process that is no worker. `out` is their run folder; None: below the
+    cache.
+    """
+
+    must_reach_hazard = True  # whether a run without a canary shows nothing without a hazard
 
     def __init__(
         self,
@@ -69,11 +75,22 @@ class CampaignRun(ItemSource):
 
     @cached_property
     def listing(self) -> ItemListing:
-        """All experiments of the plan, frozen or to be frozen."""
+        """All experiments of the file."""
         try:
             return self._list_experiments()
         except MutatorError as err:
             return ItemListing(problem=str(err))
+
+    @abstractmethod
+    def _list_experiments(self) -> ItemListing: ...
+
+    @abstractmethod
+    def _open_session(self, out: Path) -> SessionItems:
+        """Open the run folder and run the checks; `_open` ends what was opened."""
+
+    @abstractmethod
+    def _default_run_folder(self) -> Path:
+        """Return a folder below the cache for this plan of these sources: an edit of any begins a new run."""
 
     def begin(self) -> None:
         """Open the run folder and run the checks, unless it was done; MutatorError if they fail."""
@@ -81,36 +98,13 @@ class CampaignRun(ItemSource):
             raise self.failure
         if self._items is None:
             try:
-                self._open_and_check()
-            except MutatorError as err:
-                self.failure = err
+                self.out = self.out or self._default_run_folder()
+                self._items = self._open_session(self.out)
+            except BaseException as err:
+                if isinstance(err, MutatorError):
+                    self.failure = err
+                self._open.close()
                 raise
-
-    def _open_and_check(self) -> None:
-        if self.out is None:
-            self.out = self._default_run_folder()
-            make_run_folder(self.out)
-        options = self._options
-        try:
-            session = self._open.enter_context(
-                open_session(
-                    self._workspace,
-                    self.path,
-                    self.out,
-                    workers=options.workers,
-                    choices=Choices(),
-                    reviewed=options.reviewed,
-                    accept_versions=options.accept_versions,
-                    reuse=options.reuse,
-                    notify=self._notify,
-                )
-            )
-            self._check_plan(session.folder)
-            session.prepare(options.packages)
-        except BaseException:
-            self._open.close()
-            raise
-        self._items = SessionItems(session=session, expectation=self._expectation)
 
     def start_for_worker(self, name: str) -> ItemsStart:
         """Return what an xdist worker needs, or why it can run nothing."""
@@ -141,6 +135,35 @@ class CampaignRun(ItemSource):
             self._open.close()
             if campaign_runs_folder() in session.folder.path.parents:
                 prune_campaign_runs()
+
+    def _key_of_sources(self, target: str, scenarios: Iterable[str]) -> list[object]:
+        """Return what decides results, beside plan and file."""
+        inputs = RunInputs.from_workspace(self._workspace, self._workspace.manifest(target), scenarios)
+        versions = [run_environment.python_version(), run_environment.versions_of_fixed_packages()]
+        return [inputs.digest_by_source(), harness_digest(), versions, self._workspace.sandbox]
+
+
+class CampaignRun(FileRun):
+    """A campaign."""
+
+    def _open_session(self, out: Path) -> SessionItems:
+        options = self._options
+        session = self._open.enter_context(
+            open_session(
+                self._workspace,
+                self.path,
+                out,
+                workers=options.workers,
+                choices=Choices(),
+                reviewed=options.reviewed,
+                accept_versions=options.accept_versions,
+                reuse=options.reuse,
+                notify=self._notify,
+            )
+        )
+        self._check_plan(session.folder)
+        session.prepare(options.packages)
+        return SessionItems(session=session, expectation=self._expectation)
 
     @cached_property
     def _plan(self) -> Plan:
@@ -186,11 +209,7 @@ class CampaignRun(ItemSource):
         return NO_HAZARD if self._options.hazard_fails else load_campaign(self.path).expectation
 
     def _default_run_folder(self) -> Path:
-        """Return a folder below the cache for this plan of these sources: an edit of any begins a new run."""
         plan = self._plan
-        manifest = self._workspace.manifest(plan.campaign.target)
-        inputs = RunInputs.from_workspace(self._workspace, manifest, {g.scenario for g in plan.goldens()})
-        versions = [run_environment.python_version(), run_environment.versions_of_fixed_packages()]
-        sources = [inputs.digest_by_source(), harness_digest(), versions, self._workspace.sandbox]
+        sources = self._key_of_sources(plan.campaign.target, {golden.scenario for golden in plan.goldens()})
         key = content_id([plan.digest, plan.campaign.file_bytes.decode(), *sources])
         return path_below(campaign_runs_folder(), f"{plan.campaign.name}-{key}")

@@ -2,7 +2,7 @@
 
 import pickle
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from mutator.campaigns.expectations import Expectation
@@ -30,7 +30,8 @@ class ItemsStart:
     pending: frozenset[int] = frozenset()
     unproved: frozenset[str] = frozenset()
     has_forked: bool = False  # whether the run folder has an experiment that needs the proof
-    expectation: Expectation | None = None
+    expectation: Expectation | None = None  # of all experiments
+    expectation_by_id: Mapping[str, Expectation] = field(default_factory=dict)
     problem: str = ""
 
     def to_bytes(self) -> bytes:
@@ -53,7 +54,8 @@ class ItemRunner:
         self._folder, self._make_worker = folder, make_worker
         self._worker: Worker | None = None
         self._pending, self._unproved = set(start.pending), set(start.unproved)
-        self._has_forked, self._expectation = start.has_forked, start.expectation
+        self._has_forked = start.has_forked
+        self._expectation, self._expectation_by_id = start.expectation, start.expectation_by_id
         self._planned = ExperimentsReadOnAccess(folder.path, folder.head.chunks)
         self._proofs_to_decide: list[Experiment] = []  # nothing was forked yet
 
@@ -109,8 +111,11 @@ class ItemRunner:
 
     def _stored_record_of(self, experiment: Experiment) -> Record | None:
         """Return the record of an earlier session, if anything depends on it."""
-        needs_record = self._expectation is not None or experiment.id in self._unproved
+        needs_record = self._expectation_of(experiment) is not None or experiment.id in self._unproved
         return self._stored_records.get(experiment.id) if needs_record else None
+
+    def _expectation_of(self, experiment: Experiment) -> Expectation | None:
+        return self._expectation_by_id.get(experiment.id, self._expectation)
 
     def _prove_or_defer(self, experiment: Experiment) -> list[str]:
         self._unproved.discard(experiment.id)
@@ -127,7 +132,8 @@ class ItemRunner:
         self, experiment: Experiment, record: Record, finished: RecordedExperiment | None
     ) -> list[str]:
         folder = self._folder
-        problem = self._expectation.problem_with(record, folder.severity_scale) if self._expectation else ""
+        expectation = self._expectation_of(experiment)
+        problem = expectation.problem_with(record, folder.severity_scale) if expectation else ""
         if not problem:
             return []
         if finished is not None and finished.mutant is not None:

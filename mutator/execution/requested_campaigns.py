@@ -13,8 +13,9 @@ import pytest
 WORKER_INPUT_KEY = "mutator_campaigns"  # what an xdist worker gets
 _SETTINGS_FILE, _SETTINGS_TABLE = "pyproject.toml", "mutator"
 _KEYS = ("library", "target", "campaigns")
+_REGRESSIONS = "regressions/*.yaml"  # of a project with these settings
 _YAML_SUFFIXES = (".yaml", ".yml")
-_CAMPAIGN_HEAD = b"schema: campaign/"
+_CAMPAIGN_HEAD, _REGRESSION_HEAD = b"schema: campaign/", b"schema: regression/"
 _MOST_HEAD_BYTES = 4096  # comments can come first
 
 
@@ -35,7 +36,8 @@ class RequestedCampaigns:
 
 
 def find_requested_campaigns(config: pytest.Config) -> RequestedCampaigns:
-    """Return the campaigns of `--campaign`, of the arguments, and of the project where they are collected.
+    """Return the campaigns, and files of saved experiments, of `--campaign`, of the arguments, and of the
+    project where they are collected.
 
     Adds the project's campaigns to what pytest looks at, if the command names no place.
     """
@@ -49,8 +51,12 @@ def find_requested_campaigns(config: pytest.Config) -> RequestedCampaigns:
             name="" if is_file else name, files=named_files, library=library, target=target
         )
     arguments = [Path(config.invocation_params.dir, text.partition("::")[0]) for text in config.args]
-    files = [path for path in arguments if path.suffix in _YAML_SUFFIXES and _is_campaign(path)]
-    for path in settings.get("campaigns", ()):
+    files = [
+        path
+        for path in arguments
+        if path.suffix in _YAML_SUFFIXES and _has_head(path, _CAMPAIGN_HEAD, _REGRESSION_HEAD)
+    ]
+    for path in (*settings.get("campaigns", ()), *settings.get("regressions", ())):
         if any(path == place or place in path.parents for place in arguments):
             files.append(path)
         elif config.args_source is not pytest.Config.ArgsSource.ARGS:
@@ -59,13 +65,18 @@ def find_requested_campaigns(config: pytest.Config) -> RequestedCampaigns:
     return RequestedCampaigns(files=tuple(dict.fromkeys(files)), library=library, target=target)
 
 
-def _is_campaign(path: Path) -> bool:
+def is_regression_file(path: Path) -> bool:
+    """Whether a file has saved experiments, and is no campaign."""
+    return _has_head(path, _REGRESSION_HEAD)
+
+
+def _has_head(path: Path, *heads: bytes) -> bool:
     try:
         with path.open("rb") as file:
             head = file.read(_MOST_HEAD_BYTES)
     except OSError:
         return False
-    return any(line.startswith(_CAMPAIGN_HEAD) for line in head.splitlines())
+    return any(line.startswith(heads) for line in head.splitlines())
 
 
 def _project_settings(root: Path) -> dict[str, Any]:
@@ -81,7 +92,7 @@ def _project_settings(root: Path) -> dict[str, Any]:
         table = tomllib.loads(text)["tool"][_SETTINGS_TABLE]
     except (tomllib.TOMLDecodeError, LookupError, TypeError) as err:
         raise pytest.UsageError(f"{path}: [tool.{_SETTINGS_TABLE}]: {err}") from None
-    settings: dict[str, Any] = {}
+    settings: dict[str, Any] = {"regressions": sorted(root.glob(_REGRESSIONS))}
     for key, value in table.items():
         is_list = key == "campaigns"
         values = value if is_list else [value]

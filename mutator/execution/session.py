@@ -147,6 +147,14 @@ class Session:
         self.pending = pending_chunks
         self._records = None if pending_chunks else records
 
+    def find_work(self) -> None:
+        """Find what remains to do in a run whose checks its bench has run."""
+        records = self.folder.records()
+        self._finished_count_before = sum(ending.is_final for ending in endings_of(records))
+        self.pending = pending_chunks_of(self.folder, records)
+        self.proof = equivalence_check.remaining_sampled_experiments(self.folder)
+        self.golden_digests = golden_digests(self.folder)
+
     def _run_checks(self) -> None:
         try:
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)

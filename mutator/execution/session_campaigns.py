@@ -6,10 +6,11 @@ from contextlib import nullcontext
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.execution.campaign_runs import CampaignOptions, CampaignRun
+from mutator.execution.campaign_runs import CampaignOptions, CampaignRun, FileRun
 from mutator.execution.distributor_choice import Distributor, choose_distributor, packages_of_distributor
 from mutator.execution.progress_text import ProgressLines
-from mutator.execution.requested_campaigns import RequestedCampaigns
+from mutator.execution.regression_runs import RegressionRun
+from mutator.execution.requested_campaigns import RequestedCampaigns, is_regression_file
 from mutator.execution.xdist_controller import ClusterController, StandaloneController
 from mutator.store.run_progress import ProgressCallback
 from mutator.workspace import Workspace
@@ -43,7 +44,7 @@ def _cluster_distributor(config: pytest.Config) -> Distributor | None:
 
 def _campaign_runs(
     config: pytest.Config, requested: RequestedCampaigns, distributor: Distributor | None
-) -> dict[str, CampaignRun]:
+) -> dict[str, FileRun]:
     workspace = _workspace(requested, sandbox=config.getoption("campaign_sandbox"))
     files = [workspace.campaign(requested.name)] if requested.name else list(requested.files)
     out = config.getoption("campaign_out")
@@ -60,12 +61,12 @@ def _campaign_runs(
         packages=packages_of_distributor(distributor) if distributor else (),
     )
     notify = _progress_notifier(config)
-    return {
-        os.path.realpath(file): CampaignRun(
-            workspace.campaign(file).resolve(), workspace, options, out=out, notify=notify
-        )
-        for file in files
-    }
+    runs: dict[str, FileRun] = {}
+    for file in files:
+        kind = RegressionRun if is_regression_file(file) else CampaignRun
+        path = file.resolve() if kind is RegressionRun else workspace.campaign(file).resolve()
+        runs[os.path.realpath(file)] = kind(path, workspace, options, out=out, notify=notify)
+    return runs
 
 
 def _workspace(requested: RequestedCampaigns, *, sandbox: bool) -> Workspace:

@@ -1,6 +1,7 @@
 """The work of a session as items of pytest."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from mutator.campaigns.expectations import Expectation
 from mutator.execution.item_running import ItemRunner, ItemsStart
@@ -19,10 +20,13 @@ from mutator.preflight import equivalence_check
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionItems:
-    """A prepared session, whose experiments are items. `expectation` is what their results may be."""
+    """A prepared session, whose experiments are items. `expectation` is what all results may be, unless
+    `expectation_by_id` has another one for an experiment.
+    """
 
     session: Session
     expectation: Expectation | None = None
+    expectation_by_id: Mapping[str, Expectation] = field(default_factory=dict)
 
     def list_work(self) -> ItemListing:
         """List what the session has to do: experiments without a record, and those to prove."""
@@ -46,6 +50,7 @@ class SessionItems:
             unproved=frozenset(sample.id for sample in session.proof),
             has_forked=any(map(equivalence_check.was_forked, timings.values())),
             expectation=self.expectation,
+            expectation_by_id=self.expectation_by_id,
         )
 
     def start_here(self) -> ItemRunner:

@@ -26,7 +26,7 @@ from mutator.execution.campaign_items import (
     node_id_of_file,
     source_of,
 )
-from mutator.execution.campaign_runs import CampaignRun
+from mutator.execution.campaign_runs import FileRun
 from mutator.execution.item_running import ItemRunner, ItemsStart
 from mutator.execution.listed_items import ItemListing
 from mutator.execution.piece_scheduling import PieceScheduling, is_scheduler_chosen
@@ -72,7 +72,7 @@ class CampaignController:
     nothing else.
     """
 
-    def __init__(self, sources: Mapping[str, PreparedRun | CampaignRun], *, is_alone: bool = False) -> None:
+    def __init__(self, sources: Mapping[str, PreparedRun | FileRun], *, is_alone: bool = False) -> None:
         self._sources, self._is_alone = sources, is_alone
         self._worker_continuer: WorkerContinuer | None = None
         self._node_ids: list[str] = []  # what xdist's workers have selected
@@ -210,7 +210,7 @@ class CampaignController:
 class StandaloneController(CampaignController):
     """The controller of a user's session: it ends what has begun, and prints the summaries."""
 
-    def __init__(self, runs: Mapping[str, CampaignRun], *, is_alone: bool) -> None:
+    def __init__(self, runs: Mapping[str, FileRun], *, is_alone: bool) -> None:
         super().__init__(runs, is_alone=is_alone)
         self._runs = runs
         self._closing_lines: list[str] = []
@@ -231,7 +231,7 @@ class StandaloneController(CampaignController):
             if summary is not None:
                 title = f"{run.path.stem}: " if len(self._runs) > 1 else ""
                 self._closing_lines += _summary_lines(run, summary, title)
-                session.exitstatus = _exit_status(session, summary)
+                session.exitstatus = _exit_status(session, run, summary)
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         if self._closing_lines:
@@ -243,7 +243,7 @@ class StandaloneController(CampaignController):
 class ClusterItem(CampaignItem):
     """All of a campaign's work, done by a cluster."""
 
-    def __init__(self, *, run: CampaignRun, distributor: WorkDistributor, **keywords: Any) -> None:
+    def __init__(self, *, run: FileRun, distributor: WorkDistributor, **keywords: Any) -> None:
         super().__init__(**keywords)
         self._run, self._distributor = run, distributor
 
@@ -264,7 +264,7 @@ class ClusterItem(CampaignItem):
 class ClusterFile(pytest.File):
     """The file of a campaign that a cluster runs."""
 
-    def __init__(self, *, run: CampaignRun, distributor: WorkDistributor, **keywords: Any) -> None:
+    def __init__(self, *, run: FileRun, distributor: WorkDistributor, **keywords: Any) -> None:
         super().__init__(**keywords)
         self._run, self._distributor = run, distributor
 
@@ -275,9 +275,7 @@ class ClusterFile(pytest.File):
 class ClusterController(StandaloneController):
     """The controller of a session whose campaigns run on a cluster."""
 
-    def __init__(
-        self, runs: Mapping[str, CampaignRun], distributor: WorkDistributor, *, is_alone: bool
-    ) -> None:
+    def __init__(self, runs: Mapping[str, FileRun], distributor: WorkDistributor, *, is_alone: bool) -> None:
         super().__init__(runs, is_alone=is_alone)
         self._distributor = distributor
 
@@ -306,7 +304,7 @@ def _call_before(scheduler: Any, name: str, before: Callable[..., None]) -> None
     setattr(scheduler, name, call)
 
 
-def _exit_status(session: pytest.Session, summary: Summary) -> int:
+def _exit_status(session: pytest.Session, run: FileRun, summary: Summary) -> int:
     """Return the exit status of a session: pytest's, unless the campaign has a worse one."""
     status = int(session.exitstatus)
     if summary.interrupted:
@@ -314,10 +312,10 @@ def _exit_status(session: pytest.Session, summary: Summary) -> int:
     if summary.harness_errors or summary.problem:
         return EXIT_HARNESS_ERRORS
     is_whole = summary.done == summary.planned
-    return summary.exit_code if is_whole and not status else status
+    return summary.exit_code if is_whole and not status and run.must_reach_hazard else status
 
 
-def _summary_lines(run: CampaignRun, summary: Summary, title: str) -> list[str]:
+def _summary_lines(run: FileRun, summary: Summary, title: str) -> list[str]:
     missing = summary.planned - summary.done
     lines = [
         f"{title}{summary.done} of {summary.planned} experiments done, {summary.ran} now",

@@ -1,5 +1,6 @@
 """Campaigns as tests, in a fresh project with a controller of its own."""
 
+import csv
 import json
 import os
 import re
@@ -11,6 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from mutator.cli.app import main
 from mutator.execution.campaign_running import run_campaign
 from mutator.workspace import Workspace
 
@@ -221,6 +223,25 @@ def test_items_of_a_frozen_plan(project: Path, in_pytest: Pytest, tmp_path: Path
         assert code == 0, printed
         assert "2 passed" in printed
     assert "2 of 2 experiments done" in printed
+
+
+def test_saved_experiments_are_tests_of_the_project(
+    project: Path, in_pytest: Pytest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever reaches another hazard than when it was saved fails. What a campaign ran is not repeated."""
+    run = next(folder for folder in run_folders(project) if (folder / "results.csv").exists())
+    with (run / "results.csv").open() as file:
+        lane = next(row for row in csv.DictReader(file) if row["outcome"] == "hazard")["experiment_id"]
+    monkeypatch.setenv("MUTATOR_ROOT", str(project))
+    assert main(["show", lane, "--run", str(run), "--save", "regressions/lane.yaml"]) == 0
+    code, printed = in_pytest("-k", "regressions", "-n", "2")
+    assert code == 0, printed
+    assert "1 passed" in printed and "1 of 1 reused" in printed
+    saved = project / "regressions" / "lane.yaml"
+    saved.write_text(saved.read_text().replace('{"hazards": ["H3"]}', '{"hazards": []}'))
+    code, printed = in_pytest("regressions/lane.yaml")
+    assert code == 1, printed
+    assert "regressions/lane.yaml::sensor/lane" in printed and "hazard H3, allowed: none" in printed
 
 
 @pytest.mark.parametrize(
