@@ -3,6 +3,7 @@
 import shlex
 
 from mutator.model import Experiment, Record
+from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.finished_experiments_and_columns import FinishedExperiment
 from mutator.results.table_columns import result_columns_of, row_of
@@ -19,5 +20,5 @@ def describe_unexpected_result(
     row = row_of(result_columns_of(folder.head), finished)
     sentence = ExperimentSentences.of_run(folder.head).sentence(row, experiment.fault)
     words = ["mutator", "show", experiment.id[:_SHOWN_ID_LENGTH], "--run", str(folder.path), "--drive"]
-    change = patch.decode(errors="replace").rstrip()
+    change = patch_without_new_files(patch.decode(errors="replace"))[0].rstrip()  # without the probe
     return "\n".join([sentence, problem, "", change, "", f"replay: {shlex.join(words)}"])
