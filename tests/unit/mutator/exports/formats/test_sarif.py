@@ -15,6 +15,7 @@ from mutator.exports.code_findings import LEVELS_BY_SEVERITY
 from mutator.exports.formats import sarif
 from mutator.exports.run_export import export
 from mutator.model import Experiment, Outcome
+from mutator.store.plan_file import load_experiments
 from mutator.targets.hazard_severity import SEVERITY_CLASSES
 from mutator.workspace import Workspace
 
@@ -166,3 +167,19 @@ def test_a_run_whose_target_has_changed_is_refused(
     (toycar.library.parent / "tree" / "toycar" / "driver.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match="has changed since this run was planned"):
         export(run, Format.SARIF, workspace=toycar)
+
+
+def test_hazards_of_new_experiments_are_new(
+    workspace: Workspace, runs: tuple[Path, Path], tmp_path: Path, write_run: Write
+) -> None:
+    part = write_run(workspace, tmp_path / "part", lane_and_silence_hazard, limit=6)
+    planned = {e.id for e in load_experiments(part)}
+    whole = logged(runs[1], workspace)["runs"][0]["results"]
+    new = logged(runs[1], workspace, base=part)["runs"][0]["results"]
+    ids = [result["properties"]["experiment"] for result in new]
+    assert ids == [
+        result["properties"]["experiment"]
+        for result in whole
+        if result["properties"]["experiment"] not in planned
+    ]
+    assert 0 < len(new) < len(whole)
