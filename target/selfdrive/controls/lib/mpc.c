@@ -296,14 +296,16 @@ INLINE double solve(const Model model, Quadprog *quadprog, Condensed *of, const 
     Result result = {.x = x, .lam = lam};
     quadprog(&result, &problem, NULL);
 
-    double slope = 0.0, largest = 0.0, excess = -INFINITY, square = 0.0;
+    double slope = 0.0, sum = 0.0, largest = 0.0, excess = -INFINITY, square = 0.0;
     for (int i = 0; i < N; i++) {
         double by_h = 0.0, by_rows = 0.0;
         for (int j = 0; j < N; j++)
             by_h += of->h[j][i] * x[j];
         for (int row = 0; row < rows; row++)
             by_rows += a[row][i] * lam[N + row];
-        slope = larger(slope, fabs(by_h + of->gradient[i] + by_rows + lam[i]));
+        const double at = fabs(by_h + of->gradient[i] + by_rows + lam[i]);
+        slope = larger(slope, at);
+        sum += at;
         largest = larger(largest, fabs(of->gradient[i]));
         excess = larger(larger(excess, lower[i] - x[i]), x[i] - upper[i]);
         square += x[i] * x[i];
@@ -314,7 +316,8 @@ INLINE double solve(const Model model, Quadprog *quadprog, Condensed *of, const 
             at += a[row][j] * x[j];
         excess = larger(larger(excess, lower[N + row] - at), at - upper[N + row]);
     }
-    const int solved = slope <= STATIONARITY_TOL * (1.0 + largest) && excess <= FEASIBILITY_TOL && square < LARGEST;
+    const int stationary = slope <= STATIONARITY_TOL * (1.0 + largest) && sum < INFINITY;
+    const int solved = stationary && excess <= FEASIBILITY_TOL && square < LARGEST;
     if (!solved)
         memset(x, 0, N * sizeof *x);
     for (int sweep = 0; !solved && !isinf(model.control_bound) && sweep < SWEEPS; sweep++)

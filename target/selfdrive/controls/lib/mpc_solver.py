@@ -167,17 +167,19 @@ def _solve_program(
     The fallback changes bounded controls as if states had no bounds, and keeps unbounded ones.
 
     CasADi's plug-in does not report success inside a graph, so the optimality conditions are tested here. Its
-    input checks are off, because they would raise on NaN; here, NaN is reported as not solved.
+    input checks are off, because they would raise on NaN; here, NaN is reported as not solved. If DAQP gives
+    up, the plug-in leaves the results of an earlier call, which can be NaN.
     """
     low, high, x_low, x_high = bounds
     options = {"error_on_fail": False, "inputs_check": False}
     qp = ca.conic(ocp.name, "daqp", {"h": hessian.sparsity(), "a": rows.sparsity()}, options)
     sol = qp(h=hessian, g=gradient, a=rows, lba=low, uba=high, lbx=x_low, ubx=x_high)
     x = sol["x"]
-    slope = ca.norm_inf(hessian @ x + gradient + rows.T @ sol["lam_a"] + sol["lam_x"])
+    slopes = hessian @ x + gradient + rows.T @ sol["lam_a"] + sol["lam_x"]
     at = rows @ x
     excess = ca.mmax(ca.vertcat(low - at, at - high, x_low - x, x - x_high))
-    stationary = slope <= STATIONARITY_TOL * (1 + ca.norm_inf(gradient))
+    stationary = ca.norm_inf(slopes) <= STATIONARITY_TOL * (1 + ca.norm_inf(gradient))
+    stationary *= ca.norm_1(slopes) < math.inf  # `norm_inf` ignores NaN
     solved = stationary * (excess <= FEASIBILITY_TOL) * (ca.sumsqr(x) < LARGEST)
     unchanged = ca.MX.zeros(x.shape)
     if math.isinf(ocp.control_bound):

@@ -125,6 +125,24 @@ def test_a_solvers_result_does_not_depend_on_earlier_problems(name: str) -> None
     assert run(iteration) == run(Iteration(solver)) == run(Iteration(COMPILED[name]())) == wanted
 
 
+@pytest.mark.usefixtures("use")
+@pytest.mark.parametrize(("slope", "y"), [(100.0, -300.0), (1.0, -300.0), (0.5, -30.0), (0.0, -50.0)])
+def test_what_daqp_left_from_an_earlier_problem_is_no_solution(
+    slope: float, y: float, references: dict[str, Solver]
+) -> None:
+    """DAQP gives up on lanes so far away; CasADi then returns the results of the call before, here NaN."""
+    results = []
+    for solver in (build_lateral(RATE_COST), references["lateral"]):
+        iteration = Iteration(solver)
+        for first_slope in (math.nan, slope):
+            lines = [value for line in (y, y - 3.7, y - 1.85) for value in (0.0, 0.0, first_slope, line)]
+            iteration.restart(control=FIRST_RATE)
+            iteration.run((2.1, 0.0, 0.007, 0.015), (0.229, 21.0, *lines, 1.0, 1.0, 3.7))
+        results.append((iteration.unsolved, iteration.solution.tobytes(), iteration.guess.tobytes()))
+    assert results[0] == results[1]
+    assert results[0][0] == 1
+
+
 def test_the_generated_header_is_current() -> None:
     assert casadi.__version__ == compiled_mpc.CASADI_VERSION
     assert generate_mpc_header.HEADER_PATH.read_text() == generate_mpc_header.render_header()
