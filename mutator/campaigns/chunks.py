@@ -1,4 +1,4 @@
-"""Chunks: the experiments that one pytest item runs."""
+"""Chunks: consecutive experiments of a plan with the same golden run. A shard has whole chunks."""
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass

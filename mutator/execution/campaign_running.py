@@ -1,6 +1,6 @@
 """Run a campaign: plan if needed, check, run experiments without a record, build the table of results.
 
-`mutator run` starts pytest itself; otherwise, `pytest --campaign FILE --campaign-out DIR -n N` does the same.
+`mutator run` starts pytest itself; otherwise, `pytest FILE -n N` does the same.
 """
 
 import warnings
