@@ -195,8 +195,8 @@ class CampaignModel(StrictModel, title="The file"):
         20,
         ge=1,
         le=1000,
-        description="How many experiments with the same golden run form a chunk. A shard has whole chunks, and "
-        "the plan's digest depends on them.",
+        description="How many experiments with the same golden run form a chunk. A shard has whole chunks, "
+        "and the plan's digest depends on them.",
     )
 
     @model_validator(mode="after")

@@ -1,7 +1,7 @@
 """A campaign in a user's pytest session: its items, and its run folder from the first item to the results."""
 
 from abc import abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +20,7 @@ from mutator.errors import MutatorError
 from mutator.execution.campaign_items import ItemSource
 from mutator.execution.finished_run_keys import harness_digest
 from mutator.execution.item_running import ItemRunner, ItemsStart
-from mutator.execution.listed_items import ItemListing, list_experiments
+from mutator.execution.listed_items import ItemListing, list_plan
 from mutator.execution.session import Session
 from mutator.execution.session_items import SessionItems
 from mutator.execution.session_opening import open_session
@@ -180,6 +180,7 @@ class CampaignRun(FileRun):
             planned = enumerate(plan_file.iterate_experiments(folder.path))
             experiments = [(position, e) for position, e in planned if e.id in positions]
             several, digest = folder.has_seeded_goldens, folder.head.plan
+            lengths: Sequence[int] = [count for _, _, count in folder.head.chunks]
         else:
             if self.out is not None and self.out.exists():
                 make_run_folder(self.out)  # raises for a folder with anything else
@@ -191,8 +192,8 @@ class CampaignRun(FileRun):
                 )
             plan = self._plan
             experiments = list(enumerate(plan.experiments))
-            several, digest = len(plan.seeds) > 1, plan.digest
-        items = list_experiments(experiments, several_seeds=several, place_of=places.place_of)
+            several, digest, lengths = len(plan.seeds) > 1, plan.digest, plan.chunks
+        items = list_plan(experiments, lengths, several_seeds=several, place_of=places.place_of)
         return ItemListing(plan=digest, items=items)
 
     def _check_plan(self, folder: RunFolder) -> None:

@@ -71,6 +71,26 @@ def list_experiments(
     )
 
 
+def list_plan(
+    numbered: Sequence[tuple[int, Experiment]],
+    chunk_lengths: Iterable[int],
+    *,
+    several_seeds: bool,
+    place_of: PlaceFinder,
+) -> tuple[ListedItem, ...]:
+    """List a plan, or a shard of it: its experiments or, of a large plan, its chunks."""
+    if len(numbered) <= MOST_SINGLE_ITEMS:
+        return list_experiments(numbered, several_seeds=several_seeds, place_of=place_of)
+    experiments, items, begin = dict(numbered), [], 0
+    for number, count in enumerate(chunk_lengths):
+        positions = tuple(i for i in range(begin, begin + count) if i in experiments)
+        begin += count
+        if positions:
+            golden = GoldenRun.for_experiment(experiments[positions[0]], several_seeds=several_seeds)
+            items.append(ListedItem(name=_chunk_name(number), positions=positions, golden_key=golden.key))
+    return tuple(items)
+
+
 def positions_in_plan(folder: RunFolder, chunks: Iterable[PendingChunk]) -> dict[int, tuple[int, ...]]:
     """Return the positions of the pending experiments in the plan, by chunk index."""
     begins, begin = [], 0
@@ -88,7 +108,7 @@ def list_chunks(folder: RunFolder, pending: Sequence[PendingChunk]) -> tuple[Lis
     golden_keys, positions = golden_key_by_chunk(folder, pending), positions_in_plan(folder, pending)
     return tuple(
         ListedItem(
-            name=f"chunk-{chunk.chunk_index:05d}",
+            name=_chunk_name(chunk.chunk_index),
             positions=positions[chunk.chunk_index],
             golden_key=golden_keys[chunk.chunk_index],
         )
@@ -111,6 +131,10 @@ def place_in_run_folder(folder: RunFolder) -> PlaceFinder:
     """Return a finder for a plan whose library is not looked at."""
     place = (str(folder.path / CAMPAIGN_FILE), None)
     return lambda fault: place
+
+
+def _chunk_name(number: int) -> str:
+    return f"chunk-{number:05d}"
 
 
 def _label(experiment: Experiment) -> str:

@@ -13,7 +13,7 @@ from mutator.campaigns.plan import build_plan
 from mutator.execution import listed_items
 from mutator.execution.campaign_items import CampaignFile, ItemSource
 from mutator.execution.item_running import ItemRunner
-from mutator.execution.listed_items import ItemListing, list_experiments
+from mutator.execution.listed_items import ItemListing, list_experiments, list_plan
 from mutator.execution.spec_places import SpecPlaces
 from mutator.model import Experiment, Method
 from mutator.workspace import Workspace
@@ -82,6 +82,26 @@ def test_every_experiment_of_a_plan_has_a_name_of_its_own_and_a_place(toycar: Wo
         text = (toycar.library / "faults" / f"{one.fault.module}/{one.fault.fault_type}.yaml").read_text()
         assert file.endswith(f"{one.fault.fault_type}.yaml")
         assert text.splitlines()[line - 1].strip().startswith(f"{one.fault.spec.rpartition('/')[2]}:")
+
+
+def test_a_large_plan_is_listed_by_chunks(
+    experiment: Callable[..., Experiment], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a shard, those that it has."""
+    numbered = list(enumerate(experiment(value=i, scenario="A" if i < 4 else "B") for i in range(7)))
+
+    def listed(pairs: list[tuple[int, Experiment]]) -> list[tuple[str, tuple[int, ...], str]]:
+        items = list_plan(pairs, [2, 2, 3], several_seeds=False, place_of=lambda fault: PLACE)
+        return [(item.name, item.positions, item.golden_key) for item in items]
+
+    assert len(listed(numbered)) == 7
+    monkeypatch.setattr(listed_items, "MOST_SINGLE_ITEMS", 2)
+    assert listed(numbered) == [
+        ("chunk-00000", (0, 1), "A"),
+        ("chunk-00001", (2, 3), "A"),
+        ("chunk-00002", (4, 5, 6), "B"),
+    ]
+    assert [positions for _, positions, _ in listed([*numbered[:2], *numbered[4:]])] == [(0, 1), (4, 5, 6)]
 
 
 def test_collecting_5000_experiments_costs_at_most_two_seconds(
