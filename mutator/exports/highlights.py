@@ -1,7 +1,8 @@
 """Experiments as a pull request shows them: with their place in the controller, and what happened."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from mutator.campaigns.fault_positions import FaultPositions, SourcePosition
 from mutator.comparison.gate_failures import FailingExperiment
@@ -110,17 +111,24 @@ class ChartMaker:
 
     def chart(self, highlight: Highlight) -> str:
         """Return the chart in Markdown; '' if the run folder has no series of the experiment."""
-        record = self.folder.records().get(highlight.experiment.id)
+        record = self._records.get(highlight.experiment.id)
         if record is None:
             return ""
         manifest, before = self.source.manifest, self._run_before(highlight.experiment)
         history = channel_history(self.folder, record, highlight.hazard, manifest, before)
         return "" if history is None else chart_markdown(history)
 
+    @cached_property
+    def _records(self) -> Mapping[str, Record]:
+        return self.folder.records()
+
+    @cached_property
+    def _records_before(self) -> Mapping[str, Record]:
+        return {} if self.comparison is None else self.comparison.a.folder.records()
+
     def _run_before(self, experiment: Experiment) -> tuple[RunFolder, Record] | None:
         if self.comparison is None:
             return None
         pair = next((pair for pair in self.comparison.pairs if pair.b.id == experiment.id), None)
-        folder = self.comparison.a.folder
-        record = None if pair is None else folder.records().get(pair.a.id)
-        return None if record is None else (folder, record)
+        record = None if pair is None else self._records_before.get(pair.a.id)
+        return None if record is None else (self.comparison.a.folder, record)
