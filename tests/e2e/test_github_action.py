@@ -193,6 +193,21 @@ def change(repository: Path, path: str, old: str, new: str) -> None:
     git(repository, "commit", "--quiet", "--all", "-m", "change")
 
 
+def test_a_run_with_harness_errors_shows_the_end_of_its_output(runner: Runner) -> None:
+    """Such a run has no line that begins with `error`."""
+    mutator = runner.temp / "bin" / "mutator"
+    mutator.write_text("#!/bin/sh\nseq 30\necho '100% harness errors: 2'\nexit 3\n")
+    mutator.chmod(0o755)
+    runner.context |= {"inputs.campaign": "small", "steps.keys.outputs.runs": str(runner.temp / "runs")}
+    [step] = [step for step in STEPS if step.get("name") == "Run the campaign on this version"]
+    assert runner.run_step(step) == 3
+    [error] = runner.annotations("error")
+    assert error.startswith("::error title=The campaign did not finish::12%0A13%0A")
+    assert error.endswith("%0A30%0A100%25 harness errors: 2")
+    summary = (runner.temp / "summary.md").read_text()
+    assert summary.endswith("    30\n    100% harness errors: 2\n\n")
+
+
 @pytest.mark.slow
 def test_a_change_with_new_hazards_fails_with_annotations_summary_and_sarif(
     runner: Runner, repository: Path
