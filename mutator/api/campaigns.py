@@ -7,7 +7,7 @@ from mutator._common.argument_checks import check_type, check_whole_number
 from mutator.api.runs import Run
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.engines.engine_choice import check_engine_is_offered
-from mutator.errors import IncompleteRun
+from mutator.errors import IncompleteRun, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.distributor_choice import choose_distributor
 from mutator.execution.session_summary import Summary
@@ -26,6 +26,8 @@ def run(
     reviewed: bool = False,
     accept_versions: bool = False,
     reuse: bool = True,
+    since: str | Path | None = None,
+    last_failed: bool = False,
     cluster: str | None = None,
     insecure_network: bool = False,
     progress: ProgressCallback | None = None,
@@ -42,6 +44,10 @@ def run(
     * `accept_versions`: resume even if versions of Python or packages have changed, and record the change.
     * `reuse`: copy the results of experiments that earlier runs had, with the same target, faults, harness
       and versions, on this machine. A sample is proved, as for forked experiments.
+    * `since`: the run folder of an earlier run. An experiment is left out if nothing that its run executed
+      there has changed; its earlier record stands. Both runs need Python 3.12, on this machine.
+    * `last_failed`: run only what failed in `since` or, without it, in `out`: hazards, and runs that did not
+      end normally. If nothing failed, everything runs. The other experiments stay to be run.
     * `cluster`: the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file. Its
       workers run the experiments; `workers` then applies only to the checks before the campaign.
     * `insecure_network`: accept a scheduler that others on the network can reach.
@@ -56,6 +62,7 @@ def run(
     check_engine_is_offered(engine)
     if choices is not None:
         check_type("choices", choices, Choices, "mutator.Choices")
+    _check_since(since, cluster, reuse=reuse)
     opened_workspace, folder = open_workspace(workspace), Path(out)
     summary = run_campaign(
         opened_workspace,
@@ -67,12 +74,29 @@ def run(
         reviewed=reviewed,
         accept_versions=accept_versions,
         reuse=reuse,
+        since=None if since is None else Path(since),
+        last_failed=last_failed,
         distributor=choose_distributor(cluster, insecure=insecure_network),
         notify=progress,
     )
     if summary.exit_code:
         warnings.warn(describe_unfinished(summary), IncompleteRun, stacklevel=2)
     return Run(RunFolder.open(folder), opened_workspace, summary)
+
+
+def _check_since(since: str | Path | None, cluster: str | None, *, reuse: bool) -> None:
+    if since is not None and cluster is not None:
+        raise MutatorError(
+            "`since` with `cluster`",
+            argument="since",
+            remedy="leave out one of them: the workers of a cluster do not have the earlier run",
+        )
+    if since is not None and not reuse:
+        raise MutatorError(
+            "`since` without `reuse`",
+            argument="since",
+            remedy="leave out one of them: without `reuse`, every experiment runs",
+        )
 
 
 def describe_unfinished(summary: Summary) -> str:

@@ -1,6 +1,6 @@
 """Chunks: consecutive experiments of a plan with the same golden run. A shard has whole chunks."""
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice
 
@@ -40,21 +40,29 @@ class PendingChunk:
     pending_positions: tuple[int, ...]  # of its experiments in the chunk
 
 
-def pending_chunks_of(folder: RunFolder, records: Mapping[str, Record]) -> tuple[PendingChunk, ...]:
+def pending_chunks_of(
+    folder: RunFolder, records: Mapping[str, Record], selected_ids: Collection[str] | None = None
+) -> tuple[PendingChunk, ...]:
     """Return the chunks of the folder's shard that still have experiments to run.
 
-    Experiments to run are those without a record, and harness errors, which are retried.
+    Experiments to run are those without a record, and harness errors, which are retried; of these only the
+    selected ones, if any are given.
     """
     finished_ids = {record.experiment_id for record in endings_of(records) if record.is_final}
     # the ids of a large plan take long to read; a new run needs none of them
-    names = plan_file.experiment_ids(folder.path) if finished_ids else None
+    reads_ids = bool(finished_ids) or selected_ids is not None
+    names = plan_file.experiment_ids(folder.path) if reads_ids else None
     shard = folder.shard
     pending_chunks: list[PendingChunk] = []
     for index, (_, _, count) in enumerate(folder.head.chunks):
         if names is None:
             pending_positions = tuple(range(count))
         else:
-            pending_positions = tuple(i for i in range(count) if next(names) not in finished_ids)
+            pending_positions = tuple(
+                i
+                for i, name in enumerate(islice(names, count))
+                if name not in finished_ids and (selected_ids is None or name in selected_ids)
+            )
         if pending_positions and (shard is None or shard.has_chunk(index)):
             pending_chunks.append(PendingChunk(index, pending_positions))
     return tuple(pending_chunks)

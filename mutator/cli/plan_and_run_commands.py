@@ -226,6 +226,22 @@ def run(
         bool,
         typer.Option("--no-reuse", help="Run every experiment, even if an earlier run had the same one."),
     ] = False,
+    since: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="RUN",
+            help="Leave out experiments if nothing that they executed in this earlier run has changed; their "
+            "earlier results stand. Both runs need Python 3.12.",
+        ),
+    ] = None,
+    last_failed: Annotated[
+        bool,
+        typer.Option(
+            "--last-failed",
+            help="Run only what failed in the run of --since or, without it, in this folder: hazards, and "
+            "runs that did not end normally. If nothing failed, run everything.",
+        ),
+    ] = False,
     cluster: Cluster = None,
     insecure_network: InsecureNetwork = False,
     stills: Annotated[
@@ -264,6 +280,8 @@ def run(
                 reviewed=reviewed,
                 accept_versions=accept_versions,
                 reuse=not no_reuse,
+                since=since,
+                last_failed=last_failed,
                 cluster=cluster,
                 insecure_network=insecure_network,
                 progress=notify,
@@ -315,7 +333,7 @@ def _print_summary(
     )
     if terminal.as_json:
         counts = {"planned": summary.planned, "done": summary.done, "ran": summary.ran}
-        counts |= {"reused": summary.reused}
+        counts |= {"reused": summary.reused, "left_out": summary.left_out, "unselected": summary.unselected}
         paths = {"run": str(out), "report": str(report_paths[0]) if report_paths else None}
         errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
         outcomes = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
@@ -328,8 +346,9 @@ def _print_summary(
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now; "
         f"checks, experiments and proof took {describe_duration(summary.elapsed_s)}"
     )
-    if summary.reuse_note:
-        terminal.print_text(summary.reuse_note)
+    for note in (summary.reuse_note, summary.since_note, summary.selection_note):
+        if note:
+            terminal.print_text(note)
     if summary.proof_note:
         terminal.print_text(f"proof: {summary.proof_note}")
     if report:
@@ -345,7 +364,7 @@ def _print_summary(
             terminal.print_text(f"  {name[:length]}: {detail}", style="red")
     if summary.problem:
         terminal.print_error(summary.problem)
-    if summary.interrupted or summary.done < summary.planned:
+    if summary.interrupted or summary.done + summary.unselected < summary.planned:
         terminal.print_command("resume:", resume_command())
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from secrets import token_bytes
 from typing import Any, Protocol
 
+from mutator.engines.executed_functions import ExecutedFunctions
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Limits, Status
 from mutator.mutants.injected_line_syntax import place_in_target
@@ -23,12 +24,11 @@ class RunMode(StrEnum):
     FORK = "fork"
     GOLDEN_REUSED = "golden"  # the trigger never held, so no run was needed
     REUSED = "reused"  # an earlier run had the same inputs, so its result was copied
+    UNAFFECTED = "unaffected"  # nothing that an earlier run executed has changed, so its result was copied
 
 
 # modes that need the equivalence check
-MODES_TO_PROVE = frozenset(
-    {RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN_REUSED.value, RunMode.REUSED.value}
-)
+MODES_TO_PROVE = frozenset(mode.value for mode in RunMode if mode is not RunMode.REFERENCE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +55,7 @@ class Job:
     note_variable_types: bool = False  # note the types of variables when these lines begin
     # note where the injections' statements execute: file and function of each (`reach_jobs.watched_job`)
     watched_places: tuple[tuple[str, str], ...] = ()
+    note_executed_functions: bool = False  # note which functions of the tree run, where Python can tell
 
     def problem_of_probe_report(self, report: object) -> str:
         """Return the problem with the probe's report; empty if there is none, or no probe."""
@@ -111,6 +112,7 @@ class JobResult:
     * `fork_step`: the step before which the run was forked
     * `was_stopped_at_hazard`: whether a terminal hazard ended the run early
     * `third_party_modules`: the third-party top-level modules that the run imported
+    * `executed_functions`: what the run executed of the tree; None if that was not noted
     * `watch_report`, `executed_lines` (from 1, by file), `reach_report`, `variable_types` (by file, line and
       name): what the reference engine noted
     """
@@ -129,6 +131,7 @@ class JobResult:
     fork_step: int = 0
     was_stopped_at_hazard: bool = False
     third_party_modules: tuple[str, ...] = ()
+    executed_functions: ExecutedFunctions | None = None
     watch_report: Mapping[str, Any] = field(default_factory=dict)
     executed_lines: Mapping[str, list[int]] = field(default_factory=dict)
     reach_report: Mapping[str, Any] = field(default_factory=dict)

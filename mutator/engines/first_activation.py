@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from mutator.engines.executed_functions import ExecutedFunctions
 from mutator.mutants.probe_contract import ProbeSource
 from mutator.triggers.trace_formulas import ARITHMETIC_FUNCTIONS, COMPARISON_FUNCTIONS
 
@@ -22,12 +23,14 @@ class GoldenObservations:
     """What a probe observes in a golden run.
 
     `values` has a tuple for each observation: the time (s), then the observed values. `counts_before_steps`
-    has the number of observations made before each step. `imported_modules` are those of the run.
+    has the number of observations made before each step. `imported_modules` and `executed_functions` are
+    those of the run.
     """
 
     values: tuple[tuple[float, ...], ...]
     counts_before_steps: tuple[int, ...]
     imported_modules: tuple[str, ...] = ()
+    executed_functions: ExecutedFunctions | None = None
 
     @cached_property
     def columns(self) -> np.ndarray:

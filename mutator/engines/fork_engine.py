@@ -24,6 +24,7 @@ from mutator._common.hashing import content_id
 from mutator._common.message_text import counted
 from mutator.engines.code_swap_planning import CodeSwap, plan_swap
 from mutator.engines.engine_jobs import EngineArguments, Job, JobResult, RunMode, harness_error_result
+from mutator.engines.executed_functions import ExecutedFunctions, executed_functions_from_json
 from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
 from mutator.engines.fork_messages import check_fork_report, fork_request
 from mutator.engines.fork_server_processes import (
@@ -167,7 +168,7 @@ class ForkEngine:
             return self._fork_before_first_step(job, folder, swap)
         fork_point = find_fork_point(job.probe_source, observations)
         if fork_point is None:
-            return _golden_result_of_inactive_fault(job, job.golden_folder)
+            return _golden_result_of_inactive_fault(job, job.golden_folder, observations.executed_functions)
         return self._run_in_fork(
             self._process_before_step(job, fork_point.step, swap), job, folder, swap, fork_point
         )
@@ -293,6 +294,7 @@ class ForkEngine:
             log_tail=home.log_tail(),
             was_stopped_at_hazard=bool(report and report.get("stopped")),
             third_party_modules=tuple(report["modules"]) if report else (),
+            executed_functions=executed_functions_from_json(report.get("executed")) if report else None,
             watch_report={name: report[name] for name in _OBSERVATION_KEYS} if observe and report else {},
             mode=RunMode.WARM if self._forks_before_first_step else RunMode.FORK,
         )
@@ -337,7 +339,10 @@ class ForkEngine:
             if values and counts_before_steps[:1] != (0,):
                 raise NotForkable("it observes before its first step")
             observations = GoldenObservations(
-                values=values, counts_before_steps=counts_before_steps, imported_modules=imported_modules
+                values=values,
+                counts_before_steps=counts_before_steps,
+                imported_modules=imported_modules,
+                executed_functions=execution.executed_functions,
             )
             self._observation_store.save(golden_id, observations)
             return observations
@@ -355,12 +360,15 @@ def _modules_to_load(swap: CodeSwap) -> list[str]:
     return [*dict.fromkeys(function.module for function in swap.functions), *swap.imported_modules]
 
 
-def _golden_result_of_inactive_fault(job: Job, golden: Path) -> JobResult:
+def _golden_result_of_inactive_fault(
+    job: Job, golden: Path, executed_functions: ExecutedFunctions | None
+) -> JobResult:
     return JobResult(
         status=Status.OK,
         detail="",
         out=golden,
         probe_report=untriggered_report(job.mutant_id),
+        executed_functions=executed_functions,
         cpu_s=0.0,
         wall_s=0.0,
         mode=RunMode.GOLDEN_REUSED,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import write_atomic
+from mutator.engines.executed_functions import executed_functions_from_json
 from mutator.engines.first_activation import GoldenObservations
 
 _AUTHENTICATION_CODE_BYTES = 32  # of SHA-256
@@ -30,15 +31,24 @@ class ObservationStore:
         code, data = content[:_AUTHENTICATION_CODE_BYTES], content[_AUTHENTICATION_CODE_BYTES:]
         if not data or not hmac.compare_digest(code, self._authentication_code(path, data)):
             return None
-        values, counts_before_steps, imported_modules = marshal.loads(data)
+        values, counts_before_steps, imported_modules, executed = marshal.loads(data)
         return GoldenObservations(
-            values=values, counts_before_steps=counts_before_steps, imported_modules=imported_modules
+            values=values,
+            counts_before_steps=counts_before_steps,
+            imported_modules=imported_modules,
+            executed_functions=executed_functions_from_json(executed),
         )
 
     def save(self, golden_id: str, observations: GoldenObservations) -> None:
         path = self._path_of(golden_id)
+        executed = observations.executed_functions
         data = marshal.dumps(
-            (observations.values, observations.counts_before_steps, observations.imported_modules)
+            (
+                observations.values,
+                observations.counts_before_steps,
+                observations.imported_modules,
+                executed.as_json() if executed else None,
+            )
         )
         write_atomic(path, self._authentication_code(path, data) + data)
 

@@ -23,6 +23,7 @@ from mutator.engines.engine_jobs import (
     RunMode,
     harness_error_result,
 )
+from mutator.engines.executed_functions import executed_functions_from_json
 from mutator.engines.job_folder import PLAIN_OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
 from mutator.engines.job_tree_pool import JobTreePool
 from mutator.engines.process_endings import (
@@ -160,6 +161,7 @@ class ReferenceEngine:
             log_tail=home.log_tail(),
             was_stopped_at_hazard=bool(report and report.get("stopped")),
             third_party_modules=tuple(report["modules"]) if report else (),
+            executed_functions=executed_functions_from_json(report.get("executed")) if report else None,
             watch_report=report.get("watched", {}) if report else {},
             executed_lines=report.get("lines", {}) if report else {},
             variable_types=report.get("types", {}) if report else {},
@@ -193,6 +195,7 @@ class ReferenceEngine:
             "steps": self.limits.steps,
             "stop": stop_function_source(self.manifest) if job.stop_at_hazard else None,
             "stepwise": self.manifest.stepwise_function,
+            "functions": job.note_executed_functions,
             "watch": job.watch_nondeterminism,
             "observe": self._observed_names() if job.watch_nondeterminism or job.keep_observations else None,
             "lines": self._observation_lines() if job.note_executed_lines else None,

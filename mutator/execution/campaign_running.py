@@ -31,6 +31,8 @@ def run_campaign(
     reviewed: bool = False,
     accept_versions: bool = False,
     reuse: bool = True,
+    since: Path | None = None,
+    last_failed: bool = False,
     distributor: Distributor = LOCAL_DISTRIBUTOR,
     notify: ProgressCallback | None = None,
 ) -> Summary:
@@ -39,8 +41,10 @@ def run_campaign(
     A frozen plan in `out` is used unchanged. Omitted `choices` keep their frozen values. `engine` is a name
     in `engines.engine_kinds` (None: the fastest that pays off). With `reviewed`, only approved mutants run
     (`mutator.review.approval_gate`). Without `accept_versions`, Python and packages must not change during a
-    run. Without `reuse`, experiments run even if the store of finished runs has their results. Another
-    thread calls `notify` about twice a second.
+    run. Without `reuse`, experiments run even if the store of finished runs has their results. With `since`,
+    a run folder, experiments are left out if nothing that they executed there has changed. With
+    `last_failed`, only those run that failed in `since` or, without it, in `out`. Another thread calls
+    `notify` about twice a second.
 
     Raises MutatorError for wrong input, choices that differ from the frozen ones, or a changed campaign file
     or target. Raises CheckFailed if an unapproved mutant would run with `reviewed`, or if a
@@ -56,6 +60,8 @@ def run_campaign(
         reviewed=reviewed,
         accept_versions=accept_versions,
         reuse=reuse,
+        since=since,
+        last_failed=last_failed,
         notify=notify,
     ) as session:
         session.prepare(packages_of_distributor(distributor))

@@ -1,7 +1,7 @@
 """Turn experiments into records: build each mutant, run it, compare it with its golden run, judge it."""
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -10,6 +10,7 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import digest
 from mutator.campaigns.shared_runs import group_by_run
 from mutator.engines.engine_jobs import Engine, Job, JobResult, RunMode
+from mutator.engines.executed_functions import ExecutedFunctions
 from mutator.errors import BadAddition, BadOutput, InvalidMutant, MutatorError
 from mutator.execution.inactivity_check import InactivityCheck
 from mutator.execution.loaded_goldens import LoadedGoldens, changed_file_error
@@ -29,7 +30,6 @@ from mutator.outcomes.hazard_and_metric_judgement import RunJudgement, load_judg
 from mutator.outcomes.lost_observed_values import find_lost_value
 from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.outcomes.verdict_rules import first_events_after, outcome_of
-from mutator.store.finished_run_store import FinishedRun
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
@@ -40,7 +40,7 @@ class RecordedExperiment:
     """An experiment with its record.
 
     `output_folder` (of the target) is valid until the next result; None without a mutant or a run.
-    `series` is None if not requested or if the run failed.
+    `series` is None if not requested or if the run failed. `packages` are those of a copied run.
     """
 
     experiment: Experiment
@@ -55,13 +55,36 @@ class RecordedExperiment:
     fork_step: int = 0
     series: EncodedSeries | None = None
     third_party_modules: tuple[str, ...] = ()
+    executed_functions: ExecutedFunctions | None = None
+    packages: Mapping[str, str | None] | None = None
 
     @property
-    def is_reused(self) -> bool:
-        return self.mode is RunMode.REUSED
+    def is_copied(self) -> bool:
+        """Whether the record is that of another run."""
+        return self.mode in (RunMode.REUSED, RunMode.UNAFFECTED)
 
 
-FindFinishedRun = Callable[[Experiment, Mutant], FinishedRun | None]
+@dataclass(frozen=True, kw_only=True)
+class CopiedRun:
+    """The result of an earlier run, which an experiment gets instead of a run of its own.
+
+    `mode` says why it can. `why` is what the timing adds to it. `packages` are the versions of those that the
+    run loaded.
+    """
+
+    record: Record
+    faulty_series: bytes | None
+    mode: RunMode
+    why: str = ""
+    executed_functions: ExecutedFunctions | None
+    packages: Mapping[str, str | None]
+
+
+FindCopiedRun = Callable[[Experiment, Mutant], CopiedRun | None]
+
+
+def find_nothing(experiment: Experiment, mutant: Mutant) -> None:
+    """Find no run to copy."""
 
 
 class ExperimentRunner:
@@ -77,7 +100,7 @@ class ExperimentRunner:
         *,
         with_series: bool = False,
         inactivity_check: InactivityCheck | None = None,
-        find_finished_run: FindFinishedRun = lambda experiment, mutant: None,
+        find_copied_run: FindCopiedRun = find_nothing,
     ) -> None:
         self.inactivity_check = inactivity_check  # None: records do not say why a fault was never active
         self.manifest = manifest
@@ -86,13 +109,13 @@ class ExperimentRunner:
         self.goldens = goldens
         self.scenario_file = cache(scenario_file)
         self.with_series = with_series
-        self._find_finished_run = find_finished_run
+        self._find_copied_run = find_copied_run
 
     def run(self, experiments: Iterable[Experiment]) -> Iterator[RecordedExperiment]:
         """Yield each experiment with its record.
 
-        A mutant that cannot be built is not run, nor an experiment whose finished run is found. Experiments
-        that share a run get the same record.
+        A mutant that cannot be built is not run, nor an experiment that gets a copied run. Experiments that
+        share a run get the same record.
         """
         shared = {same[0].id: same for same in group_by_run(self.manifest, experiments)}
         for finished in self._run_distinct([same[0] for same in shared.values()]):
@@ -119,8 +142,8 @@ class ExperimentRunner:
                     without_job.append(self._finish_without_run(experiment, err))
                     continue
                 self.goldens.read_and_verify_files_of(experiment)
-                if (run := self._find_finished_run(experiment, built)) is not None:
-                    without_job.append(self._reuse_run(experiment, built, run))
+                if (run := self._find_copied_run(experiment, built)) is not None:
+                    without_job.append(self._copy_run(experiment, built, run))
                     continue
                 started[experiment.id] = (experiment, built)
                 yield self._build_job(experiment, built)
@@ -131,7 +154,7 @@ class ExperimentRunner:
             yield self._finish_run(*started.pop(job.name), execution)
         yield from without_job
 
-    def _reuse_run(self, experiment: Experiment, mutant: Mutant, run: FinishedRun) -> RecordedExperiment:
+    def _copy_run(self, experiment: Experiment, mutant: Mutant, run: CopiedRun) -> RecordedExperiment:
         series = None
         if self.with_series and run.faulty_series is not None:
             series = self._series_beside_golden(experiment, run.faulty_series)
@@ -139,8 +162,11 @@ class ExperimentRunner:
             experiment=experiment,
             record=replace(run.record, experiment_id=experiment.id),
             mutant=mutant,
-            mode=RunMode.REUSED,
+            mode=run.mode,
+            fallback_reason=run.why,
             series=series,
+            executed_functions=run.executed_functions,
+            packages=run.packages,
         )
 
     def _build_job(self, experiment: Experiment, mutant: Mutant) -> Job:
@@ -158,6 +184,7 @@ class ExperimentRunner:
             golden_folder=self.goldens.folder_of(experiment),
             stop_at_hazard=stop,
             golden_has_terminal_hazard=stop and self.goldens.has_terminal_hazard(experiment),
+            note_executed_functions=True,
         )
 
     def _finish_without_run(self, experiment: Experiment, err: MutatorError) -> RecordedExperiment:
@@ -190,6 +217,7 @@ class ExperimentRunner:
             fork_step=execution.fork_step,
             series=self._encode_series(experiment, record, faulty) if faulty is not None else None,
             third_party_modules=execution.third_party_modules,
+            executed_functions=execution.executed_functions,
         )
 
     def _check_input_unchanged(self, experiment: Experiment, execution: JobResult) -> None:

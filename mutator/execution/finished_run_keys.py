@@ -32,23 +32,26 @@ def surroundings_digest(workspace: "Workspace", manifest: TargetManifest) -> str
     """Return the digest of what all runs of a target have in common: target, manifest, templates, harness,
     Python, machine and the packages that the harness requires.
     """
+    return digest([_SCHEMA, manifest.tree.digest, *surroundings_by_name(workspace, manifest).values()])
+
+
+def surroundings_by_name(workspace: "Workspace", manifest: TargetManifest) -> dict[str, str]:
+    """Return the digests of what all runs of a target have in common, but for the target itself, by what it
+    is.
+    """
     importer = TRACE_IMPORTER_DOOR.other_package_of(Path(manifest.trace_file).suffix.removeprefix("."))
     packages = {*run_environment.required_packages(), *([importer] if importer else [])}
-    return digest(
-        [
-            _SCHEMA,
-            manifest.tree.digest,
-            digest(read_bounded(manifest.path)),
-            workspace.fault_models().digest,
-            as_json_types(workspace.scale_of(manifest)),
-            harness_digest(),
-            run_environment.python_version(),
-            (platform.system(), platform.machine(), run_environment.processor_name()),
-            run_environment.loaded_blas(),
-            run_environment.thread_limits(),
-            run_environment.package_versions(packages),
-        ]
-    )
+    machine = (platform.system(), platform.machine(), run_environment.processor_name())
+    values = {
+        "the manifest": digest(read_bounded(manifest.path)),
+        "the templates": workspace.fault_models().digest,
+        "the severity scale": as_json_types(workspace.scale_of(manifest)),
+        "mutator": harness_digest(),
+        "Python": run_environment.python_version(),
+        "the machine": [machine, run_environment.loaded_blas(), run_environment.thread_limits()],
+        "a package that mutator requires": run_environment.package_versions(packages),
+    }
+    return {name: digest(value) for name, value in values.items()}
 
 
 @lru_cache(maxsize=1)

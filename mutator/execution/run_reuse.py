@@ -2,21 +2,19 @@
 
 import builtins
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from mutator._common.hashing import digest
-from mutator.campaigns import run_environment
+from mutator.engines.engine_jobs import RunMode
+from mutator.engines.executed_functions import executed_functions_from_json
 from mutator.engines.process_endings import EXITED_DETAIL, KILLED_DETAIL
-from mutator.execution.experiment_runner import RecordedExperiment
+from mutator.execution.experiment_runner import CopiedRun, RecordedExperiment
 from mutator.execution.finished_run_keys import harness_digest, run_key
+from mutator.execution.loaded_packages import LoadedPackages
 from mutator.model import Experiment, Record, RunError, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.store.finished_run_store import FinishedRun, FinishedRuns, UnprovedRuns
-from mutator.store.preflight_results import (
-    packages_loaded_by_golden_runs,
-    unpackaged_modules_of_golden_runs,
-)
 from mutator.store.run_folder import RunFolder
 
 # not in the middle of a word, as in `km/h`; often the path of the scenario's file
@@ -53,16 +51,13 @@ class RunReuse:
         # a worker of a bench can begin long after its session, when somebody has edited the harness
         self._is_in_use = harness_digest() == assignment.harness
         self._searches = assignment.searches and self._is_in_use
-        self._version_by_package = assignment.version_by_package
+        self._packages = LoadedPackages(folder, assignment.version_by_package)
         self._with_series = bool(folder.series_budget_mb)
         self._golden_digest_of = golden_digest_of
-        self._run_path = folder.path
-        self._golden_packages: tuple[str, ...] | None = None  # not read yet
-        self._is_golden_unpackaged: bool | None = None
         self._stored = FinishedRuns()
         self._unproved = UnprovedRuns(folder.path, folder.head.plan_of_lines, worker_name)
 
-    def find(self, experiment: Experiment, mutant: Mutant) -> FinishedRun | None:
+    def find(self, experiment: Experiment, mutant: Mutant) -> CopiedRun | None:
         """Return the stored run of an experiment; None if it must run."""
         if not self._searches:
             return None
@@ -74,32 +69,41 @@ class RunReuse:
                 and run.surroundings == self._surroundings
                 and is_storable(run.record)
                 and (run.faulty_series is not None or not self._with_series or run.record.status != Status.OK)
-                and self._versions_of(run.packages) == run.packages
+                and self._packages.have_versions(run.packages)
             )
 
-        return self._stored.find(self._key_of(experiment, mutant), is_usable)
+        run = self._stored.find(self._key_of(experiment, mutant), is_usable)
+        if run is None:
+            return None
+        return CopiedRun(
+            record=run.record,
+            faulty_series=run.faulty_series,
+            mode=RunMode.REUSED,
+            executed_functions=executed_functions_from_json(run.executed),
+            packages=run.packages,
+        )
 
     def note(self, finished: RecordedExperiment) -> None:
         """Note what a run gave, for the store."""
         mutant, record = finished.mutant, finished.record
-        if not self._is_in_use or mutant is None or finished.is_reused or not is_storable(record):
+        if not self._is_in_use or mutant is None or finished.is_copied or not is_storable(record):
             return
-        modules = _modules_outside(mutant, finished.third_party_modules)
-        packages = self._packages_of(modules)
-        if self._has_unpackaged(modules) or not packages <= self._version_by_package.keys():
+        packages = self._packages.versions(finished.third_party_modules, mutant)
+        if packages is None:
             return  # it loaded code that can change
-        series = finished.series.faulty_bytes if finished.series else None
+        executed = finished.executed_functions
         run = FinishedRun(
             record=record,
-            packages=self._versions_of(packages),
+            packages=packages,
             surroundings=self._surroundings,
-            faulty_series=series,
+            faulty_series=finished.series.faulty_bytes if finished.series else None,
+            executed=executed.as_json() if executed else None,
         )
         self._unproved.append(self._key_of(finished.experiment, mutant), run)
 
     def note_new_goldens(self) -> None:
-        """Note that the run folder has more golden runs, which can have loaded more packages."""
-        self._golden_packages = self._is_golden_unpackaged = None
+        """Note that the run folder has more golden runs."""
+        self._packages.note_new_goldens()
 
     def close(self) -> None:
         self._unproved.close()
@@ -107,25 +111,6 @@ class RunReuse:
     def _key_of(self, experiment: Experiment, mutant: Mutant) -> str:
         golden_digest = self._golden_digest_of(experiment)
         return run_key(self._surroundings, experiment, mutant.tree_digest, golden_digest)
-
-    def _versions_of(self, packages: Iterable[str]) -> dict[str, str | None]:
-        return {name: self._version_by_package.get(name) for name in packages}
-
-    def _packages_of(self, modules: Collection[str]) -> set[str]:
-        """Return the packages of these modules, which a run loaded, and of its golden run."""
-        if self._golden_packages is None:
-            self._golden_packages = packages_loaded_by_golden_runs(RunFolder(self._run_path))
-        return {*self._golden_packages, *(run_environment.packages_of_modules(modules) if modules else ())}
-
-    def _has_unpackaged(self, modules: Collection[str]) -> bool:
-        """Whether no package provides one of these modules, or one that a golden run loaded."""
-        if self._is_golden_unpackaged is None:
-            self._is_golden_unpackaged = bool(unpackaged_modules_of_golden_runs(RunFolder(self._run_path)))
-        return self._is_golden_unpackaged or bool(run_environment.modules_without_package(modules))
-
-
-def _modules_outside(mutant: Mutant, modules: Iterable[str]) -> set[str]:
-    return {*modules} - {path.partition("/")[0].removesuffix(".py") for path in mutant.files}
 
 
 def is_storable(record: Record) -> bool:

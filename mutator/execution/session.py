@@ -10,6 +10,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cached_property
 from itertools import chain
 from secrets import token_bytes
 
@@ -34,6 +35,8 @@ from mutator.errors import (
     MutatorError,
     MutatorWarning,
 )
+from mutator.execution.code_recording import RecordingAssignment, build_recording_assignment
+from mutator.execution.earlier_run import EarlierRunUse
 from mutator.execution.finished_outcome_cache import (
     FinishedRunOutcome,
     find_finished_run,
@@ -81,6 +84,7 @@ class Session:
         engine: str | None = None,
         accept_versions: bool = False,
         reuse: bool = True,
+        earlier: EarlierRunUse | None = None,
         notify: ProgressCallback = lambda progress: None,
     ) -> None:
         self.workspace = workspace
@@ -98,6 +102,9 @@ class Session:
             if reuse
             else None
         )
+        self._earlier = earlier or EarlierRunUse()
+        self._earlier.check_target(folder)
+        self._unselected_count = 0  # experiments without a record that are left for another session
         self.worker_prefix = self._new_worker_prefix()  # of the names of this session's workers
         self.problem = ""
         self.interrupted = False
@@ -125,10 +132,19 @@ class Session:
         self._earlier_outcome = None
         records = self.folder.records()
         self._finished_count_before = sum(ending.is_final for ending in endings_of(records))
-        pending_chunks = pending_chunks_of(self.folder, records)
-        if pending_chunks and (self.engine != REFERENCE or (self.reuse and self.reuse.searches)):
+        selected_ids = self._earlier.selected_ids(self.folder)
+        pending_chunks = pending_chunks_of(self.folder, records, selected_ids)
+        copies = self._earlier.since or (self.reuse and self.reuse.searches)
+        if pending_chunks and (self.engine != REFERENCE or copies):
             equivalence_check.mark_check_as_needed(self.folder.path)
         self.proof = equivalence_check.remaining_sampled_experiments(self.folder)
+        if selected_ids is not None:
+            pending = sum(len(chunk.pending_positions) for chunk in pending_chunks)
+            planned = self.folder.planned_experiment_count
+            self._unselected_count = planned - self._finished_count_before - pending
+            self.proof = tuple(
+                sample for sample in self.proof if sample.id in selected_ids or sample.id in records
+            )
         if pending_chunks or self.proof or not checks_and_goldens_exist(self.folder):
             check_requirements(self.manifest)
             accepted_version_differences(self.folder, accept=self.accept_versions)
@@ -234,7 +250,13 @@ class Session:
             secret=self.secret,
             parent_pid=parent_pid,
             reuse=self.reuse.assignment if self.reuse else None,
+            recording=self.recording,
         )
+
+    @cached_property
+    def recording(self) -> RecordingAssignment:
+        """How workers note what runs execute, and what they leave out."""
+        return build_recording_assignment(self.workspace, self.manifest, self._earlier.since)
 
     def start_of_worker(self, name: str) -> WorkerStart:
         """Return what another process needs to begin as a worker, whose files are believed from now on."""
@@ -284,6 +306,7 @@ class Session:
             remember_finished_run(
                 self.folder, FinishedRunOutcome(outcomes=outcomes, proof=proven, seals=seals)
             )
+        left_out, since_note = self._earlier.count_left_out(self.folder, self.worker_prefix)
         return Summary(
             planned=self.folder.planned_experiment_count,
             done=finished_count,
@@ -299,6 +322,9 @@ class Session:
             elapsed_s=time.monotonic() - self._start_s,
             has_reached_nothing=self._has_reached_nothing(outcomes),
             reused=count_reused(self.folder, self.worker_prefix),
+            unselected=self._unselected_count,
+            left_out=left_out,
+            since_note=since_note,
         )
 
     def compare_sample(self, records: Mapping[str, Record]) -> equivalence_check.EquivalenceResult | None:
@@ -349,8 +375,9 @@ class Session:
         )
 
     def _has_reached_nothing(self, outcomes: Counter[str]) -> bool:
-        """Whether the whole plan shows no hazard. A shard alone cannot tell."""
-        return self.folder.canary is None and not outcomes[Outcome.HAZARD] and self.folder.shard is None
+        """Whether the whole plan shows no hazard. A part of it alone cannot tell."""
+        is_whole = self.folder.shard is None and not self._unselected_count
+        return self.folder.canary is None and not outcomes[Outcome.HAZARD] and is_whole
 
     @contextmanager
     def _noting_full_disk(self) -> Iterator[None]:

@@ -11,6 +11,7 @@ from mutator._common.folder_locks import lock_run_folder
 from mutator._common.interrupts import raising_keyboard_interrupts
 from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.errors import MutatorError
+from mutator.execution.earlier_run import EarlierRunUse, open_earlier_run
 from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.session import Session
 from mutator.execution.watched_progress import writing_progress
@@ -33,12 +34,15 @@ def open_session(
     reviewed: bool = False,
     accept_versions: bool = False,
     reuse: bool = True,
+    since: Path | None = None,
+    last_failed: bool = False,
     notify: ProgressCallback | None = None,
 ) -> Iterator[Session]:
     """Lock the run folder `out`, freeze the plan if needed, and yield the session.
 
     Scratch folders are deleted before and after the session.
     """
+    earlier = EarlierRunUse(since=open_earlier_run(since, out) if since else None, last_failed=last_failed)
     is_new = not out.exists()
     make_run_folder(out)
     with raising_keyboard_interrupts(), lock_run_folder(out):
@@ -67,6 +71,7 @@ def open_session(
                     engine=engine,
                     accept_versions=accept_versions,
                     reuse=reuse,
+                    earlier=earlier,
                     notify=progress.notify,
                 )
                 yield session

@@ -32,6 +32,9 @@ class Summary:
     #: whether, without a canary, no experiment of the whole plan has reached a hazard
     has_reached_nothing: bool = False
     reused: int = 0  #: experiments of this session whose result was copied from an earlier run
+    left_out: int = 0  #: experiments that `since` left out: their earlier records stand
+    since_note: str = ""  #: what `since` left out, and why others ran; empty without it
+    unselected: int = 0  #: experiments without a record that `last_failed` did not select
 
     @property
     def reuse_note(self) -> str:
@@ -39,6 +42,13 @@ class Summary:
         if not self.reused:
             return ""
         return f"{self.reused:,} of {self.ran:,} reused: earlier runs had the same experiments"
+
+    @property
+    def selection_note(self) -> str:
+        """How many experiments `last_failed` left to run; empty if none."""
+        if not self.unselected:
+            return ""
+        return f"not selected by --last-failed: {self.unselected:,}; without it, the same command runs them"
 
     @property
     def seal(self) -> str | None:
@@ -59,7 +69,8 @@ class Summary:
         """
         if self.interrupted:
             return EXIT_INTERRUPTED
-        whole = self.done == self.planned and (self.proof is None or self.proof.is_complete)
+        is_proved = self.proof is None or self.proof.is_complete or bool(self.unselected)
+        whole = self.done + self.unselected == self.planned and is_proved
         if not whole or self.problem:
             return EXIT_HARNESS_ERRORS
         return EXIT_CHECK_FAILED if self.has_reached_nothing else EXIT_OK

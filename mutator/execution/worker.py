@@ -15,14 +15,22 @@ from mutator._common.folder_locks import open_worker_lock
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
 from mutator.campaigns.shared_runs import run_key
-from mutator.engines.engine_jobs import EngineArguments
-from mutator.execution.experiment_runner import RecordedExperiment, record_without_outcome
+from mutator.engines.engine_jobs import EngineArguments, RunMode
+from mutator.execution.code_recording import CodeRecording, RecordingAssignment
+from mutator.execution.experiment_runner import (
+    CopiedRun,
+    RecordedExperiment,
+    find_nothing,
+    record_without_outcome,
+)
 from mutator.execution.run_reuse import ReuseAssignment, RunReuse
 from mutator.execution.suspended_workers import on_resume
+from mutator.execution.unaffected_runs import UnaffectedRuns
 from mutator.execution.worker_processes import bind_to_parent
 from mutator.execution.worker_runners import WorkerRunners
 from mutator.execution.written_files import FileDigests
 from mutator.model import Experiment, Record, Status
+from mutator.mutants.mutant_building import Mutant
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter
 from mutator.store.timings import ending_text
@@ -35,7 +43,7 @@ class WorkerAssignment:
     `worker_name` makes its file names in the run folder unique. `parent_pid` is the process that the worker
     must not outlive (None: the worker is the command itself). `golden_digests` has the digest of each golden
     run, and `secret` authenticates files that workers share; neither is in a file. Without `reuse`, the store
-    of finished runs is left out.
+    of finished runs is left out; without `recording`, nobody notes what runs execute.
     """
 
     run_folder: Path
@@ -45,6 +53,7 @@ class WorkerAssignment:
     secret: bytes
     parent_pid: int | None = None
     reuse: ReuseAssignment | None = None
+    recording: RecordingAssignment | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +91,13 @@ class Worker:
             if assignment.reuse
             else None
         )
+        recording = assignment.recording
+        self._recording = CodeRecording(recording, self.folder, inputs.manifest) if recording else None
+        self._unaffected = (
+            UnaffectedRuns(recording.earlier_run, self._recording, inputs.manifest, self._golden_digest_of)
+            if recording and self._recording and recording.earlier_run
+            else None
+        )
         self.add_inputs(goldens=assignment.golden_digests)
         self._runners = WorkerRunners(
             EngineArguments(
@@ -98,7 +114,8 @@ class Worker:
             has_seeded_goldens=self.folder.has_seeded_goldens,
             scenario_file=self._scenario_files.__getitem__,
             with_series=bool(self.folder.series_budget_mb),
-            find_finished_run=self._reuse.find if self._reuse else lambda experiment, mutant: None,
+            find_copied_run=self._find_copied_run,
+            find_proof=self._unaffected.find_for_proof if self._unaffected else find_nothing,
         )
         self._last_finished: RecordedExperiment | None = None
         self._writer = RunWriter(
@@ -146,6 +163,13 @@ class Worker:
         }
         if goldens and self._reuse:
             self._reuse.note_new_goldens()
+        if goldens and self._recording:
+            self._recording.note_new_goldens()
+
+    def _find_copied_run(self, experiment: Experiment, mutant: Mutant) -> CopiedRun | None:
+        finders = (self._unaffected, self._reuse)
+        runs = (finder.find(experiment, mutant) for finder in finders if finder)
+        return next((run for run in runs if run), None)
 
     def _golden_digest_of(self, experiment: Experiment) -> str:
         return self._digest_by_golden_folder[self.folder.golden_folder_of(experiment)]
@@ -180,6 +204,10 @@ class Worker:
     def _store_finished(self, finished: RecordedExperiment) -> None:
         patch = None if finished.mutant is None else finished.mutant.patch_bytes
         timing = timing_of(finished, self._assignment.worker_name)
+        if self._recording and (code := self._recording.code_of(finished)):
+            timing["executed"] = self._writer.append_executed_code(code)
+        if self._unaffected and finished.mode is not RunMode.UNAFFECTED:
+            timing["affected"] = self._unaffected.reason(finished.experiment)
         self._writer.append(finished.record, timing, patch, finished.series)
         if self._reuse:
             self._reuse.note(finished)

@@ -9,7 +9,12 @@ from mutator._common import cache_layout_and_pruning
 from mutator.engines.engine_choice import make_engine
 from mutator.engines.engine_jobs import Engine, EngineArguments
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.execution.experiment_runner import ExperimentRunner, FindFinishedRun, RecordedExperiment
+from mutator.execution.experiment_runner import (
+    ExperimentRunner,
+    FindCopiedRun,
+    RecordedExperiment,
+    find_nothing,
+)
 from mutator.execution.inactivity_check import InactivityCheck
 from mutator.execution.loaded_goldens import LoadedGoldens
 from mutator.model import Experiment
@@ -19,7 +24,8 @@ class WorkerRunners:
     """Runs experiments on the engine `engine_name`, and again on an independent engine for the proof.
 
     `golden_folder_of` finds the golden run of an experiment; `digest_by_golden_folder` has the digests of its
-    files, and can grow. The engine is made at once, so that what it lacks is known before any work.
+    files, and can grow. `find_copied_run` and `find_proof` find what need not run, there and for the proof.
+    The engine is made at once, so that what it lacks is known before any work.
     """
 
     def __init__(
@@ -32,14 +38,16 @@ class WorkerRunners:
         has_seeded_goldens: bool,
         scenario_file: Callable[[str], Path],
         with_series: bool,
-        find_finished_run: FindFinishedRun = lambda experiment, mutant: None,
+        find_copied_run: FindCopiedRun = find_nothing,
+        find_proof: FindCopiedRun = find_nothing,
     ) -> None:
         self._arguments, self._manifest = arguments, arguments.manifest
         self._golden_folder_of, self._digest_by_golden_folder = golden_folder_of, digest_by_golden_folder
         self._has_seeded_goldens, self._scenario_file = has_seeded_goldens, scenario_file
         self._runner = self._make_runner(
-            make_engine(engine_name, arguments), with_series=with_series, find_finished_run=find_finished_run
+            make_engine(engine_name, arguments), with_series=with_series, find_copied_run=find_copied_run
         )
+        self._find_proof = find_proof
         self._prover: ExperimentRunner | None = None
         self._current_seed: int | None = None  # the seed being run
 
@@ -50,7 +58,7 @@ class WorkerRunners:
 
     def prove(self, experiments: Sequence[Experiment]) -> Iterator[RecordedExperiment]:
         """Yield what each experiment gives on the reference engine, without data of other runs, because the
-        proof must also detect errors in such data.
+        proof must also detect errors in such data; but those that `find_proof` finds do not run.
         """
         if self._prover is None:
             arguments = self._arguments
@@ -61,7 +69,7 @@ class WorkerRunners:
                 arguments.parent_pid,
                 independent=True,
             )
-            self._prover = self._make_runner(engine)
+            self._prover = self._make_runner(engine, find_copied_run=self._find_proof)
         yield from self._prover.run(experiments)
 
     def note_seed(self, seed: int) -> None:
@@ -81,7 +89,7 @@ class WorkerRunners:
         engine: Engine,
         *,
         with_series: bool = False,
-        find_finished_run: FindFinishedRun = lambda experiment, mutant: None,
+        find_copied_run: FindCopiedRun,
     ) -> ExperimentRunner:
         goldens = LoadedGoldens(
             self._manifest,
@@ -97,5 +105,5 @@ class WorkerRunners:
             self._scenario_file,
             with_series=with_series,
             inactivity_check=InactivityCheck(self._arguments),
-            find_finished_run=find_finished_run,
+            find_copied_run=find_copied_run,
         )

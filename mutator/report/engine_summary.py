@@ -23,6 +23,7 @@ _MODE_DESCRIPTIONS = {
     RunMode.FORK: "a fork of the golden run, just before the fault is first active",
     RunMode.GOLDEN_REUSED: "no run: the trigger never holds, so the golden run's result is used",
     RunMode.REUSED: "no run: an earlier run had the same experiment, so its result was copied",
+    RunMode.UNAFFECTED: "no run: nothing that an earlier run executed has changed, so its result stands",
     RunMode.WARM: "a fork of the loaded program, from the start of the run",
     RunMode.REFERENCE: "a fresh interpreter (reference engine)",
     None: "no run: there is no mutant",

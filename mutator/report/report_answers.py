@@ -214,9 +214,12 @@ def _describe_unsimulated(frame: pd.DataFrame, cpu: pd.Series, timings: pd.DataF
     idle = int(rest.isin(golden["experiment_id"]).sum())
     reused = timings[timings["engine"] == RunMode.REUSED.value]
     copied = int(rest.isin(reused["experiment_id"]).sum())
+    unaffected = timings[timings["engine"] == RunMode.UNAFFECTED.value]
+    left_out = int(rest.isin(unaffected["experiment_id"]).sum())
     reasons = {
         "the result of an earlier run with the same experiment was copied": copied,
+        "nothing that an earlier run executed had changed, so its result stands": left_out,
         "the trigger never held, so the golden run's result was used": idle,
-        "the result of an experiment with an identical run was used": len(rest) - idle - copied,
+        "the result of an experiment with an identical run was used": len(rest) - idle - copied - left_out,
     }
     return "".join(f"; for {count:,}, {words}" for words, count in reasons.items() if count)

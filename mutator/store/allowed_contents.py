@@ -22,6 +22,7 @@ ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any
     *SIGNATURE_FILES,
     *("golden/*/*", "patches/*.blocks"),
     *("records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
+    "executed/*.jsonl",
     *("series/*.js", "series/*.blocks"),
     *(f"{TRACES_FOLDER}/*/*", *(f"plots/*.{kind}" for kind in ("svg", "jpg", "png", "mp4", "gif"))),
     *("results.csv", "results.parquet", "propagation.parquet", "timings.parquet", "results.json"),

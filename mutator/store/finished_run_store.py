@@ -20,7 +20,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from secrets import token_hex
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from mutator._common.bounded_reading import decompress_bounded, open_regular
 from mutator._common.cache_layout_and_pruning import finished_runs_folder, prune_finished_runs
@@ -59,12 +59,14 @@ class FinishedRun:
     * `packages`: versions of the packages that the run loaded
     * `surroundings`: the digest of what all runs of its session had in common
     * `faulty_series`: the encoded series; None if its run folder keeps none
+    * `executed`: the functions that it executed, as JSON; None if they are not known
     """
 
     record: Record
     packages: Mapping[str, str | None]
     surroundings: str
     faulty_series: bytes | None
+    executed: dict[str, Any] | None = None
 
     def to_bytes(self) -> bytes:
         head = canonical_json(
@@ -73,6 +75,7 @@ class FinishedRun:
                 "packages": dict(self.packages),
                 "surroundings": self.surroundings,
                 "has_series": self.faulty_series is not None,
+                "executed": self.executed,
             }
         )
         content = b"\n".join((head.encode(), self.faulty_series or b""))
@@ -88,6 +91,7 @@ class FinishedRun:
             packages=dict(values["packages"]),
             surroundings=str(values["surroundings"]),
             faulty_series=series if values["has_series"] else None,
+            executed=values["executed"],
         )
 
 

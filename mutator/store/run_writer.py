@@ -7,11 +7,14 @@ from typing import Any
 from mutator._common.confined_files import path_below
 from mutator.model import Record
 from mutator.store.checksummed_lines import LineWriter, verified_lines, write_lines_with_new_head
+from mutator.store.executed_code import EXECUTED_FOLDER, EXECUTED_SCHEMA, ExecutedCode, ExecutedCodeLines
 from mutator.store.packed_patches import PatchWriter
 from mutator.store.records import LINE_SCHEMA_BY_FOLDER, PROOF_FOLDER, RECORDS_FOLDER, record_as_json
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import EncodedSeries, SeriesWriter
 from mutator.store.timings import TIMINGS_FOLDER
+
+_SCHEMA_BY_FOLDER = {**LINE_SCHEMA_BY_FOLDER, EXECUTED_FOLDER: EXECUTED_SCHEMA}
 
 
 class RunWriter:
@@ -28,6 +31,8 @@ class RunWriter:
         self._records = self._open_lines(RECORDS_FOLDER, self._sync_blocks)
         self._timings = self._open_lines(TIMINGS_FOLDER)
         self._proof: LineWriter | None = None  # most workers prove nothing
+        self._executed: LineWriter | None = None
+        self._executed_lines: ExecutedCodeLines | None = None
 
     def append(
         self, record: Record, timing: Mapping[str, Any], patch: bytes | None, series: EncodedSeries | None
@@ -39,6 +44,13 @@ class RunWriter:
             self._series.append(record.experiment_id, series)
         self._timings.append(timing)
         self.append_record(record)
+
+    def append_executed_code(self, code: ExecutedCode) -> str:
+        """Append what a run executed, unless it is in the file already; return its digest, for the timing."""
+        if self._executed_lines is None:
+            self._executed = self._open_lines(EXECUTED_FOLDER)
+            self._executed_lines = ExecutedCodeLines(self._executed.append)
+        return self._executed_lines.append(code)
 
     def append_record(self, record: Record) -> None:
         self._records.append(record_as_json(record))
@@ -71,7 +83,8 @@ class RunWriter:
         return {writer.path.relative_to(self._run).as_posix(): writer.sha256 for writer in writers}
 
     def close(self) -> None:
-        for writer in (self._patches, self._series, self._records, self._timings, self._proof):
+        writers = (self._patches, self._series, self._executed, self._records, self._timings, self._proof)
+        for writer in writers:
             if writer is not None:
                 writer.close()
 
@@ -82,7 +95,7 @@ class RunWriter:
 
     def _open_lines(self, kind: str, before_sync: Callable[[], None] = lambda: None) -> LineWriter:
         path = path_below(self._run, f"{kind}/{self._name}.jsonl")
-        return LineWriter(path, {"schema": LINE_SCHEMA_BY_FOLDER[kind], "plan": self._plan}, before_sync)
+        return LineWriter(path, {"schema": _SCHEMA_BY_FOLDER[kind], "plan": self._plan}, before_sync)
 
     def _sync_blocks(self) -> None:
         self._patches.sync()
@@ -92,7 +105,7 @@ class RunWriter:
 
 def copy_line_files(folder: RunFolder, out: Path, suffix: str) -> None:
     """Copy all files of lines to another run folder of the same plan, with a suffix added to their names."""
-    for kind, schema in LINE_SCHEMA_BY_FOLDER.items():
+    for kind, schema in _SCHEMA_BY_FOLDER.items():
         if (folder.path / kind).is_dir():
             (out / kind).mkdir(exist_ok=True)
         for path in sorted((folder.path / kind).glob("*.jsonl")):

@@ -9,6 +9,8 @@ from mutator.store.indexed_lines import IndexedLines
 
 TIMINGS_FOLDER, TIMINGS_SCHEMA = "timings", "timings/2"  # the folder of the files of lines
 _LONGEST_RUN_S = 1e9  # 30 years: no run takes longer, and sums of such times are finite
+# the digest of what ran (`executed_code`); why an experiment was not left out of a run with `--since`
+_OPTIONAL_TEXTS = frozenset(("executed", "affected"))
 _TIME_FORMAT = "%Y-%m-%dT%H:%M:%SZ"
 
 
@@ -37,7 +39,7 @@ def _checked_timing(data: dict[str, Any]) -> dict[str, Any]:
     for name in ("cpu_s", "wall_s"):
         if type(data[name]) not in (int, float) or not 0.0 <= data[name] <= _LONGEST_RUN_S:
             raise ValueError(name)
-    for name in ("experiment_id", "host", "worker", "engine", "why"):
+    for name in ("experiment_id", "host", "worker", "engine", "why", *(data.keys() & _OPTIONAL_TEXTS)):
         value = data[name]  # `engine` is None if nothing ran
         if not (isinstance(value, str) or (name == "engine" and value is None)):
             raise ValueError(name)

@@ -34,6 +34,7 @@ mutant_installation, thread_names = (
     run_once.load_neighbour("thread_names"),
 )
 early_stop = run_once.load_neighbour("early_stop")
+function_recorder = run_once.load_neighbour("function_recorder")
 
 
 def main(connection_fd: int, start_file: str) -> int:
@@ -51,6 +52,7 @@ def serve_as_first_process(connection_fd: int, start_message: dict[str, Any]) ->
     sys.meta_path.insert(0, run_once.HarnessImportFinder)
     sys.argv = [start_message["module"]]
     server = ForkingProcess(start_message, socket.socket(fileno=connection_fd))
+    server.function_recorder.begin()
     try:
         module = importlib.import_module(start_message["module"])
         server.begin_run = operator.attrgetter(start_message["stepwise"])(module)
@@ -82,6 +84,7 @@ class ForkingProcess:
         self.waiting_children: set[int] = set()  # processes that this one forked to wait at later steps
         self.inherited_processes = 0  # processes that the run had started before this one was forked
         self.step = 0
+        self.function_recorder = function_recorder.FunctionRecorder(start_message["tree"])
 
     def send_reply(self, reply: dict[str, Any], handle: int | None = None) -> None:
         data = marshal.dumps(reply)
@@ -258,6 +261,7 @@ class ForkingProcess:
                 }
             report["stopped"] = early_stop.drive_run(run, job["stop"])
             run.write(Path(job["out"]))
+            report["executed"] = self.function_recorder.as_json()
             if observations is not None:
                 report["libraries"] = run_once.new_modules_outside_packages(
                     modules_before, self.start_message["packages"]

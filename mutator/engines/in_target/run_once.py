@@ -90,6 +90,9 @@ def run_job(job: dict[str, Any]) -> None:
     )
     if job["types"]:
         line_recorder = load_neighbour("type_recorder").TypeRecorder(job["tree"], *job["types"])
+    function_recorder = None
+    if job["functions"]:
+        function_recorder = load_neighbour("function_recorder").FunctionRecorder(job["tree"])
     observations: list[Any] = []
     reach_watcher = None
     try:
@@ -97,6 +100,8 @@ def run_job(job: dict[str, Any]) -> None:
             watcher.begin()
         if line_recorder:
             line_recorder.begin()
+        if function_recorder:
+            function_recorder.begin()
         if job["probe"]:
             probe = importlib.import_module(job["probe"])
             probe.limit(job["steps"])
@@ -116,6 +121,8 @@ def run_job(job: dict[str, Any]) -> None:
             report["stopped"] = run_to_terminal_hazard(job)
     except BaseException as err:
         report |= describe_failure(err, job["tree"], job["probe"])
+    if function_recorder:
+        report["executed"] = function_recorder.as_json()
     if job["observe"]:
         report["watched"] = {**(watcher.as_json() if watcher else {}), "seen": observations}
     if line_recorder:

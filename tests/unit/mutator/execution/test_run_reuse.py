@@ -16,7 +16,7 @@ from mutator import CheckFailed
 from mutator._common.cache_layout_and_pruning import finished_runs_folder
 from mutator.audit.run_audit import run_audit_checks
 from mutator.campaigns import run_environment
-from mutator.execution import finished_run_keys, run_reuse
+from mutator.execution import finished_run_keys, loaded_packages, run_reuse
 from mutator.execution.finished_run_keys import harness_digest, surroundings_digest
 from mutator.execution.run_reuse import is_storable
 from mutator.execution.session_summary import Summary
@@ -198,7 +198,7 @@ def test_a_run_that_loaded_a_package_needs_its_version(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Packages that the runs loaded are compared when a run is found."""
-    monkeypatch.setattr(run_reuse, "packages_loaded_by_golden_runs", lambda folder: ("pytest",))
+    monkeypatch.setattr(loaded_packages, "packages_loaded_by_golden_runs", lambda folder: ("pytest",))
     ran(toycar, tmp_path / "first")
     assert ran(toycar, tmp_path / "second").reused == 12
     installed = run_environment.package_versions()
@@ -212,7 +212,7 @@ def test_a_run_that_loaded_an_editable_package_is_not_stored(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The package's code can change while its version stays."""
-    monkeypatch.setattr(run_reuse, "packages_loaded_by_golden_runs", lambda folder: ("pytest",))
+    monkeypatch.setattr(loaded_packages, "packages_loaded_by_golden_runs", lambda folder: ("pytest",))
     monkeypatch.setattr(run_environment, "_editable_packages", lambda: ("pytest",))
     ran(toycar, tmp_path / "first")
     assert not FinishedRuns().has_any()
@@ -224,9 +224,9 @@ def test_a_run_that_loaded_a_module_of_no_package_is_not_stored(
 ) -> None:
     """No version tells what such a file contains, whether golden runs load it or only a mutant does."""
     if is_in_golden:
-        monkeypatch.setattr(run_reuse, "unpackaged_modules_of_golden_runs", lambda folder: ("loose",))
+        monkeypatch.setattr(loaded_packages, "unpackaged_modules_of_golden_runs", lambda folder: ("loose",))
     else:
-        monkeypatch.setattr(run_reuse, "_modules_outside", lambda mutant, modules: {"numpy", "loose"})
+        monkeypatch.setattr(loaded_packages, "_modules_outside", lambda mutant, modules: {"numpy", "loose"})
     ran(toycar, tmp_path / "first")
     assert not FinishedRuns().has_any()
 
