@@ -210,23 +210,28 @@ def load_campaign_study(campaign: Campaign) -> CheckableStudy | None:
         ) from error
 
 
-def check_expectation(campaign: Campaign, hazards: Collection[str], scale: SeverityScale | None) -> None:
-    """Raise MutatorError if the campaign expects a hazard, or a class of severity, that there is not."""
-    expectation = campaign.expectation
-    if expectation is None:
-        return
+def check_expectation(
+    expectation: Expectation,
+    source: YamlSource,
+    keys: KeyPath,
+    hazards: Collection[str],
+    scale: SeverityScale | None,
+) -> None:
+    """Raise MutatorError if what a file has at `keys` names a hazard, or a class of severity, that there is
+    not.
+    """
     for i, name in enumerate(expectation.hazards or ()):
         if name not in hazards:
-            raise campaign.error(
-                ("expect", "hazards", i),
+            raise source.error(
+                (*keys, "hazards", i),
                 f"hazard '{name}'",
                 expected=describe_choices(hazards),
                 remedy="name a hazard of the target's manifest",
             )
     classes = [name for name, _, _ in scale.classes] if scale else []
     if expectation.severity is not None and expectation.severity not in classes:
-        raise campaign.error(
-            ("expect", "severity"),
+        raise source.error(
+            (*keys, "severity"),
             f"severity '{expectation.severity}'",
             expected=describe_choices(classes) if classes else "a target whose manifest has a `severity`",
             remedy="name a class of the target's severity scale",

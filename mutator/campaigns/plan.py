@@ -160,7 +160,9 @@ class SeedBySeedPlan:
         if self.choices.reading is not None:
             readings.check_name(self.choices.reading)
         self._workspace, self._manifest = workspace, workspace.manifest(self.campaign.target)
-        check_expectation(self.campaign, self._manifest.hazard_names, workspace.scale_of(self._manifest))
+        if (expectation := self.campaign.expectation) is not None:
+            scale, source = workspace.scale_of(self._manifest), self.campaign.yaml_source
+            check_expectation(expectation, source, ("expect",), self._manifest.hazard_names, scale)
         if self.campaign.after_hazard is AfterHazard.STOP:
             stop_function_source(self._manifest)  # raises before any run starts
         self._expansion = CampaignExpansion(

@@ -1,16 +1,17 @@
 """Regression files: experiments that were saved with what is expected of them."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field
+from pydantic import Field, TypeAdapter, ValidationError
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import checked_name_not_path
 from mutator._common.files import write_atomic
+from mutator.campaigns.campaign_files import check_expectation
 from mutator.campaigns.expectations import Expectation
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_source_lines import YamlSource
@@ -18,9 +19,11 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.store import plan_file
 from mutator.store.plan_lines import experiment_from_json, fault_from_json
+from mutator.targets.hazard_severity import SeverityScale
 
 SCHEMA = "regression/1"
 _PARSE_ERRORS = (ValueError, LookupError, TypeError, AttributeError)
+_TYPES: TypeAdapter[Experiment] = TypeAdapter(Experiment)
 
 
 class SavedExperimentModel(StrictModel, title="A saved experiment"):
@@ -55,6 +58,7 @@ class RegressionFile:
     path: Path
     target: str
     experiments: tuple[SavedExperiment, ...]
+    source: YamlSource
 
     def bench_values(self) -> Mapping[str, Any]:
         """Return the values of the bench that runs the experiments."""
@@ -67,6 +71,12 @@ class RegressionFile:
             "seed": 0,
             "after_hazard": first.after_hazard.value,
         }
+
+    def check_expectations(self, hazards: Collection[str], scale: SeverityScale | None) -> None:
+        """Raise MutatorError if an experiment's `expect` names something that the target does not have."""
+        for i, saved in enumerate(self.experiments):
+            keys = ("experiments", i, "expect")
+            check_expectation(saved.expectation, self.source, keys, hazards, scale)
 
 
 def load_regressions(path: Path) -> RegressionFile:
@@ -86,8 +96,8 @@ def load_regressions(path: Path) -> RegressionFile:
             expectation=entry.expect,
             line=source.line_of(("experiments", i)),
         )
-    loaded = RegressionFile(path=path, target=model.target, experiments=tuple(saved.values()))
-    _check_one_kind(loaded, source)
+    loaded = RegressionFile(path=path, target=model.target, experiments=tuple(saved.values()), source=source)
+    _check_one_kind(loaded)
     return loaded
 
 
@@ -133,6 +143,7 @@ def save_regression(
 def _experiment_of(entry: SavedExperimentModel, source: YamlSource, number: int) -> Experiment:
     """Return the saved experiment; MutatorError if it is not what was saved."""
     try:
+        _check_types(entry)
         fault = fault_from_json(entry.fault)
         return experiment_from_json(entry.experiment, {fault.id: fault})
     except (MutatorError, *_PARSE_ERRORS) as err:
@@ -144,12 +155,23 @@ def _experiment_of(entry: SavedExperimentModel, source: YamlSource, number: int)
         ) from None
 
 
-def _check_one_kind(loaded: RegressionFile, source: YamlSource) -> None:
+def _check_types(entry: SavedExperimentModel) -> None:
+    """Raise ValueError if a value has a type that no plan has, even if the id matches."""
+    values = {**entry.experiment, "fault": entry.fault}
+    try:
+        _TYPES.validate_json(json.dumps(values), strict=True)
+    except ValidationError as err:
+        first = err.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise ValueError(f"{place}: {first['msg']}") from None
+
+
+def _check_one_kind(loaded: RegressionFile) -> None:
     first = loaded.experiments[0].experiment
     for i, saved in enumerate(loaded.experiments):
         other = saved.experiment
         if (other.fault.reading, other.after_hazard) != (first.fault.reading, first.after_hazard):
-            raise source.error(
+            raise loaded.source.error(
                 ("experiments", i),
                 f"reading '{other.fault.reading}', after_hazard '{other.after_hazard.value}'",
                 expected=f"'{first.fault.reading}', '{first.after_hazard.value}', as the first experiment",

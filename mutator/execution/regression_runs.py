@@ -26,7 +26,11 @@ class RegressionRun(FileRun):
         return load_regressions(self.path)
 
     def _list_experiments(self) -> ItemListing:
-        saved = self._file.experiments
+        file = self._file
+        with file.source.locating_errors(("target",)):
+            manifest = self._workspace.manifest(file.target)
+        file.check_expectations(manifest.hazard_names, self._workspace.scale_of(manifest))
+        saved = file.experiments
         numbered = list(enumerate(entry.experiment for entry in saved))
         several = True  # as all benches
         items = list_experiments(numbered, several_seeds=several, place_of=lambda fault: ("", None))

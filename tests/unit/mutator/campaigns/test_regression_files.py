@@ -1,8 +1,10 @@
 """Files of saved experiments."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,6 +12,7 @@ from mutator.campaigns.expectations import NO_HAZARD, Expectation
 from mutator.campaigns.regression_files import load_regressions, save_regression
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Method
+from mutator.targets.hazard_severity import SeverityScale
 
 Make = Callable[..., Experiment]
 
@@ -73,3 +76,43 @@ def test_what_was_changed_by_hand_is_refused(
     with pytest.raises(MutatorError, match=problem) as error:
         load_regressions(file)
     assert str(error.value).startswith(f"{file}:")
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [({"seed": "x"}, "seed"), ({"scenario": None}, "scenario"), ({"setting": ([],)}, "setting.0")],
+)
+def test_values_of_other_types_are_refused_even_with_the_right_id(
+    experiment: Make, file: Path, changes: dict[str, Any], problem: str
+) -> None:
+    """Whoever wrote the file can compute an id, too."""
+    save_regression(file, "toycar", experiment(), NO_HAZARD, "")
+    text, forged = file.read_text(), replace(experiment(), **changes)
+    old = {name: getattr(experiment(), name) for name in ("id", *changes)}
+    for name, value in old.items():
+        before, after = (f'"{name}": {json.dumps(v)}' for v in (value, getattr(forged, name)))
+        assert before in text
+        text = text.replace(before, after, 1)
+    file.write_text(text)
+    with pytest.raises(MutatorError, match=problem) as error:
+        load_regressions(file)
+    assert str(error.value).startswith(f"{file}:4: ")
+
+
+@pytest.mark.parametrize(
+    ("expectation", "problem"),
+    [
+        (Expectation(hazards=["H9"]), "hazard 'H9'"),
+        (Expectation(severity="s1"), "severity 's1'; expected one of S0, S1"),  # sorts behind all of them
+    ],
+)
+def test_what_the_target_does_not_have_cannot_be_expected(
+    experiment: Make, file: Path, expectation: Expectation, problem: str
+) -> None:
+    """A class of severity that is written wrong would let everything pass."""
+    classes = (("S0", 0.0, ""), ("S1", 2.0, ""))
+    scale = SeverityScale(name="scale", about="", source="", classes=classes, contact="H1")
+    loaded = save_regression(file, "toycar", experiment(), expectation, "")
+    with pytest.raises(MutatorError, match=problem) as error:
+        loaded.check_expectations(["H1"], scale)
+    assert str(error.value).startswith(f"{file}:4: ")
