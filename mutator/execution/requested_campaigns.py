@@ -3,6 +3,7 @@
 Every pytest session imports this, so it imports nothing of the harness.
 """
 
+import re
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ _SETTINGS_FILE, _SETTINGS_TABLE = "pyproject.toml", "mutator"
 _KEYS = ("library", "target", "campaigns")
 _REGRESSIONS = "regressions/*.yaml"  # of a project with these settings
 _YAML_SUFFIXES = (".yaml", ".yml")
-_CAMPAIGN_HEAD, _REGRESSION_HEAD = b"schema: campaign/", b"schema: regression/"
+_HEAD = re.compile(rb"""(?:\xef\xbb\xbf)?["']?schema["']?\s*:\s*["']?(campaign|regression)/""")
 _MOST_HEAD_BYTES = 4096  # comments can come first
 
 
@@ -39,7 +40,8 @@ def find_requested_campaigns(config: pytest.Config) -> RequestedCampaigns:
     """Return the campaigns, and files of saved experiments, of `--campaign`, of the arguments, and of the
     project where they are collected.
 
-    Adds the project's campaigns to what pytest looks at, if the command names no place.
+    Adds the project's campaigns to what pytest looks at, if the command is given in the project's folder and
+    names no place.
     """
     settings = _project_settings(config.rootpath)
     library, target = (settings.get(key) for key in ("library", "target"))
@@ -51,15 +53,13 @@ def find_requested_campaigns(config: pytest.Config) -> RequestedCampaigns:
             name="" if is_file else name, files=named_files, library=library, target=target
         )
     arguments = [Path(config.invocation_params.dir, text.partition("::")[0]) for text in config.args]
-    files = [
-        path
-        for path in arguments
-        if path.suffix in _YAML_SUFFIXES and _has_head(path, _CAMPAIGN_HEAD, _REGRESSION_HEAD)
-    ]
+    files = [path for path in arguments if path.suffix in _YAML_SUFFIXES and _schema_of(path)]
+    is_in_root = config.invocation_params.dir == config.rootpath
+    is_plain = is_in_root and config.args_source is not pytest.Config.ArgsSource.ARGS
     for path in (*settings.get("campaigns", ()), *settings.get("regressions", ())):
         if any(path == place or place in path.parents for place in arguments):
             files.append(path)
-        elif config.args_source is not pytest.Config.ArgsSource.ARGS:
+        elif is_plain:
             files.append(path)
             config.args.append(str(path))
     return RequestedCampaigns(files=tuple(dict.fromkeys(files)), library=library, target=target)
@@ -67,16 +67,18 @@ def find_requested_campaigns(config: pytest.Config) -> RequestedCampaigns:
 
 def is_regression_file(path: Path) -> bool:
     """Whether a file has saved experiments, and is no campaign."""
-    return _has_head(path, _REGRESSION_HEAD)
+    return _schema_of(path) == b"regression"
 
 
-def _has_head(path: Path, *heads: bytes) -> bool:
+def _schema_of(path: Path) -> bytes | None:
+    """Return `campaign` or `regression`; None for a file of another kind."""
     try:
         with path.open("rb") as file:
             head = file.read(_MOST_HEAD_BYTES)
     except OSError:
-        return False
-    return any(line.startswith(heads) for line in head.splitlines())
+        return None
+    heads = filter(None, map(_HEAD.match, head.splitlines()))
+    return next((head[1] for head in heads), None)
 
 
 def _project_settings(root: Path) -> dict[str, Any]:
@@ -107,8 +109,12 @@ def _files(path: Path, patterns: list[str]) -> list[Path]:
     """Return the files that these patterns match, relative to the folder of the settings."""
     files: list[Path] = []
     for pattern in patterns:
-        matches = sorted(path.parent.glob(pattern))
+        try:
+            matches = [file for file in sorted(path.parent.glob(pattern)) if file.is_file()]
+        except (NotImplementedError, ValueError, LookupError, AttributeError):  # absolute, or no pattern
+            matches = []
         if not matches:
-            raise pytest.UsageError(f"{path}: [tool.{_SETTINGS_TABLE}]: campaigns: no file {pattern}")
+            text = f"no file {pattern!r}, relative to this file"
+            raise pytest.UsageError(f"{path}: [tool.{_SETTINGS_TABLE}]: campaigns: {text}")
         files += matches
     return files

@@ -23,13 +23,16 @@ def root(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def ask(root: Path, *args: str, source: Any = SOURCES.ARGS, campaign: str | None = None) -> Any:
-    """Return what a command with these arguments asks for, and the places where pytest then looks."""
+def ask(
+    root: Path, *args: str, source: Any = SOURCES.ARGS, campaign: str | None = None, folder: str = ""
+) -> Any:
+    """Return what a command with these arguments, in a folder of the project, asks for, and the places where
+    pytest then looks."""
     config: Any = SimpleNamespace(
         args=list(args),
         args_source=source,
         rootpath=root,
-        invocation_params=SimpleNamespace(dir=root),
+        invocation_params=SimpleNamespace(dir=root / folder),
         getoption=lambda name: campaign,
     )
     return find_requested_campaigns(config), config.args
@@ -62,6 +65,19 @@ def test_the_campaigns_of_a_project_are_collected_where_pytest_looks(root: Path)
     assert (requested.files, places) == (both, [str(root)])
     assert ask(root, "faults")[0].files == both
     assert ask(root, "tests")[0].is_empty
+    requested, places = ask(root, str(root / "tests"), source=SOURCES.INVOCATION_DIR, folder="tests")
+    assert (requested.files, places) == ((), [str(root / "tests")])
+
+
+@pytest.mark.parametrize(
+    "head", ['schema: "campaign/1"', "'schema' : 'campaign/1'", "\ufeffschema: campaign/1"]
+)
+def test_a_campaign_is_one_in_whatever_way_its_head_is_written(root: Path, head: str) -> None:
+    path = root / "faults" / "campaigns" / "a.yaml"
+    path.write_text(f"{head}\nname: x\n", encoding="utf-8")
+    assert ask(root, str(path))[0].files == (path,)
+    path.write_text(f"about: {head}\n", encoding="utf-8")
+    assert ask(root, str(path))[0].is_empty
 
 
 def test_the_option_names_a_file_or_a_campaign_of_the_library(root: Path) -> None:
@@ -75,7 +91,10 @@ def test_the_option_names_a_file_or_a_campaign_of_the_library(root: Path) -> Non
         ("[tool.mutator]\nlibraries = 'x'\n", "libraries"),
         ("[tool.mutator]\nlibrary = 3\n", "library = 3"),
         ("[tool.mutator]\ncampaigns = 'a.yaml'\n", "expected a list of files"),
-        ("[tool.mutator]\ncampaigns = ['none.yaml']\n", "no file none.yaml"),
+        ("[tool.mutator]\ncampaigns = ['none.yaml']\n", "no file 'none.yaml'"),
+        ("[tool.mutator]\ncampaigns = ['/none/*.yaml']\n", "relative to this file"),
+        ("[tool.mutator]\ncampaigns = ['']\n", "no file ''"),
+        ("[tool.mutator]\ncampaigns = ['faults']\n", "no file 'faults'"),
         ("[tool.mutator]\ncampaigns = [\n", "tool.mutator"),
     ],
 )
