@@ -1,8 +1,9 @@
 """A campaign in a user's pytest session: its items, and its run folder from the first item to the results."""
 
+import warnings
 from abc import abstractmethod
-from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +17,7 @@ from mutator.campaigns.expectations import NO_HAZARD, Expectation
 from mutator.campaigns.plan import Plan, build_plan
 from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.run_inputs import RunInputs
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, MutatorWarning
 from mutator.execution.campaign_items import ItemSource
 from mutator.execution.finished_run_keys import harness_digest
 from mutator.execution.item_running import ItemRunner, ItemsStart
@@ -43,6 +44,14 @@ class CampaignOptions:
     hazard_fails: bool = False
     workers: int = 0
     packages: tuple[str, ...] = ()  # of a distributor of another package
+
+
+@contextmanager
+def _remarks_fail_nothing() -> Iterator[None]:
+    """Show remarks on a campaign also in a project whose settings make errors of warnings."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("default", MutatorWarning)
+        yield
 
 
 class FileRun(ItemSource):
@@ -77,7 +86,8 @@ class FileRun(ItemSource):
     def listing(self) -> ItemListing:
         """All experiments of the file."""
         try:
-            return self._list_experiments()
+            with _remarks_fail_nothing():
+                return self._list_experiments()
         except MutatorError as err:
             return ItemListing(problem=str(err))
 
@@ -99,7 +109,8 @@ class FileRun(ItemSource):
         if self._items is None:
             try:
                 self.out = self.out or self._default_run_folder()
-                self._items = self._open_session(self.out)
+                with _remarks_fail_nothing():
+                    self._items = self._open_session(self.out)
             except BaseException as err:
                 if isinstance(err, MutatorError):
                     self.failure = err
@@ -130,7 +141,8 @@ class FileRun(ItemSource):
         session = self._items.session
         try:
             self._items.close(self._runner, is_stopped=is_stopped)
-            return session.finish(tables_of_part=False)
+            with _remarks_fail_nothing():
+                return session.finish(tables_of_part=False)
         finally:
             self._open.close()
             if campaign_runs_folder() in session.folder.path.parents:

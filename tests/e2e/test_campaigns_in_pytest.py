@@ -126,10 +126,12 @@ def test_options_that_select_tests_select_experiments(in_pytest: Pytest) -> None
 
 
 def test_a_selection_is_an_unfinished_run(project: Path, in_pytest: Pytest) -> None:
-    """Its checks come with its first item. Its records count for the next call, which repeats none."""
-    code, printed = in_pytest(SMALL, "-k", "silence", "-v")
+    """Its checks come with its first item, and their remarks are no errors, even if warnings are. Its records
+    count for the next call, which repeats none."""
+    code, printed = in_pytest(SMALL, "-k", "silence", "-v", "-W", "error")
     assert code == 0, printed
     assert "4 passed" in printed and counts(printed) == (4, 4)
+    assert "no golden run reaches the trigger" in printed
     assert "the other 8 have a result" in printed
     [run] = run_folders(project)
     assert not (run / "results.csv").exists()
