@@ -23,12 +23,12 @@ PAGE = CLONE / "docs" / "how-to" / "show-hazards-in-a-pull-request.md"
 # stands for Python, whose pip would need the network
 FAKE_PYTHON = """\
 #!/bin/sh
-if [ "$1 $2" != "-m venv" ]; then exec "{python}" "$@"; fi
-mkdir -p "$3/bin"
-printf '#!/bin/sh\\necho "$@" >>"$0.log"\\n' >"$3/bin/pip"
-printf '#!/bin/sh\\nPYTHONPATH="{clone}" exec "{python}" "$@"\\n' >"$3/bin/python"
-printf '#!/bin/sh\\nPYTHONPATH="{clone}" exec "{python}" -m mutator "$@"\\n' >"$3/bin/mutator"
-chmod +x "$3"/bin/*
+if [ "$1 $2 $3" != "-P -m venv" ]; then exec "{python}" "$@"; fi
+mkdir -p "$4/bin"
+printf '#!/bin/sh\\necho "$@" >>"$0.log"\\n' >"$4/bin/pip"
+printf '#!/bin/sh\\nPYTHONPATH="{clone}" exec "{python}" "$@"\\n' >"$4/bin/python"
+printf '#!/bin/sh\\nPYTHONPATH="{clone}" exec "{python}" -m mutator "$@"\\n' >"$4/bin/mutator"
+chmod +x "$4"/bin/*
 """
 
 
@@ -282,3 +282,13 @@ def test_a_base_that_does_not_exist_is_an_error(runner: Runner) -> None:
     assert runner.annotations("error") == [
         "::error::cannot fetch 'nowhere' to compare with: correct the input 'base'"
     ]
+
+
+def test_a_base_is_no_option_of_git(runner: Runner, tmp_path: Path) -> None:
+    """A workflow can take it from a form, or from a comment."""
+    step = next(step for step in STEPS if step.get("id") == "base")
+    runner.context["inputs.base"] = f"--upload-pack=touch {tmp_path}/ran; git-upload-pack"
+    assert runner.run_step(step) == 2
+    assert not (tmp_path / "ran").exists()
+    [error] = runner.annotations("error")
+    assert error.startswith("::error::cannot fetch '--upload-pack=")
