@@ -24,6 +24,7 @@ from mutator.workspace import Workspace
 
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "run"
 EXPERIMENTS = 12
+HAZARDS = 3
 KEPT = "07bbcc0632ee6107"  # the fixture has its trace
 
 Cli = Callable[..., tuple[int, str, str]]
@@ -125,6 +126,11 @@ def test_it_exports_in_every_format(cli: Cli, place: Path, format: Format) -> No
     elif format is Format.MCAP:
         written = {path.stem for path in file.iterdir()}
         assert KEPT in written and len(written) == EXPERIMENTS
+    elif format is Format.SARIF:
+        (found,) = json.loads(file.read_text())["runs"]
+        assert len(found["results"]) == HAZARDS
+    elif format is Format.CODEQUALITY:
+        assert len(json.loads(file.read_text())) == HAZARDS
     else:
         mutants = json.loads(file.read_text())["files"]["toycar/sensing.py"]["mutants"]
         assert {mutant["status"] for mutant in mutants} >= {"Killed", "Survived"}
@@ -137,7 +143,7 @@ def test_it_is_reported_with_the_same_results(cli: Cli, place: Path) -> None:
     shutil.rmtree(copy / "report")
     code, out, err = cli("report", copy)
     assert code == 0, err
-    assert "hazard 3" in out and (copy / "report" / "index.html").is_file()
+    assert f"hazard {HAZARDS}" in out and (copy / "report" / "index.html").is_file()
     assert_results_as_stored(copy / "results.csv", FIXTURE / "small")
 
 
