@@ -18,6 +18,7 @@ from mutator.execution.distributed_crew import DistributedCrew
 from mutator.execution.session import Session
 from mutator.execution.worker import Worker
 from mutator.model import Experiment
+from mutator.store import plan_file
 from mutator.store.preflight_results import golden_digests
 from mutator.workspace import Workspace
 
@@ -35,10 +36,13 @@ class InThisProcess:
         assignment = replace(session.worker_assignment(name), golden_digests=goldens)
         session.written.note_worker_began(assignment.worker_name)
         worker = Worker(session.inputs, assignment)
-        for work in session.pending:
-            worker.run(work)
-        for sample in session.proof:
-            worker.prove(sample)
+        run, chunks = session.folder.path, session.folder.head.chunks
+        faults = plan_file.load_faults(run)
+        for chunk in session.pending:
+            experiments = plan_file.load_chunk(run, chunks[chunk.chunk_index], faults)
+            list(worker.run_experiments([experiments[at] for at in chunk.pending_positions]))
+        planned = {experiment.id: experiment for experiment in plan_file.load_experiments(run)}
+        list(worker.prove_experiments([planned[sample.id] for sample in session.proof]))
         worker.close()
         session.written.add_report(worker.file_digests, assignment.worker_name)
 
