@@ -32,6 +32,7 @@ class ItemsStart:
     has_forked: bool = False  # whether the run folder has an experiment that needs the proof
     expectation: Expectation | None = None  # of all experiments
     expectation_by_id: Mapping[str, Expectation] = field(default_factory=dict)
+    replay_options: tuple[str, ...] = ()  # with which a user's command finds library and target
     problem: str = ""
 
     def to_bytes(self) -> bytes:
@@ -56,6 +57,7 @@ class ItemRunner:
         self._pending, self._unproved = set(start.pending), set(start.unproved)
         self._has_forked = start.has_forked
         self._expectation, self._expectation_by_id = start.expectation, start.expectation_by_id
+        self._replay_options = start.replay_options
         self._planned = ExperimentsReadOnAccess(folder.path, folder.head.chunks)
         self._proofs_to_decide: list[Experiment] = []  # nothing was forked yet
 
@@ -140,4 +142,5 @@ class ItemRunner:
             patch = finished.mutant.patch_bytes
         else:
             patch = folder.read_patch(experiment.id, record) or b""
-        return [describe_unexpected_result(folder, experiment, record, patch, problem)]
+        options = self._replay_options
+        return [describe_unexpected_result(folder, experiment, record, patch, problem, options)]

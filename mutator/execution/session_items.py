@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from mutator.campaigns.expectations import Expectation
+from mutator.errors import MutatorError
 from mutator.execution.item_running import ItemRunner, ItemsStart
 from mutator.execution.listed_items import (
     MOST_SINGLE_ITEMS,
@@ -16,6 +17,7 @@ from mutator.execution.listed_items import (
 from mutator.execution.session import Session
 from mutator.execution.worker import Worker, WorkerStart
 from mutator.preflight import equivalence_check
+from mutator.workspace import Workspace
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +53,7 @@ class SessionItems:
             has_forked=any(map(equivalence_check.was_forked, timings.values())),
             expectation=self.expectation,
             expectation_by_id=self.expectation_by_id,
+            replay_options=options_of_workspace(session.workspace),
         )
 
     def start_here(self) -> ItemRunner:
@@ -69,3 +72,17 @@ class SessionItems:
     def _pending_positions(self) -> list[int]:
         chunks = positions_in_plan(self.session.folder, self.session.pending)
         return [position for positions in chunks.values() for position in positions]
+
+
+def options_of_workspace(workspace: Workspace) -> tuple[str, ...]:
+    """Return the options with which `mutator` finds this workspace, if it is called in the current folder."""
+    options: list[str] = []
+    try:
+        default: Workspace | None = Workspace.find()
+    except MutatorError:
+        default = None
+    for name in ("library", "templates", "target"):
+        folder = getattr(workspace, name)
+        if folder is not None and (default is None or folder != getattr(default, name)):
+            options += [f"--{name}", str(folder)]
+    return (*options, "--sandbox") if workspace.sandbox else tuple(options)

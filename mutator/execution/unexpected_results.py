@@ -1,6 +1,7 @@
 """What a test says that fails because of a result."""
 
 import shlex
+from collections.abc import Sequence
 
 from mutator.model import Experiment, Record
 from mutator.mutants.patches_by_file import patch_without_new_files
@@ -13,12 +14,20 @@ _SHOWN_ID_LENGTH = 8
 
 
 def describe_unexpected_result(
-    folder: RunFolder, experiment: Experiment, record: Record, patch: bytes, problem: str
+    folder: RunFolder,
+    experiment: Experiment,
+    record: Record,
+    patch: bytes,
+    problem: str,
+    replay_options: Sequence[str] = (),
 ) -> str:
-    """Return the experiment's sentence, what is not allowed, the injected change, and how to replay it."""
+    """Return the experiment's sentence, what is not allowed, the injected change, and how to replay it: with
+    these further options.
+    """
     finished = FinishedExperiment(experiment, record, folder.severity_scale)
     row = row_of(result_columns_of(folder.head), finished)
     sentence = ExperimentSentences.of_run(folder.head).sentence(row, experiment.fault)
     words = ["mutator", "show", experiment.id[:_SHOWN_ID_LENGTH], "--run", str(folder.path), "--drive"]
+    words += replay_options
     change = patch_without_new_files(patch.decode(errors="replace"))[0].rstrip()  # without the probe
     return "\n".join([sentence, problem, "", change, "", f"replay: {shlex.join(words)}"])
