@@ -20,6 +20,10 @@ _LIBRARY_PARTS = ("campaigns", "targets")  # folders of a library
 
 def register_campaigns(config: pytest.Config, requested: RequestedCampaigns) -> None:
     """Register the controller of the session's campaigns; UsageError for a mistake in the command."""
+    if getattr(config.option, "dist", "no") == "each":
+        raise pytest.UsageError(
+            "--dist each with a campaign: expected workers that share the experiments; use load or loadgroup"
+        )
     try:
         distributor = _cluster_distributor(config)
         runs = _campaign_runs(config, requested, distributor)

@@ -253,6 +253,7 @@ def test_saved_experiments_are_tests_of_the_project(
         (["--require-reviewed"], 4, "--require-reviewed without a campaign"),
         (["--hazard-fails"], 4, "--hazard-fails without a campaign"),
         (["--campaign", "small", "--campaign-out=out", "--require-reviewed"], 1, "not approved"),
+        (["--campaign", "small", "--dist", "each", "--tx", "popen"], 4, "--dist each with a campaign"),
         (["--campaign", "nosuch", "--campaign-out=out"], 4, "no campaign 'nosuch'"),
         (["--campaign", "small", "--campaign-out=tree"], 2, "has no run.json and is not empty (toycar)"),
         (["--campaign", "small", "--campaign-out=newer"], 2, "use a newer version of mutator"),
