@@ -83,9 +83,11 @@ def pytest_configure(config: pytest.Config) -> None:
         return
     requested = find_requested_campaigns(config)
     if requested.is_empty:
+        # options in a project's settings are for those of its sessions that have a campaign
+        given_names = {str(argument).partition("=")[0] for argument in config.invocation_params.args}
         for option in _CAMPAIGN_OPTIONS:
-            if config.getoption(option):
-                name = f"--{option.replace('_', '-')}"
+            name = f"--{option.replace('_', '-')}"
+            if name in given_names:
                 raise pytest.UsageError(f"{name} without a campaign (--campaign, or a campaign's file)")
         return
     from mutator.execution.session_campaigns import register_campaigns

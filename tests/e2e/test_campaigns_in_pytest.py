@@ -281,7 +281,9 @@ def test_mistakes_under_pytest_have_clear_errors(
 
 
 def test_the_plugin_does_nothing_without_a_campaign(toy: Workspace) -> None:
-    """The plugin imports no other part of the harness that takes time."""
+    """The plugin imports no other part of the harness that takes time. Settings with its options
+    are no mistake."""
+    (toy.library.parent / "pytest.ini").write_text("[pytest]\naddopts = --hazard-fails\n")
     test = "import sys\n\ndef test_it():\n    assert 'mutator.execution.session' not in sys.modules\n"
     (toy.library.parent / "test_it.py").write_text(test)
     answer = subprocess.run(
