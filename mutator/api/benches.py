@@ -22,7 +22,7 @@ from mutator.campaigns.campaign_files import load_campaign
 from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.errors import EXIT_CHECK_FAILED, IncompleteRun, MutatorWarning
 from mutator.execution import bench as bench_in_folder
-from mutator.execution.bench_opening import opened_bench
+from mutator.execution.bench_opening import finishing, opened_bench
 from mutator.execution.distributor_choice import Distributor, choose_distributor
 from mutator.execution.session_summary import Summary
 from mutator.model import AfterHazard, Experiment, Fault, Record
@@ -78,15 +78,18 @@ def open_bench(
         "seed": seed,
         "after_hazard": checked_after_hazard(after_hazard).value,
     }
-    with opened_bench(
-        opened_workspace,
-        Path(out),
-        values,
-        workers=workers,
-        engine=engine,
-        reuse=reuse,
-        distributor=_distributor_of_cluster(cluster, insecure_network=insecure_network),
-    ) as opened:
+    with (
+        opened_bench(
+            opened_workspace,
+            Path(out),
+            values,
+            workers=workers,
+            engine=engine,
+            reuse=reuse,
+            distributor=_distributor_of_cluster(cluster, insecure_network=insecure_network),
+        ) as opened,
+        finishing(opened),
+    ):
         yield Bench(opened, selected_target, values["reading"])
     _warn_of_end(opened.summary)
 

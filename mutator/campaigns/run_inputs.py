@@ -1,6 +1,5 @@
 """The inputs of a run besides its plan."""
 
-import pickle
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import digest
+from mutator._common.pickled_values import PickledValue
 from mutator.faults.fault_models import FaultModels
 from mutator.targets.manifest import TargetManifest
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunInputs:
+class RunInputs(PickledValue):
     """A target, the fault models, and the file of each scenario by name.
 
     The command that reads the library's YAML passes them to its workers, which need no reader of YAML.
@@ -34,17 +34,10 @@ class RunInputs:
         files = {name: workspace.scenario(name) for name in sorted(scenarios)}
         return cls(manifest=manifest, fault_models=workspace.fault_models(), scenario_files=files)
 
-    @classmethod
-    def from_bytes(cls, data: bytes) -> "RunInputs":
-        """Return what `to_bytes` packed. The data must come from the process that started this one."""
-        inputs = pickle.loads(data)
-        assert isinstance(inputs, cls)
-        return inputs
-
     def to_bytes(self) -> bytes:
         """Return the inputs for another process, which reads the target's tree itself."""
         # the copied manifest has no cached properties, such as the bytes of the tree
-        return pickle.dumps(replace(self, manifest=replace(self.manifest)))
+        return PickledValue.to_bytes(replace(self, manifest=replace(self.manifest)))
 
     def digest_by_source(self) -> dict[str, str]:
         """Return the digests, by name, of all files outside the plan that affect results."""

@@ -37,34 +37,10 @@ def opened_bench(
     reuse: bool = True,
     distributor: Distributor | None = None,
 ) -> Iterator[Bench]:
-    """Lock the run folder `out`, open the bench in it or begin one, and finish it at the end of the block.
+    """Lock the run folder `out`, and open the bench in it or begin one. The caller finishes what it plans.
 
-    `values` are those of `bench_files.BenchModel`; `distributor` deals to a cluster, if not None. An error in
-    the block leaves the run unfinished: it can be opened again.
+    `values` are those of `bench_files.BenchModel`; `distributor` deals to a cluster, if not None.
     """
-    with owned_bench(
-        workspace, out, values, workers=workers, engine=engine, reuse=reuse, distributor=distributor
-    ) as bench:
-        try:
-            yield bench
-            bench.finish()
-        except BaseException:
-            bench.abandon()
-            raise
-
-
-@contextmanager
-def owned_bench(
-    workspace: Workspace,
-    out: Path,
-    values: Mapping[str, Any],
-    *,
-    workers: int = 1,
-    engine: str | None = None,
-    reuse: bool = True,
-    distributor: Distributor | None = None,
-) -> Iterator[Bench]:
-    """Like `opened_bench`, for a caller that finishes what the bench has planned."""
     is_new = not out.exists()
     make_run_folder(out)
     with lock_run_folder(out):
@@ -87,6 +63,17 @@ def owned_bench(
                 file_digests.add_segments_to_ledger(out)
             elif is_new:  # nothing was planned, so nothing is worth keeping
                 remove_folder(out)
+
+
+@contextmanager
+def finishing(bench: Bench) -> Iterator[None]:
+    """Finish a bench at the end of the block. After an error in it, the bench can be opened again."""
+    try:
+        yield
+        bench.finish()
+    except BaseException:
+        bench.abandon()
+        raise
 
 
 def _build_bench(

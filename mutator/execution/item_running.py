@@ -1,10 +1,10 @@
 """Runs the items of a campaign in the process that got them: what has no record yet, and its proof."""
 
-import pickle
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from mutator._common.pickled_values import PickledValue
 from mutator.campaigns.expectations import Expectation
 from mutator.engines.engine_jobs import MODES_TO_PROVE
 from mutator.execution.experiment_runner import RecordedExperiment
@@ -19,7 +19,7 @@ from mutator.store.run_folder import RunFolder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ItemsStart:
+class ItemsStart(PickledValue):
     """What a process needs to run items of a campaign, once its checks have passed.
 
     `pending` are positions of experiments without a final record; `unproved` are ids of the equivalence
@@ -34,16 +34,6 @@ class ItemsStart:
     expectation_by_id: Mapping[str, Expectation] = field(default_factory=dict)
     replay_options: tuple[str, ...] = ()  # with which a user's command finds library and target
     problem: str = ""
-
-    def to_bytes(self) -> bytes:
-        return pickle.dumps(self)
-
-    @classmethod
-    def from_bytes(cls, data: bytes) -> "ItemsStart":
-        """Return what `to_bytes` packed. The data must come from the process that started this one."""
-        start = pickle.loads(data)
-        assert isinstance(start, cls)
-        return start
 
 
 class ItemRunner:

@@ -10,7 +10,7 @@ from mutator._common.hashing import content_id
 from mutator.campaigns.expectations import NO_HAZARD
 from mutator.campaigns.regression_files import RegressionFile, load_regressions
 from mutator.errors import MutatorError
-from mutator.execution.bench_opening import owned_bench
+from mutator.execution.bench_opening import opened_bench
 from mutator.execution.campaign_runs import FileRun
 from mutator.execution.listed_items import ItemListing, list_experiments
 from mutator.execution.session_items import SessionItems
@@ -50,7 +50,7 @@ class RegressionRun(FileRun):
                 remedy="leave the file out: reviews are of campaigns",
             )
         bench = self._open.enter_context(
-            owned_bench(
+            opened_bench(
                 self._workspace,
                 out,
                 file.bench_values(),

@@ -1,7 +1,6 @@
 """A process that runs experiments: an xdist worker, a worker of a bench, or the command itself."""
 
 import os
-import pickle
 import socket
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,6 +11,7 @@ from typing import Any
 from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator._common.folder_locks import open_worker_lock
+from mutator._common.pickled_values import PickledValue
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
 from mutator.campaigns.shared_runs import run_key
@@ -57,21 +57,11 @@ class WorkerAssignment:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WorkerStart:
+class WorkerStart(PickledValue):
     """What a process needs to begin as a worker. `inputs` is packed by `RunInputs.to_bytes`."""
 
     inputs: bytes
     assignment: WorkerAssignment
-
-    def to_bytes(self) -> bytes:
-        return pickle.dumps(self)
-
-    @classmethod
-    def from_bytes(cls, data: bytes) -> "WorkerStart":
-        """Return what `to_bytes` packed. The data must come from the process that started this one."""
-        start = pickle.loads(data)
-        assert isinstance(start, cls)
-        return start
 
 
 class Worker:

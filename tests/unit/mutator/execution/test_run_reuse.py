@@ -4,7 +4,6 @@ import dataclasses
 import os
 import shutil
 import signal
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,15 +16,16 @@ from mutator._common.cache_layout_and_pruning import finished_runs_folder
 from mutator.audit.run_audit import run_audit_checks
 from mutator.campaigns import run_environment
 from mutator.execution import finished_run_keys, loaded_packages, run_reuse
-from mutator.execution.finished_run_keys import harness_digest, surroundings_digest
+from mutator.execution.finished_run_keys import harness_digest
 from mutator.execution.run_reuse import is_storable
 from mutator.execution.session_summary import Summary
 from mutator.execution.worker import Worker
-from mutator.model import Experiment, Record, RunError, Status
+from mutator.model import Record, RunError, Status
 from mutator.store import plan_file
 from mutator.store.checksummed_blocks import block_bytes, read_blocks
 from mutator.store.finished_run_store import FinishedRun, FinishedRuns
 from mutator.workspace import Workspace
+from tests.run_contents import run_contents, run_modes
 
 pytestmark = [
     pytest.mark.usefixtures("kept_checks"),
@@ -45,25 +45,6 @@ def replace_text(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new))
 
 
-def modes(out: Path) -> Counter[str]:
-    return Counter(str(line["engine"]) for line in mutator.load_run(out).folder.timings().values())
-
-
-def contents(out: Path) -> dict[str, object]:
-    """Everything that a run found out."""
-    run = mutator.load_run(out)
-    folder = run.folder
-    series = {p.name: p.read_bytes() for p in (out / "series").rglob("*") if p.is_file()}
-    return {
-        "records": dict(folder.records()),
-        "proof": dict(folder.records("proof")),
-        "patches": {name: folder.patches.read_patch(name) for name in folder.records()},
-        "results": (out / "results.csv").read_bytes(),
-        "series": series,
-        "seal": run.seal,
-    }
-
-
 @pytest.mark.parametrize("workers", [0, 2])
 def test_a_campaign_of_reused_runs_has_the_same_files(
     toycar: Workspace, tmp_path: Path, workers: int
@@ -76,8 +57,8 @@ def test_a_campaign_of_reused_runs_has_the_same_files(
     assert second.reuse_note == "12 of 12 reused: earlier runs had the same experiments"
     assert second.proof is not None
     assert (second.proof.sampled, second.proof.is_complete) == (3, True)
-    assert contents(tmp_path / "first") == contents(tmp_path / "second")
-    assert modes(tmp_path / "second") == {"reused": 12}
+    assert run_contents(tmp_path / "first") == run_contents(tmp_path / "second")
+    assert run_modes(tmp_path / "second") == {"reused": 12}
     folder = mutator.load_run(tmp_path / "second").folder
     assert [d for check in run_audit_checks(folder, toycar) for d in check.differences] == []
 
@@ -97,7 +78,7 @@ def test_without_reuse_everything_runs(toycar: Workspace, tmp_path: Path) -> Non
     stored = sorted(finished_runs_folder().iterdir())
     assert ran(toycar, tmp_path / "second", reuse=False).reused == 0
     assert ran(toycar, tmp_path / "third", engine="reference").reused == 0
-    assert modes(tmp_path / "third") == {"reference": 12}
+    assert run_modes(tmp_path / "third") == {"reference": 12}
     assert sorted(finished_runs_folder().iterdir()) == stored
 
 
@@ -135,31 +116,6 @@ def test_after_an_edit_of_the_target_nothing_is_reused(
     assert ran(toycar, tmp_path / "second").reused == 0
 
 
-@pytest.mark.parametrize(
-    ("name", "is_other"),
-    [
-        ("outcomes/verdict_rules.py", True),
-        ("model.py", True),
-        ("engines/in_target/run_once.py", True),
-        ("report/panel.py", False),
-        ("cli/app.py", False),
-    ],
-)
-def test_the_harness_is_part_of_the_key_but_for_what_shows_results(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, is_other: bool
-) -> None:
-    before = harness_digest()
-    copy = tmp_path / "mutator"
-    shutil.copytree(Path(mutator.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(finished_run_keys, "_HARNESS_FOLDER", copy)
-    harness_digest.cache_clear()
-    assert harness_digest() == before
-    (copy / name).write_text((copy / name).read_text() + "\n")
-    harness_digest.cache_clear()
-    assert (harness_digest() != before) == is_other
-    harness_digest.cache_clear()
-
-
 def test_runs_of_edited_code_are_not_reused_but_those_before_an_unrelated_package_are(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -180,18 +136,6 @@ def test_runs_of_edited_code_are_not_reused_but_those_before_an_unrelated_packag
     reused.append(ran(toycar, tmp_path / "after a package", accept_versions=True).reused)
     harness_digest.cache_clear()
     assert reused == [0, 0, 0, 12]
-
-
-def test_an_unrelated_package_changes_no_key(toycar: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    """But another version of one that the harness requires does."""
-    manifest, installed = toycar.manifest("toycar"), run_environment._installed_packages()
-    before = surroundings_digest(toycar, manifest)
-    with_other = {**installed, "unrelated": ("1.0", [])}
-    monkeypatch.setattr(run_environment, "_installed_packages", lambda: with_other)
-    assert surroundings_digest(toycar, manifest) == before
-    with_new_numpy = {**installed, "numpy": ("99.0", installed["numpy"][1])}
-    monkeypatch.setattr(run_environment, "_installed_packages", lambda: with_new_numpy)
-    assert surroundings_digest(toycar, manifest) != before
 
 
 def test_a_run_that_loaded_a_package_needs_its_version(
@@ -231,14 +175,6 @@ def test_a_run_that_loaded_a_module_of_no_package_is_not_stored(
     assert not FinishedRuns().has_any()
 
 
-def test_the_name_of_a_scenario_is_part_of_the_key(experiment: Callable[..., Experiment]) -> None:
-    """An error of the target can contain it, and then stands in the record."""
-    asked = experiment()
-    renamed = dataclasses.replace(asked, scenario=f"{asked.scenario}_again")
-    keys = {finished_run_keys.run_key("", each, "", "") for each in (asked, asked, renamed)}
-    assert len(keys) == 2
-
-
 def test_a_worker_with_other_code_leaves_the_store_alone(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -265,7 +201,7 @@ def test_a_damaged_store_is_not_believed(toycar: Workspace, tmp_path: Path) -> N
         data[place] ^= 1
     segment.write_bytes(data)
     assert ran(toycar, tmp_path / "second").reused < 12
-    assert contents(tmp_path / "first") == contents(tmp_path / "second")
+    assert run_contents(tmp_path / "first") == run_contents(tmp_path / "second")
 
 
 def test_a_run_of_another_mutant_is_not_believed(
@@ -351,8 +287,8 @@ def test_a_killed_campaign_is_stored_once_it_is_finished(toycar: Workspace, tmp_
     killed_after(5, lambda: ran(toycar, tmp_path / "second"))
     second = ran(toycar, tmp_path / "second")
     assert (second.ran, second.reused) == (7, 7)
-    assert modes(tmp_path / "second") == {"reused": 12}
-    assert contents(tmp_path / "first") == contents(tmp_path / "second")
+    assert run_modes(tmp_path / "second") == {"reused": 12}
+    assert run_contents(tmp_path / "first") == run_contents(tmp_path / "second")
 
 
 def test_notes_that_the_run_folder_does_not_confirm_are_not_stored(toycar: Workspace, tmp_path: Path) -> None:
@@ -377,7 +313,7 @@ def test_a_bench_and_a_campaign_share_runs(toycar: Workspace, tmp_path: Path) ->
     experiments = plan_file.load_experiments(tmp_path / "first")
     with mutator.open_bench(toycar, tmp_path / "bench", campaign="small", seed=3, engine="fork") as bench:
         records = bench.run(experiments)
-    assert modes(tmp_path / "bench") == {"reused": 12}
+    assert run_modes(tmp_path / "bench") == {"reused": 12}
     assert {record.experiment_id: record for record in records} == dict(
         mutator.load_run(tmp_path / "first").folder.records()
     )
@@ -385,7 +321,7 @@ def test_a_bench_and_a_campaign_share_runs(toycar: Workspace, tmp_path: Path) ->
         toycar, tmp_path / "alone", campaign="small", engine="fork", reuse=False
     ) as bench:
         assert bench.run(experiments) == records
-    assert "reused" not in modes(tmp_path / "alone")
+    assert "reused" not in run_modes(tmp_path / "alone")
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,7 @@ Python 3.11 cannot tell what runs execute, so most tests say it by hand: everyth
 """
 
 import dataclasses
-import json
-import shutil
 import sys
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,23 +12,23 @@ from typing import Any
 import pytest
 
 import mutator
-from mutator import CheckFailed, MutatorError
+from mutator import CheckFailed
 from mutator.audit.run_audit import run_audit_checks
 from mutator.campaigns import run_environment
 from mutator.engines import fork_engine, reference_engine
 from mutator.engines.executed_functions import ExecutedFunctions
 from mutator.execution import earlier_run, unaffected_runs
 from mutator.execution.code_recording import CodeRecording, RecordingAssignment, executed_parts
-from mutator.execution.earlier_run import describe_left_out
 from mutator.execution.experiment_runner import record_without_outcome
 from mutator.execution.finished_run_keys import surroundings_by_name
 from mutator.execution.session_summary import Summary
 from mutator.execution.unaffected_runs import TargetChange, UnaffectedRuns
-from mutator.model import Outcome, RunError, Status
+from mutator.model import RunError, Status
 from mutator.store.executed_code import ExecutedCode
 from mutator.store.plan_file import iterate_experiments
 from mutator.store.preflight_results import golden_digests
 from mutator.workspace import Workspace
+from tests.run_contents import run_contents, run_modes
 
 pytestmark = [
     pytest.mark.usefixtures("kept_checks"),
@@ -63,43 +60,11 @@ def executed(monkeypatch: pytest.MonkeyPatch) -> Callable[[ExecutedFunctions | N
     return say
 
 
-@pytest.fixture
-def run(toycar: Workspace, tmp_path: Path) -> Run:
-    """Run the campaign `small` without the store of finished runs."""
-
-    def ran(name: str, **arguments: Any) -> Summary:
-        if arguments.get("since") is None:
-            arguments["reuse"] = False
-        summary = mutator.run("small", tmp_path / name, workspace=toycar, engine="fork", **arguments).summary
-        assert summary is not None
-        return summary
-
-    return ran
-
-
 def edit(toycar: Workspace, path: str, old: str, new: str) -> None:
     file = toycar.library.parent / "tree" / path
     text = file.read_text()
     assert old in text
     file.write_text(text.replace(old, new))
-
-
-def modes(out: Path) -> Counter[str]:
-    return Counter(str(line["engine"]) for line in mutator.load_run(out).folder.timings().values())
-
-
-def contents(out: Path) -> dict[str, object]:
-    """Everything that a run found out."""
-    run = mutator.load_run(out)
-    folder = run.folder
-    return {
-        "records": dict(folder.records()),
-        "proof": dict(folder.records("proof")),
-        "patches": {name: folder.patches.read_patch(name) for name in folder.records()},
-        "results": (out / "results.csv").read_bytes(),
-        "series": {p.name: p.read_bytes() for p in (out / "series").rglob("*") if p.is_file()},
-        "seal": run.seal,
-    }
 
 
 @pytest.mark.usefixtures("executed")
@@ -114,8 +79,8 @@ def test_what_a_change_cannot_affect_is_left_out(toycar: Workspace, tmp_path: Pa
     assert quick.since_note == (
         "since base: 12 of 12 left out, because nothing that they executed has changed"
     )
-    assert contents(tmp_path / "quick") == contents(tmp_path / "full")
-    assert modes(tmp_path / "quick") == {"unaffected": 12}
+    assert run_contents(tmp_path / "quick") == run_contents(tmp_path / "full")
+    assert run_modes(tmp_path / "quick") == {"unaffected": 12}
     folder = mutator.load_run(tmp_path / "quick").folder
     assert [d for check in run_audit_checks(folder, toycar) for d in check.differences] == []
     assert run("again", since=tmp_path / "quick", workers=2).left_out == 12
@@ -342,16 +307,6 @@ def test_results_from_the_store_keep_what_they_executed(toycar: Workspace, tmp_p
     assert run("third", since=tmp_path / "second").left_out == 12
 
 
-@pytest.mark.skipif(hasattr(sys, "monitoring"), reason="Python 3.12 and later can tell what runs execute")
-def test_an_older_python_runs_everything_and_says_so(tmp_path: Path, run: Run) -> None:
-    run("base")
-    summary = run("new", since=tmp_path / "base")
-    assert summary.left_out == 0
-    assert summary.since_note == (
-        "since base: 0 of 12 left out: Python 3.11 cannot tell what a run executes, as Python 3.12 can"
-    )
-
-
 @pytest.mark.skipif(not hasattr(sys, "monitoring"), reason="sys.monitoring needs Python 3.12")
 @pytest.mark.parametrize(
     ("path", "old", "new", "left_out"),
@@ -375,71 +330,3 @@ def test_what_runs_executed_is_recorded(
     quick = run("quick", since=tmp_path / "base")
     assert quick.left_out == left_out
     assert quick.seal == run("full").seal
-
-
-def test_a_sentence_lists_the_most_frequent_reasons() -> None:
-    reasons = {"a changed": 1, "b changed": 4, "c changed": 2, "d changed": 1, "e changed": 1}
-    text = describe_left_out(Path("runs/base"), 3, reasons)
-    if hasattr(sys, "monitoring"):
-        assert text == (
-            "since base: 3 of 12 left out, because nothing that they executed has changed; the others ran: "
-            "b changed (4), c changed (2), a changed (1), other reasons (2)"
-        )
-
-
-@pytest.mark.parametrize(
-    ("arguments", "match"),
-    [
-        ({"since": "new"}, "the folder of this run itself"),
-        ({"since": "nowhere"}, "not a run folder"),
-        ({"since": "base", "reuse": False}, "`since` without `reuse`"),
-        ({"since": "base", "cluster": "local:2"}, "`since` with `cluster`"),
-    ],
-)
-def test_a_useless_earlier_run_is_refused(
-    toycar: Workspace, tmp_path: Path, arguments: dict[str, Any], match: str
-) -> None:
-    arguments["since"] = tmp_path / str(arguments["since"])
-    with pytest.raises(MutatorError, match=match):
-        mutator.run("small", tmp_path / "new", workspace=toycar, **arguments)
-    assert not (tmp_path / "new").exists()
-
-
-def test_an_earlier_run_of_another_target_is_refused(toycar: Workspace, tmp_path: Path, run: Run) -> None:
-    run("base")
-    head = tmp_path / "base" / "run.json"
-    values = json.loads(head.read_text())
-    shutil.copytree(tmp_path / "base", tmp_path / "other")
-    other = mutator.load_run(tmp_path / "other").folder
-    with pytest.raises(MutatorError, match="a run of the target pole"):
-        earlier = earlier_run.EarlierRunUse(since=_with_target(other, "pole"))
-        earlier.check_target(mutator.load_run(tmp_path / "base").folder)
-    assert values["target"] == "toycar"
-
-
-def _with_target(folder: Any, target: str) -> Any:
-    folder.__dict__["head"] = dataclasses.replace(folder.head, target=target)
-    return folder
-
-
-class TestLastFailed:
-    """`last_failed` runs what had a hazard or did not end normally."""
-
-    def test_what_failed_runs_first(self, tmp_path: Path, run: Run) -> None:
-        """The rest is left for the next call, which completes the run: the same seal as in one run."""
-        base = run("base")
-        first = run("new", since=tmp_path / "base", last_failed=True)
-        assert (first.done, first.unselected, first.exit_code) == (3, 9, 0)
-        assert first.selection_note == (
-            "not selected by --last-failed: 9; without it, the same command runs them"
-        )
-        records = mutator.load_run(tmp_path / "new").folder.records()
-        assert {record.outcome for record in records.values()} == {Outcome.HAZARD}
-        assert first.seal is None
-        second = run("new", since=tmp_path / "base")
-        assert (second.done, second.unselected, second.seal) == (12, 0, base.seal)
-
-    def test_without_an_earlier_run_the_own_folder_counts(self, tmp_path: Path, run: Run) -> None:
-        """If nothing has failed there, everything runs, as with pytest."""
-        summary = run("new", last_failed=True)
-        assert (summary.done, summary.unselected) == (12, 0)

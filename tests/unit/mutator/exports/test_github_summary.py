@@ -32,15 +32,6 @@ def became(e: Experiment) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def workspace(
-    tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
-) -> Workspace:
-    toycar = copy_toycar(tmp_path_factory.mktemp("repository"))
-    (toycar.library.parent / ".git").mkdir()
-    return toycar
-
-
-@pytest.fixture(scope="module")
 def compared(workspace: Workspace, write_run: Callable[..., Path]) -> Comparison:
     """A run in which lane and silence become hazards. All series are kept."""
     folder = workspace.library.parent

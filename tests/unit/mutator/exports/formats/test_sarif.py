@@ -32,15 +32,6 @@ def lane_and_silence_hazard(experiment: Experiment) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def workspace(
-    tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
-) -> Workspace:
-    toycar = copy_toycar(tmp_path_factory.mktemp("repository"))
-    (toycar.library.parent / ".git").mkdir()
-    return toycar
-
-
-@pytest.fixture(scope="module")
 def runs(workspace: Workspace, write_run: Write) -> tuple[Path, Path]:
     """A run, and one in which one more kind of fault leads to hazards."""
     folder = workspace.library.parent
