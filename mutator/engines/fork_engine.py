@@ -26,12 +26,13 @@ from mutator.engines.code_swap_planning import CodeSwap, plan_swap
 from mutator.engines.engine_jobs import EngineArguments, Job, JobResult, RunMode, harness_error_result
 from mutator.engines.executed_functions import ExecutedFunctions, executed_functions_from_json
 from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
-from mutator.engines.fork_messages import check_fork_report, fork_request
+from mutator.engines.fork_messages import SharedParts, check_fork_report, fork_request
 from mutator.engines.fork_server_processes import (
     ForkServer,
     GoldenRunRequest,
     WaitingProcess,
     raising_if_server_input_changes,
+    tree_folder_of_server,
 )
 from mutator.engines.golden_run_keys import GoldenRunKey, golden_run_key, resolved_path
 from mutator.engines.job_folder import PLAIN_OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
@@ -83,6 +84,7 @@ class ForkEngine:
         self._patience_s = limits.wall_s + GUARD_PATIENCE_S
         self._server: ForkServer | None = None
         self._server_count = 0
+        self._shared_parts = SharedParts(None)
         self._obstacle = (
             None if manifest.stepwise_function else NotForkable(f"target {manifest.name} is not stepwise")
         )
@@ -186,14 +188,24 @@ class ForkEngine:
         if self._server is None:
             self._server_count += 1
             home = self._runs_folder / f"server-{self._server_count}"
+            self._shared_parts = self._find_shared_parts(tree_folder_of_server(home))
             try:
-                self._server = ForkServer(self._manifest, home, self._parent_pid, scenarios)
+                self._server = ForkServer(
+                    self._manifest, home, self._parent_pid, scenarios, self._shared_parts.as_message()
+                )
             except NotForkable as why:
                 self._obstacle = why
                 raise
         if self._manifest.sandbox and self._server.scenarios_folder != scenarios:
             raise NotForkable("the sandbox of the fork server has the scenarios of another folder")
         return self._server
+
+    def _find_shared_parts(self, tree: Path) -> SharedParts:
+        null = self._null_mutant
+        try:
+            return SharedParts(plan_swap(self._manifest, null.files, null.probe_source, str(tree)))
+        except MutantNotSwappable:  # nothing will be forked
+            return SharedParts(None)
 
     def _process_before_step(self, job: Job, step: int, swap: CodeSwap) -> WaitingProcess:
         pool = self._ensure_server(job)
@@ -241,6 +253,7 @@ class ForkEngine:
             self._limits,
             home,
             swap,
+            self._shared_parts,
             fork_point,
             stop_at_hazard=job.stop_at_hazard,
             observe=observe,

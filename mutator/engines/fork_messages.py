@@ -1,8 +1,9 @@
 """Messages to and from a fork that becomes a mutant: the request, and the check of its report."""
 
+from types import CodeType
 from typing import Any
 
-from mutator.engines.code_swap_planning import CodeSwap
+from mutator.engines.code_swap_planning import CodeSwap, FunctionSwap
 from mutator.engines.engine_jobs import Job
 from mutator.engines.first_activation import ForkPoint
 from mutator.engines.job_folder import JobFolder
@@ -14,11 +15,39 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_at_hazard_code import stop_function_source
 
 
+class SharedParts:
+    """The parts of requests that most mutants have, because the null mutant has them, too.
+
+    The server gets them once (`as_message`); a request has their numbers. Otherwise each fork would unmarshal
+    them, and so copy the memory of all names in them.
+    """
+
+    def __init__(self, null_mutant: CodeSwap | None) -> None:
+        self._parts: list[CodeType | FunctionSwap] = (
+            [null_mutant.probe_code[1], *null_mutant.functions] if null_mutant else []
+        )
+
+    def as_message(self) -> list[Any]:
+        return list(map(_part_as_message, self._parts))
+
+    def part_or_number(self, part: CodeType | FunctionSwap) -> Any:
+        """Return a part of a request, or the number of the same object here: compiling caches its results."""
+        numbers = (number for number, shared in enumerate(self._parts) if shared is part)
+        return next(numbers, _part_as_message(part))
+
+
+def _part_as_message(part: CodeType | FunctionSwap) -> Any:
+    if isinstance(part, CodeType):
+        return part
+    return part.module, part.name_path, part.old_code, part.new_code
+
+
 def fork_request(
     manifest: TargetManifest,
     limits: Limits,
     home: JobFolder,
     swap: CodeSwap,
+    shared: SharedParts,
     fork_point: ForkPoint,
     *,
     stop_at_hazard: bool,
@@ -38,8 +67,8 @@ def fork_request(
         "disk_mb": limits.disk_mb,
         "steps": limits.steps,
         "probe_name": probe_module(manifest.probe_package),
-        "probe": swap.probe_code,
-        "functions": [(f.module, f.name_path, f.old_code, f.new_code) for f in swap.functions],
+        "probe": list(map(shared.part_or_number, swap.probe_code)),
+        "functions": list(map(shared.part_or_number, swap.functions)),
         "settings": swap.probe_value_setters,
         "probe_state": probe_attributes_after(
             fork_point.observation_count, fork_point.earliest_time_s, fork_point.last_time_s

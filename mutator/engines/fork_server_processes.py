@@ -128,6 +128,7 @@ class ForkServer:
     """A fork server with its waiting processes, in the new folder `scratch_folder`.
 
     In a sandbox, they can read `scenarios_folder`, and write to the folder in which `scratch_folder` is.
+    `shared_parts` are those of `fork_messages.SharedParts`.
 
     Its tree has no bytecode, which a mutant could exchange before the server loads one more module. Raises
     NotForkable if the target cannot be loaded or has more than one thread, and ForkServerLost if the server
@@ -135,12 +136,17 @@ class ForkServer:
     """
 
     def __init__(
-        self, manifest: TargetManifest, scratch_folder: Path, parent_pid: int | None, scenarios_folder: Path
+        self,
+        manifest: TargetManifest,
+        scratch_folder: Path,
+        parent_pid: int | None,
+        scenarios_folder: Path,
+        shared_parts: Sequence[Any] = (),
     ) -> None:
         assert manifest.stepwise_function is not None
         self.scratch_folder = scratch_folder
         self.scenarios_folder = scenarios_folder
-        self.tree_folder = scratch_folder / "tree"
+        self.tree_folder = tree_folder_of_server(scratch_folder)
         self._parent_pid = parent_pid
         self._waiting_processes: list[WaitingProcess] = []
         self._process_group = 0  # the server's process group, once known
@@ -152,6 +158,7 @@ class ForkServer:
             "packages": list(manifest.import_names),
             "module": manifest.entry_module,
             "stepwise": manifest.stepwise_function,
+            "shared": list(shared_parts),
         }
         start_path, data = scratch_folder / "start.marshal", marshal.dumps(start)
         start_path.write_bytes(data)
@@ -281,6 +288,10 @@ class ForkServer:
         if self._sandbox:
             self._sandbox.close()
         remove_folder(self.scratch_folder)
+
+
+def tree_folder_of_server(scratch_folder: Path) -> Path:
+    return scratch_folder / "tree"
 
 
 def _describe_failure(failure: dict[str, Any]) -> str:

@@ -19,6 +19,7 @@ def main() -> int:
     child_end = process_guard.fork_guarded(server_pipe, patience_s=MOST_CLEANUP_S)
     if child_end is None:
         os.close(server_pipe)
+        process_guard.restore_default_signals()
         os.execv(sys.executable, [sys.executable, "-P", "-m", "mutator", *sys.argv[2:]])
     code = int(child_end["code"])
     return code if code >= 0 else 128 - code

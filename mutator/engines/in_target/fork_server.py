@@ -40,6 +40,7 @@ function_recorder = run_once.load_neighbour("function_recorder")
 def main(connection_fd: int, start_file: str) -> int:
     if process_guard.fork_guarded(connection_fd) is not None:
         return 0
+    process_guard.restore_default_signals()
     try:
         serve_as_first_process(connection_fd, marshal.loads(Path(start_file).read_bytes()))
     finally:
@@ -64,6 +65,10 @@ def serve_as_first_process(connection_fd: int, start_message: dict[str, Any]) ->
     server.serve_requests()
 
 
+# what real files derive from; an `isinstance` with the abstract class `io.IOBase` takes 20 times as long
+_FILE_BASE: Any = io.IOBase.__mro__[1]
+
+
 class NoLongerNeeded(Exception):
     """The process is no longer needed."""
 
@@ -82,6 +87,7 @@ class ForkingProcess:
         self.begin_run: Any = None
         self.golden_run: Any = None
         self.waiting_children: set[int] = set()  # processes that this one forked to wait at later steps
+        self.loaded_files = mutant_installation.LoadedFiles()
         self.inherited_processes = 0  # processes that the run had started before this one was forked
         self.step = 0
         self.function_recorder = function_recorder.FunctionRecorder(start_message["tree"])
@@ -184,6 +190,7 @@ class ForkingProcess:
         if processes := self.count_run_processes():
             return {"threads": [], "processes": processes}
         space_limit = process_guard.DiskGrowthLimit(home, disk_mb)
+        self.loaded_files.update()
         prepare_to_fork()
         ending = process_guard.fork_guarded(self.connection.fileno(), wall_s=wall_s, space_limit=space_limit)
         if ending is None:
@@ -217,6 +224,11 @@ class ForkingProcess:
             run_exit_handlers_and_flush()
         os._exit(0)
 
+    def with_shared_parts(self, parts: list[Any]) -> list[Any]:
+        """Return parts of a job, with those in the place of numbers that the server got when it started."""
+        shared = self.start_message["shared"]
+        return [shared[part] if isinstance(part, int) else part for part in parts]
+
     def use_temporary_folder(self, home: str) -> None:
         """Make `home` the folder for temporary files, even if `tempfile` has already chosen the server's."""
         os.environ["TMPDIR"] = home
@@ -240,8 +252,9 @@ class ForkingProcess:
         watch = job["watch"]
         probe, modules_before = None, set() if watch is None else set(sys.modules)
         try:
-            probe = mutant_installation.install_probe(job["probe_name"], job["probe"])
-            mutant_installation.swap_code(job["functions"], probe)
+            probe = mutant_installation.install_probe(job["probe_name"], self.with_shared_parts(job["probe"]))
+            functions = self.with_shared_parts(job["functions"])
+            mutant_installation.swap_code(functions, probe, self.loaded_files)
             mutant_installation.run_probe_value_setters(job["settings"], probe)
             probe.limit(job["steps"])
             run_once.delete_marker_on_activation(probe, job["inactive"])
@@ -291,7 +304,7 @@ def run_exit_handlers_and_flush() -> None:
         sys.modules["threading"]._shutdown()
     atexit._run_exitfuncs()
     for tracked_object in gc.get_objects():  # only new ones, because those from before the fork are frozen
-        if isinstance(tracked_object, io.IOBase):
+        if isinstance(tracked_object, _FILE_BASE):
             with suppress(Exception):
                 tracked_object.flush()
     for stream in (sys.stdout, sys.stderr):

@@ -30,11 +30,36 @@ def install_probe(name: str, code_parts: Sequence[types.CodeType]) -> Any:
     return module
 
 
-def swap_code(functions: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
+class LoadedFiles:
+    """The names of the loaded modules, by file.
+
+    A fork looks only here: to visit all modules, it would have to copy the memory of each.
+    """
+
+    def __init__(self) -> None:
+        self._names_by_file: dict[str, list[str]] = {}
+        self._newest: tuple[int, str] | None = None  # of the modules that were listed
+
+    def update(self) -> None:
+        """List the modules again if there are new ones."""
+        newest = (len(sys.modules), next(reversed(sys.modules)))
+        if newest != self._newest:
+            self._newest, self._names_by_file = newest, {}
+            for name, module in list(sys.modules.items()):
+                if isinstance(file := getattr(module, "__file__", None), str):
+                    self._names_by_file.setdefault(file, []).append(name)
+
+    def other_module_of_file(self, module: types.ModuleType) -> str | None:
+        """Return the name of another module that was loaded from the file of `module`."""
+        names = self._names_by_file.get(getattr(module, "__file__", None) or "", ())
+        return next((name for name in names if sys.modules.get(name, module) is not module), None)
+
+
+def swap_code(functions: Sequence[Sequence[Any]], probe: types.ModuleType, loaded_files: LoadedFiles) -> None:
     """Replace the code of all functions (module, path, old code, new code), or of none."""
     name = probe.__name__.rpartition(".")[2]
     new_code_by_function = [
-        (find_live_function(module, path, old), new) for module, path, old, new in functions
+        (find_live_function(module, path, old, loaded_files), new) for module, path, old, new in functions
     ]
     for function, new in new_code_by_function:
         function.__code__ = new
@@ -51,13 +76,15 @@ def run_probe_value_setters(value_setters: Sequence[Sequence[Any]], probe: types
         exec(code, names)
 
 
-def find_live_function(module: str, name_path: Sequence[str], code: types.CodeType) -> types.FunctionType:
+def find_live_function(
+    module: str, name_path: Sequence[str], code: types.CodeType, loaded_files: LoadedFiles
+) -> types.FunctionType:
     """Return the only function at `name_path` with this code. SwapRefused if it is missing or running."""
     where = ".".join((module, *name_path))
     if module not in sys.modules:
         raise SwapRefused(f"{module} is not loaded")
     holder: Any = sys.modules[module]
-    if other := _other_module_of_file(holder):
+    if other := loaded_files.other_module_of_file(holder):
         raise SwapRefused(f"the file of {module} is also loaded as {other}")
     for name in name_path[:-1]:
         holder = vars(holder).get(_mangled_name(holder, name))
@@ -71,12 +98,6 @@ def find_live_function(module: str, name_path: Sequence[str], code: types.CodeTy
     if _count_references_to_code(live) > _REFERENCES_TO_IDLE_CODE:
         raise SwapRefused(f"{where} is running, or exists more than once")
     return live
-
-
-def _other_module_of_file(module: types.ModuleType) -> str | None:
-    file = getattr(module, "__file__", None)
-    names = (name for name, other in list(sys.modules.items()) if getattr(other, "__file__", None) == file)
-    return next((name for name in names if sys.modules[name] is not module), None) if file else None
 
 
 def _count_references_to_code(function: types.FunctionType) -> int:

@@ -73,7 +73,6 @@ def fork_guarded(
         if space_limit is not None:
             space_limit.close()
         os.setsid()
-        _restore_default_signals()
         die_with_parent(parent)
         return None
     try:
@@ -96,8 +95,11 @@ def fork_guarded(
     }
 
 
-def _restore_default_signals() -> None:
-    """Restore the default signal handling, which shells change for background processes."""
+def restore_default_signals() -> None:
+    """Restore the default signal handling, which shells change for background processes.
+
+    Only before the target's code runs: what a golden run sets holds in its forks, too.
+    """
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     for number in _SIGNALS_TO_RESTORE:
         if signal.getsignal(number) is signal.SIG_IGN:

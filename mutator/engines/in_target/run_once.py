@@ -65,6 +65,7 @@ def main(job_file: str, connection_fd: int) -> int:
     ending = process_guard.fork_guarded(connection_fd, wall_s=job["wall_s"], space_limit=space_limit)
     if ending is None:
         os.close(connection_fd)
+        process_guard.restore_default_signals()
         run_job(job)
     else:
         ending["cpu_s"] += time.process_time()  # includes the interpreter's start

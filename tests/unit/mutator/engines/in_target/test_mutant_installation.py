@@ -8,7 +8,7 @@ from functools import lru_cache, wraps  # noqa: F401 - used in LOADED
 import pytest
 
 from mutator.engines.code_swap_planning import changed_functions
-from mutator.engines.in_target.mutant_installation import SwapRefused, swap_code
+from mutator.engines.in_target.mutant_installation import LoadedFiles, SwapRefused, swap_code
 
 LOADED = """
 from functools import lru_cache, wraps
@@ -88,6 +88,12 @@ def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.Code
     ]
 
 
+def swap(changed: list[tuple[str, tuple[str, ...], types.CodeType, types.CodeType]]) -> None:
+    loaded_files = LoadedFiles()
+    loaded_files.update()
+    swap_code(changed, PROBE, loaded_files)
+
+
 @pytest.mark.parametrize(
     ("word", "call"),
     [
@@ -110,15 +116,15 @@ def test_functions_of_every_form_run_the_new_code(
     for _ in range(200):
         if word != "cached":
             assert kept(loaded) == f"old {word}"
-    swap_code(functions(f'"old {word}"', f'"new {word}"'), PROBE)
+    swap(functions(f'"old {word}"', f'"new {word}"'))
     assert kept(loaded) == f"new {word}"
     assert vars(loaded)["_fi"] is PROBE
 
 
 def test_imported_names_and_bound_methods_run_the_new_code(loaded: types.ModuleType) -> None:
     plain, method = loaded.plain, loaded.Car().method
-    swap_code(functions('"old plain"', '"new plain"'), PROBE)
-    swap_code(functions('"old method"', '"new method"'), PROBE)
+    swap(functions('"old plain"', '"new plain"'))
+    swap(functions('"old method"', '"new method"'))
     assert (plain(), method()) == ("new plain", "new method")
 
 
@@ -126,20 +132,20 @@ def test_another_function_with_the_same_name_is_not_swapped(loaded: types.Module
     vars(loaded)["plain"] = lambda: "mine"
     changed = functions('"old', '"new')
     with pytest.raises(SwapRefused, match=r"some_loaded_car\.plain is not found"):
-        swap_code(changed, PROBE)
+        swap(changed)
     assert loaded.Car.static() == "old static"
 
 
 def test_code_shared_by_two_functions_is_not_swapped(loaded: types.ModuleType) -> None:
     with pytest.raises(SwapRefused, match="exists more than once"):
-        swap_code(functions('"old twice"', '"new twice"'), PROBE)
+        swap(functions('"old twice"', '"new twice"'))
 
 
 def test_a_function_on_the_stack_is_not_swapped(loaded: types.ModuleType) -> None:
     """The function would continue with its old code."""
 
     def work() -> None:
-        swap_code(functions('"old walk"', '"new walk"'), PROBE)
+        swap(functions('"old walk"', '"new walk"'))
 
     vars(loaded)["work"] = work
     with pytest.raises(SwapRefused, match="is running"):
@@ -149,4 +155,28 @@ def test_a_function_on_the_stack_is_not_swapped(loaded: types.ModuleType) -> Non
 def test_a_module_that_is_not_loaded_is_not_swapped(loaded: types.ModuleType) -> None:
     changed = [("car_nobody_loaded", path, old, new) for _, path, old, new in functions('"old', '"new')]
     with pytest.raises(SwapRefused, match="car_nobody_loaded is not loaded"):
-        swap_code(changed, PROBE)
+        swap(changed)
+
+
+def test_a_file_that_is_loaded_twice_is_not_swapped(loaded: types.ModuleType) -> None:
+    """Also if the second module came after the modules were first listed."""
+    loaded.__file__ = "car.py"
+    loaded_files, again = LoadedFiles(), types.ModuleType("loaded_again")
+    loaded_files.update()
+    assert loaded_files.other_module_of_file(loaded) is None
+    again.__file__, sys.modules["loaded_again"] = loaded.__file__, again
+    try:
+        loaded_files.update()
+        with pytest.raises(SwapRefused, match="the file of some_loaded_car is also loaded as loaded_again"):
+            swap_code(functions('"old plain"', '"new plain"'), PROBE, loaded_files)
+    finally:
+        del sys.modules["loaded_again"]
+
+
+def test_a_second_name_of_the_same_module_prevents_no_swap(loaded: types.ModuleType) -> None:
+    loaded.__file__, sys.modules["another_name"] = "car.py", loaded
+    try:
+        swap(functions('"old plain"', '"new plain"'))
+    finally:
+        del sys.modules["another_name"]
+    assert loaded.plain() == "new plain"
