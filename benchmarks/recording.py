@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 from statistics import fmean, stdev
 
-from scipy.stats import t as student
+from scipy.stats import t as student  # type: ignore[import-untyped]
 
 ROOT = Path(__file__).resolve().parents[1]
 GOAL = 1.03
