@@ -35,7 +35,7 @@ from mutator.workspace import Workspace
 if TYPE_CHECKING:
     import pandas as pd
 
-CHECK_RUNS_PER_GOLDEN = 3  # two golden runs and the null mutant, for each scenario with its changes
+CHECK_RUNS_PER_GOLDEN = 2  # golden run and null mutant, for each scenario with its changes
 _DEFAULT_RUN_CPU_S = 1.4  # one run on the reference engine, including interpreter start
 _TIME_OUTSIDE_RUNS_S = 3.0  # time that a campaign needs outside its runs
 _BYTES_PER_EXPERIMENT = 9_000  # series, patch, record and table rows of an experiment

@@ -4,6 +4,7 @@ import os
 import shlex
 import sys
 import warnings
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -270,7 +271,7 @@ def run(
     workers = usable_cores() if workers is None else workers
     try:
         with showing_errors(step), campaign_progress(terminal) as notify, warnings.catch_warnings():
-            warnings.simplefilter("ignore", mutator.IncompleteRun)  # `_print_summary` reports it
+            warnings.simplefilter("ignore", mutator.IncompleteRun)  # `_print_results` reports it
             finished_run = mutator.run(
                 campaign,
                 out,
@@ -287,21 +288,32 @@ def run(
                 progress=notify,
                 workspace=workspace,
             )
+        summary = finished_run.summary
+        assert summary is not None  # `mutator.run` always sets it
+        _print_results(terminal, finished_run, summary)
+        with showing_errors(step), campaign_progress(terminal) as notify:
             # resuming an unfinished run can change the worst experiments
-            if stills and finished_run.summary and finished_run.summary.exit_code == 0:
+            if stills and summary.exit_code == 0:
                 _take_stills(terminal, finished_run, notify, workers)
             report = _write_report(out, finished_run, notify)
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; finished experiments are kept; resume: {resume_command()}") from None
-    assert finished_run.summary is not None  # `mutator.run` always sets it
-    _print_summary(terminal, out, finished_run, finished_run.summary, report)
+    report_paths = (
+        [out / path.relative_to(finished_run.path) for path in (report.markdown, report.page)]
+        if report
+        else []
+    )
+    if as_json:
+        _print_results_as_json(terminal, out, summary, report_paths)
+    if report_paths:
+        terminal.print_text(f"report: {report_paths[0]} and {report_paths[1]}")
     if step and report:
         from mutator.api.github_output import run_on_github
 
-        output = run_on_github(finished_run, finished_run.summary, workspace, os.environ)
+        output = run_on_github(finished_run, summary, workspace, os.environ)
         step.show(output, to_stderr=as_json)
-    if finished_run.summary.exit_code:
-        raise typer.Exit(finished_run.summary.exit_code)
+    if summary.exit_code:
+        raise typer.Exit(summary.exit_code)
 
 
 def _take_stills(terminal: Terminal, run: "Run", notify: "ProgressCallback", workers: int) -> None:
@@ -325,22 +337,22 @@ def _write_report(out: Path, run: "Run", notify: "ProgressCallback") -> "Written
         ) from None
 
 
-def _print_summary(
-    terminal: Terminal, out: Path, run: "Run", summary: "Summary", report: "WrittenReport | None"
+def _print_results_as_json(
+    terminal: Terminal, out: Path, summary: "Summary", report_paths: Sequence[Path]
 ) -> None:
-    report_paths = (
-        [out / path.relative_to(run.path) for path in (report.markdown, report.page)] if report else []
+    counts = {"planned": summary.planned, "done": summary.done, "ran": summary.ran}
+    counts |= {"reused": summary.reused, "left_out": summary.left_out, "unselected": summary.unselected}
+    paths = {"run": str(out), "report": str(report_paths[0]) if report_paths else None}
+    errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
+    outcomes = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
+    terminal.print_json(
+        counts | paths | outcomes | asdict(summary.seals) | {"not_forked": summary.not_forked}
     )
-    if terminal.as_json:
-        counts = {"planned": summary.planned, "done": summary.done, "ran": summary.ran}
-        counts |= {"reused": summary.reused, "left_out": summary.left_out, "unselected": summary.unselected}
-        paths = {"run": str(out), "report": str(report_paths[0]) if report_paths else None}
-        errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
-        outcomes = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
-        terminal.print_json(
-            counts | paths | outcomes | asdict(summary.seals) | {"not_forked": summary.not_forked}
-        )
-    if report:
+
+
+def _print_results(terminal: Terminal, run: "Run", summary: "Summary") -> None:
+    """Print what does not need to wait for stills and report."""
+    if summary.results:
         print_outcome_counts(terminal, run)
     terminal.print_text(
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now; "
@@ -351,8 +363,6 @@ def _print_summary(
             terminal.print_text(note)
     if summary.proof_note:
         terminal.print_text(f"proof: {summary.proof_note}")
-    if report:
-        terminal.print_text(f"report: {report_paths[0]} and {report_paths[1]}")
     for name, value in summary.seals.digest_by_name().items():
         terminal.print_text(f"{name}: {value}")
     if summary.harness_errors:
@@ -366,6 +376,7 @@ def _print_summary(
         terminal.print_error(summary.problem)
     if summary.interrupted or summary.done + summary.unselected < summary.planned:
         terminal.print_command("resume:", resume_command())
+    sys.stdout.flush()  # a pipe, too, gets them before stills and report are made
 
 
 def resume_command() -> str:

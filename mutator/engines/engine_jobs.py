@@ -47,6 +47,8 @@ class Job:
     hash_seed: int = 0
     golden_folder: Path | None = None  # output folder of the fault-free run, if known
     keep_observations: bool = False  # keep what the probe observes
+    # drive by the manifest's stepwise function, as forks do, and report what a fork of it must know
+    drive_step_by_step: bool = False
     stop_at_hazard: bool = False  # end the run at its first terminal hazard
     golden_has_terminal_hazard: bool = False  # whether the golden run has a terminal hazard, too
     # like `keep_observations`; also note calls that make a target nondeterministic

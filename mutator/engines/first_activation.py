@@ -32,6 +32,11 @@ class GoldenObservations:
     imported_modules: tuple[str, ...] = ()
     executed_functions: ExecutedFunctions | None = None
 
+    @property
+    def has_any_before_first_step(self) -> bool:
+        """Whether a fork before the first step would miss an observation."""
+        return bool(self.values) and self.counts_before_steps[:1] != (0,)
+
     @cached_property
     def columns(self) -> np.ndarray:
         return np.array(self.values, dtype=float).T

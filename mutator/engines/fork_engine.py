@@ -20,7 +20,6 @@ from mutator._common.files import (
     remove_anything_at,
     remove_folder,
 )
-from mutator._common.hashing import content_id
 from mutator._common.message_text import counted
 from mutator.engines.code_swap_planning import CodeSwap, plan_swap
 from mutator.engines.engine_jobs import EngineArguments, Job, JobResult, RunMode, harness_error_result
@@ -34,9 +33,13 @@ from mutator.engines.fork_server_processes import (
     raising_if_server_input_changes,
     tree_folder_of_server,
 )
-from mutator.engines.golden_run_keys import GoldenRunKey, golden_run_key, resolved_path
+from mutator.engines.golden_run_keys import GoldenRunKey, golden_run_id, golden_run_key, resolved_path
 from mutator.engines.job_folder import PLAIN_OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
-from mutator.engines.observation_store import ObservationStore
+from mutator.engines.observation_store import (
+    OBSERVATION_KEYS,
+    ObservationStore,
+    observations_of_watched_run,
+)
 from mutator.engines.process_endings import (
     GUARD_PATIENCE_S,
     ProcessEnding,
@@ -308,12 +311,12 @@ class ForkEngine:
             was_stopped_at_hazard=bool(report and report.get("stopped")),
             third_party_modules=tuple(report["modules"]) if report else (),
             executed_functions=executed_functions_from_json(report.get("executed")) if report else None,
-            watch_report={name: report[name] for name in _OBSERVATION_KEYS} if observe and report else {},
+            watch_report={name: report[name] for name in OBSERVATION_KEYS} if observe and report else {},
             mode=RunMode.WARM if self._forks_before_first_step else RunMode.FORK,
         )
 
     def _golden_observations(self, job: Job, golden: Path) -> GoldenObservations:
-        """Return what a probe observes in a job's golden run. The first call runs it."""
+        """Return what a probe observes in a job's golden run; it runs if no check has stored that."""
         key = golden_run_key(job)
         if key not in self._observations_by_golden:
             try:
@@ -326,7 +329,7 @@ class ForkEngine:
         return observations
 
     def _observe_golden_run(self, job: Job, golden: Path) -> GoldenObservations:
-        golden_id = content_id(golden_run_key(job))
+        golden_id = golden_run_id(job)
         if stored := self._observation_store.load(golden_id):
             return stored
         folder = self._runs_folder / f"watch-{golden_id}"
@@ -344,19 +347,9 @@ class ForkEngine:
             for name in self._manifest.output_files:
                 if read_bounded(execution.out / name) != read_bounded(golden / name):
                     raise NotForkable(f"its {name} differs when it is driven step by step")
-            observed_values, *counts_and_modules = (
-                execution.watch_report[name] for name in _OBSERVATION_KEYS
-            )
-            values = tuple(map(tuple, observed_values))
-            counts_before_steps, imported_modules = map(tuple, counts_and_modules)
-            if values and counts_before_steps[:1] != (0,):
+            observations = observations_of_watched_run(execution)
+            if observations.has_any_before_first_step:
                 raise NotForkable("it observes before its first step")
-            observations = GoldenObservations(
-                values=values,
-                counts_before_steps=counts_before_steps,
-                imported_modules=imported_modules,
-                executed_functions=execution.executed_functions,
-            )
             self._observation_store.save(golden_id, observations)
             return observations
         except MutantNotSwappable as why:
@@ -365,7 +358,6 @@ class ForkEngine:
             remove_folder(folder)
 
 
-_OBSERVATION_KEYS = ("seen", "before", "libraries")
 _BEFORE_FIRST_STEP = ForkPoint(step=0, observation_count=0, earliest_time_s=None, last_time_s=None)
 
 

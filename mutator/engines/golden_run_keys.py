@@ -4,6 +4,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from mutator._common.hashing import content_id
 from mutator.engines.engine_jobs import Job
 
 
@@ -17,6 +18,10 @@ class GoldenRunKey(NamedTuple):
 
 def golden_run_key(job: Job) -> GoldenRunKey:
     return GoldenRunKey(resolved_path(job.scenario), job.seed, job.scenario_changes)
+
+
+def golden_run_id(job: Job) -> str:
+    return content_id(golden_run_key(job))
 
 
 @cache

@@ -1,4 +1,7 @@
-"""Stores what a probe observed in golden runs, for all workers of a session."""
+"""Stores what a probe observed in golden runs, for all workers of a session.
+
+The null mutant of the checks before a campaign observes; without it, a worker's fork engine does.
+"""
 
 import hmac
 import marshal
@@ -6,10 +9,23 @@ from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import write_atomic
+from mutator.engines.engine_jobs import JobResult
 from mutator.engines.executed_functions import executed_functions_from_json
 from mutator.engines.first_activation import GoldenObservations
 
+OBSERVATION_KEYS = ("seen", "before", "libraries")  # of a watched run's report
 _AUTHENTICATION_CODE_BYTES = 32  # of SHA-256
+
+
+def observations_of_watched_run(result: JobResult) -> GoldenObservations:
+    """Return what a null mutant observed that was driven step by step."""
+    values, counts_before_steps, imported_modules = (result.watch_report[key] for key in OBSERVATION_KEYS)
+    return GoldenObservations(
+        values=tuple(map(tuple, values)),
+        counts_before_steps=tuple(counts_before_steps),
+        imported_modules=tuple(imported_modules),
+        executed_functions=result.executed_functions,
+    )
 
 
 class ObservationStore:
@@ -51,6 +67,9 @@ class ObservationStore:
             )
         )
         write_atomic(path, self._authentication_code(path, data) + data)
+
+    def remove(self, golden_id: str) -> None:
+        self._path_of(golden_id).unlink(missing_ok=True)
 
     def _path_of(self, golden_id: str) -> Path:
         return self._folder / f"observed-{golden_id}"

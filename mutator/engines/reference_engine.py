@@ -195,6 +195,7 @@ class ReferenceEngine:
             "steps": self.limits.steps,
             "stop": stop_function_source(self.manifest) if job.stop_at_hazard else None,
             "stepwise": self.manifest.stepwise_function,
+            "step_by_step": job.drive_step_by_step,
             "functions": job.note_executed_functions,
             "watch": job.watch_nondeterminism,
             "observe": self._observed_names() if job.watch_nondeterminism or job.keep_observations else None,

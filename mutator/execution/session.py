@@ -173,7 +173,9 @@ class Session:
 
     def _run_checks(self) -> None:
         try:
-            run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
+            run_checks(
+                self.workspace, self.folder, workers=self.workers, notify=self.notify, secret=self.secret
+            )
         except CheckFailed as error:
             raise with_golden_run_pages(error, self.folder.path, self.workspace) from None
 

@@ -1,9 +1,15 @@
-"""The runs of the checks before a campaign: golden runs, each twice, null mutants, the canary."""
+"""The runs of the checks before a campaign: golden runs, null mutants, the canary.
+
+One run proves several things. A null mutant is driven under another hash seed and, if the target can, step by
+step. If its output is the golden run's, then neither the repetition, nor the hash seed, nor the probe, nor
+the way of driving changes anything. Only if it is not, further runs find out which of them does.
+"""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +17,15 @@ from mutator._common import cache_layout_and_pruning
 from mutator._common.confined_files import path_below
 from mutator._common.files import remove_folder
 from mutator.campaigns.campaign_files import Campaign
-from mutator.engines.engine_jobs import Job
+from mutator.engines.engine_jobs import Job, JobResult
+from mutator.engines.golden_run_keys import golden_run_id
+from mutator.engines.observation_store import ObservationStore, observations_of_watched_run
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import measure_limits
-from mutator.model import Experiment, Limits
-from mutator.mutants.mutant_building import build
+from mutator.model import Experiment, Limits, Status
+from mutator.mutants.mutant_building import Mutant, build
 from mutator.preflight import canary_check, unreached_triggers
-from mutator.preflight.check_run_problems import CheckRun, read_check_run
+from mutator.preflight.check_run_problems import CheckRun, null_mutant_problem, read_check_run
 from mutator.store.run_folder import GoldenRun
 from mutator.store.run_progress import Progress, StagePace
 from mutator.targets.manifest import TargetManifest
@@ -32,7 +40,7 @@ OnProgress = Callable[[Progress], None]
 CheckRunByName = dict[tuple[str, Any], CheckRun]  # kind of run, and `GoldenRun`
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class CheckRunner:
     """Executes the runs that the checks judge; golden runs and observations stay in `pending_folder`."""
 
@@ -44,6 +52,9 @@ class CheckRunner:
     canary_experiment: Experiment | None
     scratch_folder: Path
     pending_folder: Path
+    observation_store: ObservationStore | None = (
+        None  # from which fork engines take what null mutants observe
+    )
 
     def run_all(
         self, workers: int, notify: OnProgress
@@ -57,22 +68,42 @@ class CheckRunner:
             # last, because it waits for the golden runs, which have then begun
             judged = pool.submit(self._judge_canary, engine, futures)
             nulls = [future for name, future in futures.items() if name[0] == NULL_MUTANT]
+            goldens = [future for name, future in futures.items() if name[0] == GOLDEN]
             _report_progress("checks", [judged, *nulls], notify)
-            _report_progress(
-                "golden", [future for name, future in futures.items() if name[0] != NULL_MUTANT], notify
-            )
-            canary_verdict = judged.result()
-            return {name: future.result() for name, future in futures.items()}, canary_verdict
+            _report_progress("golden", goldens, notify)
+            runs = {name: future.result() for name, future in futures.items()}
+            for key in self.golden_runs:
+                runs |= self._repetitions(engine, pool, key, runs)
+            return runs, judged.result()
 
-    def run_goldens(self, workers: int, notify: OnProgress) -> dict[str, str]:
-        """Do each golden run once; return the digests by key."""
-        jobs = {name: job for name, job in self._jobs_by_name().items() if name[0] == GOLDEN}
+    def repeat_goldens(self, workers: int, notify: OnProgress) -> dict[str, str]:
+        """Do each golden run once, as null mutant; return the digests of what they write, by key."""
+        jobs = {name: job for name, job in self._jobs_by_name().items() if name[0] == NULL_MUTANT}
         with self._engine_and_pool(workers) as (engine, pool):
             futures = {
                 name[1].key: pool.submit(self._run_job, engine, name, job) for name, job in jobs.items()
             }
             _report_progress("golden", [*futures.values()], notify)
             return {key: future.result().output_digest for key, future in futures.items()}
+
+    def _repetitions(
+        self, engine: ReferenceEngine, pool: ThreadPoolExecutor, key: GoldenRun, runs: CheckRunByName
+    ) -> CheckRunByName:
+        """Return the runs that stand for the repeated golden run and the null mutant: the one that there is
+        or, if it is not sound, two that tell causes apart.
+        """
+        first, null = runs[GOLDEN, key], runs[NULL_MUTANT, key]
+        if first.problem or not null_mutant_problem(first, null):
+            return {(GOLDEN_AGAIN, key): null}
+        if self.observation_store:
+            self.observation_store.remove(golden_run_id(self._null_job(key)))
+        common, null_job = self._common_of_jobs(key), self._null_job(key)
+        jobs = {
+            (GOLDEN_AGAIN, key): Job(name=f"b-{key.key}", hash_seed=_OTHER_HASH_SEED, **common),
+            (NULL_MUTANT, key): replace(null_job, name=f"m-{key.key}", hash_seed=0, drive_step_by_step=False),
+        }
+        futures = {name: pool.submit(self._run_job, engine, name, job) for name, job in jobs.items()}
+        return {name: future.result() for name, future in futures.items()}
 
     @contextmanager
     def _engine_and_pool(self, workers: int) -> Iterator[tuple[ReferenceEngine, ThreadPoolExecutor]]:
@@ -117,26 +148,34 @@ class CheckRunner:
         )
 
     def _jobs_by_name(self) -> dict[tuple[str, Any], Job]:
-        jobs: dict[tuple[str, Any], Job] = {}
-        null = build(self.manifest, self.workspace.fault_models(), None, always_trigger())
-        for key in self.golden_runs:
-            common: dict[str, Any] = {
-                "scenario": self.workspace.scenario(key.scenario),
-                "seed": self.seed if key.seed is None else key.seed,
-                "scenario_changes": key.changes,
-            }
-            name = key.key
-            jobs[NULL_MUTANT, key] = Job(
-                name=f"n-{name}",
-                changed_files=null.files,
-                mutant_id=null.id,
-                keep_observations=True,
-                **common,
-            )
-            jobs[GOLDEN, key] = Job(name=f"a-{name}", **common)
-            jobs[GOLDEN_AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
         # null mutants first: their stage is reported before that of the golden runs
-        return dict(sorted(jobs.items(), key=lambda entry: entry[0][0] != NULL_MUTANT))
+        nulls = {(NULL_MUTANT, key): self._null_job(key) for key in self.golden_runs}
+        return nulls | {
+            (GOLDEN, key): Job(name=f"a-{key.key}", **self._common_of_jobs(key)) for key in self.golden_runs
+        }
+
+    def _null_job(self, key: GoldenRun) -> Job:
+        return Job(
+            name=f"n-{key.key}",
+            changed_files=self._null_mutant.files,
+            mutant_id=self._null_mutant.id,
+            keep_observations=True,
+            hash_seed=_OTHER_HASH_SEED,
+            drive_step_by_step=self.manifest.stepwise_function is not None,
+            note_executed_functions=True,
+            **self._common_of_jobs(key),
+        )
+
+    def _common_of_jobs(self, key: GoldenRun) -> dict[str, Any]:
+        return {
+            "scenario": self.workspace.scenario(key.scenario),
+            "seed": self.seed if key.seed is None else key.seed,
+            "scenario_changes": key.changes,
+        }
+
+    @cached_property
+    def _null_mutant(self) -> Mutant:
+        return build(self.manifest, self.workspace.fault_models(), None, always_trigger())
 
     def _run_job(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
         scratch = path_below(engine.work_folder, job.name)
@@ -146,9 +185,7 @@ class CheckRunner:
             if name[0] == GOLDEN and name[1].seed is not None:
                 cache_layout_and_pruning.prune_target_cache(self.manifest.cache_name)
             if name[0] == NULL_MUTANT:
-                unreached_triggers.save_observations(
-                    self.pending_folder, name[1].key, execution.watch_report.get("seen", ())
-                )
+                self._keep_observations(name[1], job, execution)
             if name[0] == GOLDEN and not run.problem:
                 golden_folder = path_below(self.pending_folder / "golden", name[1].key)
                 golden_folder.parent.mkdir(parents=True, exist_ok=True)
@@ -156,6 +193,16 @@ class CheckRunner:
             return run
         finally:
             remove_folder(scratch)
+
+    def _keep_observations(self, key: GoldenRun, job: Job, execution: JobResult) -> None:
+        unreached_triggers.save_observations(
+            self.pending_folder, key.key, execution.watch_report.get("seen", ())
+        )
+        if self.observation_store and job.drive_step_by_step and execution.status is Status.OK:
+            observations = observations_of_watched_run(execution)
+            # a worker's fork engine finds and says why it cannot fork such a run
+            if not (observations.has_any_before_first_step or execution.watch_report["threads"]):
+                self.observation_store.save(golden_run_id(job), observations)
 
 
 def _report_progress(stage: str, futures: Collection[Future[Any]], notify: OnProgress) -> None:

@@ -16,6 +16,7 @@ from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import scenarios_sharing_runs
+from mutator.engines.observation_store import ObservationStore
 from mutator.errors import CheckFailed, DiskFull, InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, Limits
@@ -53,15 +54,21 @@ from mutator.workspace import Workspace
 
 
 def run_checks(
-    workspace: Workspace, folder: RunFolder, *, workers: int = 1, notify: OnProgress | None = None
+    workspace: Workspace,
+    folder: RunFolder,
+    *,
+    workers: int = 1,
+    notify: OnProgress | None = None,
+    secret: bytes = b"",
 ) -> tuple[CheckResult, ...]:
     """Run the checks, and store the results in checks.json and the golden runs in the folder.
 
     Nothing runs if the checks have passed for these sources in this folder. If they have passed in another
-    folder on this machine, only the golden runs are repeated, because a mutant can write to the cache.
-    Raises CheckFailed if any check fails, after all have run.
+    folder on this machine, only the null mutants run, whose output must be that of the golden runs, because a
+    mutant can write to the cache. Fork engines with the same `secret` take from the null mutants what these
+    observe. Raises CheckFailed if any check fails, after all have run.
     """
-    checks = _PreflightChecks(workspace, folder)
+    checks = _PreflightChecks(workspace, folder, secret)
     notify = notify or (lambda progress: None)
     earlier_results = checks.find_earlier_results(workers, notify)
     if earlier_results is not None:
@@ -107,8 +114,9 @@ def _pending_folder(folder: RunFolder) -> Path:
 
 
 class _PreflightChecks:
-    def __init__(self, workspace: Workspace, folder: RunFolder) -> None:
+    def __init__(self, workspace: Workspace, folder: RunFolder, secret: bytes) -> None:
         head = folder.head
+        self.observation_store = ObservationStore(folder.scratch_folder, secret) if secret else None
         self.workspace = workspace
         self.folder = folder
         self.pending_folder = _pending_folder(folder)
@@ -150,7 +158,7 @@ class _PreflightChecks:
             return None  # missing or damaged
         if results is not None:
             if (
-                self._build_check_runner(self.folder.scratch_folder / "again").run_goldens(workers, notify)
+                self._build_check_runner(self.folder.scratch_folder / "again").repeat_goldens(workers, notify)
                 != stored["goldens"]
             ):
                 return None  # forged, or no longer true
@@ -206,6 +214,7 @@ class _PreflightChecks:
             canary_experiment=self.folder.canary,
             scratch_folder=self.folder.scratch_folder,
             pending_folder=pending_folder,
+            observation_store=self.observation_store,
         )
 
     def _store_in_run_folder(self, results: Mapping[str, Any]) -> None:

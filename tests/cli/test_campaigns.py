@@ -72,6 +72,21 @@ def test_run_prints_the_table_and_the_path_of_the_report(finished: tuple[Path, A
     assert "experiments " in said.stderr  # progress goes to stderr
 
 
+def test_table_and_seal_do_not_wait_for_stills_and_report(
+    cli: Cli, run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise MutatorError("no report today")
+
+    monkeypatch.setattr("mutator.api.runs.Run.report", fail)
+    answer = cli("run", "toy", "--out", run, *CHOSEN, "-n", "0")
+    assert answer.code == 2
+    assert "no report today" in answer.err
+    assert answer.out.startswith("fault type ")
+    assert "\nseal: " in answer.out
+    assert "\nreport: " not in answer.out
+
+
 def test_run_takes_results_from_earlier_runs_unless_it_is_told_not_to(cli: Cli, root: Path) -> None:
     """It says how many results it took. With `--no-reuse` it runs everything, and the seal is the same."""
     words = ("run", "small", "-n", "0", "--out")

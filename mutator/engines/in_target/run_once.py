@@ -116,7 +116,9 @@ def run_job(job: dict[str, Any]) -> None:
             observations = load_neighbour("mutant_installation").keep_observations(probe, *job["observe"])
         if probe and watcher:
             watcher.watch_threads(probe, observations)
-        if job["stop"] is None:
+        if job["step_by_step"]:
+            report["stepwise"] = run_step_by_step(job, observations, modules_before)
+        elif job["stop"] is None:
             run_module(job["module"], job["args"])
         else:
             report["stopped"] = run_to_terminal_hazard(job)
@@ -125,7 +127,8 @@ def run_job(job: dict[str, Any]) -> None:
     if function_recorder:
         report["executed"] = function_recorder.as_json()
     if job["observe"]:
-        report["watched"] = {**(watcher.as_json() if watcher else {}), "seen": observations}
+        stepwise = report.pop("stepwise", {})
+        report["watched"] = {**(watcher.as_json() if watcher else {}), "seen": observations, **stepwise}
     if line_recorder:
         report["lines"] = line_recorder.stop_and_collect()
         if job["types"]:
@@ -158,11 +161,32 @@ def run_module(module: str, args: list[str]) -> None:
             raise
 
 
-def run_to_terminal_hazard(job: dict[str, Any]) -> bool:
-    """Run and write the results; return whether a terminal hazard stopped the run."""
+def run_step_by_step(
+    job: dict[str, Any], observations: list[Any], modules_before: set[str]
+) -> dict[str, Any]:
+    """Run and write the results; return what a fork of this run must know.
+
+    * `before`: the number of observations before each step
+    * `libraries`: the modules outside the target that the run imported
+    * `threads`: the names of the other threads at its end
+    """
+    stepped = begin_stepwise_run(job)
+    counts = load_neighbour("mutant_installation").run_counting_observations(stepped, observations)
+    stepped.write(Path(job["out"]))
+    libraries = new_modules_outside_packages(modules_before, job["packages"])
+    threads = load_neighbour("thread_names").other_thread_names()
+    return {"before": counts, "libraries": libraries, "threads": threads}
+
+
+def begin_stepwise_run(job: dict[str, Any]) -> Any:
     sys.argv = [job["module"], *job["args"]]
     begin = operator.attrgetter(job["stepwise"])(importlib.import_module(job["module"]))
-    stepped = begin(job["args"])
+    return begin(job["args"])
+
+
+def run_to_terminal_hazard(job: dict[str, Any]) -> bool:
+    """Run and write the results; return whether a terminal hazard stopped the run."""
+    stepped = begin_stepwise_run(job)
     stopped: bool = load_neighbour("early_stop").drive_run(stepped, job["stop"])
     stepped.write(Path(job["out"]))
     return stopped

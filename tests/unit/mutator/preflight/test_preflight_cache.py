@@ -48,19 +48,19 @@ class RunStarted(Exception):
 
 
 @pytest.fixture
-def only_golden_runs_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Refuse second golden runs, null mutants and the canary, which only checks that are not cached need."""
+def only_null_mutants_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Refuse golden runs and the canary, which only checks that are not cached need."""
     genuine = ReferenceEngine.execute
 
     def execute(engine: ReferenceEngine, job: Job, folder: Path) -> JobResult:
-        if not job.name.startswith("a-"):
+        if not job.name.startswith("n-"):
             raise RunStarted
         return genuine(engine, job, folder)
 
     monkeypatch.setattr(ReferenceEngine, "execute", execute)
 
 
-@pytest.mark.usefixtures("cache", "only_golden_runs_start")
+@pytest.mark.usefixtures("cache", "only_null_mutants_start")
 def test_another_folder_uses_the_cached_results(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
     toy, before = checked
     folder = freeze_plan(build_plan(toy, "small", Choices(only='method == "guided"')), tmp_path / "run", toy)
@@ -71,7 +71,7 @@ def test_another_folder_uses_the_cached_results(checked: tuple[Workspace, RunFol
     assert all((folder.path / f).read_bytes() == (before.path / f).read_bytes() for f in files)
 
 
-@pytest.mark.usefixtures("only_golden_runs_start")
+@pytest.mark.usefixtures("only_null_mutants_start")
 @pytest.mark.parametrize("damaged", ["checks.json", "golden/A/log.npz", "golden/A+alone/said.json", ""])
 @pytest.mark.parametrize("content", [b"", b"{}", None])
 def test_a_damaged_entry_is_ignored(
@@ -89,7 +89,7 @@ def test_a_damaged_entry_is_ignored(
         run_checks(toy, folder)
 
 
-@pytest.mark.usefixtures("only_golden_runs_start")
+@pytest.mark.usefixtures("only_null_mutants_start")
 @pytest.mark.parametrize("how", ["another word in a result", "another file", "a pipe"])
 def test_a_changed_entry_is_ignored(
     checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, how: str
@@ -110,7 +110,7 @@ def test_a_changed_entry_is_ignored(
         run_checks(toy, folder)
 
 
-@pytest.mark.usefixtures("cache", "only_golden_runs_start")
+@pytest.mark.usefixtures("cache", "only_null_mutants_start")
 @pytest.mark.parametrize("changed", ["seed", "target", "machine"])
 def test_another_seed_target_or_machine_has_no_entry(
     checked: tuple[Workspace, RunFolder],
@@ -129,7 +129,7 @@ def test_another_seed_target_or_machine_has_no_entry(
         run_checks(toycar, freeze_plan(plan, tmp_path / "run", toycar))
 
 
-@pytest.mark.usefixtures("only_golden_runs_start")
+@pytest.mark.usefixtures("only_null_mutants_start")
 def test_a_forged_golden_run_is_ignored(
     checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path
 ) -> None:
