@@ -56,7 +56,7 @@ class RunExperiment(StoredExperiment):
         temporary = None if keep else ScratchFolder("mutator-rerun-")
         out = path_below(temporary.path, self.id) if temporary else None
         single, is_same = rerun_experiment(run.workspace, folder.path, self.id, out=out)
-        manifest = run.selected_target.manifest
+        manifest = run.manifest
         trial = build_trial(
             single,
             manifest,

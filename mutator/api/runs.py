@@ -141,7 +141,7 @@ class Run(RunFigures):
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
         """Return the alerts and hazards of the golden runs, and the range of each plotted channel."""
-        return load_fault_free_runs(self.folder, self.selected_target.manifest)
+        return load_fault_free_runs(self.folder, self.manifest)
 
     def alerts_note(self) -> str:
         """Return a sentence on the alerts that golden runs also raise; empty if there are none."""
@@ -191,7 +191,7 @@ class Run(RunFigures):
                 where=self.path,
                 expected=describe_choices(golden_names),
             )
-        return trace_frame(load_trace(self.selected_target.manifest, folder), self.selected_target.manifest)
+        return trace_frame(load_trace(self.manifest, folder), self.manifest)
 
     def report(self, *, anew: bool = False, single_file: bool = False) -> report_builder.WrittenReport:
         """Write the report, Markdown and one HTML page, unless it is up to date; with `anew`, always.

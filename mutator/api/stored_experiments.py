@@ -3,14 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 
 from mutator._common.argument_checks import check_type
 from mutator._common.confined_files import path_below
 from mutator._common.library_and_run_folder_search import run_folders_newest_first
 from mutator.api.experiment_results import ExperimentResult
-from mutator.api.mutants import build_selected
-from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.campaigns.expectations import Expectation
 from mutator.campaigns.regression_files import save_regression
 from mutator.errors import MutatorError
@@ -30,6 +29,8 @@ from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import ChannelFacts
 from mutator.workspace import Workspace
+
+_BUILDING_MODULE = "mutator.mutants.mutant_building"
 
 
 def find_newest_run(root: Path) -> Path:
@@ -66,9 +67,9 @@ class StoredRun:
         return self.given_workspace or Workspace.find()
 
     @cached_property
-    def selected_target(self) -> SelectedTarget:
-        """The run's target in the workspace."""
-        return SelectedTarget.of(self.workspace, self.folder.head.target)
+    def manifest(self) -> TargetManifest:
+        """The manifest of the run's target in the workspace."""
+        return self.workspace.manifest(self.folder.head.target)
 
     @cached_property
     def faults(self) -> dict[str, Fault]:
@@ -124,7 +125,11 @@ class StoredExperiment(ExperimentResult):
         stored_patch = self.run.folder.read_patch(self.id, self.record)
         if stored_patch is not None:
             return stored_patch.decode("utf-8", "surrogateescape")  # a source can have another encoding
-        return build_selected(self.run.selected_target, self.fault, self.experiment.trigger).patch
+        # late: what only reads a stored patch loads no parser of Python
+        build = import_module(_BUILDING_MODULE).build
+        models = self.run.workspace.fault_models()
+        patch: str = build(self.run.manifest, models, self.fault, self.experiment.trigger).patch
+        return patch
 
     @property
     def scale(self) -> SeverityScale | None:
@@ -198,7 +203,7 @@ class StoredExperiment(ExperimentResult):
         return self.run.folder.head.channels
 
     def _manifest(self) -> TargetManifest:
-        return self.run.selected_target.manifest
+        return self.run.manifest
 
     def _load_traces(self) -> tuple[Trace, Trace]:
         if self.record is None:

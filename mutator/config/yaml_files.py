@@ -43,7 +43,7 @@ _YAML12_SCALAR_PATTERNS = {
 class StrictModel(BaseModel):
     """Base of all file models: rejects unknown keys and does not convert types."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
 
 
 class _AcceptsMapping:

@@ -124,6 +124,12 @@ def test_modules_have_no_import_cycles_or_hidden_imports() -> None:
     assert not circle
 
 
+def test_the_suite_runs_the_harness_as_it_is_installed() -> None:
+    """pytest rewrites assertions of test modules only, because compiling the harness anew costs a second."""
+    assert "Rewriting" not in type(sys.modules["mutator.model"].__loader__).__name__
+    assert "Rewriting" in type(sys.modules[__name__].__loader__).__name__
+
+
 def test_code_inside_a_target_imports_only_numpy_and_the_standard_library() -> None:
     assert not strangers_in_target(CLONE)
 
