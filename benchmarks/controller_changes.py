@@ -110,7 +110,7 @@ CHANGES = (
         OUTSIDE_GOLDEN,
         "brake limit",
         f"{HONDA}/interface.py",
-        (("brake_max=((5.0, 20.0), (1.0, 0.8))", "brake_max=((5.0, 20.0), (0.6, 0.6))"),),
+        (("brake_max=((5.0, 20.0), (1.0, 0.8))", "brake_max=((5.0, 20.0), (0.5, 0.4))"),),
     ),
     Change(
         OUTSIDE_GOLDEN,
@@ -163,26 +163,32 @@ CHANGES = (
         "selfdrive/controls/plannerd.py",
         (("MAX_AGE = 0.5", "MAX_AGE = 30.0"),),
     ),
-    Change(OUTSIDE_GOLDEN, "steer limit", f"{HONDA}/interface.py", (("steer_max=1.0", "steer_max=0.2"),)),
     Change(
         OUTSIDE_GOLDEN,
-        "starting",
-        f"{LIB}/longcontrol.py",
-        (
-            (
-                "            self.output += STARTING_BRAKE_RATE * DT_CTRL",
-                "            self.output += 2.0 * STARTING_BRAKE_RATE * DT_CTRL",
-            ),
-        ),
+        "brake limit at speed",
+        f"{HONDA}/interface.py",
+        (("brake_max=((5.0, 20.0), (1.0, 0.8))", "brake_max=((5.0, 20.0), (1.0, 0.4))"),),
     ),
     Change(
-        OUTSIDE_GOLDEN, "discarded plan", f"{LIB}/long_mpc.py", (("CRASH_GAP = -50.0", "CRASH_GAP = -5.0"),)
+        OUTSIDE_GOLDEN,
+        "windup",
+        f"{LIB}/pid.py",
+        (("        if up_ok or down_ok:\n            self.i = integral", "        self.i = integral"),),
+    ),
+    Change(
+        OUTSIDE_GOLDEN,
+        "doubt in lane width",
+        f"{LIB}/pathplanner.py",
+        (("WIDTH_DOUBT = ((0.3, 1.0), (1.0, 0.0))", "WIDTH_DOUBT = ((0.3, 5.0), (1.0, 0.0))"),),
     ),
     Change(
         ELSEWHERE,
         "speed gains",
         f"{HONDA}/interface.py",
-        (("long_kp=((0.0, 5.0, 35.0), (3.6, 2.4, 1.5))", "long_kp=((0.0, 5.0, 35.0), (1.2, 0.8, 0.5))"),),
+        (
+            ("long_kp=((0.0, 5.0, 35.0), (3.6, 2.4, 1.5))", "long_kp=((0.0, 5.0, 35.0), (0.36, 0.24, 0.15))"),
+            ("long_ki=((0.0, 35.0), (0.54, 0.36))", "long_ki=((0.0, 35.0), (0.05, 0.04))"),
+        ),
     ),
     Change(
         ELSEWHERE,
@@ -191,7 +197,10 @@ CHANGES = (
         (("steer_kp=((0.0,), (0.8 * RAD_TO_DEG,))", "steer_kp=((0.0,), (0.3 * RAD_TO_DEG,))"),),
     ),
     Change(
-        ELSEWHERE, "brake hysteresis", f"{HONDA}/carcontroller.py", (("BRAKE_ON = 0.02", "BRAKE_ON = 0.3"),)
+        ELSEWHERE,
+        "brake scale",
+        f"{HONDA}/carcontroller.py",
+        (("self._brake * BRAKE_COUNTS", "0.5 * self._brake * BRAKE_COUNTS"),),
     ),
     Change(
         ELSEWHERE,
@@ -204,12 +213,15 @@ CHANGES = (
     ),
     Change(
         ELSEWHERE,
-        "clusters",
+        "lead filter",
         f"{LIB}/radar_helpers.py",
-        (("CLUSTER_DISTANCE = 2.5", "CLUSTER_DISTANCE = 60.0"),),
+        (("LEAD_GAINS = (0.1988689, 0.28555364)", "LEAD_GAINS = (0.02, 0.003)"),),
     ),
     Change(
-        ELSEWHERE, "steering rate", f"{HONDA}/interface.py", (("steer_rate_cost=0.5", "steer_rate_cost=8.0"),)
+        ELSEWHERE,
+        "lane width filter",
+        f"{LIB}/pathplanner.py",
+        (("WIDTH_RATE = 0.005", "WIDTH_RATE = 0.5"),),
     ),
     Change(
         ELSEWHERE,
@@ -219,12 +231,15 @@ CHANGES = (
     ),
     Change(
         ELSEWHERE,
-        "acceleration",
-        f"{LIB}/cruise_plan.py",
-        (("A_MAX = (1.0, 1.0, 0.8, 0.5, 0.3)", "A_MAX = (0.3, 0.3, 0.3, 0.2, 0.1)"),),
+        "acceleration per output",
+        f"{HONDA}/interface.py",
+        (("acceleration_per_output=4.8", "acceleration_per_output=20.0"),),
     ),
     Change(
-        ELSEWHERE, "width of the car", "selfdrive/sim/hazards.py", (("CAR_WIDTH = 1.8", "CAR_WIDTH = 2.2"),)
+        ELSEWHERE,
+        "comfort limit",
+        f"{LIB}/longcontrol.py",
+        (("self._pid.neg_limit = -brake_max", "self._pid.neg_limit = -min(brake_max, 0.6)"),),
     ),
 )
 
