@@ -12,7 +12,7 @@ example:
   cosmic-ray judges every mutant.
 
 Each makes mutants of its own operators, so the figure is judged mutants a second of CPU, of all processes.
-The tools run alternately. cosmic-ray starts an interpreter for each mutant: it runs once, and only on request.
+The tools run alternately. cosmic-ray starts an interpreter for each mutant, so it runs once, on request.
 """
 
 import argparse
@@ -114,8 +114,8 @@ def run_measured(command: Sequence[str | Path], folder: Path, env: Mapping[str, 
 def judge_with_this(place: Path, env: Mapping[str, str]) -> Judged:
     shutil.copytree(EXAMPLE, place / "fault_library")
     (place / "fault_library" / "campaigns" / "operators.yaml").write_text(CAMPAIGN)
-    command = [sys.executable, "-m", "mutator", "run", "operators", "--library", place / "fault_library"]
-    command += ["--out", place / "run", "-n", "2", "--no-reuse"]
+    command: list[str | Path] = [sys.executable, "-m", "mutator", "run", "operators"]
+    command += ["--library", place / "fault_library", "--out", place / "run", "-n", "2", "--no-reuse"]
     _, cpu_s = run_measured(command, place, {**env, "XDG_CACHE_HOME": str(place / "cache")})
     with (place / "run" / "results.csv").open() as table:
         return Judged(sum(1 for _ in csv.DictReader(table)), cpu_s)
@@ -137,8 +137,7 @@ def make_project(place: Path, peers: Path, env: Mapping[str, str]) -> Path:
 def judge_with_mutmut(place: Path, env: Mapping[str, str], peers: Path) -> Judged:
     make_project(place, peers, env)
     (place / "setup.cfg").write_text(MUTMUT_SETTINGS)
-    command = [peers / "bin" / "mutmut", "run", "--max-children", "2"]
-    output, cpu_s = run_measured(command, place, env)
+    output, cpu_s = run_measured([peers / "bin" / "mutmut", "run", "--max-children", "2"], place, env)
     # the last line of progress: mutants, then how many have no test
     found = re.findall(r"(\d+)/(\d+)\s+\S+ \d+ \S+ (\d+)", output)
     if not found:
