@@ -79,6 +79,7 @@ def _canonical_text(
     return canonical
 
 
+@lru_cache(maxsize=1024)
 def names_in(text: str) -> tuple[str, ...]:
     nodes = (node for node in ast.walk(parse_expression(text)) if isinstance(node, ast.Name))
     ordered = sorted(nodes, key=lambda node: (node.lineno, node.col_offset))
